@@ -1,0 +1,232 @@
+"""Declare every topic between the robot's processes: the one schema table.
+
+Cells carry packed fields (or one bounded JSON text), rings carry JSON objects, frame rings carry
+images. The layout of shared memory, the recording channel and the metric all come from here.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+MAX_JOINTS = 32
+SCAN_BEAMS = 360
+
+
+class Kind(Enum):
+    """Name what a reader may rely on."""
+
+    CELL = "latest-value cell"
+    RING = "event ring"
+    FRAME = "frame ring"
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """Describe one packed field; `dtype` is a numpy code, little-endian, "json" is bounded text."""
+
+    name: str
+    dtype: str
+    shape: int = 1
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Topic:
+    """Describe one topic.
+
+    `owner` is the only process that writes it; "any" marks a ring with many writers.
+    `rate_hz` 0 means "on change"; `deadline_s` is the age above which a reader calls it stale.
+    """
+
+    name: str
+    kind: Kind
+    owner: str
+    summary: str
+    fields: tuple[Field, ...] = ()
+    rate_hz: float = 0.0
+    deadline_s: float = 0.0
+    slots: int = 4
+    slot_bytes: int = 0
+
+
+def _joint(name: str, dtype: str, unit: str) -> Field:
+    return Field(name, dtype, MAX_JOINTS, unit)
+
+
+TOPICS: tuple[Topic, ...] = (
+    Topic(
+        name="joint_state",
+        kind=Kind.CELL,
+        owner="control",
+        rate_hz=250,
+        deadline_s=0.05,
+        summary="every servo joint, in the order of the robot file",
+        fields=(
+            Field("joint_count", "u4"),
+            _joint("position", "f8", "rad or m"),
+            _joint("velocity", "f8", "rad/s or m/s"),
+            _joint("setpoint", "f8", "rad or m"),
+            _joint("effort_ratio", "f4", "of stall torque"),
+            _joint("age_s", "f4", "s"),
+            _joint("error", "u1", "hardware error bits"),
+            _joint("torque_enabled", "u1", ""),
+        ),
+    ),
+    Topic(
+        name="base_state",
+        kind=Kind.CELL,
+        owner="control",
+        rate_hz=250,
+        deadline_s=0.1,
+        summary="wheel odometry, odom frame: starts at 0, 0, 0",
+        fields=(
+            Field("x_m", "f8", unit="m"),
+            Field("y_m", "f8", unit="m"),
+            Field("yaw_rad", "f8", unit="rad"),
+            Field("v_m_s", "f8", unit="m/s"),
+            Field("w_rad_s", "f8", unit="rad/s"),
+            Field("enabled", "u1"),
+        ),
+    ),
+    Topic(
+        name="base_command",
+        kind=Kind.CELL,
+        owner="executor",
+        rate_hz=50,
+        deadline_s=0.25,
+        summary="wanted base velocity; too old means ramp to zero",
+        fields=(Field("v_m_s", "f8", unit="m/s"), Field("w_rad_s", "f8", unit="rad/s")),
+    ),
+    Topic(
+        name="control_status",
+        kind=Kind.CELL,
+        owner="control",
+        rate_hz=50,
+        deadline_s=0.2,
+        summary="control state, active verdict, tick statistics, as JSON",
+        fields=(Field("document", "json", 4096),),
+    ),
+    Topic(
+        name="motion_command",
+        kind=Kind.RING,
+        owner="executor",
+        summary="joint goals, trajectories and cancels for control",
+        slots=32,
+        slot_bytes=65536,
+    ),
+    Topic(
+        name="motion_result",
+        kind=Kind.RING,
+        owner="control",
+        summary="end of each motion: done, cancelled, refused, stopped, with the reason",
+        slots=64,
+        slot_bytes=2048,
+    ),
+    Topic(
+        name="operator",
+        kind=Kind.RING,
+        owner="any",
+        summary="estop, reset, arm, disarm; straight to control",
+        slots=64,
+        slot_bytes=1024,
+    ),
+    Topic(
+        name="pose",
+        kind=Kind.CELL,
+        owner="perception",
+        rate_hz=50,
+        deadline_s=0.5,
+        summary="robot base in the map frame",
+        fields=(
+            Field("x_m", "f8", unit="m"),
+            Field("y_m", "f8", unit="m"),
+            Field("yaw_rad", "f8", unit="rad"),
+            Field("match_ratio", "f8", unit="share of lidar points on the map"),
+        ),
+    ),
+    Topic(
+        name="scan",
+        kind=Kind.CELL,
+        owner="perception",
+        rate_hz=10,
+        deadline_s=0.5,
+        summary="planar lidar; beam i at angle i degrees counter-clockwise from the robot's front",
+        fields=(Field("range_m", "f4", SCAN_BEAMS, "m, 0 is no return"),),
+    ),
+    Topic(
+        name="imu",
+        kind=Kind.CELL,
+        owner="perception",
+        rate_hz=100,
+        deadline_s=0.2,
+        summary="orientation and acceleration in the base frame",
+        fields=(
+            Field("yaw_rad", "f8", unit="rad"),
+            Field("pitch_rad", "f8", unit="rad"),
+            Field("roll_rad", "f8", unit="rad"),
+            Field("acceleration_m_s2", "f8", 3, "m/s^2"),
+        ),
+    ),
+    Topic(
+        name="scene",
+        kind=Kind.CELL,
+        owner="perception",
+        rate_hz=5,
+        deadline_s=2.0,
+        summary="objects with id, class, colour, map-frame position, size, last seen, as JSON",
+        fields=(Field("document", "json", 32768),),
+    ),
+    Topic(
+        name="rgbd",
+        kind=Kind.FRAME,
+        owner="perception",
+        rate_hz=5,
+        deadline_s=2.0,
+        summary="head camera: uint8 RGB then uint16 depth in millimetres",
+        slots=4,
+        slot_bytes=640 * 480 * 5,
+    ),
+    Topic(
+        name="utterance",
+        kind=Kind.RING,
+        owner="any",
+        summary="a command in words, or a whole plan as JSON, with its command id",
+        slots=32,
+        slot_bytes=65536,
+    ),
+    Topic(
+        name="plan",
+        kind=Kind.RING,
+        owner="planner",
+        summary="validated plans for the executor",
+        slots=16,
+        slot_bytes=65536,
+    ),
+    Topic(
+        name="task_event",
+        kind=Kind.RING,
+        owner="any",
+        summary="what became of a command: accepted, rejected, action status, said, finished",
+        slots=256,
+        slot_bytes=16384,
+    ),
+    Topic(
+        name="executor_status",
+        kind=Kind.CELL,
+        owner="executor",
+        rate_hz=10,
+        deadline_s=1.0,
+        summary="active command and action, what each hand holds, as JSON",
+        fields=(Field("document", "json", 8192),),
+    ),
+    Topic(
+        name="process_table",
+        kind=Kind.CELL,
+        owner="supervisor",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="state, pid, restarts, memory and CPU of every process, as JSON",
+        fields=(Field("document", "json", 16384),),
+    ),
+)
+
+BY_NAME: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
