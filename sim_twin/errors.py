@@ -1,0 +1,28 @@
+"""Group what the twin refuses to do.
+
+TwinError
+├── OpenGLMissing    nothing can be rendered here: install the named packages
+├── ModelMismatch    robot file and world do not fit together: fix the named file
+├── RefereeRefusal   the referee does not know the object, container or operation
+└── Unreachable      no twin answers under the run directory: start one
+"""
+
+
+class TwinError(Exception):
+    """Base of everything the twin raises."""
+
+
+class OpenGLMissing(TwinError):
+    """Say that nothing can be rendered on this machine, and how to change that."""
+
+
+class ModelMismatch(TwinError):
+    """Say that the robot or the world lacks a part that the twin needs."""
+
+
+class RefereeRefusal(TwinError):
+    """Say why the referee cannot answer."""
+
+
+class Unreachable(TwinError):
+    """Say that no twin answers."""
