@@ -1,0 +1,180 @@
+"""Drive an RGB-D camera that speaks the stream protocol of `drivers/camera/protocol.py`."""
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.base import ByteTransport
+from drivers.camera.protocol import (
+    CRC,
+    FRAME_MAGIC,
+    HEADER_BYTES,
+    Command,
+    FrameHeader,
+    Intrinsics,
+    decode_header,
+    encode_request,
+)
+from drivers.clock import NS_PER_S, Clock
+from drivers.device_clock import DeviceClock
+
+RESTART_NS = 2 * NS_PER_S
+MAX_RATE_HZ = 1000.0
+_READ_BYTES = 1 << 20
+_POLL_BYTES = 1 << 23
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RgbdFrame:
+    """Hold one colour and depth image with its calibration; `stamp_ns` is host time of exposure."""
+
+    stamp_ns: int
+    sequence: int
+    intrinsics: Intrinsics
+    depth_unit_m: float
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.uint16]
+
+    def depth_m(self) -> NDArray[np.float32]:
+        """Return depth along the optical axis in metres; 0 is no depth."""
+        return self.depth.astype(np.float32) * np.float32(self.depth_unit_m)
+
+
+@dataclass(slots=True)
+class CameraCounters:
+    """Count what the stream delivered and what was thrown away."""
+
+    frames: int = 0
+    superseded_frames: int = 0
+    lost_frames: int = 0
+    crc_errors: int = 0
+    discarded_bytes: int = 0
+    restarts: int = 0
+
+
+class RgbdCamera:
+    """Receive the newest frame of a stream and keep the stream alive."""
+
+    def __init__(self, transport: ByteTransport, clock: Clock) -> None:
+        self.counters = CameraCounters()
+        self._transport = transport
+        self._clock = clock
+        self._device_clock = DeviceClock()
+        self._buffer = bytearray()
+        self._last_sequence: int | None = None
+        self._rate_hz = 0.0
+        self._heard_ns = 0
+
+    def start(self, rate_hz: float) -> None:
+        """Ask for frames at `rate_hz`.
+
+        Raises:
+            ValueError: the rate is not above 0 and at most 1000 Hz.
+            LinkLost: the stream has gone.
+        """
+        if not 0.0 < rate_hz <= MAX_RATE_HZ:
+            raise ValueError(
+                f"camera: expected a rate above 0 and at most {MAX_RATE_HZ} Hz, got {rate_hz}"
+            )
+        self._rate_hz = rate_hz
+        self._heard_ns = self._clock.now_ns()
+        self._transport.write(encode_request(Command.START, rate_hz))
+
+    def stop(self) -> None:
+        """Ask the camera to stop streaming.
+
+        Raises:
+            LinkLost: the stream has gone.
+        """
+        self._rate_hz = 0.0
+        self._transport.write(encode_request(Command.STOP, 0.0))
+
+    def close(self) -> None:
+        """Release the stream."""
+        self._transport.close()
+
+    def poll(self) -> RgbdFrame | None:
+        """Return the newest frame completed since the last call, or None; never waits.
+
+        A camera that stays silent for 2 s is asked again to start: its server may be a new one.
+
+        Raises:
+            LinkLost: the stream has gone.
+        """
+        self._fill()
+        newest = None
+        while (found := self._next_frame()) is not None:
+            self.counters.superseded_frames += newest is not None
+            newest = found
+        self._keep_alive(heard=newest is not None)
+        return newest
+
+    def _fill(self) -> None:
+        """Read what is there, bounded so that a fast sender cannot hold up the caller."""
+        while len(self._buffer) < _POLL_BYTES:
+            chunk = self._transport.read(_READ_BYTES, 0)
+            if not chunk:
+                return
+            self._buffer += chunk
+
+    def _keep_alive(self, *, heard: bool) -> None:
+        now_ns = self._clock.now_ns()
+        if heard:
+            self._heard_ns = now_ns
+        elif self._rate_hz and now_ns - self._heard_ns > RESTART_NS + NS_PER_S / self._rate_hz:
+            self.counters.restarts += 1
+            self.start(self._rate_hz)
+
+    def _next_frame(self) -> RgbdFrame | None:
+        """Cut the next intact frame from the buffer; skip what is not one."""
+        while self._seek_magic() and len(self._buffer) >= HEADER_BYTES:
+            header = decode_header(bytes(self._buffer[:HEADER_BYTES]))
+            if header is None:
+                self._reject()
+                continue
+            end = HEADER_BYTES + header.payload_bytes
+            if len(self._buffer) < end + CRC.size:
+                return None
+            payload = bytes(memoryview(self._buffer)[HEADER_BYTES:end])
+            if zlib.crc32(payload) != CRC.unpack_from(self._buffer, end)[0]:
+                self._reject()
+                continue
+            del self._buffer[: end + CRC.size]
+            return self._frame(header, payload)
+        return None
+
+    def _seek_magic(self) -> bool:
+        """Drop bytes up to the next magic; false when there is none yet."""
+        at = self._buffer.find(FRAME_MAGIC)
+        # The tail may be the beginning of a magic of which the rest is still on its way.
+        count = max(0, len(self._buffer) - len(FRAME_MAGIC) + 1) if at < 0 else at
+        self._discard(count)
+        return at >= 0
+
+    def _reject(self) -> None:
+        self.counters.crc_errors += 1
+        self._discard(len(FRAME_MAGIC))
+
+    def _discard(self, count: int) -> None:
+        self.counters.discarded_bytes += count
+        del self._buffer[:count]
+
+    def _frame(self, header: FrameHeader, payload: bytes) -> RgbdFrame:
+        self.counters.frames += 1
+        if self._last_sequence is not None and header.sequence > self._last_sequence:
+            self.counters.lost_frames += header.sequence - self._last_sequence - 1
+        self._last_sequence = header.sequence
+        camera = header.intrinsics
+        pixels = camera.width * camera.height
+        rgb = np.frombuffer(payload, dtype=np.uint8, count=3 * pixels)
+        depth = np.frombuffer(payload, dtype="<u2", offset=3 * pixels)
+        return RgbdFrame(
+            stamp_ns=self._device_clock.to_host_ns(header.exposure_ns, self._clock.now_ns()),
+            sequence=header.sequence,
+            intrinsics=camera,
+            depth_unit_m=header.depth_unit_m,
+            rgb=rgb.reshape(camera.height, camera.width, 3),
+            depth=depth.reshape(camera.height, camera.width),
+        )

@@ -1,0 +1,224 @@
+"""Drive the LDROBOT LD19, a 360 degree planar lidar on a one-way serial line (230400 baud, 8N1).
+
+Protocol: LDROBOT, "LD19 Development Manual" V2.3, sections 3 and 4. Packets of 47 bytes:
+
+    offset  size  meaning, little-endian
+    0       1     header 0x54
+    1       1     0x2C: packet type 1, 12 points
+    2       2     speed, degrees per second
+    4       2     start angle, 0.01 degree
+    6       36    12 points: distance in mm (2 bytes), intensity (1 byte); distance 0 is no return
+    42      2     end angle, 0.01 degree
+    44      2     time stamp in ms, wraps at 30000
+    46      1     CRC-8, polynomial 0x4D, start value 0
+
+Angles grow clockwise seen from above. The driver turns them into beams counter-clockwise from the
+robot's front.
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.base import ByteTransport
+from drivers.clock import Clock
+from drivers.device_clock import DeviceClock
+
+HEADER = b"\x54\x2c"
+PACKET_BYTES = 47
+POINTS_PER_PACKET = 12
+STAMP_WRAP_MS = 30_000
+BEAMS = 360
+MAX_STEP_DEG = 3.0
+MIN_COVERAGE_DEG = 300.0
+_NS_PER_MS = 1_000_000
+_READ_BYTES = 16_384
+_FRAME = struct.Struct("<2sHH36sHHB")
+_POINT = np.dtype([("distance_mm", "<u2"), ("intensity", "u1")])
+
+
+def _crc_table() -> bytes:
+    table = bytearray(256)
+    for value in range(256):
+        crc = value
+        for _ in range(8):
+            crc = ((crc << 1) ^ 0x4D if crc & 0x80 else crc << 1) & 0xFF
+        table[value] = crc
+    return bytes(table)
+
+
+_CRC_TABLE = _crc_table()
+
+
+def crc8(data: bytes) -> int:
+    """Return the vendor's CRC-8 of `data`."""
+    crc = 0
+    for byte in data:
+        crc = _CRC_TABLE[crc ^ byte]
+    return crc
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scan:
+    """Hold one turn of the lidar.
+
+    Beam i lies i degrees counter-clockwise from the robot's front; range 0 is no return.
+    `beam_stamp_ns` tells when each beam was measured, for taking out the robot's own motion.
+    """
+
+    stamp_ns: int
+    range_m: NDArray[np.float32]
+    beam_stamp_ns: NDArray[np.int64]
+    turn_hz: float
+
+
+@dataclass(slots=True)
+class LidarCounters:
+    """Count what the line delivered and what was thrown away."""
+
+    packets: int = 0
+    crc_errors: int = 0
+    discarded_bytes: int = 0
+    scans: int = 0
+    incomplete_scans: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Packet:
+    speed_deg_s: int
+    start_deg: float
+    step_deg: float
+    stamp_ms: int
+    distance_mm: NDArray[np.uint16]
+
+
+class Lidar:
+    """Assemble LD19 packets into whole scans; `mounting_yaw_rad` is where sensor zero points."""
+
+    def __init__(
+        self, transport: ByteTransport, clock: Clock, *, mounting_yaw_rad: float = 0.0
+    ) -> None:
+        self.counters = LidarCounters()
+        self._transport = transport
+        self._clock = clock
+        self._mounting_deg = math.degrees(mounting_yaw_rad)
+        self._buffer = bytearray()
+        self._device_clock = DeviceClock(wrap_ns=STAMP_WRAP_MS * _NS_PER_MS)
+        self._last_deg: float | None = None
+        self._synced = False
+        self._begin_scan()
+
+    def poll(self) -> Scan | None:
+        """Return the newest scan completed since the last call, or None; never waits.
+
+        Raises:
+            LinkLost: the serial line has gone.
+        """
+        while chunk := self._transport.read(_READ_BYTES, 0):
+            self._buffer += chunk
+        newest = None
+        while (packet := self._next_packet()) is not None:
+            newest = self._take(packet) or newest
+        return newest
+
+    def close(self) -> None:
+        """Release the line."""
+        self._transport.close()
+
+    def _next_packet(self) -> _Packet | None:
+        """Cut the next intact packet from the buffer; skip what is not one."""
+        while self._seek_header() and len(self._buffer) >= PACKET_BYTES:
+            raw = bytes(self._buffer[:PACKET_BYTES])
+            if crc8(raw[:-1]) != raw[-1]:
+                self.counters.crc_errors += 1
+                self._discard(1)
+                continue
+            del self._buffer[:PACKET_BYTES]
+            self.counters.packets += 1
+            if (packet := _decode(raw)) is not None:
+                return packet
+            self.counters.discarded_bytes += PACKET_BYTES
+        return None
+
+    def _seek_header(self) -> bool:
+        """Drop bytes up to the next header; false when there is none yet."""
+        at = self._buffer.find(HEADER)
+        if at < 0:
+            keep = 1 if self._buffer.endswith(HEADER[:1]) else 0
+            self._discard(len(self._buffer) - keep)
+            return False
+        self._discard(at)
+        return True
+
+    def _discard(self, count: int) -> None:
+        self.counters.discarded_bytes += count
+        del self._buffer[:count]
+
+    def _take(self, packet: _Packet) -> Scan | None:
+        """Add a packet's points to the scan; return the scan that it completes."""
+        stamp_ns = self._device_clock.to_host_ns(packet.stamp_ms * _NS_PER_MS, self._clock.now_ns())
+        angles_deg = packet.start_deg + packet.step_deg * np.arange(
+            POINTS_PER_PACKET, dtype=np.float64
+        )
+        wrapped = angles_deg % 360.0
+        starts = np.flatnonzero(np.diff(wrapped, prepend=self._last_deg or 0.0) < -180.0)
+        self._last_deg = float(wrapped[-1])
+        if not starts.size:
+            self._add(packet, wrapped, slice(None), stamp_ns)
+            return None
+        self._add(packet, wrapped, slice(0, starts[0]), stamp_ns)
+        scan = self._finish(packet.speed_deg_s)
+        self._add(packet, wrapped, slice(starts[0], None), stamp_ns)
+        return scan
+
+    def _add(
+        self, packet: _Packet, angles_deg: NDArray[np.float64], part: slice, stamp_ns: int
+    ) -> None:
+        distance = packet.distance_mm[part]
+        beams = np.rint(self._mounting_deg - angles_deg[part]).astype(np.int64) % BEAMS
+        self._coverage_deg += packet.step_deg * distance.size
+        self._stamps[beams] = stamp_ns
+        seen = distance > 0
+        # Two points may fall on one beam: the nearer one is what the robot could hit.
+        np.minimum.at(self._ranges_m, beams[seen], distance[seen] * np.float32(1e-3))
+
+    def _begin_scan(self) -> None:
+        self._ranges_m = np.full(BEAMS, np.inf, dtype=np.float32)
+        self._stamps = np.zeros(BEAMS, dtype=np.int64)
+        self._coverage_deg = 0.0
+
+    def _finish(self, speed_deg_s: int) -> Scan | None:
+        ranges_m, stamps, coverage_deg = self._ranges_m, self._stamps, self._coverage_deg
+        was_synced, self._synced = self._synced, True
+        self._begin_scan()
+        if coverage_deg < MIN_COVERAGE_DEG:
+            # The first turn after the start is partial by nature and not worth an alarm.
+            self.counters.incomplete_scans += was_synced
+            return None
+        self.counters.scans += 1
+        stamp_ns = int(stamps.max())
+        return Scan(
+            stamp_ns=stamp_ns,
+            range_m=np.where(np.isinf(ranges_m), np.float32(0.0), ranges_m),
+            beam_stamp_ns=np.where(stamps > 0, stamps, stamp_ns),
+            turn_hz=speed_deg_s / 360.0,
+        )
+
+
+def _decode(raw: bytes) -> _Packet | None:
+    """Return the packet's content, or None where its angles cannot belong to a turning lidar."""
+    _, speed_deg_s, start, points, end, stamp_ms, _ = _FRAME.unpack(raw)
+    span_deg = ((end - start) % 36_000) / 100.0
+    step_deg = span_deg / (POINTS_PER_PACKET - 1)
+    if start >= 36_000 or end >= 36_000 or step_deg > MAX_STEP_DEG or stamp_ms > STAMP_WRAP_MS:
+        return None
+    return _Packet(
+        speed_deg_s=speed_deg_s,
+        start_deg=start / 100.0,
+        step_deg=step_deg,
+        stamp_ms=stamp_ms,
+        distance_mm=np.frombuffer(points, dtype=_POINT)["distance_mm"],
+    )

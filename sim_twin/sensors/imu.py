@@ -1,0 +1,82 @@
+"""Emulate the BNO085 in UART-RVC mode: one 19-byte frame every 10 ms."""
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from drivers.imu.bno085_rvc import HEADER, STANDARD_GRAVITY_M_S2
+
+ANGLE_SIGMA_RAD = math.radians(0.02)
+ACCELERATION_SIGMA_M_S2 = 0.03
+YAW_DRIFT_RAD_S = math.radians(0.5) / 60.0
+_BODY = struct.Struct("<B6h3x")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuTruth:
+    """Hold what the world does to the sensor: attitude, and specific force in its own frame."""
+
+    yaw_rad: float
+    pitch_rad: float
+    roll_rad: float
+    acceleration_m_s2: tuple[float, float, float]
+
+
+class ImuDevice:
+    """Turn the true motion into the BNO085's frames.
+
+    Yaw starts at 0 as on the real sensor and drifts at a rate drawn from the seed, at most
+    half a degree a minute.
+    """
+
+    def __init__(
+        self, read: Callable[[], ImuTruth], rate_hz: float = 100.0, *, seed: int = 0
+    ) -> None:
+        self._read = read
+        self._rate_hz = rate_hz
+        self._random = np.random.default_rng(seed)
+        self._drift_rad_s = float(self._random.uniform(-YAW_DRIFT_RAD_S, YAW_DRIFT_RAD_S))
+        self._start_ns: int | None = None
+        self._start_yaw_rad = 0.0
+        self._sent = 0
+        self._out = bytearray()
+
+    def receive(self, data: bytes) -> None:
+        """Ignore what the host sends: in RVC mode the sensor only talks."""
+
+    def transmit(self) -> bytes:
+        """Return and forget the frames that are ready."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    def step(self, now_ns: int) -> None:
+        """Send a frame when one is due."""
+        if self._start_ns is None:
+            self._start_ns = now_ns
+            self._start_yaw_rad = self._read().yaw_rad
+        elapsed_s = (now_ns - self._start_ns) / NS_PER_S
+        if elapsed_s * self._rate_hz < self._sent:
+            return
+        self._out += self._frame(self._read(), elapsed_s)
+        self._sent = math.floor(elapsed_s * self._rate_hz) + 1
+
+    def _frame(self, truth: ImuTruth, elapsed_s: float) -> bytes:
+        yaw_rad = truth.yaw_rad - self._start_yaw_rad + self._drift_rad_s * elapsed_s
+        angles = np.array([yaw_rad, truth.pitch_rad, truth.roll_rad])
+        angles += ANGLE_SIGMA_RAD * self._random.standard_normal(3)
+        force = np.array(truth.acceleration_m_s2)
+        force += ACCELERATION_SIGMA_M_S2 * self._random.standard_normal(3)
+        centidegrees = np.rint(np.degrees(_wrapped(angles)) * 100.0).astype(int)
+        milli_g = np.rint(force / STANDARD_GRAVITY_M_S2 * 1000.0).clip(-32_768, 32_767).astype(int)
+        body = _BODY.pack(self._sent % 256, *centidegrees.tolist(), *milli_g.tolist())
+        return HEADER + body + bytes([sum(body) & 0xFF])
+
+
+def _wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    return (angles + math.pi) % (2.0 * math.pi) - math.pi
