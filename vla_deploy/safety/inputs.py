@@ -1,0 +1,64 @@
+"""Declare what the judge sees each tick and the limits it judges by: values only."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveSample:
+    """Describe one wheel drive; `fault_code` 0 means none."""
+
+    name: str
+    age_s: float
+    fault_code: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyInputs:
+    """Carry one tick's measurements, joint arrays in the order of the robot file.
+
+    `energised` is true while any actuator may move: from arming until torque is off.
+    An age of None means that nothing has ever arrived, so there is nothing to lose yet.
+    """
+
+    energised: bool
+    estop_source: str | None
+    reset_requested: bool
+    position: Floats
+    velocity: Floats
+    setpoint: Floats
+    torque_enabled: Flags
+    sample_age_s: Floats
+    hardware_error: NDArray[np.uint8]
+    watchdog_tripped: Flags
+    lost_servo_buses: tuple[str, ...]
+    lost_can_buses: tuple[str, ...]
+    drives: tuple[DriveSample, ...]
+    base_moving: bool
+    base_command_age_s: float | None
+    supervisor_age_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyLimits:
+    """Carry the thresholds; an infinite entry switches one joint's check off.
+
+    `outward_velocity` is the speed above which a joint beyond its range counts as still
+    leaving it, so that the way back stays open.
+    """
+
+    joint_names: tuple[str, ...]
+    position_lower: Floats
+    position_upper: Floats
+    outward_velocity: Floats
+    velocity: Floats
+    following_error: Floats
+    servo_age_s: float
+    drive_age_s: float
+    base_command_age_s: float
+    supervisor_age_s: float
