@@ -1,0 +1,50 @@
+"""Pace simulated time to the wall clock, and let it slip rather than catch up in a burst."""
+
+LAG_CAP_NS = 20_000_000
+
+
+class Pacer:
+    """Say when the next physics step is due.
+
+    A machine that falls behind may catch up `lag_cap_ns` of steps; whatever is older is dropped, so
+    that simulated time slips and the buses are served between any two steps.
+    """
+
+    def __init__(self, step_ns: int, start_ns: int, lag_cap_ns: int = LAG_CAP_NS) -> None:
+        self.slipped_ns = 0
+        self._step_ns = step_ns
+        self._lag_cap_ns = lag_cap_ns
+        self._due_ns = start_ns
+
+    def due(self, wall_ns: int) -> bool:
+        """Return whether a step is due at `wall_ns`; drop the lag beyond the cap."""
+        excess_ns = wall_ns - self._due_ns - self._lag_cap_ns
+        if excess_ns > 0:
+            self.slipped_ns += excess_ns
+            self._due_ns += excess_ns
+        return wall_ns >= self._due_ns
+
+    def stepped(self) -> None:
+        """Note that one step was made."""
+        self._due_ns += self._step_ns
+
+    def wait_ns(self, wall_ns: int) -> int:
+        """Return how long from `wall_ns` to the next step, at least 0."""
+        return max(0, self._due_ns - wall_ns)
+
+
+class RealTimeFactor:
+    """Measure simulated over wall time in windows of about a second."""
+
+    def __init__(self, wall_ns: int, now_ns: int, window_ns: int = 1_000_000_000) -> None:
+        self.value = 1.0
+        self._window_ns = window_ns
+        self._wall_ns = wall_ns
+        self._now_ns = now_ns
+
+    def update(self, wall_ns: int, now_ns: int) -> None:
+        """Renew `value` when a window is complete."""
+        elapsed_ns = wall_ns - self._wall_ns
+        if elapsed_ns >= self._window_ns:
+            self.value = (now_ns - self._now_ns) / elapsed_ns
+            self._wall_ns, self._now_ns = wall_ns, now_ns
