@@ -1,0 +1,39 @@
+"""Share state, events and images between the robot's processes."""
+
+from vla_deploy.ipc.cell import CellReader, CellWriter, Sample
+from vla_deploy.ipc.doorbell import Doorbell
+from vla_deploy.ipc.errors import (
+    BadPayload,
+    IpcError,
+    SchemaMismatch,
+    SpaceUnavailable,
+    UnknownTopic,
+)
+from vla_deploy.ipc.frame_ring import Frame, FrameReader, FrameWriter
+from vla_deploy.ipc.ring import Event, RingReader, RingWriter
+from vla_deploy.ipc.space import SharedSpace
+from vla_deploy.ipc.topics import BY_NAME, TOPICS, Field, Kind, Topic
+
+__all__ = [
+    "BY_NAME",
+    "TOPICS",
+    "BadPayload",
+    "CellReader",
+    "CellWriter",
+    "Doorbell",
+    "Event",
+    "Field",
+    "Frame",
+    "FrameReader",
+    "FrameWriter",
+    "IpcError",
+    "Kind",
+    "RingReader",
+    "RingWriter",
+    "Sample",
+    "SchemaMismatch",
+    "SharedSpace",
+    "SpaceUnavailable",
+    "Topic",
+    "UnknownTopic",
+]

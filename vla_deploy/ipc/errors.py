@@ -1,0 +1,28 @@
+"""Group the errors of shared memory by what the caller can do about them.
+
+IpcError
+├── UnknownTopic        no such topic, or another kind of topic: fix the call
+├── BadPayload          the payload does not fit the topic's declaration: fix the sender
+├── SchemaMismatch      the file was made by another version: stop the whole run, start it again
+└── SpaceUnavailable    the directory or its memory cannot be had: free memory, check permissions
+"""
+
+
+class IpcError(Exception):
+    """Base of everything that shared memory raises."""
+
+
+class UnknownTopic(IpcError):
+    """Say that the schema table has no such topic of that kind."""
+
+
+class BadPayload(IpcError):
+    """Say that a payload does not fit what its topic declares."""
+
+
+class SchemaMismatch(IpcError):
+    """Say that a shared file was made with another layout."""
+
+
+class SpaceUnavailable(IpcError):
+    """Say that the shared directory or its memory cannot be had."""

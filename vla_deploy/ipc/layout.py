@@ -1,0 +1,80 @@
+"""Derive the bytes of shared memory from a topic's declaration."""
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from vla_deploy.ipc.topics import Kind, Topic
+
+VERSION = 1
+FILE_HEADER_BYTES = 128
+SLOT_HEADER_BYTES = 32
+SLOT_TRAILER_BYTES = 16
+_CACHE_LINE_BYTES = 64
+_SUFFIX = {Kind.CELL: "cell", Kind.RING: "ring", Kind.FRAME: "frames"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Place the slots of one topic behind the file header."""
+
+    slots: int
+    capacity_bytes: int
+    stride_bytes: int
+
+    @property
+    def file_bytes(self) -> int:
+        """Return the size of the whole file."""
+        return FILE_HEADER_BYTES + self.slots * self.stride_bytes
+
+    def offset(self, sequence: int) -> int:
+        """Return where the slot of `sequence` begins."""
+        return FILE_HEADER_BYTES + (sequence % self.slots) * self.stride_bytes
+
+    def trailer_offset(self, sequence: int) -> int:
+        """Return where the closing check words of the slot of `sequence` begin."""
+        return self.offset(sequence) + self.stride_bytes - SLOT_TRAILER_BYTES
+
+
+def layout_of(topic: Topic) -> Layout:
+    """Lay out a topic: slot header, payload, trailer, rounded up to cache lines."""
+    capacity = payload_capacity(topic)
+    used = SLOT_HEADER_BYTES + capacity + SLOT_TRAILER_BYTES
+    stride = -(-used // _CACHE_LINE_BYTES) * _CACHE_LINE_BYTES
+    return Layout(slots=max(topic.slots, 3), capacity_bytes=capacity, stride_bytes=stride)
+
+
+def payload_capacity(topic: Topic) -> int:
+    """Return how many payload bytes one slot of the topic takes."""
+    if topic.kind is not Kind.CELL:
+        return topic.slot_bytes
+    if is_document(topic):
+        return topic.fields[0].shape
+    return record_dtype(topic).itemsize
+
+
+def is_document(topic: Topic) -> bool:
+    """Tell whether a cell carries one bounded JSON text instead of packed fields."""
+    return any(field.dtype == "json" for field in topic.fields)
+
+
+def record_dtype(topic: Topic) -> "np.dtype[np.void]":
+    """Build the little-endian, aligned record of a packed cell."""
+    columns = [
+        (field.name, f"<{field.dtype}", (field.shape,) if field.shape > 1 else ())
+        for field in topic.fields
+    ]
+    return np.dtype(columns, align=True)
+
+
+def schema_hash(topic: Topic) -> int:
+    """Sum up everything that decides the bytes; two processes must agree on it."""
+    fields = ",".join(f"{field.name}:{field.dtype}:{field.shape}" for field in topic.fields)
+    text = f"{VERSION}|{topic.name}|{topic.kind.name}|{topic.slots}|{topic.slot_bytes}|{fields}"
+    return zlib.crc32(text.encode())
+
+
+def file_name(topic: Topic) -> str:
+    """Name the topic's file inside the shared directory."""
+    return f"{topic.name}.{_SUFFIX[topic.kind]}"

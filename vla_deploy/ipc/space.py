@@ -1,0 +1,82 @@
+"""Open the topics of one run by name."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from drivers.clock import Clock
+from vla_deploy.ipc.cell import CellReader, CellWriter
+from vla_deploy.ipc.doorbell import Doorbell
+from vla_deploy.ipc.errors import SpaceUnavailable, UnknownTopic
+from vla_deploy.ipc.frame_ring import FrameReader, FrameWriter
+from vla_deploy.ipc.ring import RingReader, RingWriter
+from vla_deploy.ipc.segment import Segment
+from vla_deploy.ipc.topics import TOPICS, Kind, Topic
+
+
+class SharedSpace:
+    """Give access to the shared memory of one run; files are made by whoever comes first.
+
+    Every method but `doorbell` may raise `UnknownTopic`, `SchemaMismatch` or `SpaceUnavailable`.
+
+    Raises:
+        SpaceUnavailable: the directory cannot be made.
+    """
+
+    def __init__(self, directory: Path, clock: Clock, topics: Iterable[Topic] = TOPICS) -> None:
+        self._directory = directory
+        self._clock = clock
+        self._topics = {topic.name: topic for topic in topics}
+        try:
+            directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        except OSError as error:
+            raise SpaceUnavailable(f"{directory}: cannot make it: {error.strerror}") from error
+
+    def cell_writer(self, name: str) -> CellWriter:
+        """Open a latest-value cell as its owner."""
+        topic = self._topic(name, Kind.CELL)
+        return CellWriter(self._segment(topic, writable=True), topic, self._clock)
+
+    def cell_reader(self, name: str) -> CellReader:
+        """Open a latest-value cell for reading."""
+        topic = self._topic(name, Kind.CELL)
+        return CellReader(self._segment(topic, writable=False), topic)
+
+    def ring_writer(self, name: str) -> RingWriter:
+        """Open an event ring for publishing."""
+        topic = self._topic(name, Kind.RING)
+        return RingWriter(self._segment(topic, writable=True), topic, self._clock)
+
+    def ring_reader(self, name: str, *, from_start: bool) -> RingReader:
+        """Open an event ring for reading, from its oldest event or from now on."""
+        topic = self._topic(name, Kind.RING)
+        return RingReader(self._segment(topic, writable=False), from_start=from_start)
+
+    def frame_writer(self, name: str) -> FrameWriter:
+        """Open a frame ring as its owner."""
+        topic = self._topic(name, Kind.FRAME)
+        return FrameWriter(self._segment(topic, writable=True), topic)
+
+    def frame_reader(self, name: str) -> FrameReader:
+        """Open a frame ring for reading."""
+        return FrameReader(self._segment(self._topic(name, Kind.FRAME), writable=False))
+
+    def doorbell(self, name: str) -> Doorbell:
+        """Listen for the writers of an event or frame ring.
+
+        Raises:
+            UnknownTopic: no such topic, or a cell: cells are polled, they ring no bell.
+        """
+        return Doorbell(self._directory, self._topic(name, Kind.RING, Kind.FRAME).name, self._clock)
+
+    def _segment(self, topic: Topic, *, writable: bool) -> Segment:
+        return Segment(self._directory, topic, writable=writable)
+
+    def _topic(self, name: str, *kinds: Kind) -> Topic:
+        topic = self._topics.get(name)
+        if topic is None:
+            known = ", ".join(sorted(self._topics))
+            raise UnknownTopic(f"no topic {name!r}; topics.py declares: {known}")
+        if topic.kind not in kinds:
+            wanted = " or ".join(kind.value for kind in kinds)
+            raise UnknownTopic(f"topic {name!r} is a {topic.kind.value}, not a {wanted}")
+        return topic
