@@ -1,0 +1,168 @@
+"""List every skill: its parameters, limits, resources and time-out, in one literal table."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+
+ARMS = ("left", "right")
+OBJECT_CLASSES = ("cup", "ball", "book", "bottle", "phone", "keys", "box", "object")
+GRASPABLE_CLASSES = tuple(name for name in OBJECT_CLASSES if name != "box")
+COLOURS = (
+    "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "white", "grey", "black",
+)  # fmt: skip
+RELATIONS = ("in", "on")
+NAVIGATION_TIMEOUT_S = 300.0
+MANIPULATION_TIMEOUT_S = 120.0
+DEFAULT_TIMEOUT_S = 60.0
+
+
+class Type(Enum):
+    """Name the kinds of parameter that a skill takes."""
+
+    NUMBER = "a number"
+    TEXT = "a text"
+    PLACE = "a known place"
+    OBJECT = "a known kind of object, with a colour if it matters"
+    DESTINATION = "a known object or a known place"
+    CHOICE = "one of a list"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """Describe one parameter; numbers carry their range, choices their list."""
+
+    type: Type
+    required: bool = True
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkillSpec:
+    """Describe one skill; `one_of` names parameter groups of which exactly one must be given."""
+
+    summary: str
+    parameters: dict[str, Parameter]
+    one_of: tuple[tuple[str, ...], ...] = ()
+    resources: tuple[str, ...] = ()
+    timeout_s: float = DEFAULT_TIMEOUT_S
+    estimated_duration_s: float = 1.0
+    retryable: bool = False
+
+
+_ARM = Parameter(type=Type.CHOICE, required=False, choices=ARMS)
+_OBJECT = Parameter(type=Type.OBJECT)
+
+SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
+    {
+        "navigate_to": SkillSpec(
+            summary="drive to a named place, to where an object can be reached, or to a point",
+            parameters={
+                "place": Parameter(type=Type.PLACE, required=False),
+                "object": Parameter(type=Type.OBJECT, required=False),
+                "x_m": Parameter(type=Type.NUMBER, required=False, minimum=-100, maximum=100),
+                "y_m": Parameter(type=Type.NUMBER, required=False, minimum=-100, maximum=100),
+                "yaw_rad": Parameter(
+                    type=Type.NUMBER, required=False, minimum=-math.pi, maximum=math.pi
+                ),
+            },
+            one_of=(("place",), ("object",), ("x_m", "y_m")),
+            resources=("base",),
+            timeout_s=NAVIGATION_TIMEOUT_S,
+            estimated_duration_s=15.0,
+            retryable=True,
+        ),
+        "move": SkillSpec(
+            summary="drive straight, forward or (negative) backward",
+            parameters={"distance_m": Parameter(type=Type.NUMBER, minimum=-3, maximum=3)},
+            resources=("base",),
+            estimated_duration_s=4.0,
+        ),
+        "turn": SkillSpec(
+            summary="turn on the spot, counter-clockwise positive",
+            parameters={
+                "angle_rad": Parameter(type=Type.NUMBER, minimum=-2 * math.pi, maximum=2 * math.pi)
+            },
+            resources=("base",),
+            estimated_duration_s=4.0,
+        ),
+        "look_at": SkillSpec(
+            summary="turn the head to an object or a direction",
+            parameters={
+                "object": Parameter(type=Type.OBJECT, required=False),
+                "direction": Parameter(
+                    type=Type.CHOICE,
+                    required=False,
+                    choices=("ahead", "left", "right", "up", "down"),
+                ),
+            },
+            one_of=(("object",), ("direction",)),
+            resources=("head",),
+            estimated_duration_s=2.0,
+        ),
+        "find_object": SkillSpec(
+            summary="look for an object, from here and then from each viewpoint",
+            parameters={"object": _OBJECT},
+            resources=("base", "head"),
+            timeout_s=NAVIGATION_TIMEOUT_S,
+            estimated_duration_s=10.0,
+            retryable=True,
+        ),
+        "pick_up": SkillSpec(
+            summary="grasp an object within reach and verify the grasp",
+            parameters={"object": _OBJECT, "arm": _ARM},
+            resources=("base", "head", "arm"),
+            timeout_s=MANIPULATION_TIMEOUT_S,
+            estimated_duration_s=15.0,
+            retryable=True,
+        ),
+        "place": SkillSpec(
+            summary="put what is held in or on something within reach",
+            parameters={
+                "destination": Parameter(type=Type.DESTINATION),
+                "relation": Parameter(type=Type.CHOICE, choices=RELATIONS),
+                "arm": _ARM,
+            },
+            resources=("base", "head", "arm"),
+            timeout_s=MANIPULATION_TIMEOUT_S,
+            estimated_duration_s=12.0,
+        ),
+        "open_gripper": SkillSpec(
+            summary="open a gripper, letting go of what it holds",
+            parameters={"arm": _ARM},
+            resources=("arm",),
+            estimated_duration_s=2.0,
+        ),
+        "close_gripper": SkillSpec(
+            summary="close a gripper until it is shut or holds something",
+            parameters={"arm": _ARM},
+            resources=("arm",),
+            estimated_duration_s=2.0,
+        ),
+        "move_arm": SkillSpec(
+            summary="bring the arms to a named pose of the robot file",
+            parameters={"pose": Parameter(type=Type.TEXT), "arm": _ARM},
+            resources=("arm",),
+            estimated_duration_s=4.0,
+        ),
+        "speak": SkillSpec(
+            summary="say a sentence",
+            parameters={"text": Parameter(type=Type.TEXT)},
+            estimated_duration_s=1.0,
+        ),
+        "wait": SkillSpec(
+            summary="do nothing for a while",
+            parameters={"duration_s": Parameter(type=Type.NUMBER, minimum=0, maximum=600)},
+            timeout_s=660.0,
+            estimated_duration_s=5.0,
+        ),
+        "stop": SkillSpec(
+            summary="bring the base and the arms to rest",
+            parameters={},
+            resources=("base", "head", "arm"),
+            estimated_duration_s=1.0,
+        ),
+    }
+)

@@ -1,0 +1,48 @@
+"""Group planning errors by what the person who gave the command can do.
+
+PlanningError
+├── NotUnderstood     say it in other words
+├── UnknownPlace      name a place the robot knows
+├── UnknownObject     name a kind of object the robot knows
+└── PlanInvalid       mend the plan; carries every fault
+"""
+
+from collections.abc import Iterable, Sequence
+
+
+class PlanningError(Exception):
+    """Base of everything that planning refuses."""
+
+
+class NotUnderstood(PlanningError):
+    """Say that no rule covers the command."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(
+            f'I do not understand "{text}"; try: go to the kitchen, find the keys, '
+            "pick up the red cup and put it in the box, bring me the bottle, stop"
+        )
+
+
+class UnknownPlace(PlanningError):
+    """Say that a place is not in the robot file."""
+
+    def __init__(self, name: str, known: Iterable[str]) -> None:
+        super().__init__(f'I do not know the place "{name}"; I know: {", ".join(sorted(known))}')
+
+
+class UnknownObject(PlanningError):
+    """Say that a kind of object is none the robot can recognise."""
+
+    def __init__(self, name: str, known: Iterable[str]) -> None:
+        super().__init__(
+            f'I do not know the object "{name}"; I can handle: {", ".join(sorted(known))}'
+        )
+
+
+class PlanInvalid(PlanningError):
+    """Say everything that is wrong with a plan, in one line."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("the plan was refused: " + "; ".join(self.faults))

@@ -1,0 +1,104 @@
+"""Run the planner: commands in words or plans in any dialect in, validated plans out."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from drivers.clock import NS_PER_S
+from vla_deploy.ipc import CellReader, RingReader, RingWriter, SharedSpace
+from vla_deploy.node import NodeContext
+from vla_deploy.planning.dialects import parse_plan
+from vla_deploy.planning.errors import PlanningError
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.rules import is_stop, plan_command
+from vla_deploy.planning.validator import World, check_plan
+from vla_deploy.robots import RobotDescription
+
+
+class PlannerNode:
+    """Turn each utterance into a plan for the executor, or into a refusal with its reason."""
+
+    period_s = 0.05
+
+    def __init__(self, context: NodeContext, robot: RobotDescription) -> None:
+        self._space = SharedSpace(context.run_dir / "ipc", context.clock)
+        self._clock = context.clock
+        self._robot = robot
+        self._utterances: RingReader
+        self._plans: RingWriter
+        self._events: RingWriter
+        self._pose: CellReader
+        self._executor: CellReader
+
+    def start(self) -> None:
+        """Open the topics; commands given before this moment are not replayed."""
+        self._utterances = self._space.ring_reader("utterance", from_start=False)
+        self._plans = self._space.ring_writer("plan")
+        self._events = self._space.ring_writer("task_event")
+        self._pose = self._space.cell_reader("pose")
+        self._executor = self._space.cell_reader("executor_status")
+
+    def step(self) -> None:
+        """Answer every command that has come in."""
+        for event in self._utterances.drain():
+            self._answer(event.payload)
+
+    def stop(self) -> None:
+        """Close the topics."""
+        self._space.close()
+
+    def _answer(self, utterance: Mapping[str, Any]) -> None:
+        command_id = str(utterance.get("command_id", ""))
+        text = str(utterance.get("text", ""))
+        if utterance.get("cancel") or is_stop(text):
+            self._plans.publish({"command_id": command_id, "cancel": True})
+            return
+        try:
+            plan = self._plan(utterance, text)
+        except PlanningError as error:
+            refusal = {"command_id": command_id, "event": "rejected", "reason": str(error)}
+            self._events.publish(refusal)
+            return
+        document = plan.model_dump(mode="json")
+        self._events.publish({"command_id": command_id, "event": "accepted"})
+        self._events.publish({"command_id": command_id, "event": "plan", "plan": document})
+        self._plans.publish({"command_id": command_id, "plan": document})
+
+    def _plan(self, utterance: Mapping[str, Any], text: str) -> Plan:
+        world = self._world()
+        if "plan" in utterance:
+            given = utterance["plan"]
+            plan = parse_plan(given if isinstance(given, dict | list) else json.dumps(given))
+        else:
+            plan = plan_command(text, world, here=self._here())
+        check_plan(plan, world)
+        return plan
+
+    def _world(self) -> World:
+        return world_of(self._robot, self._holding())
+
+    def _holding(self) -> Mapping[str, str | None]:
+        sample = self._executor.latest()
+        if sample is None or sample.age_s(self._clock.now_ns()) > _STATUS_AGE_S:
+            return {}
+        holding: Mapping[str, str | None] = sample.document().get("holding", {})
+        return holding
+
+    def _here(self) -> tuple[float, float, float] | None:
+        sample = self._pose.latest()
+        if sample is None or self._clock.now_ns() - sample.stamp_ns > NS_PER_S:
+            return None
+        return tuple(float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))  # type: ignore[return-value]
+
+
+_STATUS_AGE_S = 2.0
+
+
+def world_of(robot: RobotDescription, holding: Mapping[str, str | None]) -> World:
+    """Return what plans for this robot may refer to."""
+    spoken = {
+        name.replace("_", " ").lower(): place.name
+        for place in robot.places.values()
+        for name in (place.name, *place.aliases)
+    }
+    return World(places=spoken, poses=frozenset(robot.poses), holding=dict(holding))

@@ -1,0 +1,63 @@
+"""Define the one canonical plan that every planner emits and the executor runs."""
+
+from enum import StrEnum
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class ActionStatus(StrEnum):
+    """Tell how far an action has come; the last five are final."""
+
+    PENDING = "pending"
+    ACTIVE = "active"
+    SUCCEEDED = "succeeded"
+    CANCELLED = "cancelled"
+    ABORTED = "aborted"
+    REJECTED = "rejected"
+    LOST = "lost"
+
+
+class Priority(StrEnum):
+    """Rank actions whose dependencies allow either order."""
+
+    HIGH = "high"
+    MEDIUM = "medium"
+    LOW = "low"
+
+
+class Action(BaseModel):
+    """Name one skill with its parameters and what must come before it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    id: str = Field(min_length=1, max_length=64)
+    skill: str = Field(min_length=1, max_length=64)
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    depends_on: tuple[str, ...] = ()
+    priority: Priority = Priority.MEDIUM
+    description: str = ""
+    estimated_duration_s: float = Field(default=0.0, ge=0.0)
+    feasibility_score: float = Field(default=1.0, ge=0.0, le=1.0)
+    resources: tuple[str, ...] = ()
+    preconditions: tuple[str, ...] = ()
+    effects: tuple[str, ...] = ()
+
+
+class Plan(BaseModel):
+    """Answer one command with actions, or say why it is not feasible."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    goal: str = Field(min_length=1)
+    summary: str = ""
+    reasoning: str = ""
+    feasible: bool = True
+    actions: tuple[Action, ...] = Field(default=(), max_length=100)
+    safety_concerns: tuple[str, ...] = ()
+    success_criteria: tuple[str, ...] = ()
+
+
+def plan_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a plan, as published in `docs/plan.schema.json`."""
+    return Plan.model_json_schema()
