@@ -183,7 +183,7 @@ class Lidar:
         self._stamps[beams] = stamp_ns
         seen = distance > 0
         # Two points may fall on one beam: the nearer one is what the robot could hit.
-        np.minimum.at(self._ranges_m, beams[seen], distance[seen] * np.float32(1e-3))
+        np.minimum.at(self._ranges_m, beams[seen], (distance[seen] / 1000.0).astype(np.float32))
 
     def _begin_scan(self) -> None:
         self._ranges_m = np.full(BEAMS, np.inf, dtype=np.float32)

@@ -1,0 +1,218 @@
+import struct
+import time
+import zlib
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.camera.rgbd_stream import RgbdCamera
+
+MS = 1_000_000
+
+
+@dataclass
+class FakeClock:
+    ns: int = 0
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.ns = max(self.ns, deadline_ns)
+
+
+@dataclass
+class Line:
+    pending: bytearray = field(default_factory=bytearray)
+    sent: bytearray = field(default_factory=bytearray)
+
+    def write(self, data: bytes) -> None:
+        self.sent += data
+
+    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
+        data = bytes(self.pending[:max_bytes])
+        del self.pending[:max_bytes]
+        return data
+
+    def discard_input(self) -> None:
+        self.pending.clear()
+
+    def close(self) -> None:
+        pass
+
+
+def frame(
+    sequence: int, exposure_ns: int = 0, width: int = 4, height: int = 3, fill: int = 7
+) -> bytes:
+    """Encode independently of the driver, straight from the protocol's table."""
+    pixels = width * height
+    payload = bytes([fill]) * (3 * pixels) + struct.pack("<H", 1000 + fill) * pixels
+    head = (
+        b"VRGB" + bytes([1, 0, 0, 0]) + struct.pack("<IQHH", sequence, exposure_ns, width, height)
+    )
+    head += struct.pack("<5fI", 200.0, 201.0, 1.5, 1.0, 0.001, len(payload))
+    return (
+        head
+        + struct.pack("<I", zlib.crc32(head))
+        + payload
+        + struct.pack("<I", zlib.crc32(payload))
+    )
+
+
+def make(now_ns: int = 10**9) -> tuple[RgbdCamera, Line, FakeClock]:
+    line, clock = Line(), FakeClock(now_ns)
+    return RgbdCamera(line, clock), line, clock
+
+
+def test_a_frame_is_read_field_by_field() -> None:
+    camera, line, _ = make()
+    line.pending += frame(5, exposure_ns=123)
+    got = camera.poll()
+    assert got is not None
+    assert got.sequence == 5
+    assert (got.intrinsics.width, got.intrinsics.height) == (4, 3)
+    assert (got.intrinsics.fx, got.intrinsics.fy) == (200.0, 201.0)
+    assert (got.intrinsics.cx, got.intrinsics.cy) == (1.5, 1.0)
+    assert got.rgb.shape == (3, 4, 3)
+    assert np.all(got.rgb == 7)
+    assert np.all(got.depth == 1007)
+    assert got.depth_m() == pytest.approx(np.full((3, 4), 1.007))
+    assert camera.poll() is None
+
+
+def test_start_and_stop_are_the_documented_bytes() -> None:
+    camera, line, _ = make()
+    camera.start(12.5)
+    camera.stop()
+    start = b"VRGC\x01\x01" + struct.pack("<H", 125)
+    stop = b"VRGC\x01\x00" + struct.pack("<H", 0)
+    assert bytes(line.sent) == b"".join(
+        part + struct.pack("<I", zlib.crc32(part)) for part in (start, stop)
+    )
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, -1.0, 1001.0])
+def test_an_impossible_rate_is_refused(rate_hz: float) -> None:
+    camera, _, _ = make()
+    with pytest.raises(ValueError, match="rate"):
+        camera.start(rate_hz)
+
+
+def test_the_newest_frame_wins_and_the_others_are_counted() -> None:
+    camera, line, _ = make()
+    line.pending += frame(1) + frame(2) + frame(5)
+    got = camera.poll()
+    assert got is not None
+    assert got.sequence == 5
+    assert camera.counters.superseded_frames == 2
+    assert camera.counters.lost_frames == 2
+
+
+def test_a_frame_that_arrives_in_pieces_is_returned_when_whole() -> None:
+    camera, line, _ = make()
+    data = frame(1)
+    for byte in data[:-1]:
+        line.pending.append(byte)
+        assert camera.poll() is None
+    line.pending.append(data[-1])
+    assert camera.poll() is not None
+
+
+def test_a_truncated_frame_costs_only_itself() -> None:
+    camera, line, _ = make()
+    line.pending += frame(1)[:70] + frame(2) + frame(3)
+    got = camera.poll()
+    assert got is not None
+    assert got.sequence == 3
+    assert camera.counters.frames == 2
+    assert camera.counters.crc_errors == 1
+
+
+def test_a_silent_camera_is_asked_again() -> None:
+    camera, line, clock = make()
+    camera.start(10.0)
+    line.sent.clear()
+    clock.ns += 1_900 * MS
+    camera.poll()
+    assert not line.sent
+    clock.ns += 300 * MS
+    camera.poll()
+    assert line.sent.startswith(b"VRGC\x01\x01")
+    assert camera.counters.restarts == 1
+
+
+def test_a_stopped_camera_is_left_alone() -> None:
+    camera, line, clock = make()
+    camera.start(10.0)
+    camera.stop()
+    line.sent.clear()
+    clock.ns += 10_000 * MS
+    camera.poll()
+    assert not line.sent
+
+
+def test_device_time_is_mapped_by_the_least_latency_seen() -> None:
+    camera, line, clock = make()
+    latencies_ms = [30, 12, 45, 12, 80]
+    stamps = []
+    for i, latency_ms in enumerate(latencies_ms):
+        clock.ns = 10**9 + (100 * i + latency_ms) * MS
+        line.pending += frame(i, exposure_ns=77_000_000_000 + 100 * i * MS)
+        got = camera.poll()
+        assert got is not None
+        stamps.append(got.stamp_ns)
+    # From the second frame on, every stamp is the true exposure plus the least latency.
+    assert stamps[1:] == [10**9 + (100 * i + 12) * MS for i in range(1, 5)]
+
+
+def test_a_camera_that_restarts_its_clock_is_followed() -> None:
+    camera, line, clock = make()
+    line.pending += frame(1, exposure_ns=50_000_000_000)
+    camera.poll()
+    clock.ns = 5_000_000_000
+    line.pending += frame(0, exposure_ns=1_000_000)
+    got = camera.poll()
+    assert got is not None
+    assert got.stamp_ns == clock.ns
+
+
+def test_large_frames_in_small_pieces_do_not_take_quadratic_time() -> None:
+    camera, line, _ = make()
+    data = frame(1, width=640, height=480)
+    started = time.process_time()
+    for at in range(0, len(data), 4096):
+        line.pending += data[at : at + 4096]
+        camera.poll()
+    assert camera.counters.frames == 1
+    # 375 polls; copying the buffer each time would move 290 MB.
+    assert time.process_time() - started < 0.25
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.binary(max_size=120), st.binary(max_size=40), st.integers(1, 200))
+def test_frames_are_found_behind_garbage_and_never_wrong(a: bytes, b: bytes, cut: int) -> None:
+    camera, line, _ = make()
+    stream = a + frame(1, fill=9) + b"VRGB" + b + frame(2, fill=9) + frame(3, fill=9)
+    sequences = []
+    for at in range(0, len(stream), cut):
+        line.pending += stream[at : at + cut]
+        got = camera.poll()
+        if got is not None:
+            sequences.append(got.sequence)
+            assert np.all(got.rgb == 9)
+            assert np.all(got.depth == 1009)
+    assert camera.counters.frames == 3
+    assert sequences[-1] == 3
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 115), st.integers(1, 255))
+def test_a_changed_byte_never_passes_as_a_frame(at: int, flip: int) -> None:
+    camera, line, _ = make()
+    data = bytearray(frame(1))
+    data[at % len(data)] ^= flip
+    line.pending += data
+    assert camera.poll() is None

@@ -1,0 +1,112 @@
+import struct
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.imu.bno085_rvc import FRAME_BYTES, Imu
+
+# BNO08X Data Sheet, section 1.3.5.2: the example frame and its meaning.
+GOLDEN = bytes.fromhex("aaaade010092ff25088dfeecffd103000000e7")
+
+
+@dataclass
+class FakeClock:
+    ns: int = 0
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.ns = max(self.ns, deadline_ns)
+
+
+@dataclass
+class Line:
+    pending: bytearray = field(default_factory=bytearray)
+
+    def write(self, data: bytes) -> None:
+        raise AssertionError("the sensor takes no data")
+
+    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
+        data = bytes(self.pending[:max_bytes])
+        del self.pending[:max_bytes]
+        return data
+
+    def discard_input(self) -> None:
+        self.pending.clear()
+
+    def close(self) -> None:
+        pass
+
+
+def frame(index: int, yaw_cdeg: int = 0) -> bytes:
+    body = struct.pack("<B6h3B", index % 256, yaw_cdeg, 0, 0, 0, 0, 1000, 0, 0, 0)
+    return b"\xaa\xaa" + body + bytes([sum(body) % 256])
+
+
+def make(now_ns: int = 10**9) -> tuple[Imu, Line]:
+    line = Line()
+    return Imu(line, FakeClock(now_ns)), line
+
+
+def test_the_data_sheets_example_is_read_as_the_data_sheet_says() -> None:
+    imu, line = make()
+    line.pending += GOLDEN
+    (sample,) = imu.poll()
+    assert sample.index == 0xDE
+    assert sample.yaw_rad == pytest.approx(0.000174533, abs=1e-8)
+    assert sample.pitch_rad == pytest.approx(-0.0191986, abs=1e-7)
+    assert sample.roll_rad == pytest.approx(0.3639011, abs=1e-7)
+    assert sample.acceleration_m_s2 == pytest.approx((-3.63827, -0.19613, 9.58110), abs=1e-5)
+
+
+def test_several_frames_come_oldest_first_ten_milliseconds_apart() -> None:
+    imu, line = make()
+    line.pending += frame(1, 100) + frame(2, 200) + frame(3, 300)[:5]
+    samples = imu.poll()
+    assert [s.index for s in samples] == [1, 2]
+    assert [s.stamp_ns for s in samples] == [10**9 - 10_000_000, 10**9]
+    line.pending += frame(3, 300)[5:]
+    assert [s.index for s in imu.poll()] == [3]
+    assert imu.poll() == []
+
+
+def test_lost_frames_are_counted_over_the_wrap_of_the_index() -> None:
+    imu, line = make()
+    line.pending += frame(254) + frame(1)
+    imu.poll()
+    assert imu.counters.lost_frames == 2
+
+
+def test_a_frame_with_a_wrong_sum_is_dropped_and_the_next_one_is_found() -> None:
+    imu, line = make()
+    bad = bytearray(frame(7, 111))
+    bad[8] ^= 0x10
+    line.pending += bad + frame(8, 222)
+    assert [s.index for s in imu.poll()] == [8]
+    assert imu.counters.checksum_errors >= 1
+    assert imu.counters.discarded_bytes == FRAME_BYTES
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.binary(max_size=60).filter(lambda b: 0xAA not in b), st.integers(1, 40))
+def test_frames_are_found_behind_any_garbage_without_a_header(noise: bytes, cut: int) -> None:
+    imu, line = make()
+    stream = noise + frame(1, 1234) + noise + frame(2, 1234)
+    seen = []
+    for at in range(0, len(stream), cut):
+        line.pending += stream[at : at + cut]
+        seen += imu.poll()
+    assert [s.index for s in seen] == [1, 2]
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(2, FRAME_BYTES - 2), st.integers(1, 255))
+def test_a_changed_byte_never_passes_as_a_sample(at: int, flip: int) -> None:
+    imu, line = make()
+    bad = bytearray(frame(7, 1234))
+    bad[at] ^= flip
+    line.pending += bad
+    assert imu.poll() == []
