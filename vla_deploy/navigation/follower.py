@@ -1,0 +1,148 @@
+"""Follow a path with a differential drive: turn towards it, track it, turn to the final heading."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def wrap_angle(angle_rad: float) -> float:
+    """Return the same angle within (-pi, pi]."""
+    return math.pi - (math.pi - angle_rad) % (2 * math.pi)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveLimits:
+    """Bound what the follower asks of the base."""
+
+    speed_m_s: float
+    turn_rate_rad_s: float
+    acceleration_m_s2: float
+    turn_acceleration_rad_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Ask for a base velocity: forward, and counter-clockwise."""
+
+    v_m_s: float
+    w_rad_s: float
+
+
+AT_REST = Twist(0.0, 0.0)
+LOOK_AHEAD_M = 0.35
+POSITION_TOLERANCE_M = 0.02
+YAW_TOLERANCE_RAD = 0.02
+TURN_FIRST_RAD = 0.5
+TRACK_RAD = 0.15
+HEADING_GAIN_1_S = 2.5
+# Below this rate the drives' friction wins over a proportional command.
+MIN_TURN_RATE_RAD_S = 0.06
+MIN_SPEED_M_S = 0.02
+
+
+class Phase(Enum):
+    """Name what the follower is doing."""
+
+    ALIGN = "align"
+    TRACK = "track"
+    FINAL_TURN = "final turn"
+    ARRIVED = "arrived"
+
+
+class PathFollower:
+    """Turn poses into velocities until the path's end; `points` is (n, 2) in the pose's frame."""
+
+    def __init__(
+        self, points: NDArray[np.float64], limits: DriveLimits, final_yaw_rad: float | None = None
+    ) -> None:
+        self._points = points
+        self._limits = limits
+        self._final_yaw_rad = final_yaw_rad
+        self._segment = 0
+        self.phase = Phase.ALIGN
+
+    def step(self, x_m: float, y_m: float, yaw_rad: float) -> Twist:
+        """Return the velocity for this moment; at rest once `phase` is ARRIVED."""
+        position = np.array((x_m, y_m))
+        remaining_m = self._remaining(position)
+        if self.phase in (Phase.ALIGN, Phase.TRACK) and self._at_end(position):
+            self.phase = Phase.FINAL_TURN
+        if self.phase in (Phase.ALIGN, Phase.TRACK):
+            target = self._look_ahead(position)
+            bearing_rad = math.atan2(target[1] - y_m, target[0] - x_m)
+            return self._towards(wrap_angle(bearing_rad - yaw_rad), remaining_m)
+        return self._final_turn(yaw_rad)
+
+    def _towards(self, error_rad: float, remaining_m: float) -> Twist:
+        if abs(error_rad) > TURN_FIRST_RAD:
+            self.phase = Phase.ALIGN
+        elif abs(error_rad) < TRACK_RAD:
+            self.phase = Phase.TRACK
+        turn = self._turn_rate(error_rad)
+        if self.phase is Phase.ALIGN:
+            return Twist(0.0, turn)
+        braking_m_s = math.sqrt(max(0.0, 1.2 * self._limits.acceleration_m_s2 * remaining_m))
+        speed = min(self._limits.speed_m_s, braking_m_s) * max(0.0, math.cos(2.0 * error_rad))
+        return Twist(max(speed, MIN_SPEED_M_S), turn)
+
+    def _final_turn(self, yaw_rad: float) -> Twist:
+        if self._final_yaw_rad is None:
+            self.phase = Phase.ARRIVED
+            return AT_REST
+        error_rad = wrap_angle(self._final_yaw_rad - yaw_rad)
+        if abs(error_rad) < YAW_TOLERANCE_RAD:
+            self.phase = Phase.ARRIVED
+            return AT_REST
+        return Twist(0.0, self._turn_rate(error_rad))
+
+    def _turn_rate(self, error_rad: float) -> float:
+        braking_rad_s = math.sqrt(1.2 * self._limits.turn_acceleration_rad_s2 * abs(error_rad))
+        rate = min(self._limits.turn_rate_rad_s, braking_rad_s, HEADING_GAIN_1_S * abs(error_rad))
+        return math.copysign(max(rate, MIN_TURN_RATE_RAD_S), error_rad)
+
+    def _at_end(self, position: NDArray[np.float64]) -> bool:
+        """Tell whether the end is reached, or was just passed."""
+        to_end = self._points[-1] - position
+        distance_m = float(np.linalg.norm(to_end))
+        if distance_m < POSITION_TOLERANCE_M:
+            return True
+        if self._segment < len(self._points) - 2 or len(self._points) < 2:
+            return False
+        along = self._points[-1] - self._points[-2]
+        return distance_m < 5 * POSITION_TOLERANCE_M and float(to_end @ along) <= 0.0
+
+    def _remaining(self, position: NDArray[np.float64]) -> float:
+        self._advance(position)
+        ahead = self._points[self._segment + 1 :]
+        legs = np.diff(np.vstack((position, ahead)), axis=0)
+        return float(np.linalg.norm(legs, axis=1).sum())
+
+    def _advance(self, position: NDArray[np.float64]) -> None:
+        """Move on to the next segment once the projection has passed its end."""
+        while self._segment < len(self._points) - 2:
+            start, end = self._points[self._segment], self._points[self._segment + 1]
+            along = end - start
+            if float((position - end) @ along) < 0.0:
+                return
+            self._segment += 1
+
+    def _look_ahead(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the point LOOK_AHEAD_M along the path from the projection of `position`."""
+        if len(self._points) < 2:
+            return np.asarray(self._points[-1])
+        start, end = self._points[self._segment], self._points[self._segment + 1]
+        along = end - start
+        length_m = float(np.linalg.norm(along)) or 1e-9
+        travelled_m = float((position - start) @ along) / length_m
+        left_m = min(max(travelled_m, 0.0), length_m) + LOOK_AHEAD_M
+        for first, second in zip(
+            self._points[self._segment :], self._points[self._segment + 1 :], strict=False
+        ):
+            leg_m = float(np.linalg.norm(second - first))
+            if left_m <= leg_m:
+                return np.asarray(first + (second - first) * (left_m / leg_m))
+            left_m -= leg_m
+        return np.asarray(self._points[-1])

@@ -1,0 +1,132 @@
+"""Plan paths with A* on the map's clearance: keep away from walls, then cut needless corners."""
+
+import heapq
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.navigation.errors import NoPath
+from vla_deploy.navigation.grid_map import GridMap
+
+Cell = tuple[int, int]
+
+# Cells nearer than this to an obstacle cost more, up to WALL_COST times at the least clearance.
+COMFORT_M = 0.25
+WALL_COST = 4.0
+_NEIGHBOURS = tuple(
+    (dr, dc, math.hypot(dr, dc)) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if dr or dc
+)
+
+
+def clearance_of(grid: GridMap) -> NDArray[np.float32]:
+    """Return each cell's distance in metres to the nearest cell that is not free."""
+    free = (~grid.blocked).astype(np.uint8)
+    cells: NDArray[np.float32] = cv2.distanceTransform(free, cv2.DIST_L2, 5).astype(np.float32)
+    return cells * np.float32(grid.resolution_m)
+
+
+class PathPlanner:
+    """Plan on one map for one body; `body_radius_m` is the clearance that every path keeps."""
+
+    def __init__(self, grid: GridMap, body_radius_m: float) -> None:
+        self._grid = grid
+        self._radius_m = body_radius_m
+        self._clearance_m = clearance_of(grid)
+        near = np.clip((body_radius_m + COMFORT_M - self._clearance_m) / COMFORT_M, 0.0, 1.0)
+        self._cost = 1.0 + (WALL_COST - 1.0) * near
+
+    def is_free(self, x_m: float, y_m: float) -> bool:
+        """Tell whether the body fits at a point of the map frame."""
+        cell = self._grid.world_to_cell(x_m, y_m)
+        return self._inside(cell) and bool(self._clearance_m[cell] >= self._radius_m)
+
+    def plan(self, start: tuple[float, float], goal: tuple[float, float]) -> NDArray[np.float64]:
+        """Return the way from start to goal as (n, 2) points in the map frame.
+
+        A start too close to a wall is left by the shortest way out.
+
+        Raises:
+            NoPath: the goal is off the map or too tight, or nothing leads there.
+        """
+        start_cell, goal_cell = self._grid.world_to_cell(*start), self._grid.world_to_cell(*goal)
+        if not self._inside(goal_cell) or self._clearance_m[goal_cell] < self._radius_m:
+            raise NoPath(
+                f"the goal {goal[0]:.2f}, {goal[1]:.2f} m leaves less than the "
+                f"{self._radius_m:.2f} m of clearance that the body needs; choose another point"
+            )
+        if not self._inside(start_cell):
+            raise NoPath(f"the robot stands off the map at {start[0]:.2f}, {start[1]:.2f} m")
+        cells = self._search(self._way_out(start_cell), goal_cell)
+        if cells is None:
+            raise NoPath(f"nothing leads from {start} to {goal} with {self._radius_m:.2f} m around")
+        centres = np.array([self._grid.cell_to_world(*cell) for cell in self._shortcut(cells)])
+        centres[-1] = goal
+        return np.vstack((start, centres[1:] if start_cell == cells[0] else centres))
+
+    def _inside(self, cell: Cell) -> bool:
+        rows, columns = self._clearance_m.shape
+        return bool(0 <= cell[0] < rows and 0 <= cell[1] < columns)
+
+    def _way_out(self, cell: Cell) -> Cell:
+        if self._clearance_m[cell] >= self._radius_m:
+            return cell
+        rows, columns = np.nonzero(self._clearance_m >= self._radius_m)
+        if not rows.size:
+            raise NoPath("the map has no place where the body fits")
+        nearest = int(np.argmin((rows - cell[0]) ** 2 + (columns - cell[1]) ** 2))
+        return int(rows[nearest]), int(columns[nearest])
+
+    def _search(self, start: Cell, goal: Cell) -> list[Cell] | None:
+        came_from: dict[Cell, Cell] = {}
+        cost_so_far = {start: 0.0}
+        frontier: list[tuple[float, Cell]] = [(0.0, start)]
+        while frontier:
+            _, cell = heapq.heappop(frontier)
+            if cell == goal:
+                return _unwind(came_from, cell)
+            for following, step in self._steps(cell):
+                cost = cost_so_far[cell] + step
+                if cost < cost_so_far.get(following, math.inf):
+                    cost_so_far[following] = cost
+                    came_from[following] = cell
+                    heapq.heappush(frontier, (cost + math.dist(following, goal), following))
+        return None
+
+    def _steps(self, cell: Cell) -> list[tuple[Cell, float]]:
+        steps = []
+        for d_row, d_column, length in _NEIGHBOURS:
+            following = (cell[0] + d_row, cell[1] + d_column)
+            if self._inside(following) and self._clearance_m[following] >= self._radius_m:
+                steps.append((following, length * float(self._cost[following])))
+        return steps
+
+    def _shortcut(self, cells: list[Cell]) -> list[Cell]:
+        """Drop cells while the straight line costs no more than the way along them."""
+        kept, anchor = [cells[0]], 0
+        for index in range(2, len(cells)):
+            along = sum(
+                math.dist(a, b) * float(self._cost[b])
+                for a, b in zip(cells[anchor:index], cells[anchor + 1 : index + 1], strict=True)
+            )
+            if self._line_cost(cells[anchor], cells[index]) > along + 1e-6:
+                anchor = index - 1
+                kept.append(cells[anchor])
+        return [*kept, cells[-1]] if cells[-1] != kept[-1] else kept
+
+    def _line_cost(self, start: Cell, end: Cell) -> float:
+        length = math.dist(start, end)
+        samples = np.linspace(start, end, max(2, math.ceil(2 * length)))
+        rows, columns = np.rint(samples).astype(np.intp).T
+        if (self._clearance_m[rows, columns] < self._radius_m).any():
+            return math.inf
+        return length * float(self._cost[rows, columns].mean())
+
+
+def _unwind(came_from: dict[Cell, Cell], cell: Cell) -> list[Cell]:
+    cells = [cell]
+    while cell in came_from:
+        cell = came_from[cell]
+        cells.append(cell)
+    return cells[::-1]
