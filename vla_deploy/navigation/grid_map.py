@@ -1,5 +1,6 @@
-"""Load the occupancy map of a place in the ROS format: a PGM picture and its YAML."""
+"""Load an occupancy map in the format of ROS map_server: a YAML file beside a grey image."""
 
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,60 +11,99 @@ from numpy.typing import NDArray
 
 from vla_deploy.navigation.errors import MapInvalid
 
-_REQUIRED = ("image", "resolution", "origin", "occupied_thresh")
+FREE, OCCUPIED, UNKNOWN = 0, 100, 255
+REQUIRED_KEYS = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GridMap:
-    """Hold which cells of the floor are not free; row 0 is the lowest y, column 0 the lowest x."""
+    """Hold a map of square cells; row 0 is the southernmost, as y grows with the row.
+
+    `origin` is the map-frame position of the outer corner of cell (0, 0).
+    """
 
     resolution_m: float
-    origin_m: tuple[float, float]
-    blocked: NDArray[np.bool_]
+    origin: tuple[float, float]
+    occupancy: NDArray[np.uint8]
+
+    @property
+    def blocked(self) -> NDArray[np.bool_]:
+        """Return where the robot must not go: occupied and unknown cells."""
+        return self.occupancy != FREE
+
+    @property
+    def occupied(self) -> NDArray[np.bool_]:
+        """Return where something stands."""
+        return self.occupancy == OCCUPIED
 
     def world_to_cell(self, x_m: float, y_m: float) -> tuple[int, int]:
-        """Return (row, column) of a point of the map frame; it may lie off the map."""
-        row = math.floor((y_m - self.origin_m[1]) / self.resolution_m)
-        return row, math.floor((x_m - self.origin_m[0]) / self.resolution_m)
+        """Return row and column of the cell that holds a point; it may lie off the map."""
+        column = math.floor((x_m - self.origin[0]) / self.resolution_m)
+        row = math.floor((y_m - self.origin[1]) / self.resolution_m)
+        return row, column
 
     def cell_to_world(self, row: int, column: int) -> tuple[float, float]:
-        """Return the centre of a cell in the map frame."""
-        x_m = self.origin_m[0] + (column + 0.5) * self.resolution_m
-        return x_m, self.origin_m[1] + (row + 0.5) * self.resolution_m
+        """Return x and y of a cell's centre."""
+        x_m = self.origin[0] + (column + 0.5) * self.resolution_m
+        y_m = self.origin[1] + (row + 0.5) * self.resolution_m
+        return x_m, y_m
 
 
-def load_map(path: Path) -> GridMap:
-    """Load a map by its YAML file.
+def load_map(yaml_path: Path) -> GridMap:
+    """Read a map.
 
     Raises:
-        MapInvalid: a file is missing, a key is missing or wrong, or the picture cannot be read.
+        MapInvalid: a file is missing or not readable, or a key is missing or out of range.
     """
-    keys = _read_yaml(path)
-    missing = [key for key in _REQUIRED if key not in keys]
+    entries = _read_entries(yaml_path)
+    missing = [key for key in REQUIRED_KEYS if key not in entries]
     if missing:
-        raise MapInvalid(f"{path}: missing {', '.join(missing)}; a ROS map has {_REQUIRED}")
-    try:
-        resolution_m = float(keys["resolution"])
-        occupied = float(keys["occupied_thresh"])
-        origin = [float(number) for number in keys["origin"].strip("[] ").split(",")]
-    except ValueError as error:
-        raise MapInvalid(f"{path}: expected numbers, got {error}") from error
-    if resolution_m <= 0 or len(origin) < 2:
-        raise MapInvalid(f"{path}: resolution must be positive and origin [x, y, yaw]")
-    picture = cv2.imread(str(path.parent / keys["image"]), cv2.IMREAD_GRAYSCALE)
-    if picture is None:
-        raise MapInvalid(f"{path}: cannot read the picture {path.parent / keys['image']}")
-    darkness = 1.0 - np.flipud(picture).astype(np.float64) / 255.0
+        raise MapInvalid(f"{yaml_path}: missing {', '.join(missing)}; see ROS map_server's format")
+    origin, resolution_m = entries["origin"], entries["resolution"]
+    if not (isinstance(origin, list) and len(origin) == 3 and origin[2] == 0.0):
+        raise MapInvalid(f"{yaml_path}: origin: expected [x, y, 0.0], got {origin}")
+    if not (isinstance(resolution_m, (int, float)) and resolution_m > 0.0):
+        raise MapInvalid(f"{yaml_path}: resolution: expected metres above 0, got {resolution_m}")
+    image_path = yaml_path.parent / str(entries["image"])
+    image = cv2.imread(str(image_path), cv2.IMREAD_GRAYSCALE) if image_path.is_file() else None
+    if image is None:
+        raise MapInvalid(f"{image_path}: expected a grey image, found none or an unreadable one")
     return GridMap(
-        resolution_m=resolution_m, origin_m=(origin[0], origin[1]), blocked=darkness > occupied
+        resolution_m=float(resolution_m),
+        origin=(float(origin[0]), float(origin[1])),
+        occupancy=_occupancy(np.flipud(image), entries),
     )
 
 
-def _read_yaml(path: Path) -> dict[str, str]:
-    """Read the flat `key: value` lines that a map's YAML consists of."""
+def _occupancy(image: NDArray[np.uint8], entries: dict[str, object]) -> NDArray[np.uint8]:
+    """Apply map_server's "trinary" thresholds."""
+    dark = image / 255.0 if entries.get("negate") else (255 - image) / 255.0
+    occupancy = np.full(image.shape, UNKNOWN, dtype=np.uint8)
+    occupancy[dark > float(str(entries["occupied_thresh"]))] = OCCUPIED
+    occupancy[dark < float(str(entries["free_thresh"]))] = FREE
+    return occupancy
+
+
+def _read_entries(path: Path) -> dict[str, object]:
+    """Read the one level of `key: value` lines that map files consist of."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text().splitlines()
     except OSError as error:
         raise MapInvalid(f"{path}: cannot read the map: {error.strerror}") from error
-    pairs = (line.split("#")[0].split(":", 1) for line in lines if ":" in line.split("#")[0])
-    return {key.strip(): value.strip().strip("\"'") for key, value in pairs}
+    entries: dict[str, object] = {}
+    for number, line in enumerate(lines, start=1):
+        text = line.split("#", 1)[0].strip()
+        if not text or text == "---":
+            continue
+        key, colon, value = text.partition(":")
+        if not colon:
+            raise MapInvalid(f"{path}:{number}: expected `key: value`, got {text!r}")
+        entries[key.strip()] = _value(value.strip())
+    return entries
+
+
+def _value(text: str) -> object:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text.strip("'\"")
