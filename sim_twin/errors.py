@@ -4,6 +4,7 @@ TwinError
 ├── OpenGLMissing    nothing can be rendered here: install the named packages
 ├── ModelMismatch    robot file and world do not fit together: fix the named file
 ├── RefereeRefusal   the referee does not know the object, container or operation
+├── FilmFault        a film cannot be written: choose another path or ending
 └── Unreachable      no twin answers under the run directory: start one
 """
 
@@ -26,3 +27,7 @@ class RefereeRefusal(TwinError):
 
 class Unreachable(TwinError):
     """Say that no twin answers."""
+
+
+class FilmFault(TwinError):
+    """Say why a film cannot be written."""

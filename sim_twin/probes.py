@@ -1,0 +1,69 @@
+"""Read what the robot's range and motion sensors would feel, straight from the physics."""
+
+import math
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_twin.compose import ROBOT_ROOT
+from sim_twin.sensors.imu import ImuTruth
+
+BEAMS = 360
+RANGE_CUTOFF_M = 25.0
+ACCELEROMETER = "imu_accelerometer"
+_WORLD_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+
+
+class RangeProbe:
+    """Cast 360 rays in the base's plane from the lidar; they pass the robot itself by."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, site: str = "lidar") -> None:
+        self._model = model
+        self._data = data
+        self._site = model.site(site).id
+        self._base = model.body(ROBOT_ROOT).id
+        angles = np.radians(np.arange(BEAMS))
+        self._beams = np.stack([np.cos(angles), np.sin(angles), np.zeros(BEAMS)])
+        self._geoms = np.zeros(BEAMS, np.int32)
+        self._ranges_m = np.zeros(BEAMS)
+
+    def cast(self) -> NDArray[np.float32]:
+        """Return ranges in metres, beam i at i degrees counter-clockwise; 0 is no return."""
+        rotation = self._data.xmat[self._base].reshape(3, 3)
+        mujoco.mj_multiRay(
+            self._model,
+            self._data,
+            self._data.site_xpos[self._site],
+            (rotation @ self._beams).T.ravel(),
+            _WORLD_GROUPS,
+            True,
+            -1,
+            self._geoms,
+            self._ranges_m,
+            None,
+            BEAMS,
+            RANGE_CUTOFF_M,
+        )
+        hit = (self._geoms >= 0) & (self._ranges_m > 0.0)
+        return np.where(hit, self._ranges_m, 0.0).astype(np.float32)
+
+
+class MotionProbe:
+    """Read attitude and specific force at the IMU's site."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, site: str = "imu") -> None:
+        self._data = data
+        self._site = model.site(site).id
+        self._address = int(model.sensor(ACCELEROMETER).adr[0])
+
+    def read(self) -> ImuTruth:
+        """Return yaw, pitch, roll and acceleration with gravity, in the site's frame."""
+        matrix = self._data.site_xmat[self._site]
+        force = self._data.sensordata[self._address : self._address + 3]
+        return ImuTruth(
+            yaw_rad=math.atan2(matrix[3], matrix[0]),
+            pitch_rad=math.asin(max(-1.0, min(1.0, -float(matrix[6])))),
+            roll_rad=math.atan2(matrix[7], matrix[8]),
+            acceleration_m_s2=(float(force[0]), float(force[1]), float(force[2])),
+        )

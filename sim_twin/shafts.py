@@ -1,0 +1,63 @@
+"""Translate between the robot's joints and the motor shafts that the emulated firmware knows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_twin.errors import ModelMismatch
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shaft:
+    """Say how a motor's shaft drives a joint: joint = offset + ratio * shaft angle."""
+
+    joint: str
+    offset: float = 0.0
+    ratio: float = 1.0
+
+
+class Shafts:
+    """Read shaft angle, speed and torque of all motors of one kind, and set their input."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, shafts: Sequence[Shaft]) -> None:
+        joints = [_find(model.joint, "joint", shaft.joint) for shaft in shafts]
+        self._data = data
+        self._actuator = np.array([_find(model.actuator, "actuator", s.joint) for s in shafts])
+        self._qpos = model.jnt_qposadr[joints]
+        self._qvel = model.jnt_dofadr[joints]
+        self._offset = np.array([shaft.offset for shaft in shafts])
+        self._ratio = np.array([shaft.ratio for shaft in shafts])
+        self._sign = np.sign(self._ratio)
+
+    def position_rad(self) -> Floats:
+        """Return shaft angles."""
+        angle: Floats = (self._data.qpos[self._qpos] - self._offset) / self._ratio
+        return angle
+
+    def velocity_rad_s(self) -> Floats:
+        """Return shaft speeds."""
+        speed: Floats = self._data.qvel[self._qvel] / self._ratio
+        return speed
+
+    def effort(self) -> Floats:
+        """Return what the motors gave in the last step, in the shaft's direction."""
+        effort: Floats = self._data.actuator_force[self._actuator] * self._sign
+        return effort
+
+    def command(self, value: Floats) -> None:
+        """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
+        self._data.ctrl[self._actuator] = value * self._sign
+
+
+def _find(lookup: object, kind: str, name: str) -> int:
+    try:
+        return int(lookup(name).id)  # type: ignore[operator]
+    except KeyError as error:
+        raise ModelMismatch(
+            f"the robot file names {name!r}, but its MJCF has no such {kind}"
+        ) from error
