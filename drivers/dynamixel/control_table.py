@@ -12,6 +12,8 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 PULSES_PER_REV: Final = 4096
+CENTRE_PULSE: Final = 2048
+"""The pulse at which a servo's horn is drawn in the datasheet; a joint's offset counts from it."""
 PULSE_RAD: Final = 2 * pi / PULSES_PER_REV
 VELOCITY_UNIT_RAD_S: Final = 0.229 * 2 * pi / 60
 CURRENT_UNIT_A: Final = 2.69e-3

@@ -1,0 +1,129 @@
+"""A tty is opened, locked, read without spinning, and its loss is told at once."""
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.clock import MonotonicClock
+from drivers.errors import DeviceBusy, DeviceMissing, LinkLost
+from drivers.serial_port import SerialPort
+
+CLOCK = MonotonicClock()
+
+
+@pytest.fixture
+def pty(tmp_path: Path) -> Iterator[tuple[int, Path]]:
+    master, slave = os.openpty()
+    link = tmp_path / "servos"
+    link.symlink_to(os.ttyname(slave))
+    os.close(slave)
+    yield master, link
+    try:
+        os.close(master)
+    except OSError as error:
+        assert "descriptor" in str(error)  # the test closed it to unplug
+
+
+def soon(seconds: float) -> int:
+    return CLOCK.now_ns() + round(seconds * 1e9)
+
+
+def test_bytes_pass_unchanged_both_ways_through_a_symlink(pty: tuple[int, Path]) -> None:
+    master, path = pty
+    port = SerialPort(path, 1_000_000, CLOCK)
+    every_byte = bytes(range(256))
+    port.write(every_byte)
+    assert os.read(master, 512) == every_byte
+    os.write(master, every_byte)
+    received = b""
+    while len(received) < 256:
+        chunk = port.read(256, soon(1.0))
+        assert chunk
+        received += chunk
+    assert received == every_byte
+    port.close()
+
+
+def test_a_silent_line_returns_nothing_at_the_deadline_without_spinning(
+    pty: tuple[int, Path],
+) -> None:
+    _, path = pty
+    port = SerialPort(path, 1_000_000, CLOCK)
+    cpu = time.process_time()
+    start = CLOCK.now_ns()
+    assert port.read(10, soon(0.1)) == b""
+    waited_s = (CLOCK.now_ns() - start) / 1e9
+    assert waited_s >= 0.1
+    assert time.process_time() - cpu < 0.03
+    assert port.read(10, 0) == b""
+    port.close()
+
+
+def test_a_read_returns_what_is_there_up_to_the_limit(pty: tuple[int, Path]) -> None:
+    master, path = pty
+    port = SerialPort(path, 57_600, CLOCK)
+    os.write(master, b"abcdef")
+    assert port.read(4, soon(1.0)) == b"abcd"
+    assert port.read(4, soon(1.0)) == b"ef"
+    port.close()
+
+
+def test_discarded_input_is_gone(pty: tuple[int, Path]) -> None:
+    master, path = pty
+    port = SerialPort(path, 57_600, CLOCK)
+    os.write(master, b"stale")
+    assert port.read(1, soon(1.0)) == b"s"
+    port.discard_input()
+    assert port.read(10, soon(0.01)) == b""
+    port.close()
+
+
+def test_a_second_opener_is_told_that_the_port_is_busy(pty: tuple[int, Path]) -> None:
+    _, path = pty
+    port = SerialPort(path, 57_600, CLOCK)
+    with pytest.raises(DeviceBusy, match="stop the process that holds it"):
+        SerialPort(path, 57_600, CLOCK)
+    port.close()
+    port.close()
+    SerialPort(path, 57_600, CLOCK).close()
+
+
+def test_a_path_that_is_not_there_or_no_tty_is_named_with_a_remedy(tmp_path: Path) -> None:
+    with pytest.raises(DeviceMissing, match=r"ttyNONE.*plug the adapter in"):
+        SerialPort(tmp_path / "ttyNONE", 57_600, CLOCK)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DeviceMissing, match="not a serial port"):
+        SerialPort(tmp_path / "file", 57_600, CLOCK)
+
+
+def test_an_unknown_baud_rate_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="baud must be one of"):
+        SerialPort(tmp_path / "any", 12_345, CLOCK)
+
+
+def test_unplugging_is_told_by_every_operation_at_once(pty: tuple[int, Path]) -> None:
+    master, path = pty
+    port = SerialPort(path, 57_600, CLOCK)
+    os.close(master)
+    start = CLOCK.now_ns()
+    with pytest.raises(LinkLost, match="reconnect"):
+        port.read(10, soon(5.0))
+    with pytest.raises(LinkLost, match="reconnect"):
+        port.write(b"x")
+    assert CLOCK.now_ns() - start < 1_000_000_000
+    port.close()
+
+
+def test_a_line_that_takes_no_bytes_is_given_up_instead_of_blocking(
+    pty: tuple[int, Path],
+) -> None:
+    _, path = pty
+    port = SerialPort(path, 57_600, CLOCK)
+    start = CLOCK.now_ns()
+    with pytest.raises(LinkLost, match="took no byte"):
+        port.write(bytes(1_000_000))
+    assert CLOCK.now_ns() - start < 1_000_000_000
+    port.close()
