@@ -1,0 +1,47 @@
+"""Bring the base from its present velocity to the wanted one, no faster than it can bear."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseLimits:
+    """Carry the base's largest speeds and accelerations."""
+
+    speed_m_s: float
+    turn_rad_s: float
+    acceleration_m_s2: float
+    turn_acceleration_rad_s2: float
+
+
+class BaseRamp:
+    """Hold the base velocity that is being commanded."""
+
+    def __init__(self, limits: BaseLimits) -> None:
+        self.v_m_s = 0.0
+        self.w_rad_s = 0.0
+        self._limits = limits
+
+    @property
+    def at_rest(self) -> bool:
+        """Tell whether the commanded velocity is zero."""
+        return self.v_m_s == 0.0 and self.w_rad_s == 0.0
+
+    def advance(self, v_m_s: float, w_rad_s: float, period_s: float) -> None:
+        """Move towards a wanted velocity for one period; both parts reach it together."""
+        limits = self._limits
+        dv = _clamp(v_m_s, limits.speed_m_s) - self.v_m_s
+        dw = _clamp(w_rad_s, limits.turn_rad_s) - self.w_rad_s
+        needed_s = max(
+            abs(dv) / limits.acceleration_m_s2, abs(dw) / limits.turn_acceleration_rad_s2
+        )
+        share = 1.0 if needed_s <= period_s else period_s / needed_s
+        self.v_m_s += share * dv
+        self.w_rad_s += share * dw
+
+    def halt(self) -> None:
+        """Forget the velocity: the drives no longer follow it."""
+        self.v_m_s = self.w_rad_s = 0.0
+
+
+def _clamp(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)

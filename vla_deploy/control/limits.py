@@ -1,0 +1,43 @@
+"""Limit what leaves for the joints: the only exit from plans to the servo buses."""
+
+import numpy as np
+
+from vla_deploy.control.axes import Floats
+
+# A plan that keeps its velocity limit passes untouched, also over a tick that came late.
+_STEP_SLACK = 1.25
+MAX_OFFSET_RAD = 0.2
+
+
+class SetpointGate:
+    """Clamp setpoints to each joint's range and to the step its velocity allows.
+
+    A joint that starts outside its range, pushed there by hand, may stay or come back, but not go
+    further out: arming must not move it.
+    """
+
+    def __init__(self, lower: Floats, upper: Floats, velocity: Floats) -> None:
+        self._lower = lower
+        self._upper = upper
+        self._velocity = velocity * _STEP_SLACK
+        self.sent = np.zeros_like(lower)
+        self._clamped = np.zeros(len(lower), dtype=np.bool_)
+
+    @property
+    def clamped(self) -> bool:
+        """Tell whether the last setpoints had to be changed."""
+        return bool(self._clamped.any())
+
+    def place(self, position: Floats) -> None:
+        """Start from the measured position, without a step."""
+        self.sent = position.copy()
+
+    def limit(self, setpoint: Floats, period_s: float) -> Floats:
+        """Return the setpoints that may be sent; NaN keeps the last one."""
+        step = self._velocity * period_s
+        wanted = np.where(np.isnan(setpoint), self.sent, setpoint)
+        low = np.maximum(self.sent - step, np.minimum(self._lower, self.sent))
+        high = np.minimum(self.sent + step, np.maximum(self._upper, self.sent))
+        self.sent = np.clip(wanted, low, high)
+        np.not_equal(self.sent, wanted, out=self._clamped)
+        return self.sent
