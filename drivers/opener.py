@@ -1,10 +1,18 @@
 """Open a robot's devices by name, so that a node never knows whether a wire or the twin answers."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import can
 
 from drivers.base import ByteTransport
+from drivers.canopen.open_bus import open_can_bus
+from drivers.clock import Clock
+from drivers.errors import DeviceMissing
+from drivers.serial_port import SerialPort
+from drivers.socket_stream import SocketStream
 
 
 class DeviceOpener(Protocol):
@@ -34,3 +42,52 @@ class DeviceOpener(Protocol):
             DeviceMissing: the interface is not there.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceLink:
+    """Say where a device is reached; `baud` is the serial speed or CAN bit rate, 0 for a stream."""
+
+    path: str
+    baud: int = 0
+
+
+class PathOpener:
+    """Open real devices, or the twin's, by the paths that the robot file gives them."""
+
+    def __init__(self, links: Mapping[str, DeviceLink], clock: Clock) -> None:
+        self._links = links
+        self._clock = clock
+
+    def serial(self, name: str) -> SerialPort:
+        """Open a serial line.
+
+        Raises:
+            DeviceMissing: the device is not there, or the robot file does not name it.
+            DeviceBusy: another process holds it.
+        """
+        link = self._link(name)
+        return SerialPort(Path(link.path), link.baud, self._clock)
+
+    def stream(self, name: str) -> SocketStream:
+        """Open a byte stream.
+
+        Raises:
+            DeviceMissing: nothing serves it, or the robot file does not name it.
+        """
+        return SocketStream(Path(self._link(name).path), self._clock)
+
+    def can(self, name: str) -> can.BusABC:
+        """Open a CAN bus: a SocketCAN interface, or a hub where the path is one of the file system.
+
+        Raises:
+            DeviceMissing: the interface is not there, or the robot file does not name it.
+        """
+        link = self._link(name)
+        return open_can_bus(link.path, link.baud)
+
+    def _link(self, name: str) -> DeviceLink:
+        if name not in self._links:
+            known = ", ".join(self._links)
+            raise DeviceMissing(f"the robot file has no device {name!r}; it has {known}")
+        return self._links[name]
