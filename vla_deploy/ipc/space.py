@@ -26,6 +26,7 @@ class SharedSpace:
         self._directory = directory
         self._clock = clock
         self._topics = {topic.name: topic for topic in topics}
+        self._opened: list[Segment | Doorbell] = []
         try:
             directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
@@ -66,10 +67,21 @@ class SharedSpace:
         Raises:
             UnknownTopic: no such topic, or a cell: cells are polled, they ring no bell.
         """
-        return Doorbell(self._directory, self._topic(name, Kind.RING, Kind.FRAME).name, self._clock)
+        topic = self._topic(name, Kind.RING, Kind.FRAME)
+        bell = Doorbell(self._directory, topic.name, self._clock)
+        self._opened.append(bell)
+        return bell
+
+    def close(self) -> None:
+        """Close everything that was opened here; what was read stays valid."""
+        for opened in self._opened:
+            opened.close()
+        self._opened.clear()
 
     def _segment(self, topic: Topic, *, writable: bool) -> Segment:
-        return Segment(self._directory, topic, writable=writable)
+        segment = Segment(self._directory, topic, writable=writable)
+        self._opened.append(segment)
+        return segment
 
     def _topic(self, name: str, *kinds: Kind) -> Topic:
         topic = self._topics.get(name)

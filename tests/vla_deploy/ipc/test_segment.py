@@ -1,5 +1,6 @@
 import dataclasses
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,3 +116,16 @@ def test_packed_fields_lie_aligned_and_little_endian():
     assert dtype.isalignedstruct
     assert all(dtype[name].base.byteorder in "=|<" for name in dtype.names)
     assert dtype["position"] == np.dtype(("<f8", (32,)))
+
+
+def test_a_closed_space_holds_no_descriptor_and_its_samples_stay_valid(tmp_path, clock):
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    space = SharedSpace(tmp_path, clock)
+    space.cell_writer("pose").put(x_m=1, y_m=2, yaw_rad=3, match_ratio=1)
+    sample = space.cell_reader("pose").latest()
+    space.ring_reader("operator", from_start=True).drain()
+    space.doorbell("operator")
+    space.close()
+    space.close()
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert sample.data["y_m"] == 2
