@@ -29,12 +29,14 @@ class GridMap:
     @property
     def blocked(self) -> NDArray[np.bool_]:
         """Return where the robot must not go: occupied and unknown cells."""
-        return self.occupancy != FREE
+        blocked: NDArray[np.bool_] = self.occupancy != FREE
+        return blocked
 
     @property
     def occupied(self) -> NDArray[np.bool_]:
         """Return where something stands."""
-        return self.occupancy == OCCUPIED
+        occupied: NDArray[np.bool_] = self.occupancy == OCCUPIED
+        return occupied
 
     def world_to_cell(self, x_m: float, y_m: float) -> tuple[int, int]:
         """Return row and column of the cell that holds a point; it may lie off the map."""
