@@ -1,0 +1,6 @@
+"""Emulate Dynamixel X servos at their wire."""
+
+from sim_twin.servos.bank import ServoBank
+from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
+
+__all__ = ["EmulatedServoSpec", "FirmwareOptions", "ServoBank"]

@@ -1,0 +1,246 @@
+"""Run the firmware of all servos on one bus: power, torque, goals, protection, watchdog.
+
+Events (a write, a fault, a trip) are handled servo by servo; the control loops run over all servos
+at once, because they run every physics step.
+
+What the firmware does at the edges:
+
+- torque on: the goal position becomes the present one, unless it was written since torque went off;
+- a hardware error that Shutdown (63) names cuts torque, and only a reboot lets it come back: until
+  then torque_enable takes a 1 without an error and stays 0;
+- a tripped bus watchdog holds the present position (velocity mode brakes, current and PWM mode go
+  limp), clears the profile and refuses goals until 0 is written to it;
+- a reboot or loss of supply gives the RAM its defaults and forgets the turns counted.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from drivers.clock import NS_PER_S
+from drivers.dynamixel.control_table import (
+    WATCHDOG_TRIPPED,
+    OperatingMode,
+    Register,
+)
+from sim_twin.servos.columns import Columns
+from sim_twin.servos.feedback import Feedback
+from sim_twin.servos.motion import Motion
+from sim_twin.servos.profile import Floats
+from sim_twin.servos.protection import CHECK_PERIOD_S, Protection
+from sim_twin.servos.registers import RegisterFile
+from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
+from sim_twin.servos.watchdog import BusWatchdog
+
+_CHECK_PERIOD_NS: Final = round(CHECK_PERIOD_S * NS_PER_S)
+_TORQUE_ON_BY_GOAL: Final = 0x08
+_TORQUE_ON_AT_START: Final = 0x01
+
+
+class Firmware:
+    """Own the control tables and everything that changes them from inside."""
+
+    def __init__(self, specs: Sequence[EmulatedServoSpec], options: FirmwareOptions) -> None:
+        self.registers = RegisterFile(specs)
+        self._columns = Columns(self.registers)
+        self._options = options
+        self._motion = Motion(self.registers, self._columns)
+        self._protection = Protection(self._columns, options)
+        self._feedback = Feedback(self._columns, self._motion, self._protection)
+        self._watchdog = BusWatchdog(self._columns)
+        self._stall_nm = np.array([t.model.stall_torque_nm for t in self.registers.tables])
+        self._boot_until_ns = [0] * len(specs)
+        self._goal_is_fresh = [False] * len(specs)
+        self._powered = True
+        self._pose_known = False
+        self._stale = False
+        self._advanced_ns = 0
+        self._checked_ns = 0
+        self.now_ns = 0
+        self._on_change: dict[str, Callable[[int], None]] = {
+            "torque_enable": self._on_torque,
+            "operating_mode": self._on_mode,
+        }
+        self._on_write: dict[str, Callable[[int], None]] = {
+            "bus_watchdog": self._on_watchdog,
+            "goal_position": self._on_goal_position,
+        }
+        for row in range(len(specs)):
+            self._boot(row)
+
+    def set_time(self, now_ns: int) -> None:
+        """Take over the time, and trip the watchdogs that ran out."""
+        self.now_ns = now_ns
+        for row in self._watchdog.expired(now_ns):
+            self._trip(row)
+
+    def advance(
+        self,
+        now_ns: int,
+        position_rad: Floats,
+        velocity_rad_s: Floats,
+        torque_nm: Floats,
+        supply_v: float,
+    ) -> Floats:
+        """Sense, run the control loops and return the duty for the next step."""
+        dt_s = (now_ns - self._advanced_ns) / NS_PER_S
+        self._advanced_ns = now_ns
+        self.set_time(now_ns)
+        if self._stale:
+            self._reload()
+        self._motion.sense(position_rad, velocity_rad_s)
+        if not self._pose_known:
+            self._take_first_pose()
+        if (supply_v >= self._options.brownout_v) != self._powered:
+            self._switch_power(on=not self._powered)
+        np.divide(torque_nm, self._stall_nm, out=self._feedback.effort_ratio)
+        self._feedback.supply_v = supply_v
+        if now_ns - self._checked_ns >= _CHECK_PERIOD_NS:
+            self._protect(supply_v)
+        if self._stale:
+            self._reload()
+        return self._motion.advance(max(dt_s, 1e-6))
+
+    def answers(self, row: int) -> bool:
+        """Tell whether a servo is powered and has finished booting."""
+        return self._powered and self.now_ns >= self._boot_until_ns[row]
+
+    def feed_watchdog(self, rows: Sequence[int]) -> None:
+        """Count a packet to these servos as communication."""
+        self._watchdog.feed(rows, self.now_ns)
+
+    def refresh(self, address: int, length: int) -> None:
+        """Bring present values within this range up to date."""
+        self._feedback.now_ns = self.now_ns
+        self._feedback.refresh(address, length)
+
+    def store(self, row: int, writes: Sequence[tuple[Register, int]]) -> None:
+        """Carry out a host's write that was checked, with all that follows from it."""
+        table = self.registers.tables[row]
+        for register, value in writes:
+            changed = table.get(register.name) != value
+            table.put(register.name, value)
+            if changed and register.name in self._on_change:
+                self._on_change[register.name](row)
+            if register.name in self._on_write:
+                self._on_write[register.name](row)
+            if changed and register.name != "goal_position":
+                self._stale = True
+
+    def reboot(self, row: int) -> None:
+        """Start the firmware anew; the servo is silent while it boots."""
+        self._boot(row)
+        self._boot_until_ns[row] = self.now_ns + round(self._options.reboot_s * NS_PER_S)
+
+    def factory_reset(self, row: int, option: int) -> None:
+        """Reset the EEPROM, then reboot.
+
+        Raises:
+            Refused: the option is unknown.
+        """
+        self.registers.tables[row].factory_reset(option)
+        self.reboot(row)
+
+    def clear_turns(self, row: int) -> bool:
+        """Forget the turns counted; False when the servo moves, which forbids it."""
+        self.refresh(122, 1)
+        if self.registers.tables[row].get("moving"):
+            return False
+        self._motion.home(row)
+        self._stale = True
+        return True
+
+    def raise_errors(self, row: int, bits: int) -> None:
+        """Set hardware error bits, and cut torque where Shutdown names one of them."""
+        columns = self._columns
+        columns.hardware_error[row] |= bits
+        if columns.hardware_error[row] & columns.shutdown[row] and columns.torque_enable[row]:
+            self._cut_torque(row)
+
+    def _boot(self, row: int) -> None:
+        table = self.registers.tables[row]
+        table.power_on()
+        self._feedback.booted_ns[row] = self.now_ns
+        self._protection.clear_overload(row)
+        self._motion.home(row)
+        self._goal_is_fresh[row] = False
+        if "startup_configuration" in table.model.registers:
+            table.put("torque_enable", table.get("startup_configuration") & _TORQUE_ON_AT_START)
+        self._watchdog.reload(row, self.now_ns)
+        self._stale = True
+
+    def _take_first_pose(self) -> None:
+        self._pose_known = True
+        for row in range(len(self.registers)):
+            self._motion.home(row)
+        self._stale = True
+
+    def _switch_power(self, *, on: bool) -> None:
+        self._powered = on
+        for row in range(len(self.registers)):
+            if on:
+                self.reboot(row)
+            else:
+                self._cut_torque(row)
+
+    def _protect(self, supply_v: float) -> None:
+        elapsed_s = (self.now_ns - self._checked_ns) / NS_PER_S
+        self._checked_ns = self.now_ns
+        bits = self._protection.check(self._feedback.effort_ratio, supply_v, elapsed_s)
+        if self._powered and bits.any():
+            for row in np.flatnonzero(bits):
+                self.raise_errors(int(row), int(bits[row]))
+
+    def _cut_torque(self, row: int) -> None:
+        self._columns.torque_enable[row] = 0
+        self._goal_is_fresh[row] = False
+        self._watchdog.reload(row, self.now_ns)
+        self._stale = True
+
+    def _trip(self, row: int) -> None:
+        columns = self._columns
+        columns.bus_watchdog[row] = WATCHDOG_TRIPPED
+        columns.profile_acceleration[row] = 0
+        columns.profile_velocity[row] = 0
+        columns.goal_position[row] = self._motion.pulses[row]
+        columns.goal_velocity[row] = 0
+        mode = columns.operating_mode[row]
+        if mode == OperatingMode.PWM:
+            columns.goal_pwm[row] = 0
+        if mode == OperatingMode.CURRENT:
+            columns.goal_current[row] = 0
+        self._motion.restart(row)
+        self._stale = True
+
+    def _on_torque(self, row: int) -> None:
+        columns = self._columns
+        if not columns.torque_enable[row] or columns.hardware_error[row] & columns.shutdown[row]:
+            self._cut_torque(row)
+            return
+        if not self._goal_is_fresh[row]:
+            columns.goal_position[row] = self._motion.pulses[row]
+        self._motion.restart(row)
+        self._watchdog.reload(row, self.now_ns)
+
+    def _on_mode(self, row: int) -> None:
+        self.registers.tables[row].reset_motion_settings()
+        self._goal_is_fresh[row] = False
+        self._motion.home(row)
+
+    def _on_watchdog(self, row: int) -> None:
+        self._watchdog.reload(row, self.now_ns)
+
+    def _on_goal_position(self, row: int) -> None:
+        self._motion.profile.on_goal(row)
+        if self._columns.torque_enable[row]:
+            return
+        self._goal_is_fresh[row] = True
+        if self._columns.drive_mode[row] & _TORQUE_ON_BY_GOAL:
+            self._columns.torque_enable[row] = 1
+            self._on_torque(row)
+            self._stale = True
+
+    def _reload(self) -> None:
+        self._stale = False
+        self._motion.reload()

@@ -1,0 +1,197 @@
+"""Turn goals into motor duty as the servo's control loops do, for all servos of a bus at once.
+
+Positions are pulses, velocities register units, outputs PWM units (885 = full). Gains as in the
+e-manual: position P/128, I/65536, D/16; velocity P/128, I/65536; integrals and derivatives count in
+milliseconds. The current loop is taken as ideal: it asks for the duty at which the motor, at its
+present speed, draws the goal current. Feed-forward gains are stored but have no effect.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.dynamixel.control_table import (
+    PULSE_RAD,
+    PULSES_PER_REV,
+    PWM_FULL,
+    OperatingMode,
+)
+from sim_twin.servos.columns import Columns
+from sim_twin.servos.profile import PULSES_S2_PER_UNIT, PULSES_S_PER_UNIT, Floats, Profile
+from sim_twin.servos.registers import RegisterFile
+
+CENTRE_PULSES: Final = PULSES_PER_REV // 2
+_REVERSE: Final = 0x01
+_MS_PER_S: Final = 1e3
+_POSITION_MODES: Final = (
+    OperatingMode.POSITION,
+    OperatingMode.EXTENDED_POSITION,
+    OperatingMode.CURRENT_BASED_POSITION,
+)
+_CURRENT_MODES: Final = (OperatingMode.CURRENT, OperatingMode.CURRENT_BASED_POSITION)
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(slots=True)
+class Motors:
+    """Hold what the control loops know of each motor, from its model."""
+
+    no_load_rad_s: Floats
+    effort_unit_ratio: Floats
+    velocity_unit_rad_s: Floats
+
+    @classmethod
+    def of(cls, registers: RegisterFile) -> "Motors":
+        """Collect the figures of the models on the bus."""
+        models = [table.model for table in registers.tables]
+        return cls(
+            no_load_rad_s=np.array([m.no_load_speed_rad_s for m in models]),
+            effort_unit_ratio=np.array([m.effort_unit_ratio for m in models]),
+            velocity_unit_rad_s=np.array([m.velocity_unit_rad_s for m in models]),
+        )
+
+
+class Motion:
+    """Run the control loops; `pulses`, `velocity_rad_s` and `pwm` are the latest results."""
+
+    def __init__(self, registers: RegisterFile, columns: Columns) -> None:
+        count = len(registers)
+        self._columns = columns
+        self._motors = Motors.of(registers)
+        self.profile = Profile(columns)
+        self.pulses = np.full(count, float(CENTRE_PULSES))
+        self.velocity_rad_s = np.zeros(count)
+        self.pwm = np.zeros(count)
+        self._turn_pulses = np.zeros(count)
+        self._last_setpoint = np.zeros(count)
+        self._position_sum = np.zeros(count)
+        self._velocity_sum = np.zeros(count)
+        self._ramped_velocity = np.zeros(count)
+        self.reload()
+
+    def reload(self) -> None:
+        """Take over registers that the host or the firmware changed."""
+        columns = self._columns
+        self.profile.reload()
+        self.direction = np.where(columns.drive_mode & _REVERSE, -1.0, 1.0)
+        self._pulses_per_rad = self.direction / PULSE_RAD
+        self._offset_pulses = CENTRE_PULSES + self._turn_pulses + columns.homing_offset
+        self._enabled = columns.torque_enable.astype(np.float64)
+        self._any_enabled = bool(columns.torque_enable.any())
+        self._p = columns.position_p_gain / 128.0
+        self._i = columns.position_i_gain / 65536.0
+        self._d = columns.position_d_gain / 16.0
+        self._has_i, self._has_d = bool(self._i.any()), bool(self._d.any())
+        self._reload_modes()
+
+    def _reload_modes(self) -> None:
+        columns, mode = self._columns, self._columns.operating_mode
+        in_pwm = mode == OperatingMode.PWM
+        limit = np.minimum(columns.pwm_limit, np.abs(columns.goal_pwm))
+        self._pwm_limit = np.where(in_pwm, columns.pwm_limit, limit).astype(np.float64)
+        self._velocity_rows = np.flatnonzero(mode == OperatingMode.VELOCITY)
+        self._pwm_rows = np.flatnonzero(in_pwm)
+        self._torque_rows = np.flatnonzero(mode == OperatingMode.CURRENT)
+        self._limited_rows = np.flatnonzero(mode == OperatingMode.CURRENT_BASED_POSITION)
+        self.in_position_mode = np.isin(mode, _POSITION_MODES)
+
+    def sense(self, position_rad: Floats, velocity_rad_s: Floats) -> None:
+        """Read the encoders."""
+        np.multiply(position_rad, self._pulses_per_rad, out=self.pulses)
+        self.pulses += self._offset_pulses
+        np.rint(self.pulses, out=self.pulses)
+        np.multiply(velocity_rad_s, self.direction, out=self.velocity_rad_s)
+
+    def home(self, row: int) -> None:
+        """Forget the turns counted, as at power-on: the position comes back to 0..4095."""
+        offset = float(self._columns.homing_offset[row])
+        turns = np.floor((self.pulses[row] - offset) / PULSES_PER_REV)
+        self._turn_pulses[row] -= turns * PULSES_PER_REV
+        self.pulses[row] -= turns * PULSES_PER_REV
+        self._columns.goal_position[row] = self.pulses[row]
+        self.restart(row)
+
+    def restart(self, row: int) -> None:
+        """Begin anew from the present position and velocity, with empty integrals."""
+        self.profile.restart(row, self.pulses[row])
+        self._last_setpoint[row] = self.pulses[row]
+        self._position_sum[row] = 0.0
+        self._velocity_sum[row] = 0.0
+        self._ramped_velocity[row] = 0.0
+
+    def advance(self, dt_s: float) -> Floats:
+        """Return the duty, -1..1 in shaft coordinates, for the next `dt_s`."""
+        if not self._any_enabled:
+            self.pwm = np.zeros_like(self.pwm)
+            return self.pwm.copy()
+        pwm = self._position_pwm(dt_s)
+        if self._velocity_rows.size:
+            pwm[self._velocity_rows] = self._velocity_pwm(self._velocity_rows, dt_s)
+        if self._pwm_rows.size:
+            pwm[self._pwm_rows] = self._columns.goal_pwm[self._pwm_rows]
+        if self._torque_rows.size or self._limited_rows.size:
+            self._limit_current(pwm)
+        np.minimum(pwm, self._pwm_limit, out=pwm)
+        np.maximum(pwm, -self._pwm_limit, out=pwm)
+        pwm *= self._enabled
+        self.pwm = pwm
+        duty = pwm * self.direction
+        duty /= PWM_FULL
+        return duty
+
+    def _position_pwm(self, dt_s: float) -> Floats:
+        self.profile.advance(dt_s)
+        error = self.profile.position - self.pulses
+        pwm: Floats = error * self._p
+        if self._has_i:
+            self._position_sum += error * (dt_s * _MS_PER_S)
+            bound = PWM_FULL / np.maximum(self._i, 1e-9)
+            self._position_sum = np.clip(self._position_sum, -bound, bound)
+            pwm += self._position_sum * self._i
+        if self._has_d:
+            pwm += self._d * self._error_rate(dt_s)
+        return pwm
+
+    def _error_rate(self, dt_s: float) -> Floats:
+        """Return the change of the position error in pulses per millisecond."""
+        asked = (self.profile.position - self._last_setpoint) / (dt_s * _MS_PER_S)
+        np.copyto(self._last_setpoint, self.profile.position)
+        return asked - self.velocity_rad_s / (PULSE_RAD * _MS_PER_S)
+
+    def _velocity_pwm(self, rows: Rows, dt_s: float) -> Floats:
+        columns = self._columns
+        goal = columns.goal_velocity[rows].astype(np.float64)
+        ramp = columns.profile_acceleration[rows] * (PULSES_S2_PER_UNIT / PULSES_S_PER_UNIT * dt_s)
+        ramp[ramp == 0.0] = np.inf
+        before = self._ramped_velocity[rows]
+        asked = np.clip(goal, before - ramp, before + ramp)
+        self._ramped_velocity[rows] = asked
+        error = asked - self.velocity_rad_s[rows] / self._motors.velocity_unit_rad_s[rows]
+        i_gain = columns.velocity_i_gain[rows] / 65536.0
+        bound = PWM_FULL / np.maximum(i_gain, 1e-9)
+        total = np.clip(self._velocity_sum[rows] + error * dt_s * _MS_PER_S, -bound, bound)
+        self._velocity_sum[rows] = total
+        return error * (columns.velocity_p_gain[rows] / 128.0) + total * i_gain
+
+    def _limit_current(self, pwm: Floats) -> None:
+        columns = self._columns
+        allowed = np.minimum(np.abs(columns.goal_current), columns.current_limit)
+        allowed_pwm = allowed * self._motors.effort_unit_ratio * PWM_FULL
+        back_emf_pwm = self.velocity_rad_s / self._motors.no_load_rad_s * PWM_FULL
+        rows = self._torque_rows
+        asked = np.sign(columns.goal_current[rows]) * allowed_pwm[rows]
+        pwm[rows] = back_emf_pwm[rows] + asked
+        rows = self._limited_rows
+        low, high = back_emf_pwm[rows] - allowed_pwm[rows], back_emf_pwm[rows] + allowed_pwm[rows]
+        pwm[rows] = np.clip(pwm[rows], low, high)
+
+    def present_effort(self, effort_ratio: Floats) -> Floats:
+        """Return what address 126 shows: current, or load where the model senses none."""
+        return effort_ratio * self.direction / self._motors.effort_unit_ratio
+
+    def present_velocity(self) -> Floats:
+        """Return the measured velocity in register units."""
+        return self.velocity_rad_s / self._motors.velocity_unit_rad_s

@@ -1,0 +1,33 @@
+"""Describe one emulated servo and how the undocumented corners of its firmware behave."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EmulatedServoSpec:
+    """Say which servo sits on the bus; `eeprom` replaces factory values by register name."""
+
+    id: int
+    model_name: str
+    eeprom: Mapping[str, int] = field(default_factory=dict)
+    firmware_version: int = 48
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirmwareOptions:
+    """Choose what the manual leaves open, and the constants of the protection.
+
+    A servo counts as overloaded when its effort stays above `overload_ratio` of stall for
+    `overload_time_s`. The winding heats towards `stall_rise_c` above ambient at stall current.
+    """
+
+    watchdog_fed_by_any_packet: bool = False
+    sync_read_stops_at_missing: bool = False
+    reboot_s: float = 0.2
+    brownout_v: float = 5.0
+    overload_ratio: float = 0.8
+    overload_time_s: float = 3.0
+    ambient_c: float = 25.0
+    stall_rise_c: float = 250.0
+    thermal_time_constant_s: float = 200.0
