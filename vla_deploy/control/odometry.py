@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BaseGeometry:
+class DifferentialDrive:
     """Carry a differential drive's wheel radius and the distance between its wheels."""
 
     wheel_radius_m: float
@@ -25,7 +25,7 @@ class BaseGeometry:
 class Odometry:
     """Integrate wheel angles exactly: between two readings the base drives an arc."""
 
-    def __init__(self, geometry: BaseGeometry) -> None:
+    def __init__(self, geometry: DifferentialDrive) -> None:
         self.x_m = 0.0
         self.y_m = 0.0
         self.yaw_rad = 0.0
