@@ -20,7 +20,7 @@ class ServoBank:
     shafts nobody moves; a bus that is advanced does not need it.
 
     Raises:
-        ValueError: two servos share an id, or a model or register name is unknown.
+        ValueError: there are no servos, or two of them share an id.
     """
 
     def __init__(

@@ -76,9 +76,8 @@ class ControlTable:
     def get(self, name: str) -> int:
         """Return a register's value as the firmware sees it."""
         register = self.model.registers[name]
-        return register.from_bytes(
-            self._memory[register.address : register.address + register.size]
-        )
+        end = register.address + register.size
+        return register.from_bytes(bytes(self._memory[register.address : end]))
 
     def put(self, name: str, value: int) -> None:
         """Set a register from inside the firmware, unchecked."""

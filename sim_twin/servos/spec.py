@@ -3,15 +3,34 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from drivers.dynamixel.control_table import MODELS
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmulatedServoSpec:
-    """Say which servo sits on the bus; `eeprom` replaces factory values by register name."""
+    """Say which servo sits on the bus; `eeprom` replaces factory values by register name.
+
+    Raises:
+        ValueError: the model or a register is unknown, or a register is not in the EEPROM.
+    """
 
     id: int
     model_name: str
     eeprom: Mapping[str, int] = field(default_factory=dict)
     firmware_version: int = 48
+
+    def __post_init__(self) -> None:
+        if self.model_name not in MODELS:
+            expected = ", ".join(MODELS)
+            raise ValueError(
+                f"servo {self.id}: model: expected one of {expected}; got {self.model_name}"
+            )
+        registers = MODELS[self.model_name].registers
+        wrong = [n for n in self.eeprom if n not in registers or not registers[n].eeprom]
+        if wrong:
+            raise ValueError(
+                f"servo {self.id} ({self.model_name}): eeprom: not in its EEPROM: {wrong}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,100 @@
+"""Serve an emulated device on a pseudo-terminal behind a stable path, for a driver in any process.
+
+The line holds its own end of the terminal open, so that a poll on it wakes for bytes alone and not
+because no driver is there yet. Bytes that nobody fetches are lost once the terminal is full, as on
+a UART without a listener; `lost_bytes` counts them.
+"""
+
+import os
+import tty
+from pathlib import Path
+from typing import Final
+
+from drivers.errors import LinkLost
+from sim_twin.device import WireDevice
+
+_CHUNK_BYTES: Final = 4096
+
+
+class PtyLine:
+    """Carry bytes between a pseudo-terminal and a device; belongs to one single-threaded loop."""
+
+    def __init__(self, device: WireDevice, link_path: Path) -> None:
+        self.link_path = link_path
+        self.lost_bytes = 0
+        self._device = device
+        self._ends: tuple[int, int] | None = None
+        self.replug()
+
+    def fileno(self) -> int:
+        """Return the descriptor to poll for input.
+
+        Raises:
+            LinkLost: the line is unplugged.
+        """
+        return self._plugged_ends()[0]
+
+    def poll_once(self) -> bool:
+        """Hand over what the host has sent and send what the device has ready; False when idle.
+
+        Raises:
+            LinkLost: the line is unplugged.
+        """
+        line = self.fileno()
+        request = self._read(line)
+        if request:
+            self._device.receive(request)
+        reply = self._device.transmit()
+        if reply:
+            self._write(line, reply)
+        return bool(request or reply)
+
+    def unplug(self) -> None:
+        """Take the terminal away, as pulling the cable does: the host's reads and writes fail."""
+        if self._ends is None:
+            return
+        self.link_path.unlink(missing_ok=True)
+        for end in self._ends:
+            os.close(end)
+        self._ends = None
+
+    def replug(self) -> None:
+        """Put a new terminal behind the same path; nothing happens while one is there."""
+        if self._ends is not None:
+            return
+        line, terminal = os.openpty()
+        self._ends = (line, terminal)
+        tty.setraw(terminal)
+        os.set_blocking(line, False)
+        self._device.transmit()  # what was under way when the cable was pulled
+        self._link_to(os.ttyname(terminal))
+
+    def close(self) -> None:
+        """Unplug for good; closing twice is allowed."""
+        self.unplug()
+
+    def _link_to(self, terminal_path: str) -> None:
+        """Replace the link in one act, so that a driver never finds none."""
+        self.link_path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = self.link_path.with_name(f".{self.link_path.name}.{os.getpid()}")
+        fresh.unlink(missing_ok=True)
+        fresh.symlink_to(terminal_path)
+        fresh.replace(self.link_path)
+
+    def _plugged_ends(self) -> tuple[int, int]:
+        if self._ends is None:
+            raise LinkLost(f"{self.link_path}: unplugged; call replug() before using the line")
+        return self._ends
+
+    def _read(self, line: int) -> bytes:
+        try:
+            return os.read(line, _CHUNK_BYTES)
+        except BlockingIOError:
+            return b""
+
+    def _write(self, line: int, reply: bytes) -> None:
+        try:
+            sent = os.write(line, reply)
+        except BlockingIOError:
+            sent = 0
+        self.lost_bytes += len(reply) - sent
