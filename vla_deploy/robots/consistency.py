@@ -1,0 +1,209 @@
+"""Find what contradicts itself in a robot file.
+
+Every check works on the raw document and passes over values of the wrong kind: the schema has
+reported those already.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from math import pi
+from pathlib import Path
+from typing import Any
+
+from vla_deploy.robots.schema import Fault, is_number
+
+Document = Mapping[str, Any]
+DEVICES = ("servo_bus", "can_bus", "lidar", "imu", "camera")
+
+
+def table(document: Document, key: object) -> Document:
+    """Return a sub-table, or an empty one where the file holds something else."""
+    value = document.get(key) if isinstance(key, str) else None
+    return value if isinstance(value, dict) else {}
+
+
+def subtables(document: Document, key: str) -> dict[str, Document]:
+    """Return the tables inside a table, by name."""
+    return {name: row for name, row in table(document, key).items() if isinstance(row, dict)}
+
+
+def rows(record: Document, key: str) -> list[Document]:
+    """Return the tables of a list in order, an empty one for anything else in it."""
+    value = record.get(key)
+    return (
+        [row if isinstance(row, dict) else {} for row in value] if isinstance(value, list) else []
+    )
+
+
+def texts(record: Document, key: str) -> list[str]:
+    """Return the texts of a list."""
+    value = record.get(key)
+    return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
+
+
+def unknown_name(key: str, name: str, kind: str, known: Collection[str]) -> Fault:
+    """Return the fault of a name that nothing bears, with the names there are."""
+    listed = ", ".join(sorted(known)) or "there is none"
+    return Fault(key=key, got=repr(name), expected=f"{kind}: {listed}")
+
+
+def _servos(document: Document) -> list[Document]:
+    return rows(table(document, "servo_bus"), "servos")
+
+
+def _drives(document: Document) -> list[Document]:
+    return rows(table(document, "can_bus"), "drives")
+
+
+def _joints(records: list[Document]) -> set[str]:
+    return {row["joint"] for row in records if isinstance(row.get("joint"), str)}
+
+
+def _repeats(values: Iterator[tuple[str, object]] | list[tuple[str, object]]) -> Iterator[Fault]:
+    first: dict[object, str] = {}
+    for key, value in values:
+        if not isinstance(value, str | int):
+            continue
+        if value in first:
+            yield Fault(key=key, got=repr(value), expected=f"a value not used by {first[value]}")
+        first.setdefault(value, key)
+
+
+def nothing_used_twice(document: Document) -> Iterator[Fault]:
+    """Servo ids, node ids, driven joints and device names are unique."""
+    servos = [(f"servo_bus.servos[{i}]", row) for i, row in enumerate(_servos(document))]
+    drives = [(f"can_bus.drives[{i}]", row) for i, row in enumerate(_drives(document))]
+    yield from _repeats([(f"{key}.id", row.get("id")) for key, row in servos])
+    yield from _repeats([(f"{key}.node_id", row.get("node_id")) for key, row in drives])
+    yield from _repeats([(f"{key}.joint", row.get("joint")) for key, row in servos + drives])
+    yield from _repeats([(f"{d}.device", table(document, d).get("device")) for d in DEVICES])
+
+
+def models_are_listed(document: Document) -> Iterator[Fault]:
+    """Each servo's model has its datasheet figures."""
+    models = subtables(document, "servo_models")
+    for i, row in enumerate(_servos(document)):
+        model = row.get("model")
+        if isinstance(model, str) and model not in models:
+            key = f"servo_bus.servos[{i}].model"
+            yield unknown_name(key, model, "a key of servo_models", models)
+
+
+def limits_match_servos(document: Document) -> Iterator[Fault]:
+    """Each servo joint has limits, the lower below the upper."""
+    limits, joints = subtables(document, "limits"), _joints(_servos(document))
+    for joint in sorted(joints - limits.keys()):
+        yield Fault(key=f"limits.{joint}", got="nothing", expected="a table: it has a servo")
+    for joint, row in limits.items():
+        low, high = row.get("min"), row.get("max")
+        if joint not in joints:
+            yield unknown_name(f"limits.{joint}", joint, "a servo's joint", joints)
+        elif is_number(low) and is_number(high) and not low < high:
+            yield Fault(key=f"limits.{joint}.min", got=repr(low), expected=f"below max {high}")
+
+
+def servos_reach(document: Document) -> Iterator[Fault]:
+    """A servo's one turn covers its joint's limits, its no-load speed the velocity limit."""
+    limits, models = table(document, "limits"), table(document, "servo_models")
+    for row in _servos(document):
+        joint, offset, travel = row.get("joint"), row.get("offset"), row.get("travel_per_rad")
+        if not (is_number(offset) and is_number(travel)):
+            continue
+        bounds = table(limits, joint)
+        for end in ("min", "max"):
+            value = bounds.get(end)
+            if is_number(value) and abs(value - offset) > pi * travel:
+                expected = f"within {pi * travel:.4g} of the servo's offset {offset}"
+                yield Fault(key=f"limits.{joint}.{end}", got=repr(value), expected=expected)
+        velocity, speed = bounds.get("velocity"), table(models, row.get("model"))
+        no_load = speed.get("no_load_speed_rad_s")
+        if is_number(velocity) and is_number(no_load) and velocity > no_load * travel:
+            expected = f"at most the servo's no-load speed {no_load * travel:.4g}"
+            yield Fault(key=f"limits.{joint}.velocity", got=repr(velocity), expected=expected)
+
+
+def groups_cover_joints(document: Document) -> Iterator[Fault]:
+    """Each driven joint is in exactly one group."""
+    driven = _joints(_servos(document)) | _joints(_drives(document))
+    placed: list[tuple[str, object]] = [
+        (f"groups.{name}.joints", joint)
+        for name, row in subtables(document, "groups").items()
+        for joint in texts(row, "joints")
+    ]
+    yield from _repeats(placed)
+    for key, joint in placed:
+        if joint not in driven:
+            yield unknown_name(key, str(joint), "a driven joint", driven)
+    for joint in sorted(driven - {joint for _, joint in placed}):
+        yield Fault(key="groups", got=f"no group with {joint}", expected="each joint in a group")
+
+
+def hands_name_groups(document: Document) -> Iterator[Fault]:
+    """A hand names two groups; that of the gripper has one joint."""
+    groups = subtables(document, "groups")
+    for name, row in subtables(document, "hands").items():
+        for part in ("arm", "gripper"):
+            group = row.get(part)
+            if isinstance(group, str) and group not in groups:
+                yield unknown_name(f"hands.{name}.{part}", group, "a group", groups)
+        joints = texts(table(groups, row.get("gripper")), "joints")
+        if len(joints) > 1:
+            got = f"a group of {len(joints)} joints"
+            yield Fault(key=f"hands.{name}.gripper", got=got, expected="a group of one joint")
+
+
+def poses_are_reachable(document: Document) -> Iterator[Fault]:
+    """A pose names servo joints and stays inside their limits."""
+    limits, joints = table(document, "limits"), _joints(_servos(document))
+    for name, targets in table(document, "poses").items():
+        if not isinstance(targets, dict):
+            key = f"poses.{name}"
+            yield Fault(key=key, got=repr(targets), expected="a table of joint = position")
+            continue
+        for joint, value in targets.items():
+            yield from _pose_target(f"poses.{name}.{joint}", joint, value, joints, limits)
+
+
+def _pose_target(
+    key: str, joint: str, value: object, joints: set[str], limits: Document
+) -> Iterator[Fault]:
+    bounds = table(limits, joint)
+    low, high = bounds.get("min"), bounds.get("max")
+    if joint not in joints:
+        yield unknown_name(key, joint, "a servo's joint", joints)
+    elif not is_number(value):
+        yield Fault(key=key, got=repr(value), expected="a number")
+    elif is_number(low) and is_number(high) and not low <= value <= high:
+        yield Fault(key=key, got=repr(value), expected=f"inside the limits {low}..{high}")
+
+
+def places_are_distinct(document: Document) -> Iterator[Fault]:
+    """The start is a place; no two places share a name or an alias."""
+    home = table(document, "home")
+    places = subtables(home, "places")
+    start = home.get("start")
+    if isinstance(start, str) and start not in places:
+        yield unknown_name("home.start", start, "a place", places)
+    words: list[tuple[str, object]] = [(f"home.places.{name}", name) for name in places]
+    for name, row in places.items():
+        words += [(f"home.places.{name}.aliases", alias) for alias in texts(row, "aliases")]
+    yield from _repeats(words)
+
+
+CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
+    nothing_used_twice,
+    models_are_listed,
+    limits_match_servos,
+    servos_reach,
+    groups_cover_joints,
+    hands_name_groups,
+    poses_are_reachable,
+    places_are_distinct,
+)
+
+
+def missing_files(document: Document, directory: Path) -> Iterator[Fault]:
+    """Yield a fault for each file that the robot file names and that is not there."""
+    named = (("mjcf", document.get("mjcf")), ("home.map", table(document, "home").get("map")))
+    for key, name in named:
+        if isinstance(name, str) and not (directory / name).is_file():
+            yield Fault(key=key, got=repr(name), expected=f"a file under {directory}")

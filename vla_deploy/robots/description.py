@@ -1,0 +1,277 @@
+"""Describe one robot as immutable values: what it is wired to, how it may move, where it lives."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class StopCategory(IntEnum):
+    """Name the stop categories of IEC 60204-1."""
+
+    POWER_REMOVED = 0
+    STOP_THEN_REMOVE_POWER = 1
+    STOP_KEEP_POWER = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoModel:
+    """Give a servo model's datasheet figures at 12 V."""
+
+    stall_torque_nm: float
+    no_load_speed_rad_s: float
+    mass_kg: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Servo:
+    """Tie one servo to one joint.
+
+    joint = offset + sign * travel_per_rad * angle, where angle is 0 at the servo's centre
+    (position 2048). `travel_per_rad` is 1 for a hinge and the pinion's radius in m for a finger.
+    """
+
+    id: int
+    model: str
+    joint: str
+    sign: int
+    offset: float
+    travel_per_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoBus:
+    """Describe the serial bus that carries every servo; their order is the joint order."""
+
+    device: str
+    path: str
+    baud: int
+    protocol: int
+    servos: tuple[Servo, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """Tie one CiA 402 drive to one wheel: wheel speed = sign * motor speed / gear_ratio."""
+
+    node_id: int
+    joint: str
+    sign: int
+    gear_ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CanBus:
+    """Describe the CAN bus that carries the wheel drives."""
+
+    device: str
+    path: str
+    bitrate: int
+    drives: tuple[Drive, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseGeometry:
+    """Give the differential drive's dimensions and the speeds it may reach."""
+
+    wheel_radius_m: float
+    track_m: float
+    max_speed_m_s: float
+    max_turn_rad_s: float
+    max_acceleration_m_s2: float
+    max_turn_acceleration_rad_s2: float
+    footprint_radius_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SerialSensor:
+    """Describe a sensor on a serial line; `site` names its place in the MJCF."""
+
+    device: str
+    path: str
+    model: str
+    site: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """Describe the RGB-D camera; `site` is its optical frame: x right, y down, z forward."""
+
+    device: str
+    path: str
+    site: str
+    width: int
+    height: int
+    fovy_rad: float
+
+    @property
+    def focal_px(self) -> float:
+        """Return the focal length in pixels, the same in both directions."""
+        return float(self.height / 2 / np.tan(self.fovy_rad / 2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointLimits:
+    """Bound one joint's motion in its own unit (rad, or m for a finger)."""
+
+    min: float
+    max: float
+    velocity: float
+    acceleration: float
+    jerk: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group:
+    """Name joints that stop together, and how."""
+
+    name: str
+    joints: tuple[str, ...]
+    stop_category: StopCategory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hand:
+    """Tie an arm to its gripper; the opening between the pads is opening_ratio * gripper joint."""
+
+    name: str
+    arm: str
+    gripper: str
+    grip_site: str
+    opening_ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloorPose:
+    """Place the robot's base on the floor of the map frame."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Name a pose to drive to, and the poses from which its furniture can be searched."""
+
+    name: str
+    pose: FloorPose
+    aliases: tuple[str, ...]
+    viewpoints: tuple[FloorPose, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeepOutZone:
+    """Bound a part of the floor, as a polygon in the map frame, that the base must not enter."""
+
+    name: str
+    reason: str
+    polygon_m: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Home:
+    """Describe where the robot lives; `start` names the place where it is switched on."""
+
+    map_path: Path
+    start: str
+    places: Mapping[str, Place]
+    zones: tuple[KeepOutZone, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotDescription:
+    """Hold everything that the robot file declares."""
+
+    name: str
+    mjcf_path: Path
+    servo_bus: ServoBus
+    servo_models: Mapping[str, ServoModel]
+    can_bus: CanBus
+    base: BaseGeometry
+    lidar: SerialSensor
+    imu: SerialSensor
+    camera: Camera
+    limits: Mapping[str, JointLimits]
+    groups: Mapping[str, Group]
+    hands: Mapping[str, Hand]
+    poses: Mapping[str, Mapping[str, float]]
+    home: Home
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the servo joints in the canonical order of every joint array."""
+        return tuple(servo.joint for servo in self.servo_bus.servos)
+
+    @property
+    def joint_index(self) -> dict[str, int]:
+        """Return each servo joint's place in a joint array."""
+        return {name: index for index, name in enumerate(self.joint_names)}
+
+    @property
+    def places(self) -> Mapping[str, Place]:
+        """Return the named places."""
+        return self.home.places
+
+    @property
+    def start_pose(self) -> FloorPose:
+        """Return the pose in which the robot is switched on."""
+        return self.home.places[self.home.start].pose
+
+    @property
+    def position_min(self) -> NDArray[np.float64]:
+        """Return the lower position limits in joint order."""
+        return np.array([self.limits[name].min for name in self.joint_names])
+
+    @property
+    def position_max(self) -> NDArray[np.float64]:
+        """Return the upper position limits in joint order."""
+        return np.array([self.limits[name].max for name in self.joint_names])
+
+    @property
+    def velocity_max(self) -> NDArray[np.float64]:
+        """Return the velocity limits in joint order."""
+        return np.array([self.limits[name].velocity for name in self.joint_names])
+
+    @property
+    def acceleration_max(self) -> NDArray[np.float64]:
+        """Return the acceleration limits in joint order."""
+        return np.array([self.limits[name].acceleration for name in self.joint_names])
+
+    @property
+    def jerk_max(self) -> NDArray[np.float64]:
+        """Return the jerk limits in joint order."""
+        return np.array([self.limits[name].jerk for name in self.joint_names])
+
+    def group(self, name: str) -> Group:
+        """Return a joint group.
+
+        Raises:
+            KeyError: the robot has no group of that name; the message lists those it has.
+        """
+        try:
+            return self.groups[name]
+        except KeyError:
+            known = ", ".join(self.groups)
+            raise KeyError(f"{self.name} has no joint group {name!r}; it has {known}") from None
+
+    def model_of(self, joint: str) -> ServoModel:
+        """Return the datasheet of the servo that drives `joint`."""
+        servo = self.servo_bus.servos[self.joint_index[joint]]
+        return self.servo_models[servo.model]
+
+    def device_path(self, name: str, devices_dir: Path | None = None) -> str:
+        """Return where a device is reached: the file's own path, or `<devices_dir>/<name>`.
+
+        Raises:
+            KeyError: the robot has no device of that name; the message lists those it has.
+        """
+        buses = (self.servo_bus, self.can_bus, self.lidar, self.imu, self.camera)
+        paths = {device.device: device.path for device in buses}
+        if name not in paths:
+            raise KeyError(f"{self.name} has no device {name!r}; it has {', '.join(paths)}")
+        return paths[name] if devices_dir is None else str(devices_dir / name)

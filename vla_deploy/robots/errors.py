@@ -1,0 +1,19 @@
+"""Say what is wrong with a robot file.
+
+RobotFileError    the robot file, or a file it names, cannot be used: fix every fault it lists
+"""
+
+from pathlib import Path
+
+from vla_deploy.robots.schema import Fault
+
+
+class RobotFileError(ValueError):
+    """Report every fault of one robot file at once."""
+
+    def __init__(self, file: Path, faults: tuple[Fault, ...]) -> None:
+        self.file = file
+        self.faults = faults
+        lines = "\n".join(f"  {fault}" for fault in faults)
+        count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
+        super().__init__(f"{file}: {count}\n{lines}")

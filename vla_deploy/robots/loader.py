@@ -1,0 +1,186 @@
+"""Load a robot file: read, judge everything, then build; never half a robot."""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from vla_deploy.robots import schema
+from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
+from vla_deploy.robots.description import (
+    BaseGeometry,
+    Camera,
+    CanBus,
+    Drive,
+    FloorPose,
+    Group,
+    Hand,
+    Home,
+    JointLimits,
+    KeepOutZone,
+    Place,
+    RobotDescription,
+    SerialSensor,
+    Servo,
+    ServoBus,
+    ServoModel,
+    StopCategory,
+)
+from vla_deploy.robots.errors import RobotFileError
+from vla_deploy.robots.mjcf import mjcf_faults, read_mjcf_names
+from vla_deploy.robots.schema import Fault, Shape, check_record
+
+ROBOTS_DIR = Path(__file__).parent
+ROBOT_FILE = "robot.toml"
+Document = Mapping[str, Any]
+
+SINGLE: Mapping[str, Shape] = {
+    "servo_bus": schema.SERVO_BUS,
+    "can_bus": schema.CAN_BUS,
+    "base": schema.BASE,
+    "lidar": schema.LIDAR,
+    "imu": schema.IMU,
+    "camera": schema.CAMERA,
+    "home": schema.HOME,
+}
+NAMED: Mapping[str, Shape] = {
+    "servo_models": schema.SERVO_MODEL,
+    "limits": schema.LIMITS,
+    "groups": schema.GROUP,
+    "hands": schema.HAND,
+}
+LISTED: Mapping[tuple[str, str], Shape] = {
+    ("servo_bus", "servos"): schema.SERVO,
+    ("can_bus", "drives"): schema.DRIVE,
+    ("home", "zones"): schema.ZONE,
+}
+
+
+def load_robot(name_or_path: str | Path) -> RobotDescription:
+    """Return the robot of that name under `vla_deploy/robots`, or of that file or folder.
+
+    Raises:
+        RobotFileError: the file is missing, is not TOML, or has faults; all of them are listed.
+    """
+    file = _find(name_or_path)
+    document = _parse(file)
+    faults = tuple(_faults(document, file.parent))
+    if faults:
+        raise RobotFileError(file, faults)
+    return _build(document, file.parent)
+
+
+def robot_names() -> tuple[str, ...]:
+    """Return the names of the robots that come with the stack."""
+    return tuple(sorted(path.parent.name for path in ROBOTS_DIR.glob(f"*/{ROBOT_FILE}")))
+
+
+def _find(name_or_path: str | Path) -> Path:
+    given = Path(name_or_path)
+    candidates = (given, given / ROBOT_FILE, ROBOTS_DIR / given / ROBOT_FILE)
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    expected = f"a robot file, its folder, or one of {', '.join(robot_names())}"
+    raise RobotFileError(given, (Fault(key="(file)", got="no such file", expected=expected),))
+
+
+def _parse(file: Path) -> Document:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        fault = Fault(key="(file)", got=str(error), expected="a TOML document")
+        raise RobotFileError(file, (fault,)) from error
+
+
+def _faults(document: Document, directory: Path) -> Iterator[Fault]:
+    for record, key, shape in _records(document):
+        yield from check_record(record, key, shape)
+    yield from missing_files(document, directory)
+    for check in CHECKS:
+        yield from check(document)
+    yield from _faults_against_mjcf(document, directory)
+
+
+def _faults_against_mjcf(document: Document, directory: Path) -> Iterator[Fault]:
+    name = document.get("mjcf")
+    if not isinstance(name, str) or not (directory / name).is_file():
+        return
+    try:
+        mjcf = read_mjcf_names(directory / name)
+    except ElementTree.ParseError as error:
+        yield Fault(key="mjcf", got=f"{name}: {error}", expected="an MJCF file")
+    else:
+        yield from mjcf_faults(document, mjcf)
+
+
+def _records(document: Document) -> Iterator[tuple[Document, str, Shape]]:
+    yield document, "", schema.ROBOT
+    for key, shape in SINGLE.items():
+        if isinstance(document.get(key), dict):
+            yield document[key], key, shape
+    for key, shape in NAMED.items():
+        for name, record in table(document, key).items():
+            yield _as_table(record), f"{key}.{name}", shape
+    for (outer, inner), shape in LISTED.items():
+        for i, record in enumerate(rows(table(document, outer), inner)):
+            yield record, f"{outer}.{inner}[{i}]", shape
+    for name, place in table(table(document, "home"), "places").items():
+        yield _as_table(place), f"home.places.{name}", schema.PLACE
+        for i, view in enumerate(rows(_as_table(place), "viewpoints")):
+            yield view, f"home.places.{name}.viewpoints[{i}]", schema.FLOOR_POSE
+
+
+def _as_table(value: Any) -> Document:
+    return value if isinstance(value, dict) else {}
+
+
+def _build(document: Document, directory: Path) -> RobotDescription:
+    servo_bus, can_bus = document["servo_bus"], document["can_bus"]
+    return RobotDescription(
+        name=document["name"],
+        mjcf_path=directory / document["mjcf"],
+        servo_bus=ServoBus(
+            **{**servo_bus, "servos": tuple(Servo(**row) for row in servo_bus["servos"])}
+        ),
+        servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
+        can_bus=CanBus(**{**can_bus, "drives": tuple(Drive(**row) for row in can_bus["drives"])}),
+        base=BaseGeometry(**document["base"]),
+        lidar=SerialSensor(**document["lidar"]),
+        imu=SerialSensor(**document["imu"]),
+        camera=Camera(**document["camera"]),
+        limits={name: JointLimits(**row) for name, row in document["limits"].items()},
+        groups={name: _group(name, row) for name, row in document["groups"].items()},
+        hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},
+        poses=subtables(document, "poses"),
+        home=_home(document["home"], directory),
+    )
+
+
+def _group(name: str, row: Document) -> Group:
+    category = StopCategory(row["stop_category"])
+    return Group(name=name, joints=tuple(row["joints"]), stop_category=category)
+
+
+def _home(row: Document, directory: Path) -> Home:
+    return Home(
+        map_path=directory / row["map"],
+        start=row["start"],
+        places={name: _place(name, place) for name, place in row["places"].items()},
+        zones=tuple(_zone(zone) for zone in row["zones"]),
+    )
+
+
+def _place(name: str, row: Document) -> Place:
+    return Place(
+        name=name,
+        pose=FloorPose(x_m=row["x_m"], y_m=row["y_m"], yaw_rad=row["yaw_rad"]),
+        aliases=tuple(row["aliases"]),
+        viewpoints=tuple(FloorPose(**view) for view in row["viewpoints"]),
+    )
+
+
+def _zone(row: Document) -> KeepOutZone:
+    polygon = tuple((float(x), float(y)) for x, y in row["polygon_m"])
+    return KeepOutZone(name=row["name"], reason=row["reason"], polygon_m=polygon)

@@ -1,0 +1,92 @@
+"""Read names and joint ranges from an MJCF file as text, and hold a robot file against them."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
+from vla_deploy.robots.schema import Fault, is_number
+
+Document = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MjcfNames:
+    """List what an MJCF file offers to a robot file."""
+
+    root_bodies: tuple[str, ...]
+    joint_ranges: Mapping[str, tuple[float, float] | None]
+    sites: frozenset[str]
+
+
+def read_mjcf_names(path: Path) -> MjcfNames:
+    """Return the root bodies, joints with their ranges, and sites of an MJCF file.
+
+    Raises:
+        OSError: the file cannot be read.
+        ElementTree.ParseError: it is not XML.
+    """
+    world = ElementTree.parse(path).getroot().find("worldbody")
+    if world is None:
+        return MjcfNames(root_bodies=(), joint_ranges={}, sites=frozenset())
+    return MjcfNames(
+        root_bodies=tuple(body.get("name", "") for body in world.findall("body")),
+        joint_ranges={joint.get("name", ""): _range_of(joint) for joint in world.iter("joint")},
+        sites=frozenset(site.get("name", "") for site in world.iter("site")),
+    )
+
+
+def _range_of(joint: ElementTree.Element) -> tuple[float, float] | None:
+    text = joint.get("range")
+    if text is None:
+        return None
+    low, high = map(float, text.split())
+    return low, high
+
+
+def mjcf_faults(document: Document, mjcf: MjcfNames) -> Iterator[Fault]:
+    """Yield what the robot file says and the MJCF does not bear out."""
+    yield from _one_root_body(mjcf)
+    yield from _named(_joint_names(document), "a joint of the MJCF", mjcf.joint_ranges)
+    yield from _named(_site_names(document), "a site of the MJCF", mjcf.sites)
+    yield from _limits_inside_stops(document, mjcf)
+
+
+def _one_root_body(mjcf: MjcfNames) -> Iterator[Fault]:
+    # Pinocchio reads the first body of the world and drops the others without a word.
+    if len(mjcf.root_bodies) != 1:
+        got = f"{len(mjcf.root_bodies)} root bodies ({', '.join(mjcf.root_bodies)})"
+        yield Fault(key="mjcf", got=got, expected="a file with exactly one root body")
+
+
+def _named(used: Iterable[tuple[str, object]], kind: str, known: Iterable[str]) -> Iterator[Fault]:
+    names = frozenset(known)
+    for key, name in used:
+        if isinstance(name, str) and name not in names:
+            yield unknown_name(key, name, kind, names)
+
+
+def _joint_names(document: Document) -> Iterator[tuple[str, object]]:
+    for outer, inner in (("servo_bus", "servos"), ("can_bus", "drives")):
+        for i, row in enumerate(rows(table(document, outer), inner)):
+            yield f"{outer}.{inner}[{i}].joint", row.get("joint")
+
+
+def _site_names(document: Document) -> Iterator[tuple[str, object]]:
+    for sensor in ("lidar", "imu", "camera"):
+        yield f"{sensor}.site", table(document, sensor).get("site")
+    for name, row in subtables(document, "hands").items():
+        yield f"hands.{name}.grip_site", row.get("grip_site")
+
+
+def _limits_inside_stops(document: Document, mjcf: MjcfNames) -> Iterator[Fault]:
+    for joint, row in subtables(document, "limits").items():
+        stops = mjcf.joint_ranges.get(joint)
+        low, high = row.get("min"), row.get("max")
+        if stops is None or not (is_number(low) and is_number(high)):
+            continue
+        if low < stops[0] or high > stops[1]:
+            expected = f"inside the MJCF range {stops[0]}..{stops[1]}"
+            yield Fault(key=f"limits.{joint}", got=f"{low}..{high}", expected=expected)

@@ -1,0 +1,175 @@
+"""Declare which keys a robot file has and what each may hold; collect every fault, stop at none."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, TypeGuard
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """Say what is wrong with one key of a file."""
+
+    key: str
+    got: str
+    expected: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: got {self.got}, expected {self.expected}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """Say what a value must be, in words and as a test."""
+
+    expected: str
+    holds: Callable[[Any], bool]
+
+
+def is_number(value: object) -> TypeGuard[int | float]:
+    """Tell whether a value is a finite number; TOML's booleans are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+
+
+def _integer(low: int, high: int) -> Check:
+    def holds(value: Any) -> bool:
+        return is_number(value) and isinstance(value, int) and low <= value <= high
+
+    return Check(expected=f"an integer in {low}..{high}", holds=holds)
+
+
+def one_of(*choices: Any) -> Check:
+    """Return the check that a value is one of `choices`."""
+    listed = ", ".join(str(choice) for choice in choices)
+    return Check(expected=f"one of {listed}", holds=lambda value: value in choices)
+
+
+NUMBER = Check(expected="a number", holds=is_number)
+POSITIVE = Check(expected="a number above 0", holds=lambda value: is_number(value) and value > 0)
+TEXT = Check(expected="a text", holds=lambda value: isinstance(value, str) and value != "")
+TABLE = Check(expected="a table", holds=lambda value: isinstance(value, dict))
+TABLES = Check(
+    expected="a list of tables",
+    holds=lambda value: isinstance(value, list) and all(isinstance(row, dict) for row in value),
+)
+TEXTS = Check(
+    expected="a list of texts",
+    holds=lambda value: isinstance(value, list) and all(isinstance(row, str) for row in value),
+)
+POLYGON = Check(
+    expected="three or more [x, y] corners",
+    holds=lambda value: isinstance(value, list) and len(value) >= 3 and all(map(_is_point, value)),
+)
+
+
+def _is_point(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
+
+
+Shape = Mapping[str, Check]
+
+ROBOT: Shape = {
+    "name": TEXT,
+    "mjcf": TEXT,
+    "servo_bus": TABLE,
+    "servo_models": TABLE,
+    "can_bus": TABLE,
+    "base": TABLE,
+    "lidar": TABLE,
+    "imu": TABLE,
+    "camera": TABLE,
+    "limits": TABLE,
+    "groups": TABLE,
+    "hands": TABLE,
+    "poses": TABLE,
+    "home": TABLE,
+}
+SERVO_BUS: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "baud": one_of(57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000),
+    "protocol": one_of(2),
+    "servos": TABLES,
+}
+SERVO: Shape = {
+    "id": _integer(0, 252),
+    "model": TEXT,
+    "joint": TEXT,
+    "sign": one_of(-1, 1),
+    "offset": NUMBER,
+    "travel_per_rad": POSITIVE,
+}
+SERVO_MODEL: Shape = {
+    "stall_torque_nm": POSITIVE,
+    "no_load_speed_rad_s": POSITIVE,
+    "mass_kg": POSITIVE,
+    "source": TEXT,
+}
+CAN_BUS: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "bitrate": one_of(125000, 250000, 500000, 800000, 1000000),
+    "drives": TABLES,
+}
+DRIVE: Shape = {
+    "node_id": _integer(1, 127),
+    "joint": TEXT,
+    "sign": one_of(-1, 1),
+    "gear_ratio": POSITIVE,
+}
+BASE: Shape = {
+    "wheel_radius_m": POSITIVE,
+    "track_m": POSITIVE,
+    "max_speed_m_s": POSITIVE,
+    "max_turn_rad_s": POSITIVE,
+    "max_acceleration_m_s2": POSITIVE,
+    "max_turn_acceleration_rad_s2": POSITIVE,
+    "footprint_radius_m": POSITIVE,
+}
+LIDAR: Shape = {"device": TEXT, "path": TEXT, "model": one_of("LD19"), "site": TEXT}
+IMU: Shape = {"device": TEXT, "path": TEXT, "model": one_of("BNO085-RVC"), "site": TEXT}
+CAMERA: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "site": TEXT,
+    "width": _integer(16, 1920),
+    "height": _integer(16, 1080),
+    "fovy_rad": Check(
+        expected="an angle in 0.1..2.8 rad",
+        holds=lambda value: is_number(value) and 0.1 <= value <= 2.8,
+    ),
+}
+LIMITS: Shape = {
+    "min": NUMBER,
+    "max": NUMBER,
+    "velocity": POSITIVE,
+    "acceleration": POSITIVE,
+    "jerk": POSITIVE,
+}
+GROUP: Shape = {"joints": TEXTS, "stop_category": one_of(0, 1, 2)}
+HAND: Shape = {"arm": TEXT, "gripper": TEXT, "grip_site": TEXT, "opening_ratio": POSITIVE}
+HOME: Shape = {"map": TEXT, "start": TEXT, "places": TABLE, "zones": TABLES}
+FLOOR_POSE: Shape = {"x_m": NUMBER, "y_m": NUMBER, "yaw_rad": NUMBER}
+PLACE: Shape = {**FLOOR_POSE, "aliases": TEXTS, "viewpoints": TABLES}
+ZONE: Shape = {"name": TEXT, "reason": TEXT, "polygon_m": POLYGON}
+
+
+def check_record(record: Mapping[str, Any], key: str, shape: Shape) -> tuple[Fault, ...]:
+    """Return the faults of one table: missing keys, unknown keys, values of the wrong kind."""
+    prefix = f"{key}." if key else ""
+    missing = [
+        Fault(key=prefix + name, got="nothing", expected=check.expected)
+        for name, check in shape.items()
+        if name not in record
+    ]
+    unknown = [
+        Fault(key=prefix + name, got="an unknown key", expected=f"one of {', '.join(shape)}")
+        for name in record
+        if name not in shape
+    ]
+    wrong = [
+        Fault(key=prefix + name, got=repr(record[name]), expected=check.expected)
+        for name, check in shape.items()
+        if name in record and not check.holds(record[name])
+    ]
+    return (*missing, *unknown, *wrong)
