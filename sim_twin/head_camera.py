@@ -1,0 +1,84 @@
+"""Be the robot's RGB-D camera: renders the head's view when a frame is due."""
+
+import math
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.protocol import Command, Intrinsics, encode_request
+from sim_twin.errors import ModelMismatch
+from sim_twin.renderer import Renderer, fixed_camera
+from sim_twin.sensors.camera import CameraDevice
+from vla_deploy.robots.description import Camera
+
+_FOVY_TOLERANCE_RAD = 1e-3
+
+
+class HeadCamera:
+    """Render from the MJCF camera named as the robot file's optical site; GL opens at first use."""
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, camera: Camera, seed: int
+    ) -> None:
+        """Check the calibration and prepare the device.
+
+        Raises:
+            ModelMismatch: the MJCF camera's field of view is not the robot file's.
+        """
+        self._model = model
+        self._data = data
+        self._camera = camera
+        self._view = fixed_camera(model, camera.site)
+        self._renderer: Renderer | None = None
+        _check_fovy(model, camera)
+        self.device = CameraDevice(self.render, _intrinsics(camera), seed=seed)
+
+    def open(self) -> None:
+        """Open OpenGL now rather than at the first frame.
+
+        Raises:
+            OpenGLMissing: nothing can be rendered on this machine.
+        """
+        if self._renderer is None:
+            self._renderer = Renderer(self._model, self._camera.width, self._camera.height)
+
+    def render(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Return RGB and depth in metres of the present state.
+
+        Raises:
+            OpenGLMissing: nothing can be rendered on this machine.
+        """
+        self.open()
+        assert self._renderer is not None
+        return self._renderer.render(self._data, self._view)
+
+    def hang_up(self) -> None:
+        """Stop streaming because the client has gone."""
+        self.device.receive(encode_request(Command.STOP, 0.0))
+
+    def close(self) -> None:
+        """Release OpenGL."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def _intrinsics(camera: Camera) -> Intrinsics:
+    return Intrinsics(
+        width=camera.width,
+        height=camera.height,
+        fx=camera.focal_px,
+        fy=camera.focal_px,
+        cx=(camera.width - 1) / 2,
+        cy=(camera.height - 1) / 2,
+    )
+
+
+def _check_fovy(model: mujoco.MjModel, camera: Camera) -> None:
+    fovy_rad = math.radians(float(model.camera(camera.site).fovy[0]))
+    if abs(fovy_rad - camera.fovy_rad) > _FOVY_TOLERANCE_RAD:
+        raise ModelMismatch(
+            f"camera {camera.site!r}: robot file says fovy_rad = {camera.fovy_rad:.4f}, "
+            f"its MJCF {fovy_rad:.4f}; make them agree"
+        )

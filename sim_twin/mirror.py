@@ -1,0 +1,62 @@
+"""Copy the physics' state to a process that only draws it; old states are dropped, never queued."""
+
+import socket
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_HEAD = struct.Struct("<qq")
+_MAX_STATE_BYTES = 65_536
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MirrorState:
+    """Hold one moment: simulated time, monotonic time, and all positions."""
+
+    now_ns: int
+    wall_ns: int
+    qpos: NDArray[np.float64]
+
+
+def mirror_pair() -> tuple[socket.socket, socket.socket]:
+    """Return the two ends of a mirror; states go from the first to the second."""
+    sender, receiver = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    sender.setblocking(False)
+    receiver.setblocking(False)
+    return sender, receiver
+
+
+def send_state(sender: socket.socket, state: MirrorState) -> None:
+    """Send one state, or drop it when the receiver is behind.
+
+    Raises:
+        BrokenPipeError: the receiver has ended.
+    """
+    try:
+        sender.send(_HEAD.pack(state.now_ns, state.wall_ns) + state.qpos.tobytes())
+    except BlockingIOError:
+        return
+
+
+def newest_state(receiver: socket.socket) -> MirrorState | None:
+    """Return the newest state that has arrived, or None.
+
+    Raises:
+        EOFError: the sender has ended.
+    """
+    newest = None
+    while True:
+        try:
+            packet = receiver.recv(_MAX_STATE_BYTES)
+        except BlockingIOError:
+            break
+        if not packet:
+            raise EOFError("the twin has ended")
+        newest = packet
+    if newest is None:
+        return None
+    now_ns, wall_ns = _HEAD.unpack_from(newest)
+    qpos = np.frombuffer(newest, np.float64, offset=_HEAD.size)
+    return MirrorState(now_ns=now_ns, wall_ns=wall_ns, qpos=qpos)

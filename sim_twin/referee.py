@@ -1,0 +1,104 @@
+"""Ask a running twin what really happened: `python -m sim_twin.referee --run-dir D truth`.
+
+Ground truth is for tests and for the demo's verdict; nothing on the robot may use it.
+"""
+
+import argparse
+import json
+import socket
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from sim_twin.errors import RefereeRefusal, TwinError, Unreachable
+
+REFEREE_SOCKET = "referee"
+FILM_SOCKET = "film"
+TIMEOUT_S = 10.0
+_CHUNK_BYTES = 65_536
+_EXAMPLES = """examples:
+  python -m sim_twin.referee --run-dir /run/vla truth
+  python -m sim_twin.referee --run-dir /run/vla inside --object red_cup --container box
+  python -m sim_twin.referee --run-dir /run/vla film_start --path demo.webm
+  python -m sim_twin.referee --run-dir /run/vla caption --text "pick_up: red cup"
+"""
+_SOCKET_AND_ARGUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "truth": (REFEREE_SOCKET, ()),
+    "inside": (REFEREE_SOCKET, ("object", "container")),
+    "film_start": (FILM_SOCKET, ("path",)),
+    "film_stop": (FILM_SOCKET, ()),
+    "caption": (FILM_SOCKET, ("text",)),
+}
+
+
+def ask(run_dir: Path, op: str, **arguments: str) -> dict[str, Any]:
+    """Ask the twin under `run_dir` and return its answer.
+
+    Raises:
+        Unreachable: no twin answers there.
+        RefereeRefusal: the twin does not know the operation, or what it was asked about.
+    """
+    if op not in _SOCKET_AND_ARGUMENTS:
+        raise RefereeRefusal(f"no operation {op!r}; there are {', '.join(_SOCKET_AND_ARGUMENTS)}")
+    path = run_dir / "dev" / _SOCKET_AND_ARGUMENTS[op][0]
+    line = json.dumps({"op": op, **arguments}).encode() + b"\n"
+    try:
+        reply = _exchange(path, line)
+    except OSError as error:
+        reason = error.strerror or error
+        raise Unreachable(f"{path}: {reason}; expected a running twin, start one") from error
+    answer: dict[str, Any] = json.loads(reply)
+    if not answer.pop("ok"):
+        raise RefereeRefusal(answer["error"])
+    return answer
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print one answer as JSON; 2 when the twin is not there or refuses."""
+    options = vars(_parser().parse_args(argv))
+    op, run_dir = options["op"], options["run_dir"]
+    names = _SOCKET_AND_ARGUMENTS[op][1]
+    missing = [name for name in names if options[name] is None]
+    if missing:
+        sys.stderr.write(f"referee: {op} needs --{missing[0]}\n")
+        return 2
+    try:
+        answer = ask(run_dir, op, **{name: options[name] for name in names})
+    except TwinError as error:
+        sys.stderr.write(f"referee: {error}\n")
+        return 2
+    sys.stdout.write(json.dumps(answer) + "\n")
+    return 0
+
+
+def _exchange(path: Path, line: bytes) -> bytes:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+        client.settimeout(TIMEOUT_S)
+        client.connect(str(path))
+        client.sendall(line)
+        reply = bytearray()
+        while not reply.endswith(b"\n"):
+            data = client.recv(_CHUNK_BYTES)
+            if not data:
+                raise ConnectionError("the twin hung up")
+            reply += data
+    return bytes(reply)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m sim_twin.referee",
+        description="Ask a running twin what really happened.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--run-dir", type=Path, required=True)
+    parser.add_argument("op", choices=tuple(_SOCKET_AND_ARGUMENTS))
+    for name in ("object", "container", "path", "text"):
+        parser.add_argument(f"--{name}")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
