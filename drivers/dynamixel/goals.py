@@ -1,0 +1,106 @@
+"""Write goals for all servos, converted from the joint side and clamped to the servo's range."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.dynamixel.codec import Instruction
+from drivers.dynamixel.control_table import CENTRE_PULSE, PWM_FULL
+from drivers.dynamixel.handshake import ServoSetup
+from drivers.dynamixel.link import Link, Patience
+from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.servo import ServoSpec
+from drivers.errors import DriverError, LinkLost
+
+_GOAL: Final = np.dtype([("id", "u1"), ("pulse", "<i4")])
+_GOAL_POSITION_HEAD: Final = b"\x74\x00\x04\x00"  # address 116, 4 bytes
+
+Floats = NDArray[np.float64]
+
+
+class GoalWriter:
+    """Write goal positions in one sync write, and PWM limits when they change."""
+
+    def __init__(
+        self,
+        link: Link,
+        registers: Registers,
+        servos: Sequence[ServoSpec],
+        setups: Sequence[ServoSetup],
+        *,
+        margin_s: float,
+    ) -> None:
+        self._link = link
+        self._registers = registers
+        self._servos = {servo.id: servo for servo in servos}
+        self._joints = [servo.joint for servo in servos]
+        self._patience = Patience(margin_s=margin_s, attempts=2)
+        self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
+        offsets = np.array([servo.offset_rad for servo in servos])
+        self._at_pulse_zero = offsets - CENTRE_PULSE * self._per_pulse
+        self._minimum = np.array([setup.minimum_pulse for setup in setups])
+        self._maximum = np.array([setup.maximum_pulse for setup in setups])
+        self._pwm_limit = {
+            servo.id: setup.pwm_limit for servo, setup in zip(servos, setups, strict=True)
+        }
+        self._pwm: dict[int, int] = {}
+        self._records = np.zeros(len(servos), dtype=_GOAL)
+        self._records["id"] = [servo.id for servo in servos]
+
+    def write(self, position_rad: Floats) -> Floats:
+        """Send a goal to every servo and return what was sent, on the joint side.
+
+        Raises:
+            ValueError: a goal is not finite, or there is not one per servo.
+            LinkLost: the adapter is gone.
+        """
+        self._check(position_rad)
+        pulses = np.rint((position_rad - self._at_pulse_zero) / self._per_pulse)
+        np.clip(pulses, self._minimum, self._maximum, out=pulses)
+        self._records["pulse"] = pulses
+        self._link.broadcast(Instruction.SYNC_WRITE, _GOAL_POSITION_HEAD + self._records.tobytes())
+        return np.asarray(pulses * self._per_pulse + self._at_pulse_zero, dtype=np.float64)
+
+    def write_pwm(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
+        """Limit the PWM of servos, where it changed; return those that did not take it.
+
+        Raises:
+            ValueError: a ratio is not within 0..1 or an id is unknown.
+            LinkLost: the adapter is gone.
+        """
+        failures: dict[int, DriverError] = {}
+        for servo_id, ratio in ratios.items():
+            value = self._pwm_value(servo_id, ratio)
+            if self._pwm.get(servo_id) == value:
+                continue
+            try:
+                self._registers.write(self._servos[servo_id], "goal_pwm", value, self._patience)
+                self._pwm[servo_id] = value
+            except LinkLost:
+                raise
+            except DriverError as error:
+                failures[servo_id] = error
+        return failures
+
+    def forget_pwm(self, servo_id: int) -> None:
+        """Write the PWM limit anew the next time: the servo has lost it."""
+        self._pwm.pop(servo_id, None)
+
+    def _pwm_value(self, servo_id: int, ratio: float) -> int:
+        if servo_id not in self._servos:
+            raise ValueError(f"no servo {servo_id} on this bus; it has {sorted(self._servos)}")
+        if not 0.0 <= ratio <= 1.0:
+            raise ValueError(
+                f"{self._servos[servo_id]}: PWM ratio must be within 0..1, got {ratio}"
+            )
+        return min(round(ratio * PWM_FULL), self._pwm_limit[servo_id])
+
+    def _check(self, position_rad: Floats) -> None:
+        if position_rad.shape != (len(self._joints),):
+            raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
+        finite = np.isfinite(position_rad)
+        if not finite.all():
+            bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
+            raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")

@@ -1,0 +1,116 @@
+"""Run the block read of each cycle and put its values, on the joint side, into the state."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from drivers.dynamixel.block import BlockRead, Records, records_of
+from drivers.dynamixel.codec import ALERT
+from drivers.dynamixel.control_table import CENTRE_PULSE
+from drivers.dynamixel.link import Link
+from drivers.dynamixel.roster import Roster
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.state import BusState
+
+_NEVER_NS: Final = -1
+_EVERYONE: Final = slice(None)
+_Rows = slice | NDArray[np.intp]
+
+
+class StateReader:
+    """Read the block of all polled servos; what one servo does costs the others nothing."""
+
+    def __init__(
+        self,
+        link: Link,
+        servos: Sequence[ServoSpec],
+        roster: Roster,
+        state: BusState,
+        *,
+        fast_sync: bool,
+        margin_s: float,
+    ) -> None:
+        self._link = link
+        self._servos = servos
+        self._roster = roster
+        self._state = state
+        self._fast = fast_sync
+        self._margin_s = margin_s
+        self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
+        offsets = np.array([servo.offset_rad for servo in servos])
+        self._at_pulse_zero = offsets - CENTRE_PULSE * self._per_pulse
+        self._per_velocity = np.array(
+            [servo.model.velocity_unit_rad_s * servo.sign * servo.joint_per_rad for servo in servos]
+        )
+        self._per_effort = np.array(
+            [servo.model.effort_unit_ratio * servo.sign for servo in servos]
+        )
+        self._stamps_ns = np.full(len(servos), _NEVER_NS, dtype=np.int64)
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """Prepare the request for the servos that are polled now."""
+        polled = self._roster.polled
+        ids = [self._servos[index].id for index in polled]
+        self._block = BlockRead(ids, fast=self._fast)
+        self._rows: _Rows = _EVERYONE if len(ids) == len(self._servos) else np.array(polled)
+
+    def read(self) -> None:
+        """Run one block read and update the state's first group.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        request = self._block.sync_read
+        reply, deadline_ns = self._link.exchange(
+            request.request, request.reply_bytes, self._margin_s
+        )
+        counters = self._link.counters
+        counters.cycles += 1
+        records = self._block.match(reply)
+        if records is not None:
+            self._roster.note_complete()
+            self._store(records, self._rows)
+            return
+        records, indices = self._frame_anew(reply, deadline_ns)
+        complete = len(indices) == len(self._roster.polled)
+        counters.stuffed += complete
+        counters.partial_cycles += not complete
+        self._store(records, np.array(indices, dtype=np.intp))
+        self._review_roster(indices)
+
+    def _frame_anew(self, reply: bytes, deadline_ns: int) -> tuple[Records, list[int]]:
+        entries = self._link.collect(self._block.sync_read, reply, deadline_ns)
+        indices = [index for index in self._roster.polled if self._servos[index].id in entries]
+        ids = [self._servos[index].id for index in indices]
+        return records_of(entries, ids), indices
+
+    def _review_roster(self, answered: list[int]) -> None:
+        if len(answered) == len(self._roster.polled):
+            self._roster.note_complete()
+        elif dropped := self._roster.note_partial(answered, chained=self._fast):
+            self._link.counters.suspensions += len(dropped)
+            self.rebuild()
+
+    def _store(self, records: Records, rows: _Rows) -> None:
+        state = self._state
+        now_ns = self._link.now_ns()
+        state.position_rad[rows] = (
+            records["position"] * self._per_pulse[rows] + self._at_pulse_zero[rows]
+        )
+        state.velocity_rad_s[rows] = records["velocity"] * self._per_velocity[rows]
+        state.effort_ratio[rows] = records["effort"] * self._per_effort[rows]
+        state.alert[rows] = records["error"] >= ALERT
+        state.valid[:] = False
+        state.valid[rows] = True
+        self._stamps_ns[rows] = now_ns
+        state.stamp_ns = now_ns
+        if isinstance(rows, slice):
+            state.age_s[:] = 0.0
+        else:
+            state.age_s[:] = np.where(
+                self._stamps_ns == _NEVER_NS, np.inf, (now_ns - self._stamps_ns) / NS_PER_S
+            )

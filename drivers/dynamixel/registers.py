@@ -1,0 +1,163 @@
+"""Read and write registers by name, one servo at a time or many at once."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from drivers.dynamixel.codec import Instruction
+from drivers.dynamixel.control_table import Register
+from drivers.dynamixel.link import Link, Patience
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.sync_read import SyncRead
+
+SETUP: Final = Patience(margin_s=0.02, attempts=3)
+"""For what is asked before or after motion, when a retry costs nothing."""
+
+_PING_ANSWER_BYTES: Final = 3
+
+
+def register_of(servo: ServoSpec, name: str) -> Register:
+    """Return a servo's register.
+
+    Raises:
+        ValueError: the model has no register of this name.
+    """
+    try:
+        return servo.model.registers[name]
+    except KeyError:
+        raise ValueError(
+            f"{servo}: no register {name!r}; it has {', '.join(servo.model.registers)}"
+        ) from None
+
+
+class Registers:
+    """Turn register names into transactions; an alert bit is no failure of a transaction.
+
+    All methods that wait for an answer raise ServoSilent, CorruptReply or Rejected (a class per
+    reason) for the servo, and LinkLost when the adapter is gone.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    def ping(self, servo: ServoSpec, patience: Patience = SETUP) -> tuple[int, int]:
+        """Return a servo's model number and firmware version.
+
+        Raises:
+            ServoSilent: no answer.
+        """
+        packet = self._link.request(
+            servo.id,
+            Instruction.PING,
+            b"",
+            answer_bytes=_PING_ANSWER_BYTES,
+            patience=patience,
+            name=f"ping {servo}",
+        )
+        return int.from_bytes(packet.params[:2], "little"), packet.params[2]
+
+    def read(self, servo: ServoSpec, name: str, patience: Patience = SETUP) -> int:
+        """Return a register's value.
+
+        Raises:
+            ValueError: the model has no such register.
+            ServoSilent: no answer.
+        """
+        register = register_of(servo, name)
+        return register.from_bytes(self.read_span(servo, register.address, register.size, patience))
+
+    def read_span(
+        self, servo: ServoSpec, address: int, size: int, patience: Patience = SETUP
+    ) -> bytes:
+        """Return the bytes of neighbouring registers, read at one instant.
+
+        Raises:
+            ServoSilent: no answer.
+        """
+        packet = self._link.request(
+            servo.id,
+            Instruction.READ,
+            address.to_bytes(2, "little") + size.to_bytes(2, "little"),
+            answer_bytes=size,
+            patience=patience,
+            name=f"read {servo} address {address}, {size} bytes",
+        )
+        return packet.params
+
+    def write(self, servo: ServoSpec, name: str, value: int, patience: Patience = SETUP) -> None:
+        """Write a register and wait for the servo's consent.
+
+        Raises:
+            ValueError: no such register, not writable, or the value does not fit its bytes.
+            Rejected: the servo refuses; the class tells why.
+            ServoSilent: no answer.
+        """
+        register = register_of(servo, name)
+        self._link.request(
+            servo.id,
+            Instruction.WRITE,
+            register.address.to_bytes(2, "little") + _encode(servo, register, value),
+            answer_bytes=0,
+            patience=patience,
+            name=f"write {servo} {name} = {value}",
+        )
+
+    def read_many(self, name: str, servos: Sequence[ServoSpec]) -> dict[int, int]:
+        """Return a register of many servos by id; silent servos are left out.
+
+        A sync read is a broadcast, so it feeds the Bus Watchdog of every servo.
+
+        Raises:
+            ValueError: a model has no such register.
+        """
+        register = register_of(servos[0], name)
+        ids = [servo.id for servo in servos]
+        entries = self._link.sync_read(
+            SyncRead(ids, register.address, register.size, fast=False), SETUP
+        )
+        return {servo_id: register.from_bytes(entry.data) for servo_id, entry in entries.items()}
+
+    def write_many(self, name: str, servos: Sequence[ServoSpec], value: int) -> None:
+        """Write a register of many servos at one instant; nobody answers.
+
+        Raises:
+            ValueError: no such register, not writable, or the value does not fit its bytes.
+        """
+        register = register_of(servos[0], name)
+        data = _encode(servos[0], register, value)
+        head = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
+        params = head + b"".join(bytes((servo.id,)) + data for servo in servos)
+        self._link.broadcast(Instruction.SYNC_WRITE, params)
+
+    def reboot(self, servo: ServoSpec) -> None:
+        """Restart a servo's firmware, the only way out of a shutdown.
+
+        Raises:
+            ServoSilent: no answer.
+        """
+        self._link.request(
+            servo.id,
+            Instruction.REBOOT,
+            b"",
+            answer_bytes=0,
+            patience=Patience(margin_s=SETUP.margin_s, attempts=1),
+            name=f"reboot {servo}",
+        )
+
+
+def decode(servo: ServoSpec, image: bytes, start: int, name: str) -> int:
+    """Return a register's value out of a span that starts at address `start`."""
+    register = register_of(servo, name)
+    first = register.address - start
+    return register.from_bytes(image[first : first + register.size])
+
+
+def _encode(servo: ServoSpec, register: Register, value: int) -> bytes:
+    if not register.writable:
+        raise ValueError(f"{servo}: register {register.name} is read-only")
+    try:
+        return register.to_bytes(value)
+    except OverflowError:
+        raise ValueError(
+            f"{servo}: {register.name} must fit in {register.size} bytes and lie in "
+            f"{register.minimum}..{register.maximum}, got {value}"
+        ) from None

@@ -1,0 +1,82 @@
+"""Hold what is known of all servos of a bus, on the joint side."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.dynamixel.control_table import HardwareError
+from drivers.dynamixel.servo import ServoSpec
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(slots=True, eq=False)
+class BusState:
+    """Hold arrays in the order of the servos; the bus overwrites them in every cycle.
+
+    The first group comes with each cycle's block read. A servo that gave no value keeps its last
+    one: then `valid` is False and `age_s` grows (infinite before the first value). The second group
+    is polled a servo at a time; NaN and -2 mean that it was not read yet.
+    """
+
+    position_rad: Floats
+    velocity_rad_s: Floats
+    effort_ratio: Floats
+    """Present current over stall current, or present load; signed like the joint."""
+    age_s: Floats
+    valid: Bools
+    alert: Bools
+    """The servo reports a hardware error; `error` follows in the same cycle or the next ones."""
+
+    error: NDArray[np.uint8]
+    """Bits of `HardwareError`."""
+    torque_on: Bools
+    watchdog: NDArray[np.int16]
+    """bus_watchdog (98): 0 off, 1..127 armed in units of 20 ms, -1 tripped."""
+    voltage_v: Floats
+    temperature_c: Floats
+
+    stamp_ns: int = 0
+
+    @classmethod
+    def of(cls, count: int) -> "BusState":
+        """Return the state of `count` servos of which nothing is known."""
+        return cls(
+            position_rad=np.full(count, np.nan),
+            velocity_rad_s=np.full(count, np.nan),
+            effort_ratio=np.full(count, np.nan),
+            age_s=np.full(count, np.inf),
+            valid=np.zeros(count, dtype=np.bool_),
+            alert=np.zeros(count, dtype=np.bool_),
+            error=np.zeros(count, dtype=np.uint8),
+            torque_on=np.zeros(count, dtype=np.bool_),
+            watchdog=np.full(count, -2, dtype=np.int16),
+            voltage_v=np.full(count, np.nan),
+            temperature_c=np.full(count, np.nan),
+        )
+
+    def copy(self) -> "BusState":
+        """Return a state that the next cycle does not change."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return BusState(
+            **{
+                name: value.copy() if name != "stamp_ns" else value
+                for name, value in values.items()
+            }
+        )
+
+    def faults(self, servos: Sequence[ServoSpec]) -> list[str]:
+        """Return a line for each servo that reports a hardware error."""
+        return [
+            f"{servo}: {hardware_error_text(int(bits))}"
+            for servo, bits in zip(servos, self.error, strict=True)
+            if bits
+        ]
+
+
+def hardware_error_text(bits: int) -> str:
+    """Return hardware error bits in words."""
+    return ", ".join((bit.name or "").lower().replace("_", " ") for bit in HardwareError(bits))
