@@ -9,16 +9,16 @@ from sim_twin.errors import ModelMismatch
 
 STEP_S = 0.002
 ROBOT_ROOT = "base"
-ROBOT_LOOKS_GROUP = 4
-ROBOT_COLLISION_GROUP = 5
-_LAST_LOOKS_GROUP = 2
+ROBOT_LOOKS_GROUP = 2
+ROBOT_COLLISION_GROUP = 3
+"""The world keeps to groups 0 and 1 for what is seen, 4 for collision shapes that are not."""
 _FILM_SIZE = (640, 480)
 
 
 def compose(robot_xml: Path, world_xml: Path) -> mujoco.MjModel:
     """Put the robot into the world and return the compiled model.
 
-    The robot's geoms move to groups 4 (looks) and 5 (collision), so that rays can pass them by.
+    The robot's geoms move to groups 2 (looks) and 3 (collision), so that rays can pass them by.
 
     Raises:
         ModelMismatch: a file does not compile, or the robot has no root body `base`.
@@ -28,7 +28,7 @@ def compose(robot_xml: Path, world_xml: Path) -> mujoco.MjModel:
     if robot.body(ROBOT_ROOT) is None:
         raise ModelMismatch(f"{robot_xml}: expected a root body named {ROBOT_ROOT!r}, found none")
     for geom in robot.geoms:
-        looks = geom.group <= _LAST_LOOKS_GROUP
+        looks = geom.group <= ROBOT_LOOKS_GROUP
         geom.group = ROBOT_LOOKS_GROUP if looks else ROBOT_COLLISION_GROUP
     _set_options(world)
     try:

@@ -12,7 +12,7 @@ from sim_twin.sensors.imu import ImuTruth
 BEAMS = 360
 RANGE_CUTOFF_M = 25.0
 ACCELEROMETER = "imu_accelerometer"
-_WORLD_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+_WORLD_GROUPS = np.array([1, 1, 0, 0, 0, 0], np.uint8)
 
 
 class RangeProbe:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from sim_twin.errors import OpenGLMissing
 
 APT_LINE = "apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
-VISIBLE_GROUPS = (1, 1, 1, 0, 1, 0)
-"""Groups 0-2 are the world's looks, 4 the robot's; 3 and 5 are collision shapes."""
+VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
+"""Groups 0 and 1 are the world's looks, 2 the robot's; the others are collision shapes."""
 
 
 class GLContext(Protocol):

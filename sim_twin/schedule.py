@@ -1,6 +1,6 @@
 """Step nodes by due time on simulated time, in one process and in a repeatable order."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -32,9 +32,9 @@ class Schedule:
     when it is killed, as the kernel does for a dead process.
     """
 
-    def __init__(self, simulation: Simulation, opened: list[Closable] | None = None) -> None:
+    def __init__(self, simulation: Simulation, opened: Sequence[Closable] = ()) -> None:
         self._simulation = simulation
-        self._opened = [] if opened is None else opened
+        self._opened = opened
         self._entries: list[_Entry] = []
 
     @property

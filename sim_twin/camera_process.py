@@ -1,0 +1,115 @@
+"""Render in a process of its own, so that drawing a frame never holds up physics or buses.
+
+It mirrors the physics' positions, serves the RGB-D camera's stream and shoots the film.
+"""
+
+import argparse
+import select
+import signal
+import socket
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+
+from sim_twin.errors import TwinError
+from sim_twin.film_desk import FilmDesk
+from sim_twin.head_camera import HeadCamera
+from sim_twin.json_line_server import JsonLineServer
+from sim_twin.lifetime import die_with_parent
+from sim_twin.load import load_model
+from sim_twin.mirror import MirrorState, newest_state
+from sim_twin.referee import FILM_SOCKET
+from sim_twin.stream_line import StreamLine
+from vla_deploy.robots import load_robot
+
+READY = b"ready"
+_IDLE_S = 0.5
+
+
+class Studio:
+    """Draw what the mirror shows, for the camera's client and for the film."""
+
+    def __init__(self, robot_name: str, world: str, seed: int, devices_dir: Path) -> None:
+        """Open OpenGL and serve the sockets.
+
+        Raises:
+            TwinError: the model does not load, or nothing can be rendered here.
+        """
+        robot = load_robot(robot_name)
+        self._model = load_model(robot, world)
+        self._data = mujoco.MjData(self._model)
+        self._camera = HeadCamera(self._model, self._data, robot.camera, seed)
+        self._camera.open()
+        self._stream = StreamLine(
+            self._camera.device, devices_dir / robot.camera.device, self._camera.hang_up
+        )
+        self._desk = FilmDesk(self._model, self._data)
+        self._film_server = JsonLineServer(devices_dir / FILM_SOCKET, self._desk.answer)
+
+    def run(self, mirror: socket.socket) -> None:
+        """Serve until the mirror's other end closes."""
+        while True:
+            self._wait(mirror)
+            self._stream.poll_once()
+            self._film_server.poll_once()
+            try:
+                state = newest_state(mirror)
+            except EOFError:
+                return
+            if state is not None:
+                self._show(state)
+
+    def close(self) -> None:
+        """Finish the film and take the sockets away."""
+        self._desk.close()
+        self._film_server.close()
+        self._stream.close()
+        self._camera.close()
+
+    def _wait(self, mirror: socket.socket) -> None:
+        readable = [mirror.fileno(), *self._stream.filenos(), *self._film_server.filenos()]
+        select.select(readable, self._stream.output_filenos(), [], _IDLE_S)
+
+    def _show(self, state: MirrorState) -> None:
+        """Take over a state; stamp camera frames with wall time, which never slips."""
+        self._data.qpos[:] = state.qpos
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        if not self._stream.is_backed_up:
+            self._camera.device.step(state.wall_ns)
+        self._desk.shoot_if_due(state.now_ns)
+        self._stream.poll_once()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the studio until its parent ends; 2 when it cannot start."""
+    parser = argparse.ArgumentParser(prog="python -m sim_twin.camera_process")
+    parser.add_argument("--robot", required=True)
+    parser.add_argument("--world", required=True)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--devices-dir", type=Path, required=True)
+    parser.add_argument("--mirror-fd", type=int, required=True)
+    parser.add_argument("--parent-pid", type=int, required=True)
+    options = parser.parse_args(argv)
+    die_with_parent(options.parent_pid, signal.SIGKILL)
+    # Ctrl-C reaches the whole group; the twin tells this process when to end, by closing the mirror.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    mirror = socket.socket(fileno=options.mirror_fd)
+    try:
+        studio = Studio(options.robot, options.world, options.seed, options.devices_dir)
+    except TwinError as error:
+        sys.stderr.write(f"twin camera: {error}\n")
+        return 2
+    mirror.send(READY)
+    try:
+        studio.run(mirror)
+    finally:
+        studio.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

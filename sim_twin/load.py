@@ -1,0 +1,62 @@
+"""Load a robot into a world: the composed model, and its state at the start of a run."""
+
+from pathlib import Path
+
+import mujoco
+
+from sim_twin.compose import ROBOT_ROOT, compose
+from sim_twin.engine import Engine
+from sim_twin.errors import ModelMismatch
+from sim_twin.shafts import Shaft
+from sim_twin.worlds.placement import draw_poses
+from vla_deploy.robots import RobotDescription
+
+WORLDS_DIR = Path(__file__).parent / "worlds"
+
+
+def world_names() -> tuple[str, ...]:
+    """Return the names of the worlds that come with the twin."""
+    return tuple(sorted(path.stem for path in WORLDS_DIR.glob("*.xml")))
+
+
+def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
+    """Compose robot and world.
+
+    Raises:
+        ModelMismatch: there is no such world, or the two do not fit together.
+    """
+    path = WORLDS_DIR / f"{world}.xml"
+    if not path.is_file():
+        known = ", ".join(world_names())
+        raise ModelMismatch(f"no world {world!r} in {WORLDS_DIR}; there are {known}")
+    return compose(robot.mjcf_path, path)
+
+
+def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:
+    """Return the physics with the robot at its start pose and the objects where the seed puts them.
+
+    Raises:
+        ModelMismatch: there is no such world, or robot and world do not fit together.
+    """
+    engine = Engine(load_model(robot, world), servo_shafts(robot), drive_shafts(robot))
+    start = robot.start_pose
+    engine.place(ROBOT_ROOT, start.x_m, start.y_m, 0.0, start.yaw_rad)
+    for name, pose in draw_poses(world, seed).items():
+        engine.place(name, *pose.position_m, pose.yaw_rad)
+    return engine
+
+
+def servo_shafts(robot: RobotDescription) -> list[Shaft]:
+    """Return how each servo's shaft drives its joint."""
+    return [
+        Shaft(joint=servo.joint, offset=servo.offset, ratio=servo.sign * servo.travel_per_rad)
+        for servo in robot.servo_bus.servos
+    ]
+
+
+def drive_shafts(robot: RobotDescription) -> list[Shaft]:
+    """Return how each drive's shaft turns its wheel."""
+    return [
+        Shaft(joint=drive.joint, ratio=drive.sign / drive.gear_ratio)
+        for drive in robot.can_bus.drives
+    ]

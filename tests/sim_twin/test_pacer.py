@@ -1,0 +1,49 @@
+from sim_twin.pacer import Pacer, RealTimeFactor
+
+MS = 1_000_000
+
+
+def steps_due(pacer: Pacer, wall_ns: int) -> int:
+    steps = 0
+    while pacer.due(wall_ns):
+        pacer.stepped()
+        steps += 1
+    return steps
+
+
+def test_a_step_falls_due_every_period() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    assert [steps_due(pacer, wall) for wall in (0, 1 * MS, 2 * MS, 4 * MS)] == [1, 0, 1, 1]
+
+
+def test_the_wait_lasts_until_the_next_step() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    steps_due(pacer, 0)
+    assert pacer.wait_ns(MS) == MS
+    assert pacer.wait_ns(3 * MS) == 0
+
+
+def test_a_lag_within_the_cap_is_caught_up() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    assert steps_due(pacer, 20 * MS) == 11
+    assert pacer.slipped_ns == 0
+
+
+def test_a_lag_beyond_the_cap_slips_instead_of_bursting() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    assert steps_due(pacer, 1000 * MS) == 11
+    assert pacer.slipped_ns == 980 * MS
+
+
+def test_time_that_slipped_is_never_made_up_later() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    steps_due(pacer, 1000 * MS)
+    assert steps_due(pacer, 1004 * MS) == 2
+
+
+def test_the_real_time_factor_is_that_of_the_last_whole_window() -> None:
+    factor = RealTimeFactor(wall_ns=0, now_ns=0)
+    factor.update(500 * MS, 100 * MS)
+    assert factor.value == 1.0
+    factor.update(1000 * MS, 500 * MS)
+    assert factor.value == 0.5
