@@ -1,0 +1,51 @@
+"""Produce and consume heartbeats on simulated time (CiA 301, 1016 and 1017)."""
+
+from drivers.canopen.objects import HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER
+from sim_twin.can.object_dictionary import ObjectDictionary
+
+NS_PER_MS = 1_000_000
+
+
+class HeartbeatProducer:
+    """Tell when the next heartbeat is due."""
+
+    def __init__(self, objects: ObjectDictionary) -> None:
+        self._objects = objects
+        self._next_ns = 0
+
+    def due(self, now_ns: int) -> bool:
+        """Tell whether to send one now, and plan the next."""
+        period_ns = self._objects.get(HEARTBEAT_PRODUCER) * NS_PER_MS
+        if not period_ns or now_ns < self._next_ns:
+            return False
+        self._next_ns = max(self._next_ns + period_ns, now_ns)
+        return True
+
+
+class HeartbeatConsumer:
+    """Watch one producer from its first heartbeat on, as the standard has it."""
+
+    def __init__(self, objects: ObjectDictionary) -> None:
+        self._objects = objects
+        self._heard_ns: int | None = None
+
+    @property
+    def node_id(self) -> int:
+        """Return the node that is watched; 0 is nobody."""
+        return self._objects.get(HEARTBEAT_CONSUMER, 1) >> 16 & 0x7F
+
+    def hear(self, now_ns: int) -> None:
+        """Note a heartbeat of the watched node."""
+        self._heard_ns = now_ns
+
+    def forget(self) -> None:
+        """Watch again only after the next heartbeat."""
+        self._heard_ns = None
+
+    def expired(self, now_ns: int) -> bool:
+        """Tell once that the producer has gone silent."""
+        limit_ns = (self._objects.get(HEARTBEAT_CONSUMER, 1) & 0xFFFF) * NS_PER_MS
+        if self._heard_ns is None or not limit_ns or now_ns - self._heard_ns <= limit_ns:
+            return False
+        self.forget()
+        return True
