@@ -1,0 +1,116 @@
+"""Read a world's description and draw where its objects lie: the same seed, the same poses."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import hypot
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+WORLDS_DIR = Path(__file__).parent
+MAX_DRAWS = 1000
+
+
+class BodyPose(NamedTuple):
+    """Place an upright body: its origin and its turn about the vertical."""
+
+    x_m: float
+    y_m: float
+    z_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldObject:
+    """Describe one free object and the region in which it may lie."""
+
+    name: str
+    class_name: str
+    colour: str
+    surface: str
+    rest_height_m: float
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    yaw_rad: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldSpec:
+    """Describe a world: its MJCF, the robot's start and the objects in the order of drawing."""
+
+    name: str
+    mjcf_path: Path
+    start: BodyPose
+    min_distance_m: float
+    surfaces: Mapping[str, float]
+    objects: Mapping[str, WorldObject]
+
+
+def load_world(name: str) -> WorldSpec:
+    """Return the world of that name.
+
+    Raises:
+        FileNotFoundError: there is no such world; the message lists those there are.
+    """
+    file = WORLDS_DIR / f"{name}.toml"
+    if not file.is_file():
+        known = ", ".join(sorted(path.stem for path in WORLDS_DIR.glob("*.toml")))
+        raise FileNotFoundError(f"no world {name!r} under {WORLDS_DIR}; there is {known}")
+    document = tomllib.loads(file.read_text(encoding="utf-8"))
+    start = document["start"]
+    return WorldSpec(
+        name=document["name"],
+        mjcf_path=WORLDS_DIR / document["mjcf"],
+        start=BodyPose(start["x_m"], start["y_m"], 0.0, start["yaw_rad"]),
+        min_distance_m=document["min_distance_m"],
+        surfaces=document["surfaces"],
+        objects={name: _object(name, row) for name, row in document["objects"].items()},
+    )
+
+
+def _object(name: str, row: Mapping[str, Any]) -> WorldObject:
+    return WorldObject(
+        name=name,
+        class_name=row["class"],
+        colour=row["colour"],
+        surface=row["surface"],
+        rest_height_m=row["rest_height_m"],
+        x_m=(row["x_m"][0], row["x_m"][1]),
+        y_m=(row["y_m"][0], row["y_m"][1]),
+        yaw_rad=(row["yaw_rad"][0], row["yaw_rad"][1]),
+    )
+
+
+def draw_poses(world: WorldSpec, seed: int) -> dict[str, BodyPose]:
+    """Return a pose for each object, no two nearer to each other than the world allows.
+
+    Raises:
+        ValueError: the regions are too small for the objects and the distance between them.
+    """
+    random = np.random.default_rng(seed)
+    poses: dict[str, BodyPose] = {}
+    for item in world.objects.values():
+        poses[item.name] = _draw_free(world, item, poses, random)
+    return poses
+
+
+def _draw_free(
+    world: WorldSpec,
+    item: WorldObject,
+    taken: Mapping[str, BodyPose],
+    random: np.random.Generator,
+) -> BodyPose:
+    z_m = world.surfaces[item.surface] + item.rest_height_m
+    for _ in range(MAX_DRAWS):
+        x_m, y_m, yaw_rad = (
+            float(random.uniform(*span)) for span in (item.x_m, item.y_m, item.yaw_rad)
+        )
+        gaps = (hypot(x_m - other.x_m, y_m - other.y_m) for other in taken.values())
+        if all(gap >= world.min_distance_m for gap in gaps):
+            return BodyPose(x_m, y_m, z_m, yaw_rad)
+    raise ValueError(
+        f"{world.name}: no room for {item.name} on {item.surface} after {MAX_DRAWS} draws; "
+        f"widen its region or lower min_distance_m ({world.min_distance_m} m)"
+    )
