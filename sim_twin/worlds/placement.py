@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,11 @@ WORLDS_DIR = Path(__file__).parent
 MAX_DRAWS = 1000
 
 
-class BodyPose(NamedTuple):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyPose:
     """Place an upright body: its origin and its turn about the vertical."""
 
-    x_m: float
-    y_m: float
-    z_m: float
+    position_m: tuple[float, float, float]
     yaw_rad: float
 
 
@@ -38,11 +37,10 @@ class WorldObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldSpec:
-    """Describe a world: its MJCF, the robot's start and the objects in the order of drawing."""
+    """Describe a world: its MJCF, its surfaces and the objects in the order of drawing."""
 
     name: str
     mjcf_path: Path
-    start: BodyPose
     min_distance_m: float
     surfaces: Mapping[str, float]
     objects: Mapping[str, WorldObject]
@@ -59,11 +57,9 @@ def load_world(name: str) -> WorldSpec:
         known = ", ".join(sorted(path.stem for path in WORLDS_DIR.glob("*.toml")))
         raise FileNotFoundError(f"no world {name!r} under {WORLDS_DIR}; there is {known}")
     document = tomllib.loads(file.read_text(encoding="utf-8"))
-    start = document["start"]
     return WorldSpec(
         name=document["name"],
         mjcf_path=WORLDS_DIR / document["mjcf"],
-        start=BodyPose(start["x_m"], start["y_m"], 0.0, start["yaw_rad"]),
         min_distance_m=document["min_distance_m"],
         surfaces=document["surfaces"],
         objects={name: _object(name, row) for name, row in document["objects"].items()},
@@ -83,16 +79,18 @@ def _object(name: str, row: Mapping[str, Any]) -> WorldObject:
     )
 
 
-def draw_poses(world: WorldSpec, seed: int) -> dict[str, BodyPose]:
+def draw_poses(world: str, seed: int) -> dict[str, BodyPose]:
     """Return a pose for each object, no two nearer to each other than the world allows.
 
     Raises:
+        FileNotFoundError: there is no such world.
         ValueError: the regions are too small for the objects and the distance between them.
     """
+    spec = load_world(world)
     random = np.random.default_rng(seed)
     poses: dict[str, BodyPose] = {}
-    for item in world.objects.values():
-        poses[item.name] = _draw_free(world, item, poses, random)
+    for item in spec.objects.values():
+        poses[item.name] = _draw_free(spec, item, poses, random)
     return poses
 
 
@@ -107,9 +105,11 @@ def _draw_free(
         x_m, y_m, yaw_rad = (
             float(random.uniform(*span)) for span in (item.x_m, item.y_m, item.yaw_rad)
         )
-        gaps = (hypot(x_m - other.x_m, y_m - other.y_m) for other in taken.values())
+        gaps = (
+            hypot(x_m - other.position_m[0], y_m - other.position_m[1]) for other in taken.values()
+        )
         if all(gap >= world.min_distance_m for gap in gaps):
-            return BodyPose(x_m, y_m, z_m, yaw_rad)
+            return BodyPose(position_m=(x_m, y_m, z_m), yaw_rad=yaw_rad)
     raise ValueError(
         f"{world.name}: no room for {item.name} on {item.surface} after {MAX_DRAWS} draws; "
         f"widen its region or lower min_distance_m ({world.min_distance_m} m)"
