@@ -4,6 +4,7 @@ PlanningError
 ├── NotUnderstood     say it in other words
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
+├── NotReady          reset and arm the robot first
 └── PlanInvalid       mend the plan; carries every fault
 """
 
@@ -38,6 +39,10 @@ class UnknownObject(PlanningError):
         super().__init__(
             f'I do not know the object "{name}"; I can handle: {", ".join(sorted(known))}'
         )
+
+
+class NotReady(PlanningError):
+    """Say why the robot may not move now, and what to do about it."""
 
 
 class PlanInvalid(PlanningError):

@@ -8,11 +8,14 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellReader, RingReader, RingWriter, SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.dialects import parse_plan
-from vla_deploy.planning.errors import PlanningError
+from vla_deploy.planning.errors import NotReady, PlanningError
 from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.planning.rules import is_stop, plan_command
-from vla_deploy.planning.validator import World, check_plan
+from vla_deploy.planning.validator import World, check_plan, spoken_places
 from vla_deploy.robots import RobotDescription
+
+STATUS_AGE_S = 2.0
 
 
 class PlannerNode:
@@ -29,6 +32,7 @@ class PlannerNode:
         self._events: RingWriter
         self._pose: CellReader
         self._executor: CellReader
+        self._control: CellReader
 
     def start(self) -> None:
         """Open the topics; commands given before this moment are not replayed."""
@@ -37,6 +41,7 @@ class PlannerNode:
         self._events = self._space.ring_writer("task_event")
         self._pose = self._space.cell_reader("pose")
         self._executor = self._space.cell_reader("executor_status")
+        self._control = self._space.cell_reader("control_status")
 
     def step(self) -> None:
         """Answer every command that has come in."""
@@ -55,6 +60,7 @@ class PlannerNode:
             return
         try:
             plan = self._plan(utterance, text)
+            self._check_ready()
         except PlanningError as error:
             refusal = {"command_id": command_id, "event": "rejected", "reason": str(error)}
             self._events.publish(refusal)
@@ -65,7 +71,7 @@ class PlannerNode:
         self._plans.publish({"command_id": command_id, "plan": document})
 
     def _plan(self, utterance: Mapping[str, Any], text: str) -> Plan:
-        world = self._world()
+        world = world_of(self._robot, self._holding())
         if "plan" in utterance:
             given = utterance["plan"]
             plan = parse_plan(given if isinstance(given, dict | list) else json.dumps(given))
@@ -74,12 +80,16 @@ class PlannerNode:
         check_plan(plan, world)
         return plan
 
-    def _world(self) -> World:
-        return world_of(self._robot, self._holding())
+    def _check_ready(self) -> None:
+        sample = self._control.latest()
+        fresh = sample is not None and sample.age_s(self._clock.now_ns()) < STATUS_AGE_S
+        refusal = refusal_of(sample.document() if sample is not None and fresh else None)
+        if refusal:
+            raise NotReady(refusal)
 
     def _holding(self) -> Mapping[str, str | None]:
         sample = self._executor.latest()
-        if sample is None or sample.age_s(self._clock.now_ns()) > _STATUS_AGE_S:
+        if sample is None or sample.age_s(self._clock.now_ns()) > STATUS_AGE_S:
             return {}
         holding: Mapping[str, str | None] = sample.document().get("holding", {})
         return holding
@@ -91,14 +101,8 @@ class PlannerNode:
         return tuple(float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))  # type: ignore[return-value]
 
 
-_STATUS_AGE_S = 2.0
-
-
 def world_of(robot: RobotDescription, holding: Mapping[str, str | None]) -> World:
     """Return what plans for this robot may refer to."""
-    spoken = {
-        name.replace("_", " ").lower(): place.name
-        for place in robot.places.values()
-        for name in (place.name, *place.aliases)
-    }
-    return World(places=spoken, poses=frozenset(robot.poses), holding=dict(holding))
+    return World(
+        places=spoken_places(robot.places), poses=frozenset(robot.poses), holding=dict(holding)
+    )

@@ -9,7 +9,8 @@ from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, SKILLS, Parameter, 
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
 from vla_deploy.planning.graph import dependency_faults
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.references import match_place, parse_object
+from vla_deploy.planning.references import match_place, parse_object, words_of
+from vla_deploy.robots.description import Place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,6 +24,15 @@ class World:
     places: Mapping[str, str]
     poses: frozenset[str]
     holding: Mapping[str, str | None]
+
+
+def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:
+    """Map every name by which a place may be called, in lower case, to the place."""
+    return {
+        " ".join(words_of(spoken.replace("_", " "))): place.name
+        for place in places.values()
+        for spoken in (place.name, *place.aliases)
+    }
 
 
 def check_plan(plan: Plan, world: World) -> None:

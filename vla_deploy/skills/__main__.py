@@ -1,0 +1,19 @@
+"""Run the executor process: `python -m vla_deploy.skills --run-dir D --robot butler`."""
+
+import sys
+
+from platforms.profile import load_profile
+from vla_deploy.node import NodeContext
+from vla_deploy.process_main import main
+from vla_deploy.robots import load_robot
+from vla_deploy.skills.node import ExecutorNode
+
+
+def build(context: NodeContext) -> ExecutorNode:
+    """Build the node from what the process was started with."""
+    profile = load_profile(context.profile)
+    return ExecutorNode(context, load_robot(context.robot), profile.executor_rate_hz)
+
+
+if __name__ == "__main__":
+    sys.exit(main("executor", build))

@@ -1,0 +1,197 @@
+"""Move arms and grippers: carry poses, named poses, open, close, and what the fingers feel."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vla_deploy.manipulation.errors import ManipulationError
+from vla_deploy.manipulation.grasps import hand_down
+from vla_deploy.skills.context import Held, Skill, SkillContext
+from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.motion import follow_joints, move_joints, pause, settle
+
+AT_POSE_RAD = 0.05
+TUCK = "tuck"
+# Where a loaded hand travels, in the base frame: pointing down, close in front of the chest.
+CARRY_POINT_M = (0.27, 0.16, 0.72)
+CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30))
+FULL_EFFORT = 0.5
+GENTLE_EFFORT = 0.25
+# An empty gripper stops where it was sent; fingers on an object stop this much earlier, pressing.
+HELD_OPENING_M = 0.004
+HELD_EFFORT_SHARE = 0.4
+CLOSE_TIME_S = 0.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touch:
+    """Say what the fingers feel: their opening, how far short of the goal, and their effort."""
+
+    opening_m: float
+    short_of_goal_m: float
+    effort_ratio: float
+
+    def holds(self, effort_limit: float) -> bool:
+        """Tell whether something keeps the fingers apart under pressure."""
+        pressing = self.effort_ratio > HELD_EFFORT_SHARE * effort_limit
+        return self.short_of_goal_m > HELD_OPENING_M and pressing
+
+
+def opening_of(context: SkillContext, hand: str) -> float:
+    """Return the distance between a hand's fingers in metres."""
+    described = context.robot.hands[hand]
+    index = context.robot.joint_index[described.gripper]
+    return float(context.link.positions[index]) * described.opening_ratio
+
+
+def feel(context: SkillContext, hand: str, goal_opening_m: float) -> Touch:
+    """Return what a hand's fingers feel now."""
+    index = context.robot.joint_index[context.robot.hands[hand].gripper]
+    opening_m = opening_of(context, hand)
+    return Touch(
+        opening_m=opening_m,
+        short_of_goal_m=opening_m - goal_opening_m,
+        effort_ratio=abs(float(context.link.efforts[index])),
+    )
+
+
+def set_opening(
+    context: SkillContext, hand: str, opening_m: float, effort_ratio: float = FULL_EFFORT
+) -> Skill:
+    """Send a hand's fingers to an opening with a bounded effort."""
+    described = context.robot.hands[hand]
+    limits = context.robot.limits[described.gripper]
+    position = min(max(opening_m / described.opening_ratio, limits.min), limits.max)
+    targets = {described.gripper: position}
+    yield from move_joints(context, targets, effort_ratio={described.gripper: effort_ratio})
+    yield from pause(context, CLOSE_TIME_S)
+
+
+def open_gripper(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Open one hand, or both; what was held is let go."""
+    for hand in _hands(context, parameters):
+        limits = context.robot.limits[context.robot.hands[hand].gripper]
+        yield from set_opening(context, hand, limits.max * context.robot.hands[hand].opening_ratio)
+        context.hands[hand] = None
+
+
+def close_gripper(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Close one hand, or both, gently; remember it if something is between the fingers."""
+    for hand in _hands(context, parameters):
+        yield from set_opening(context, hand, 0.0, GENTLE_EFFORT)
+        touch = feel(context, hand, _smallest(context, hand))
+        if touch.holds(GENTLE_EFFORT) and context.hands.get(hand) is None:
+            context.hands[hand] = Held(
+                kind="object", colour="", width_m=touch.opening_m, below_grip_m=0.05
+            )
+
+
+def recall_hands(context: SkillContext) -> bool:
+    """Find out by touch what the hands hold after a restart; return False until it can be felt."""
+    try:
+        for hand in context.robot.hands:
+            touch = feel(context, hand, _smallest(context, hand))
+            held = touch.holds(GENTLE_EFFORT)
+            context.hands[hand] = (
+                Held(kind="object", colour="", width_m=touch.opening_m, below_grip_m=0.06)
+                if held
+                else None
+            )
+    except TryAgain:
+        return False
+    return True
+
+
+def move_arm(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Bring the arms, or one arm, to a named pose of the robot file."""
+    targets = dict(context.robot.poses[parameters["pose"]])
+    if "arm" in parameters:
+        joints = context.robot.group(context.robot.hands[parameters["arm"]].arm).joints
+        targets = {name: value for name, value in targets.items() if name in joints}
+    if not targets:
+        raise NotPossible(f"the pose {parameters['pose']} names no joint of that arm")
+    yield from move_joints(context, targets)
+
+
+def carry(context: SkillContext) -> Skill:
+    """Bring both arms to where they may travel: tucked when empty, close in front when loaded."""
+    for hand, described in context.robot.hands.items():
+        joints = context.robot.group(described.arm).joints
+        if context.hands.get(hand) is None:
+            pose = context.robot.poses[TUCK]
+            targets = {name: pose[name] for name in joints}
+        else:
+            targets = _carry_targets(context, hand)
+        if not _is_at(context, targets):
+            yield from move_joints(context, targets, speed_ratio=0.6)
+            yield from settle(context, joints)
+
+
+def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
+    """Return the carry posture nearest to the present one."""
+    arm = context.arms[hand]
+    side = 1.0 if hand == "left" else -1.0
+    point = (CARRY_POINT_M[0], side * CARRY_POINT_M[1], CARRY_POINT_M[2])
+    now = context.link.positions
+    found = []
+    for yaw_rad in CARRY_YAWS_RAD:
+        try:
+            found.append(arm.solve(hand_down(point, yaw_rad), now).positions)
+        except ManipulationError:
+            continue  # not every yaw is within the wrist's range
+    if not found:
+        raise NotPossible(f"the {hand} hand cannot reach its carry pose {point}")
+    best = min(found, key=lambda positions: float(np.abs(positions - now).max()))
+    index = context.robot.joint_index
+    return {name: float(best[index[name]]) for name in _arm_joints(context, hand)}
+
+
+def lift(context: SkillContext, hand: str, height_m: float, speed_ratio: float = 0.4) -> Skill:
+    """Raise a hand straight up.
+
+    Raises:
+        NotPossible: the arm cannot follow the line.
+    """
+    start = context.link.positions
+    target = context.arms[hand].forward(start)
+    target[2, 3] += height_m
+    yield from move_straight(context, hand, target, speed_ratio)
+
+
+def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: float) -> Skill:
+    """Move a hand along a straight line to a grip pose in the base frame.
+
+    Raises:
+        NotPossible: the arm cannot follow the line.
+    """
+    try:
+        waypoints = context.arms[hand].straight_line(context.link.positions, target)
+    except ManipulationError as error:
+        raise NotPossible(str(error)) from error
+    joints = _arm_joints(context, hand)
+    columns = [context.robot.joint_index[name] for name in joints]
+    yield from follow_joints(context, joints, waypoints[:, columns], speed_ratio)
+    yield from settle(context, joints)
+
+
+def _arm_joints(context: SkillContext, hand: str) -> tuple[str, ...]:
+    return context.robot.group(context.robot.hands[hand].arm).joints
+
+
+def _hands(context: SkillContext, parameters: Mapping[str, Any]) -> list[str]:
+    return [parameters["arm"]] if "arm" in parameters else list(context.robot.hands)
+
+
+def _smallest(context: SkillContext, hand: str) -> float:
+    described = context.robot.hands[hand]
+    return context.robot.limits[described.gripper].min * described.opening_ratio
+
+
+def _is_at(context: SkillContext, targets: Mapping[str, float]) -> bool:
+    now, index = context.link.positions, context.robot.joint_index
+    return all(
+        abs(float(now[index[name]]) - value) < AT_POSE_RAD for name, value in targets.items()
+    )

@@ -1,0 +1,54 @@
+"""Carry what skills work with: link, kinematics, map, and what the hands hold."""
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from vla_deploy.manipulation.kinematics import ArmKinematics
+from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.robots import RobotDescription
+from vla_deploy.skills.errors import NotPossible
+from vla_deploy.skills.link import RobotLink
+
+Skill = Generator[None, None, None]
+"""A skill yields once per executor step, returns on success, raises SkillFailed otherwise."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """Say what a hand holds and how it is held.
+
+    `below_grip_m` is how far the object reaches below the grip point when the hand points down.
+    """
+
+    kind: str
+    colour: str
+    width_m: float
+    below_grip_m: float
+
+
+@dataclass(slots=True, kw_only=True)
+class SkillContext:
+    """Carry everything a skill may use; `hands` is the executor's memory of each hand."""
+
+    robot: RobotDescription
+    link: RobotLink
+    planner: PathPlanner
+    arms: Mapping[str, ArmKinematics]
+    say: Callable[[str], None]
+    hands: dict[str, Held | None] = field(default_factory=dict)
+
+    def holding_hand(self, wanted: str | None = None) -> str:
+        """Return the hand that holds something.
+
+        Raises:
+            NotPossible: no hand does, or not the one wanted.
+        """
+        for name, held in self.hands.items():
+            if held is not None and wanted in (None, name):
+                return name
+        which = f"the {wanted} hand" if wanted else "neither hand"
+        raise NotPossible(f"{which} holds anything; pick something up first")
+
+
+SkillFunction = Callable[[SkillContext, Mapping[str, Any]], Skill]

@@ -1,0 +1,165 @@
+"""Drive the base: along planned paths, straight, or on the spot; stop for what is in the way."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from vla_deploy.navigation.errors import NavigationError
+from vla_deploy.navigation.follower import (
+    AT_REST,
+    DriveLimits,
+    PathFollower,
+    Phase,
+    Twist,
+    wrap_angle,
+)
+from vla_deploy.robots.description import FloorPose
+from vla_deploy.skills.context import Skill, SkillContext
+from vla_deploy.skills.errors import NotPossible, TryAgain
+
+# Cruise below what the drives can do, so that tracking errors can be made up.
+CRUISE_RATIO = 0.9
+SIDE_MARGIN_M = 0.04
+STOP_DISTANCE_M = 0.12
+BLOCKED_TIMEOUT_S = 5.0
+STRAIGHT_TOLERANCE_M = 0.01
+
+
+def limits_of(context: SkillContext) -> DriveLimits:
+    """Return the speeds at which this robot cruises."""
+    base = context.robot.base
+    return DriveLimits(
+        speed_m_s=CRUISE_RATIO * base.max_speed_m_s,
+        turn_rate_rad_s=CRUISE_RATIO * base.max_turn_rad_s,
+        acceleration_m_s2=0.6 * base.max_acceleration_m_s2,
+        turn_acceleration_rad_s2=0.6 * base.max_turn_acceleration_rad_s2,
+    )
+
+
+def drive_to(context: SkillContext, goal: FloorPose, turn: bool = True) -> Skill:
+    """Drive to a pose of the map along a planned path.
+
+    Raises:
+        NotPossible: no path leads there.
+        TryAgain: something blocks the way for too long.
+    """
+    pose = context.link.pose
+    try:
+        points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
+    except NavigationError as error:
+        raise NotPossible(str(error)) from error
+    yield from follow(context, points, goal.yaw_rad if turn else None)
+
+
+def follow(
+    context: SkillContext, points: NDArray[np.float64], final_yaw_rad: float | None
+) -> Skill:
+    """Follow points of the map frame; wait for what stands in the way, and give up on it.
+
+    Raises:
+        TryAgain: the way stayed blocked.
+    """
+    follower = PathFollower(points, limits_of(context), final_yaw_rad)
+    clear_ns = context.link.clock.now_ns()
+    while follower.phase is not Phase.ARRIVED:
+        pose = context.link.pose
+        twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
+        if _blocked(context, twist, _distance(pose, points[-1])):
+            twist = Twist(0.0, 0.0)
+            if context.link.clock.now_ns() - clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
+                context.link.drive(AT_REST)
+                raise TryAgain("something stands in the way")
+        else:
+            clear_ns = context.link.clock.now_ns()
+        context.link.drive(twist)
+        yield
+    context.link.drive(AT_REST)
+    yield from stand_still(context)
+
+
+def move(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Drive straight for a distance, backward when negative.
+
+    Raises:
+        TryAgain: the way stayed blocked.
+    """
+    yield from straight(context, float(parameters["distance_m"]))
+
+
+def straight(context: SkillContext, distance_m: float) -> Skill:
+    """Drive straight, holding the heading; positive is forward.
+
+    Raises:
+        TryAgain: the way stayed blocked.
+    """
+    start = context.link.pose
+    limits = limits_of(context)
+    sign = math.copysign(1.0, distance_m)
+    clear_ns = context.link.clock.now_ns()
+    while True:
+        pose = context.link.pose
+        travelled_m = sign * (
+            (pose.x_m - start.x_m) * math.cos(start.yaw_rad)
+            + (pose.y_m - start.y_m) * math.sin(start.yaw_rad)
+        )
+        left_m = abs(distance_m) - travelled_m
+        if left_m < STRAIGHT_TOLERANCE_M:
+            break
+        speed = min(limits.speed_m_s / 2, math.sqrt(1.2 * limits.acceleration_m_s2 * left_m))
+        twist = Twist(sign * max(speed, 0.03), 1.5 * wrap_angle(start.yaw_rad - pose.yaw_rad))
+        if _blocked(context, twist, left_m):
+            twist = AT_REST
+            if context.link.clock.now_ns() - clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
+                raise TryAgain("something stands in the way")
+        else:
+            clear_ns = context.link.clock.now_ns()
+        context.link.drive(twist)
+        yield
+    context.link.drive(AT_REST)
+    yield from stand_still(context)
+
+
+def turn(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Turn on the spot by an angle, counter-clockwise positive, also beyond half a turn."""
+    limits = limits_of(context)
+    left_rad = float(parameters["angle_rad"])
+    before_rad = context.link.pose.yaw_rad
+    while abs(left_rad) > 0.02:
+        rate = min(limits.turn_rate_rad_s, 2.0 * abs(left_rad))
+        context.link.drive(Twist(0.0, math.copysign(max(rate, 0.06), left_rad)))
+        yield
+        yaw_rad = context.link.pose.yaw_rad
+        left_rad -= wrap_angle(yaw_rad - before_rad)
+        before_rad = yaw_rad
+    context.link.drive(AT_REST)
+    yield from stand_still(context)
+
+
+def stand_still(context: SkillContext, duration_s: float = 0.4) -> Skill:
+    """Hold the base at rest for a moment, so that what is seen next does not smear."""
+    end_ns = context.link.clock.now_ns() + round(duration_s * NS_PER_S)
+    while context.link.clock.now_ns() < end_ns:
+        context.link.drive(AT_REST)
+        yield
+
+
+def _blocked(context: SkillContext, twist: Twist, remaining_m: float) -> bool:
+    """Tell whether the lidar sees something in the strip that the body is about to sweep."""
+    ranges_m = context.link.ranges_m
+    if abs(twist.v_m_s) < 1e-3 or ranges_m is None:
+        return False
+    angles = np.deg2rad(np.arange(len(ranges_m)))
+    seen = ranges_m > 0.0
+    x = np.sign(twist.v_m_s) * ranges_m[seen] * np.cos(angles[seen])
+    y = ranges_m[seen] * np.sin(angles[seen])
+    radius_m = context.robot.base.footprint_radius_m
+    reach_m = radius_m + min(STOP_DISTANCE_M + abs(twist.v_m_s) * 0.5, remaining_m)
+    return bool(((x > 0) & (x < reach_m) & (np.abs(y) < radius_m + SIDE_MARGIN_M)).any())
+
+
+def _distance(pose: FloorPose, point: NDArray[np.float64]) -> float:
+    return math.hypot(float(point[0]) - pose.x_m, float(point[1]) - pose.y_m)

@@ -1,0 +1,188 @@
+"""Hold the executor's end of every topic: the state it reads, the motions it asks for."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.navigation.follower import AT_REST, Twist
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import FloorPose
+from vla_deploy.skills.errors import TryAgain
+
+POSE_AGE_S = 0.5
+JOINT_AGE_S = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionResult:
+    """Tell how a motion ended."""
+
+    status: str
+    reason: str
+
+
+class RobotLink:
+    """Read the robot's state once per step and send it motions."""
+
+    def __init__(self, space: SharedSpace, clock: Clock, robot: RobotDescription) -> None:
+        self.robot = robot
+        self.clock = clock
+        self._joint_state = space.cell_reader("joint_state")
+        self._pose = space.cell_reader("pose")
+        self._scene = space.cell_reader("scene")
+        self._scan = space.cell_reader("scan")
+        self._control_status = space.cell_reader("control_status")
+        self._results_in = space.ring_reader("motion_result", from_start=False)
+        self._commands = space.ring_writer("motion_command")
+        self._base = space.cell_writer("base_command")
+        self._ids = itertools.count(clock.now_ns() // 1000 + 1)
+        self._active: set[int] = set()
+        self._ended: dict[int, MotionResult] = {}
+        self._driving = False
+
+    def refresh(self) -> None:
+        """Take in the motions that have ended."""
+        for event in self._results_in.drain():
+            ended = MotionResult(
+                status=str(event.payload["status"]), reason=str(event.payload["reason"])
+            )
+            motion_id = int(event.payload["motion_id"])
+            if motion_id in self._active:
+                self._active.discard(motion_id)
+                self._ended[motion_id] = ended
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Return every joint's position in the robot file's order.
+
+        Raises:
+            TryAgain: control has not told the joints' state for a while.
+        """
+        return self._joints("position")
+
+    @property
+    def efforts(self) -> NDArray[np.float64]:
+        """Return every joint's effort as a ratio of its stall torque.
+
+        Raises:
+            TryAgain: control has not told the joints' state for a while.
+        """
+        return self._joints("effort_ratio")
+
+    @property
+    def velocities(self) -> NDArray[np.float64]:
+        """Return every joint's velocity.
+
+        Raises:
+            TryAgain: control has not told the joints' state for a while.
+        """
+        return self._joints("velocity")
+
+    def _joints(self, field: str) -> NDArray[np.float64]:
+        sample = self._joint_state.latest()
+        if sample is None or sample.age_s(self.clock.now_ns()) > JOINT_AGE_S:
+            raise TryAgain("control does not tell the joints' positions; is it running?")
+        count = int(sample.data["joint_count"])
+        return np.asarray(sample.data[field][:count], dtype=np.float64)
+
+    @property
+    def pose(self) -> FloorPose:
+        """Return the base's pose in the map.
+
+        Raises:
+            TryAgain: perception has not told the pose for a while.
+        """
+        sample = self._pose.latest()
+        if sample is None or sample.age_s(self.clock.now_ns()) > POSE_AGE_S:
+            raise TryAgain("perception does not tell the robot's pose; is it running?")
+        return FloorPose(
+            x_m=float(sample.data["x_m"]),
+            y_m=float(sample.data["y_m"]),
+            yaw_rad=float(sample.data["yaw_rad"]),
+        )
+
+    @property
+    def ranges_m(self) -> NDArray[np.float64] | None:
+        """Return the newest lidar scan, beam i at i degrees, or None while there is none."""
+        sample = self._scan.latest()
+        if sample is None or sample.age_s(self.clock.now_ns()) > POSE_AGE_S:
+            return None
+        return np.asarray(sample.data["range_m"], dtype=np.float64)
+
+    @property
+    def objects(self) -> Sequence[Mapping[str, Any]]:
+        """Return the scene's objects as perception published them last."""
+        sample = self._scene.latest()
+        return () if sample is None else sample.document().get("objects", ())
+
+    @property
+    def surfaces(self) -> Sequence[Mapping[str, Any]]:
+        """Return the horizontal surfaces that perception saw last."""
+        sample = self._scene.latest()
+        return () if sample is None else sample.document().get("surfaces", ())
+
+    @property
+    def control_status(self) -> Mapping[str, Any] | None:
+        """Return control's newest status, or None when it is silent."""
+        sample = self._control_status.latest()
+        if sample is None or self.clock.now_ns() - sample.stamp_ns > NS_PER_S:
+            return None
+        return sample.document()
+
+    def drive(self, twist: Twist) -> None:
+        """Ask for a base velocity; it must be repeated, control lets it go stale."""
+        self._base.put(v_m_s=twist.v_m_s, w_rad_s=twist.w_rad_s)
+        self._driving = twist != AT_REST
+
+    def send_goal(
+        self,
+        targets: Mapping[str, float],
+        speed_ratio: float = 1.0,
+        effort_ratio: Mapping[str, float] | None = None,
+    ) -> int:
+        """Ask control to bring joints to targets; return the motion's id."""
+        command: dict[str, Any] = {
+            "kind": "goal",
+            "targets": dict(targets),
+            "speed_ratio": speed_ratio,
+        }
+        if effort_ratio:
+            command["effort_ratio"] = dict(effort_ratio)
+        return self._send(command)
+
+    def send_trajectory(
+        self, joints: Sequence[str], times_s: NDArray[np.float64], positions: NDArray[np.float64]
+    ) -> int:
+        """Ask control to follow timed joint positions (n, joints); return the motion's id."""
+        return self._send(
+            {
+                "kind": "trajectory",
+                "joints": list(joints),
+                "times_s": times_s.tolist(),
+                "positions": positions.tolist(),
+            }
+        )
+
+    def _send(self, command: dict[str, Any]) -> int:
+        motion_id = next(self._ids)
+        self._active.add(motion_id)
+        self._commands.publish(command | {"motion_id": motion_id})
+        return motion_id
+
+    def ended(self, motion_id: int) -> MotionResult | None:
+        """Return how a motion ended, or None while it runs."""
+        return self._ended.get(motion_id)
+
+    def halt(self) -> None:
+        """Cancel every motion that this executor started and bring the base to rest."""
+        for motion_id in sorted(self._active):
+            self._commands.publish({"kind": "cancel", "motion_id": motion_id})
+        self._active.clear()
+        if self._driving:
+            self.drive(AT_REST)

@@ -1,0 +1,70 @@
+"""Go to a place, a point, or to where an object can be reached."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
+from vla_deploy.planning.validator import spoken_places
+from vla_deploy.robots.description import FloorPose
+from vla_deploy.skills.arms import carry
+from vla_deploy.skills.context import Skill, SkillContext
+from vla_deploy.skills.drive import drive_to
+from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.gaze import remembered, turn_head
+from vla_deploy.skills.stand import standing_poses
+
+DRIVING_GAZE = (0.0, 0.3)
+
+
+def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Drive to `place`, to `x_m`, `y_m` (and `yaw_rad`), or to where `object` can be reached.
+
+    Raises:
+        NotPossible: the place is unknown or no path leads there.
+        TryAgain: the object has not been seen, or the way is blocked.
+    """
+    yield from carry(context)
+    if "object" in parameters:
+        yield from reach(context, parse_object(parameters["object"]))
+        return
+    yield from turn_head(context, *DRIVING_GAZE)
+    if "place" in parameters:
+        yield from drive_to(context, _place(context, parameters["place"]))
+        return
+    yaw_rad = parameters.get("yaw_rad")
+    goal = FloorPose(
+        x_m=float(parameters["x_m"]),
+        y_m=float(parameters["y_m"]),
+        yaw_rad=float(yaw_rad) if yaw_rad is not None else 0.0,
+    )
+    yield from drive_to(context, goal, turn=yaw_rad is not None)
+
+
+def reach(context: SkillContext, query: ObjectQuery) -> Skill:
+    """Drive to the best standing pose from which an object is within the arms' reach.
+
+    Raises:
+        TryAgain: the object has not been seen.
+        NotPossible: no pose near it is free and reachable.
+    """
+    known = remembered(context, query)
+    if known is None:
+        raise TryAgain(f"I have not seen a {query}; look for it first")
+    reasons = []
+    for goal in standing_poses(context, known["position_m"]):
+        try:
+            yield from drive_to(context, goal)
+        except NotPossible as error:
+            reasons.append(str(error))
+            continue
+        return
+    why = reasons[0] if reasons else "walls or furniture stand around it"
+    raise NotPossible(f"I cannot get within reach of the {query}: {why}")
+
+
+def _place(context: SkillContext, name: str) -> FloorPose:
+    place = match_place(name, spoken_places(context.robot.places))
+    if place is None:
+        known = ", ".join(sorted(context.robot.places))
+        raise NotPossible(f'I do not know the place "{name}"; I know: {known}')
+    return context.robot.places[place].pose

@@ -1,0 +1,149 @@
+"""Pick an object up: see it afresh, choose hand and grasp, take it, feel it, lift it, feel again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.manipulation.errors import ManipulationError
+from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
+from vla_deploy.planning.references import ObjectQuery, parse_object
+from vla_deploy.skills.arms import (
+    carry,
+    feel,
+    lift,
+    move_straight,
+    set_opening,
+)
+from vla_deploy.skills.context import Held, Skill, SkillContext
+from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.frames import to_base
+from vla_deploy.skills.gaze import remembered, see
+from vla_deploy.skills.motion import move_joints, pause, settle
+
+PREGRASP_M = 0.12
+LIFT_M = 0.12
+APPROACH_SPEED_RATIO = 0.5
+STRAIGHT_SPEED_RATIO = 0.35
+# The fingers are sent this much past the surface they should meet.
+SQUEEZE_M = 0.012
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """Hold the hand, the grasp and the joint positions above and at it."""
+
+    hand: str
+    grasp: Grasp
+    above: NDArray[np.float64]
+
+
+def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Grasp an object within reach, verified by the fingers' opening and effort.
+
+    Raises:
+        NotPossible: no hand is free, or none reaches the object.
+        TryAgain: it was not seen, or the grasp did not hold.
+    """
+    query = parse_object(parameters["object"])
+    hands = _free_hands(context, parameters.get("arm"))
+    yield from see(context, query)
+    seen = remembered(context, query)
+    if seen is None:
+        raise TryAgain(f"I lost sight of the {query}")
+    choice = _choose(context, seen, hands)
+    yield from _approach(context, choice)
+    yield from _take(context, choice, query)
+    context.hands[choice.hand] = Held(
+        kind=str(seen["class"]),
+        colour=str(seen["colour"]),
+        width_m=choice.grasp.width_m,
+        below_grip_m=choice.grasp.below_grip_m,
+    )
+    yield from carry(context)
+
+
+def _approach(context: SkillContext, choice: Choice) -> Skill:
+    yield from set_opening(context, choice.hand, choice.grasp.opening_m)
+    joints = context.robot.group(context.robot.hands[choice.hand].arm).joints
+    index = context.robot.joint_index
+    targets = {name: float(choice.above[index[name]]) for name in joints}
+    yield from move_joints(context, targets, APPROACH_SPEED_RATIO)
+    yield from settle(context, joints)
+    target = hand_down(choice.grasp.point_m, choice.grasp.yaw_rad)
+    yield from move_straight(context, choice.hand, target, STRAIGHT_SPEED_RATIO)
+
+
+def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
+    """Close, feel, lift, feel again; open and back off when nothing is held."""
+    grasp, hand = choice.grasp, choice.hand
+    goal_m = max(grasp.width_m - 2 * SQUEEZE_M, 0.004)
+    yield from set_opening(context, hand, goal_m, grasp.effort_ratio)
+    touch = feel(context, hand, goal_m)
+    if touch.holds(grasp.effort_ratio):
+        yield from lift(context, hand, LIFT_M)
+        yield from pause(context, 0.3)
+        touch = feel(context, hand, goal_m)
+        if touch.holds(grasp.effort_ratio):
+            return
+    yield from set_opening(context, hand, grasp.opening_m)
+    if touch.opening_m > 0:
+        yield from lift(context, hand, LIFT_M)
+    yield from carry(context)
+    raise TryAgain(
+        f"the {hand} hand does not hold the {query}: fingers {touch.opening_m * 1000:.0f} mm apart "
+        f"(expected {grasp.width_m * 1000:.0f}), effort {touch.effort_ratio:.2f}"
+    )
+
+
+def _free_hands(context: SkillContext, wanted: str | None) -> list[str]:
+    free = [name for name in context.robot.hands if context.hands.get(name) is None]
+    if wanted is not None:
+        free = [name for name in free if name == wanted]
+    if not free:
+        full = ", ".join(f"{name}: {held.kind}" for name, held in context.hands.items() if held)
+        raise NotPossible(f"no hand is free ({full}); put something down first")
+    return free
+
+
+def _choose(context: SkillContext, seen: Mapping[str, Any], hands: list[str]) -> Choice:
+    """Return the reachable grasp that moves the arm least, of the hand on the object's side."""
+    pose = context.link.pose
+    centre = to_base(pose, seen["position_m"])
+    yaw_rad = float(seen["yaw_rad"]) - pose.yaw_rad
+    reasons: list[str] = []
+    nearer_first = sorted(hands, key=lambda name: (name == "left") != (centre[1] >= 0.0))
+    for hand in nearer_first:
+        described = context.robot.hands[hand]
+        widest_m = context.robot.limits[described.gripper].max * described.opening_ratio
+        size_m = tuple(float(side) for side in seen["size_m"])
+        try:
+            grasps = grasps_from_above(
+                str(seen["class"]), centre, (size_m[0], size_m[1], size_m[2]), yaw_rad, widest_m
+            )
+        except ManipulationError as error:
+            raise NotPossible(str(error)) from error
+        choices = [choice for grasp in grasps if (choice := _solve(context, hand, grasp, reasons))]
+        if choices:
+            now = context.link.positions
+            return min(choices, key=lambda one: float(np.abs(one.above - now).max()))
+    raise NotPossible(
+        f"neither grasp of the {seen['class']} at {centre[0]:.2f}, {centre[1]:.2f}, "
+        f"{centre[2]:.2f} m is within reach: {reasons[0] if reasons else 'no grasp fits'}"
+    )
+
+
+def _solve(context: SkillContext, hand: str, grasp: Grasp, reasons: list[str]) -> Choice | None:
+    arm = context.arms[hand]
+    x_m, y_m, z_m = grasp.point_m
+    try:
+        at = arm.solve(hand_down(grasp.point_m, grasp.yaw_rad), context.link.positions).positions
+        high = hand_down((x_m, y_m, z_m + PREGRASP_M), grasp.yaw_rad)
+        above = arm.solve(high, at).positions
+        arm.straight_line(above, hand_down(grasp.point_m, grasp.yaw_rad))
+    except ManipulationError as error:
+        reasons.append(str(error))
+        return None
+    return Choice(hand=hand, grasp=grasp, above=above)

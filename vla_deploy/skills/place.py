@@ -1,0 +1,110 @@
+"""Put what a hand holds into a container, on an object, or on a free spot of a surface."""
+
+import math
+from collections.abc import Generator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.manipulation.errors import ManipulationError
+from vla_deploy.manipulation.grasps import hand_down
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.references import ObjectQuery, parse_object
+from vla_deploy.skills.arms import carry, lift, move_straight, opening_of, set_opening
+from vla_deploy.skills.context import Held, Skill, SkillContext
+from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.frames import to_base
+from vla_deploy.skills.gaze import remembered, see, turn_head
+from vla_deploy.skills.motion import move_joints, pause, settle
+from vla_deploy.skills.surfaces import free_spot
+
+ABOVE_M = 0.10
+# A thing put into a container is let go this far below the rim; one put on something, just above.
+BELOW_RIM_M = 0.03
+ABOVE_SURFACE_M = 0.008
+YAWS_RAD = tuple(2 * math.pi * step / 16 for step in range(16))
+LOST_OPENING_M = 0.012
+LOOK_AT_TABLE = (0.0, 0.85)
+
+
+def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
+    """Put what is held `in` or `on` a destination within reach.
+
+    Raises:
+        NotPossible: nothing is held, or the spot is out of reach.
+        TryAgain: the destination was not seen, or the object was lost on the way.
+    """
+    hand = context.holding_hand(parameters.get("arm"))
+    held = context.hands[hand]
+    if held is None:
+        raise NotPossible(f"the {hand} hand holds nothing")
+    if opening_of(context, hand) < held.width_m - LOST_OPENING_M:
+        context.hands[hand] = None
+        raise TryAgain(f"the {hand} hand has lost the {held.kind} on the way")
+    release_m = yield from _release_point(context, parameters, held)
+    above = _solve_above(context, hand, release_m)
+    joints = context.robot.group(context.robot.hands[hand].arm).joints
+    index = context.robot.joint_index
+    yield from move_joints(context, {name: float(above[index[name]]) for name in joints}, 0.5)
+    yield from settle(context, joints)
+    down = context.arms[hand].forward(context.link.positions)
+    down[:3, 3] = release_m
+    yield from move_straight(context, hand, down, 0.35)
+    yield from set_opening(context, hand, held.width_m + 0.03)
+    context.hands[hand] = None
+    yield from pause(context, 0.3)
+    yield from lift(context, hand, ABOVE_M)
+    yield from carry(context)
+
+
+def _release_point(
+    context: SkillContext, parameters: Mapping[str, Any], held: Held
+) -> Generator[None, None, tuple[float, float, float]]:
+    """Return where the grip must be when the fingers open, in the base frame."""
+    try:
+        query = parse_object(parameters["destination"])
+    except UnknownObject:
+        yield from turn_head(context, *LOOK_AT_TABLE)
+        yield from pause(context, 1.5)
+        x_m, y_m, z_m = free_spot(context)
+        return x_m, y_m, z_m + held.below_grip_m + ABOVE_SURFACE_M
+    return (yield from _over_object(context, query, str(parameters["relation"]), held))
+
+
+def _over_object(
+    context: SkillContext, query: ObjectQuery, relation: str, held: Held
+) -> Generator[None, None, tuple[float, float, float]]:
+    yield from see(context, query)
+    seen = remembered(context, query)
+    if seen is None:
+        raise TryAgain(f"I lost sight of the {query}")
+    x_m, y_m, z_m = to_base(context.link.pose, seen["position_m"])
+    top_m = z_m + float(seen["size_m"][2]) / 2
+    if relation == "in":
+        if seen["class"] != "box":
+            raise NotPossible(f"a {seen['class']} is no container; put things in a box")
+        return x_m, y_m, top_m - BELOW_RIM_M + held.below_grip_m
+    return x_m, y_m, top_m + ABOVE_SURFACE_M + held.below_grip_m
+
+
+def _solve_above(
+    context: SkillContext, hand: str, release_m: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """Return the posture above the release point that moves the arm least and can descend."""
+    now, arm = context.link.positions, context.arms[hand]
+    x_m, y_m, z_m = release_m
+    found, reason = [], ""
+    for yaw_rad in YAWS_RAD:
+        try:
+            above = arm.solve(hand_down((x_m, y_m, z_m + ABOVE_M), yaw_rad), now).positions
+            arm.straight_line(above, hand_down(release_m, yaw_rad))
+        except ManipulationError as error:
+            reason = str(error)
+            continue  # another yaw may be within reach
+        found.append(above)
+    if not found:
+        raise NotPossible(
+            f"the {hand} hand cannot reach {x_m:.2f}, {y_m:.2f}, {z_m:.2f} m: {reason}"
+        )
+    return min(found, key=lambda positions: float(np.abs(positions - now).max()))

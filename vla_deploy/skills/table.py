@@ -1,0 +1,31 @@
+"""Tie each skill of the catalogue to the code that does it."""
+
+from types import MappingProxyType
+
+from vla_deploy.skills.arms import close_gripper, move_arm, open_gripper
+from vla_deploy.skills.context import SkillFunction
+from vla_deploy.skills.drive import move, turn
+from vla_deploy.skills.find import find_object
+from vla_deploy.skills.gaze import look_at
+from vla_deploy.skills.navigate import navigate_to
+from vla_deploy.skills.pick import pick_up
+from vla_deploy.skills.place import place
+from vla_deploy.skills.simple import speak, stop, wait
+
+SKILL_FUNCTIONS: MappingProxyType[str, SkillFunction] = MappingProxyType(
+    {
+        "navigate_to": navigate_to,
+        "move": move,
+        "turn": turn,
+        "look_at": look_at,
+        "find_object": find_object,
+        "pick_up": pick_up,
+        "place": place,
+        "open_gripper": open_gripper,
+        "close_gripper": close_gripper,
+        "move_arm": move_arm,
+        "speak": speak,
+        "wait": wait,
+        "stop": stop,
+    }
+)
