@@ -1,0 +1,84 @@
+"""Turn an RGB-D image into points in the base frame, pixel by pixel."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.protocol import Intrinsics
+
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+MIN_DEPTH_M = 0.2
+MAX_DEPTH_M = 3.0
+# Stereo depth noise grows with the square of the distance.
+DEPTH_SIGMA_PER_M = 0.0012
+SMOOTHING_PX = 5
+UPRIGHT = 0.9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cloud:
+    """Hold an image's points; `points` is (h, w, 3) in metres, x forward, z up from the floor."""
+
+    rgb: NDArray[np.uint8]
+    depth_m: Floats
+    points: Floats
+    valid: Mask
+    camera_position: NDArray[np.float64]
+    focal_px: float
+
+    def sigma_m(self) -> Floats:
+        """Return the depth noise to expect at each pixel."""
+        sigma: Floats = np.float32(DEPTH_SIGMA_PER_M) * self.depth_m**2
+        return sigma
+
+
+def make_cloud(
+    rgb: NDArray[np.uint8],
+    depth_m: Floats,
+    camera: Intrinsics,
+    base_from_camera: NDArray[np.float64],
+    ignore: Mask | None = None,
+) -> Cloud:
+    """Back-project an image; `base_from_camera` is 4x4 from the optical frame (z forward).
+
+    `ignore` marks pixels that show the robot itself.
+    """
+    height, width = depth_m.shape
+    u, v = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    rays = np.dstack(
+        ((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u))
+    ).astype(np.float32)
+    rotation = base_from_camera[:3, :3].astype(np.float32)
+    origin = base_from_camera[:3, 3].astype(np.float32)
+    points: Floats = np.einsum("hwi,ji->hwj", rays * depth_m[..., None], rotation) + origin
+    valid = (depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)
+    if ignore is not None:
+        valid &= ~ignore
+    return Cloud(
+        rgb=rgb,
+        depth_m=depth_m,
+        points=points,
+        valid=valid,
+        camera_position=base_from_camera[:3, 3].copy(),
+        focal_px=camera.fx,
+    )
+
+
+def upward_area(cloud: Cloud) -> Floats:
+    """Return for each pixel the area in m^2 of horizontal surface that it shows, else 0."""
+    smooth = np.dstack(
+        [cv2.blur(cloud.points[..., axis], (SMOOTHING_PX, SMOOTHING_PX)) for axis in range(3)]
+    )
+    normal = np.zeros_like(smooth)
+    along_u = smooth[1:-1, 2:] - smooth[1:-1, :-2]
+    along_v = smooth[2:, 1:-1] - smooth[:-2, 1:-1]
+    normal[1:-1, 1:-1] = np.cross(along_u, along_v)
+    length = np.linalg.norm(normal, axis=2)
+    upright = np.abs(normal[..., 2]) > UPRIGHT * np.maximum(length, 1e-12)
+    # The two differences span two pixels each way: a quarter of their parallelogram is the pixel.
+    area: Floats = np.where(upright & cloud.valid, length * 0.25, 0.0).astype(np.float32)
+    return area

@@ -1,0 +1,128 @@
+"""Cut what stands on a support into separate things."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.perception.cloud import Cloud, Floats, Mask
+from vla_deploy.perception.supports import Support, inside
+
+MIN_HEIGHT_M = 0.004
+# Rugs and thresholds are floor.
+MIN_HEIGHT_ON_FLOOR_M = 0.012
+NOISE_SIGMAS = 2.5
+MAX_HEIGHT_M = 0.42
+TALL_MARGIN_CELLS = 3
+OUTLINE_MARGIN_M = 0.02
+HIGHER_MARGIN_M = 0.05
+MAX_EXTENT_M = 0.55
+MIN_PIXELS = 14
+NEAR_CELL_M, FAR_CELL_M = 0.01, 0.02
+NEAR_M = 1.5
+OCCLUDER_M = 0.05
+OCCLUDED_SHARE = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cluster:
+    """Hold one thing's visible points; `truncated` by the image, `occluded` by something nearer."""
+
+    support: Support
+    points: Floats
+    heights: Floats
+    rgb: NDArray[np.uint8]
+    depth_m: float
+    box_px: tuple[int, int, int, int]
+    truncated: bool
+    occluded: bool
+
+
+def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
+    """Return the things on each support; furniture and walls are none."""
+    clusters: list[Cluster] = []
+    for index, support in enumerate(supports):
+        heights = cv2.medianBlur(support.heights_above(cloud), 3)
+        lowest_m = MIN_HEIGHT_ON_FLOOR_M if support.is_floor else MIN_HEIGHT_M
+        least = np.maximum(lowest_m, NOISE_SIGMAS * cloud.sigma_m())
+        standing = cloud.valid & (heights > least)
+        standing[standing] = inside(
+            support.outline, cloud.points[standing][:, :2], OUTLINE_MARGIN_M
+        )
+        for higher in supports[:index]:
+            standing[standing] = ~_belongs_to(higher, support, cloud.points[standing])
+        clusters += _split(cloud, support, heights, standing)
+    return clusters
+
+
+def _belongs_to(higher: Support, lower: Support, points: Floats) -> Mask:
+    """Tell which points are part of, under, or on a higher surface."""
+    if np.allclose(higher.plane, lower.plane):
+        return np.zeros(len(points), dtype=np.bool_)
+    return inside(higher.outline, points[:, :2], HIGHER_MARGIN_M)
+
+
+def _split(cloud: Cloud, support: Support, heights: Floats, standing: Mask) -> list[Cluster]:
+    rows, columns = np.nonzero(standing)
+    if rows.size < MIN_PIXELS:
+        return []
+    points = cloud.points[rows, columns]
+    cell_m = NEAR_CELL_M if np.median(cloud.depth_m[rows, columns]) < NEAR_M else FAR_CELL_M
+    labels = _label(points[:, :2], heights[rows, columns], cell_m)
+    clusters = []
+    for label in np.flatnonzero(np.bincount(labels) >= MIN_PIXELS):
+        if label == 0:
+            continue
+        member = labels == label
+        extent = np.ptp(points[member][:, :2], axis=0)
+        if extent.max() < MAX_EXTENT_M:
+            clusters.append(_cluster(cloud, support, heights, (rows[member], columns[member])))
+    return clusters
+
+
+def _label(xy: Floats, heights: Floats, cell_m: float) -> NDArray[np.int32]:
+    """Number the points by connected cells seen from above; 0 marks what is too tall."""
+    cells = ((xy - xy.min(axis=0)) / cell_m).astype(np.intp) + 1
+    grid = np.zeros(cells.max(axis=0) + 2, dtype=np.uint8)
+    grid[cells[:, 0], cells[:, 1]] = 1
+    tall = np.zeros_like(grid)
+    reaching = cells[heights > MAX_HEIGHT_M]
+    tall[reaching[:, 0], reaching[:, 1]] = 1
+    tall = cv2.dilate(tall, np.ones((TALL_MARGIN_CELLS, TALL_MARGIN_CELLS), dtype=np.uint8))
+    closed = cv2.morphologyEx(grid, cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8))
+    _, labels = cv2.connectedComponents(closed * (1 - tall), connectivity=8)
+    numbered: NDArray[np.int32] = labels[cells[:, 0], cells[:, 1]]
+    return numbered
+
+
+def _cluster(
+    cloud: Cloud,
+    support: Support,
+    heights: Floats,
+    pixels: tuple[NDArray[np.intp], NDArray[np.intp]],
+) -> Cluster:
+    rows, columns = pixels
+    height, width = cloud.depth_m.shape
+    box = (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1)
+    return Cluster(
+        support=support,
+        points=cloud.points[pixels],
+        heights=heights[pixels],
+        rgb=cloud.rgb[pixels],
+        depth_m=float(np.median(cloud.depth_m[pixels])),
+        box_px=box,
+        truncated=box[0] <= 1 or box[1] <= 1 or box[2] >= width - 1 or box[3] >= height - 1,
+        occluded=_occluded(cloud.depth_m, pixels),
+    )
+
+
+def _occluded(depth_m: Floats, pixels: tuple[NDArray[np.intp], NDArray[np.intp]]) -> bool:
+    """Tell whether much of the outline borders on something nearer to the camera."""
+    member = np.zeros(depth_m.shape, dtype=np.uint8)
+    member[pixels] = 1
+    ring = (cv2.dilate(member, np.ones((5, 5), dtype=np.uint8)) - member).astype(np.bool_)
+    own = np.where(member > 0, depth_m, 0.0).astype(np.float32)
+    beside = cv2.dilate(own, np.ones((5, 5), dtype=np.uint8))
+    nearer = ring & (depth_m > 0.0) & (depth_m < beside - OCCLUDER_M)
+    return bool(np.count_nonzero(nearer) > OCCLUDED_SHARE * np.count_nonzero(ring))

@@ -1,0 +1,74 @@
+"""Name colours as people do, by one table over hue, saturation and brightness."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class ColourRange:
+    """Bound one colour name; hue is in OpenCV's 0..179, the others 0..255, bounds included."""
+
+    name: str
+    hue: tuple[int, int]
+    saturation: tuple[int, int]
+    value: tuple[int, int]
+
+
+ANY_HUE = (0, 179)
+# The first row that holds wins; the last rows catch what is left of the hue circle.
+COLOURS: tuple[ColourRange, ...] = (
+    ColourRange("black", ANY_HUE, (0, 255), (0, 38)),
+    ColourRange("black", ANY_HUE, (0, 90), (39, 64)),
+    ColourRange("white", ANY_HUE, (0, 38), (175, 255)),
+    ColourRange("grey", ANY_HUE, (0, 48), (39, 255)),
+    ColourRange("pink", (145, 179), (49, 150), (150, 255)),
+    ColourRange("pink", (0, 7), (49, 130), (190, 255)),
+    ColourRange("pink", (150, 168), (49, 255), (150, 255)),
+    ColourRange("brown", (6, 24), (49, 255), (39, 150)),
+    ColourRange("brown", (6, 20), (49, 150), (151, 205)),
+    ColourRange("red", (0, 6), (49, 255), (39, 255)),
+    ColourRange("orange", (7, 20), (49, 255), (151, 255)),
+    ColourRange("yellow", (21, 34), (49, 255), (39, 255)),
+    ColourRange("green", (35, 86), (49, 255), (39, 255)),
+    ColourRange("blue", (87, 127), (49, 255), (39, 255)),
+    ColourRange("purple", (128, 160), (49, 255), (39, 255)),
+    ColourRange("red", (161, 179), (49, 255), (39, 255)),
+)
+UNNAMED = "grey"
+
+
+def colour_names(rgb: NDArray[np.uint8]) -> NDArray[np.intp]:
+    """Return for each of (n, 3) pixels the row of `COLOURS` that holds, -1 for none."""
+    hsv = cv2.cvtColor(np.ascontiguousarray(rgb).reshape(-1, 1, 3), cv2.COLOR_RGB2HSV)
+    hue, saturation, value = hsv.reshape(-1, 3).T
+    rows = np.full(len(rgb), -1, dtype=np.intp)
+    for index, row in enumerate(COLOURS):
+        holds = (
+            (rows < 0)
+            & _within(hue, row.hue)
+            & _within(saturation, row.saturation)
+            & _within(value, row.value)
+        )
+        rows[holds] = index
+    return rows
+
+
+def dominant_colour(rgb: NDArray[np.uint8]) -> tuple[str, float]:
+    """Return the commonest colour name of (n, 3) pixels and the share of pixels it has."""
+    rows, counts = np.unique(colour_names(rgb), return_counts=True)
+    votes: dict[str, int] = {}
+    for row, count in zip(rows, counts, strict=True):
+        name = COLOURS[row].name if row >= 0 else UNNAMED
+        votes[name] = votes.get(name, 0) + int(count)
+    if not votes:
+        return UNNAMED, 0.0
+    best = max(votes, key=lambda name: votes[name])
+    return best, votes[best] / len(rgb)
+
+
+def _within(channel: NDArray[np.uint8], bounds: tuple[int, int]) -> NDArray[np.bool_]:
+    inside: NDArray[np.bool_] = (channel >= bounds[0]) & (channel <= bounds[1])
+    return inside

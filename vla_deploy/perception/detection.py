@@ -1,0 +1,113 @@
+"""Find things in an RGB-D image: supports, clusters on them, their form, colour and class."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vla_deploy.perception.classes import OTHER, classify
+from vla_deploy.perception.cloud import Cloud
+from vla_deploy.perception.clusters import Cluster, find_clusters
+from vla_deploy.perception.colour import dominant_colour
+from vla_deploy.perception.shapes import Shape, measure
+from vla_deploy.perception.supports import find_supports
+
+Vector = tuple[float, float, float]
+
+CONFIDENCE_KNOWN = 0.9
+CONFIDENCE_OTHER = 0.5
+FEW_PIXELS = 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """Hold one thing as one image shows it.
+
+    `position_m` is its centre, for a box the centre of its opening; `size_m` is length along yaw,
+    width, height. The frame is that of the cloud. A truncated thing touches the image's border: its
+    class and measures are guesses.
+    """
+
+    class_name: str
+    colour: str
+    position_m: Vector
+    size_m: Vector
+    yaw_rad: float
+    confidence: float
+    truncated: bool
+    occluded: bool
+    box_px: tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Pose:
+    xy: tuple[float, float]
+    z_ratio: float
+    length_m: float
+    width_m: float
+    yaw_rad: float
+
+
+def _as_round(shape: Shape) -> _Pose:
+    """Take the middle of the top: it is seen whole, while the far side is hidden."""
+    return _Pose(shape.top.centre, 0.5, shape.across_m, shape.across_m, 0.0)
+
+
+def _as_cup(shape: Shape) -> _Pose:
+    """Take the rim: a handle sticks out below it."""
+    rim_m = 0.5 * (shape.top.length_m + shape.top.width_m)
+    return _Pose(shape.top.centre, 0.5, rim_m, rim_m, 0.0)
+
+
+def _as_ball(shape: Shape) -> _Pose:
+    sphere = shape.sphere
+    assert sphere is not None, "only what fits a sphere is called a ball"
+    return _Pose(sphere.centre[:2], 0.5, 2 * sphere.radius_m, 2 * sphere.radius_m, 0.0)
+
+
+def _as_box(shape: Shape) -> _Pose:
+    rim = shape.top
+    return _Pose(rim.centre, 1.0, rim.length_m, rim.width_m, rim.yaw_rad)
+
+
+def _as_block(shape: Shape) -> _Pose:
+    base = shape.footprint
+    return _Pose(base.centre, 0.5, base.length_m, base.width_m, base.yaw_rad)
+
+
+PLACEMENT: dict[str, Callable[[Shape], _Pose]] = {
+    "bottle": _as_round,
+    "cup": _as_cup,
+    "ball": _as_ball,
+    "box": _as_box,
+}
+
+
+def detect(cloud: Cloud) -> list[Detection]:
+    """Return the things in view, the nearest first."""
+    clusters = find_clusters(cloud, find_supports(cloud))
+    clusters.sort(key=lambda cluster: cluster.depth_m)
+    return [_detection(cluster, cloud) for cluster in clusters]
+
+
+def _detection(cluster: Cluster, cloud: Cloud) -> Detection:
+    shape = measure(cluster, cloud.camera_position, cloud.focal_px)
+    name = classify(shape)
+    colour, share = dominant_colour(cluster.rgb)
+    pose = PLACEMENT.get(name, _as_block)(shape)
+    ground_m = cluster.support.height_m(*pose.xy)
+    known = CONFIDENCE_OTHER if name == OTHER else CONFIDENCE_KNOWN
+    enough = min(1.0, math.sqrt(len(cluster.points) / FEW_PIXELS))
+    whole = 0.6 if cluster.truncated or cluster.occluded else 1.0
+    return Detection(
+        class_name=name,
+        colour=colour,
+        position_m=(*pose.xy, ground_m + pose.z_ratio * shape.height_m),
+        size_m=(pose.length_m, pose.width_m, shape.height_m),
+        yaw_rad=pose.yaw_rad,
+        confidence=float(np.round(known * enough * whole * (0.7 + 0.3 * share), 3)),
+        truncated=cluster.truncated,
+        occluded=cluster.occluded,
+        box_px=cluster.box_px,
+    )

@@ -1,0 +1,134 @@
+"""Measure what a cluster of points says about its thing's size and form."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.perception.cloud import Floats
+from vla_deploy.perception.clusters import Cluster
+
+TOP_SLICE_M = 0.012
+TOP_SLICE_RATIO = 0.12
+RIM_MARGIN_M = 0.035
+SPHERE_MIN_HEIGHT_M = 0.006
+
+Point = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rectangle:
+    """Hold the tightest rectangle around points on the floor plan; length >= width."""
+
+    centre: tuple[float, float]
+    length_m: float
+    width_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sphere:
+    """Hold a fitted sphere and how well the points agree with it."""
+
+    centre: tuple[float, float, float]
+    radius_m: float
+    residual_ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """Hold the measures that the class rules look at.
+
+    `across_m` is the width as seen from the camera, which no far side can hide. `hole_m` is how far
+    the inside lies below the rim, 0 for what has no rim. `sphere` is None where none fits.
+    """
+
+    height_m: float
+    across_m: float
+    footprint: Rectangle
+    top: Rectangle
+    hole_m: float
+    sphere: Sphere | None
+
+
+def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
+    """Measure one cluster."""
+    pixel_m = cluster.depth_m / focal_px
+    height_m = float(np.percentile(cluster.heights, 98.0))
+    xy = cluster.points[:, :2]
+    slice_m = max(TOP_SLICE_M, TOP_SLICE_RATIO * height_m)
+    top_xy = xy[cluster.heights > height_m - slice_m]
+    top = rectangle_of(top_xy, pixel_m)
+    return Shape(
+        height_m=height_m,
+        across_m=_across(xy, camera_position) + pixel_m,
+        footprint=rectangle_of(xy, pixel_m),
+        top=top,
+        hole_m=_hole(cluster, top_xy, height_m),
+        sphere=_sphere(cluster.points[cluster.heights > SPHERE_MIN_HEIGHT_M]),
+    )
+
+
+def rectangle_of(xy: Floats, pixel_m: float) -> Rectangle:
+    """Return the tightest rectangle around (n, 2) points, half a pixel wider on each side."""
+    # Around their mean and in millimetres: OpenCV computes in single precision.
+    mean = xy.mean(axis=0, dtype=np.float64)
+    local = ((xy - mean) * 1000.0).astype(np.float32)
+    (x, y), (first, second), angle_deg = cv2.minAreaRect(local)
+    length, width, angle_deg = (
+        (first, second, angle_deg) if first >= second else (second, first, angle_deg + 90.0)
+    )
+    return Rectangle(
+        centre=(float(mean[0] + x / 1000.0), float(mean[1] + y / 1000.0)),
+        length_m=length / 1000.0 + pixel_m,
+        width_m=width / 1000.0 + pixel_m,
+        yaw_rad=half_turn(math.radians(angle_deg)),
+    )
+
+
+def half_turn(angle_rad: float) -> float:
+    """Return the direction of an axis, which looks the same after half a turn: (-pi/2, pi/2]."""
+    return math.pi / 2 - (math.pi / 2 - angle_rad) % math.pi
+
+
+def _across(xy: Floats, camera_position: Point) -> float:
+    """Return the extent at right angles to the line of sight."""
+    sight = xy.mean(axis=0) - camera_position[:2]
+    across = np.array([-sight[1], sight[0]]) / max(float(np.linalg.norm(sight)), 1e-6)
+    low, high = np.percentile(xy @ across, (1.0, 99.0))
+    return float(high - low)
+
+
+def _hole(cluster: Cluster, rim_xy: Floats, height_m: float) -> float:
+    """Return how deep the middle lies below the rim around it."""
+    hull = cv2.convexHull(np.ascontiguousarray(rim_xy, dtype=np.float32))
+    if len(hull) < 4:
+        return 0.0
+    depth_inside = [
+        cv2.pointPolygonTest(hull, (float(x), float(y)), True) for x, y in cluster.points[:, :2]
+    ]
+    middle = cluster.heights[np.array(depth_inside) > RIM_MARGIN_M]
+    return max(0.0, height_m - float(np.median(middle))) if middle.size > 10 else 0.0
+
+
+def _sphere(points: Floats) -> Sphere | None:
+    """Fit a sphere by linear least squares on |p|^2 = 2 c p + k."""
+    if len(points) < 12:
+        return None
+    mean = points.mean(axis=0, dtype=np.float64)
+    local = points.astype(np.float64) - mean
+    system = np.column_stack((2.0 * local, np.ones(len(local))))
+    solution, _, rank, _ = np.linalg.lstsq(system, (local**2).sum(axis=1), rcond=None)
+    square = float(solution[3] + solution[:3] @ solution[:3])
+    if rank < 4 or square <= 0.0:
+        return None
+    radius_m = math.sqrt(square)
+    off = np.linalg.norm(local - solution[:3], axis=1) - radius_m
+    x, y, z = solution[:3] + mean
+    return Sphere(
+        centre=(float(x), float(y), float(z)),
+        radius_m=radius_m,
+        residual_ratio=float(np.sqrt(np.mean(off**2))) / radius_m,
+    )

@@ -1,0 +1,129 @@
+"""Find the horizontal surfaces that things may stand on: the floor and table tops of any height."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from vla_deploy.perception.cloud import Cloud, Floats, Mask, upward_area
+
+BIN_M = 0.01
+LAYER_M = 0.015
+MIN_AREA_M2 = 0.04
+MAX_SUPPORTS = 6
+CELL_M = 0.02
+FLOOR_M = 0.04
+_FIT_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Support:
+    """Hold one surface: z = a x + b y + c within a convex outline (n, 2) in the base frame."""
+
+    plane: tuple[float, float, float]
+    outline: Floats
+    area_m2: float
+
+    def height_m(self, x_m: float, y_m: float) -> float:
+        """Return the surface's height above the floor at a point."""
+        a, b, c = self.plane
+        return a * x_m + b * y_m + c
+
+    def heights_above(self, cloud: Cloud) -> Floats:
+        """Return each pixel's height above the surface's plane."""
+        return _above(cloud.points, self.plane)
+
+    @property
+    def is_floor(self) -> bool:
+        """Tell whether this is the floor that the robot stands on."""
+        middle = self.outline.mean(axis=0)
+        return abs(self.height_m(float(middle[0]), float(middle[1]))) < FLOOR_M
+
+
+def find_supports(cloud: Cloud) -> list[Support]:
+    """Return the surfaces in view, the highest first."""
+    area = upward_area(cloud)
+    z = cloud.points[..., 2]
+    supports: list[Support] = []
+    left = area > 0.0
+    for _ in range(MAX_SUPPORTS):
+        level = _strongest_level(z[left], area[left])
+        if level is None:
+            break
+        layer = left & (np.abs(z - level) < 2.0 * LAYER_M)
+        plane = _fit_plane(cloud.points[layer], level)
+        on_plane = left & (np.abs(_above(cloud.points, plane)) < LAYER_M)
+        supports += _pieces(cloud.points, on_plane, area, plane)
+        left &= ~(on_plane | (np.abs(z - level) < LAYER_M))
+    return sorted(supports, key=lambda s: -s.height_m(*map(float, s.outline.mean(axis=0))))
+
+
+def inside(outline: Floats, xy: Floats, margin_m: float) -> Mask:
+    """Tell which of (n, 2) points lie within a convex outline widened by `margin_m`."""
+    following = np.roll(outline, -1, axis=0)
+    edge = following - outline
+    length = np.maximum(np.linalg.norm(edge, axis=1), 1e-9)
+    normal = np.column_stack((edge[:, 1], -edge[:, 0])) / length[:, None]
+    offsets = np.einsum("ij,ij->i", normal, outline)
+    distance = xy @ normal.T - offsets
+    within: Mask = np.all(distance < margin_m, axis=1)
+    return within
+
+
+def _strongest_level(z: Floats, area: Floats) -> float | None:
+    if not z.size:
+        return None
+    bins = np.floor(z / BIN_M).astype(np.int64)
+    first = int(bins.min())
+    histogram = np.convolve(np.bincount(bins - first, weights=area), np.ones(3), mode="same")
+    best = int(np.argmax(histogram))
+    if histogram[best] < MIN_AREA_M2:
+        return None
+    return (first + best + 0.5) * BIN_M
+
+
+def _above(points: Floats, plane: tuple[float, float, float]) -> Floats:
+    a, b, c = plane
+    above: Floats = points[..., 2] - a * points[..., 0] - b * points[..., 1] - c
+    return above
+
+
+def _fit_plane(points: Floats, level: float) -> tuple[float, float, float]:
+    """Fit a nearly level plane; small tilts are the camera's calibration errors."""
+    plane = (0.0, 0.0, level)
+    for _ in range(_FIT_ROUNDS):
+        near = points[np.abs(_above(points, plane)) < LAYER_M].astype(np.float64)
+        if len(near) < 30:
+            break
+        a, b, c = np.linalg.lstsq(
+            np.column_stack((near[:, :2], np.ones(len(near)))), near[:, 2], rcond=None
+        )[0]
+        plane = (float(a), float(b), float(c))
+    return plane
+
+
+def _pieces(
+    points: Floats, on_plane: Mask, area: Floats, plane: tuple[float, float, float]
+) -> list[Support]:
+    """Split the pixels of one plane into surfaces that do not touch."""
+    xy = points[on_plane][:, :2]
+    low = xy.min(axis=0)
+    cells = ((xy - low) / CELL_M).astype(np.intp)
+    grid = np.zeros(cells.max(axis=0) + 1, dtype=np.uint8)
+    grid[cells[:, 0], cells[:, 1]] = 1
+    grid = cv2.morphologyEx(grid, cv2.MORPH_CLOSE, np.ones((5, 5), dtype=np.uint8))
+    _, labels = cv2.connectedComponents(grid, connectivity=8)
+    label = labels[cells[:, 0], cells[:, 1]]
+    areas = np.bincount(label, weights=area[on_plane])
+    return [
+        Support(plane=plane, outline=_outline(xy[label == index]), area_m2=float(areas[index]))
+        for index in np.flatnonzero(areas >= MIN_AREA_M2)
+    ]
+
+
+def _outline(xy: Floats) -> Floats:
+    hull: Floats = cv2.convexHull(np.ascontiguousarray(xy, dtype=np.float32)).reshape(-1, 2)
+    # `inside` needs counter-clockwise corners.
+    x, y = hull.T
+    area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    return hull if area > 0.0 else np.ascontiguousarray(hull[::-1])
