@@ -152,7 +152,9 @@ def _canonical_plan(document: Any) -> Json:
         document = {"actions": document}
     if not isinstance(document, Mapping):
         raise PlanInvalid([f"a plan is a JSON object or a list of actions, got {document!r:.60}"])
-    listed: list[Any] = next((document[key] for key in PLAN_LISTS if isinstance(document.get(key), list)), [])
+    listed: list[Any] = next(
+        (document[key] for key in PLAN_LISTS if isinstance(document.get(key), list)), []
+    )
     plan: Json = {key: document[key] for key in PLAN_TEXTS if key in document}
     plan["goal"] = next((document[key] for key in PLAN_GOALS if document.get(key)), "unnamed goal")
     plan["actions"] = []

@@ -1,4 +1,4 @@
-"""Pick an object up: see it afresh, choose hand and grasp, take it, feel it, lift it, feel again."""
+"""Pick an object up: see it afresh, choose a grasp, take it, feel it, lift it, feel again."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

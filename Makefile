@@ -1,0 +1,37 @@
+# Two commands for a newcomer: `make demo` and `make test`. Each sets up what it needs first.
+PYTHON ?= python3
+VENV := .venv
+STAMP := $(VENV)/.installed
+
+.PHONY: help demo test check campaign lock clean
+help:
+	@echo "make demo      install what is needed, then pick up the red cup on the twin"
+	@echo "make test      install what is needed, then run all tests (under 10 minutes)"
+	@echo "make check     format, lint, types, import rules, tests: the one gate"
+	@echo "make campaign  the long tests: ten seeds of pick and place"
+	@echo "make lock      pin every dependency afresh"
+
+$(STAMP): pyproject.toml requirements-dev.lock scripts/install
+	scripts/install $(VENV) $(PYTHON)
+	touch $@
+
+demo: $(STAMP)
+	scripts/system-packages
+	$(VENV)/bin/vla-deploy demo
+
+test: $(STAMP)
+	scripts/system-packages
+	$(VENV)/bin/python -m pytest
+
+check: $(STAMP)
+	scripts/check
+
+campaign: $(STAMP)
+	scripts/system-packages
+	$(VENV)/bin/python -m pytest -m slow --timeout 3600
+
+lock: $(STAMP)
+	scripts/lock
+
+clean:
+	rm -rf $(VENV) out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
