@@ -90,7 +90,7 @@ def test_an_unknown_process_and_missing_budgets_are_faults(tmp_path):
 
 
 def test_an_unknown_name_lists_the_known_ones():
-    with pytest.raises(ProfileError, match="no profile 'deskop': choose .*desktop"):
+    with pytest.raises(ProfileError, match=r"no profile 'deskop': choose .*desktop"):
         load_profile("deskop")
 
 

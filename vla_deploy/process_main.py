@@ -1,0 +1,115 @@
+"""Enter every robot process the same way: arguments, log, signals, priority, exit code."""
+
+import argparse
+import ctypes
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from drivers.clock import MonotonicClock
+from drivers.errors import DriverError
+from platforms import Profile, ProfileError, load_profile
+from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_CRASHED, EXIT_OK
+from vla_deploy.ipc import IpcError
+from vla_deploy.node import Node, NodeContext, run_node
+from vla_deploy.robots import RobotFileError
+
+READY_DIR = "ready"
+_REALTIME_PROCESS = "control"
+_PR_SET_NAME = 15
+_log = logging.getLogger(__name__)
+
+
+def main(
+    name: str, build: Callable[[NodeContext], Node], arguments: Sequence[str] | None = None
+) -> int:
+    """Run one node until SIGTERM or SIGINT, and return the exit code of its process.
+
+    The file `<run_dir>/ready/<name>` holds the pid while the node is started.
+    """
+    context = _context(name, arguments)
+    _name_process(name)
+    logging.basicConfig(
+        stream=sys.stderr, level=logging.INFO, format=f"{name}: %(levelname)s: %(message)s"
+    )
+    stop_signals = _catch_stop_signals()
+    try:
+        profile = load_profile(context.profile)
+        if name == _REALTIME_PROCESS:
+            _raise_priority(profile)
+        node = _Announced(build(context), context.run_dir / READY_DIR / name)
+        run_node(node, context.clock, lambda: bool(stop_signals))
+    except (DriverError, RobotFileError, ProfileError, IpcError) as error:
+        _log.error("%s", error)
+        return EXIT_CONFIGURATION
+    except Exception:  # the last place where a crash can be told to the log
+        _log.exception("crashed")
+        return EXIT_CRASHED
+    return EXIT_OK
+
+
+class _Announced:
+    """Say by a file that a node is started, for whoever waits for it."""
+
+    def __init__(self, node: Node, ready_file: Path) -> None:
+        self.period_s = node.period_s
+        self._ready_file = ready_file
+        self._node = node
+        self.step = node.step
+
+    def start(self) -> None:
+        self._node.start()
+        self._ready_file.parent.mkdir(exist_ok=True)
+        self._ready_file.write_text(f"{os.getpid()}\n")
+
+    def stop(self) -> None:
+        self._ready_file.unlink(missing_ok=True)
+        self._node.stop()
+
+
+def _context(name: str, arguments: Sequence[str] | None) -> NodeContext:
+    parser = argparse.ArgumentParser(
+        prog=f"vla-{name}",
+        description=f"Run the robot's {name} process; normally the supervisor starts it.",
+    )
+    parser.add_argument("--run-dir", type=Path, required=True, help="directory of the run")
+    parser.add_argument("--robot", required=True, help="robot name or folder, e.g. butler")
+    parser.add_argument("--profile", required=True, help="platform profile, e.g. desktop")
+    parser.add_argument("--devices-dir", type=Path, help="take every device from here instead")
+    given = parser.parse_args(arguments)
+    if not given.run_dir.is_dir():
+        parser.error(f"--run-dir {given.run_dir}: no such directory; is the run still up?")
+    return NodeContext(
+        run_dir=given.run_dir,
+        robot=given.robot,
+        profile=given.profile,
+        devices_dir=given.devices_dir,
+        clock=MonotonicClock(),
+    )
+
+
+def _name_process(name: str) -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_NAME, f"vla-{name}".encode(), 0, 0, 0)
+
+
+def _catch_stop_signals() -> list[int]:
+    caught: list[int] = []
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda got, _frame: caught.append(got))
+    return caught
+
+
+def _raise_priority(profile: Profile) -> None:
+    if profile.realtime_priority == 0:
+        return
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(profile.realtime_priority))
+    except PermissionError:
+        _log.warning(
+            "degraded: no SCHED_FIFO priority %d (grant CAP_SYS_NICE or LimitRTPRIO); ticks may "
+            "be late under load",
+            profile.realtime_priority,
+        )

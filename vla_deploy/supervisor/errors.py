@@ -1,0 +1,23 @@
+"""Group what the supervisor refuses to do.
+
+SupervisorError
+├── AlreadyRunning      another supervisor holds the runtime directory: stop it or choose another
+├── RuntimeUnavailable  the runtime directory cannot be used: fix its path or permissions
+└── StartFailed         a process did not become ready: its last words are in the message
+"""
+
+
+class SupervisorError(Exception):
+    """Base of everything the supervisor raises."""
+
+
+class AlreadyRunning(SupervisorError):
+    """Say who holds the runtime directory."""
+
+
+class RuntimeUnavailable(SupervisorError):
+    """Say why the runtime directory cannot be used."""
+
+
+class StartFailed(SupervisorError):
+    """Say which process did not become ready, and why."""

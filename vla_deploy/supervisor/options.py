@@ -1,0 +1,28 @@
+"""Say what one run of the robot is made of."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """Choose robot, profile and world; `arm` arms the robot once everything is ready."""
+
+    robot: str = "butler"
+    profile: str = "desktop"
+    twin: bool = False
+    seed: int = 0
+    world: str = "flat"
+    runtime_base: Path | None = None
+    arm: bool = False
+
+    def fill(self, command: tuple[str, ...], run_dir: Path) -> list[str]:
+        """Replace the `{...}` of a table's command."""
+        values = {
+            "run_dir": run_dir,
+            "robot": self.robot,
+            "profile": self.profile,
+            "world": self.world,
+            "seed": self.seed,
+        }
+        return [part.format_map(values) for part in command]

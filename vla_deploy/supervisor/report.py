@@ -1,0 +1,69 @@
+"""Publish what runs, for `status`, for control's watch on the supervisor, and for the demo."""
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from drivers.clock import Clock
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor.crew import Crew
+from vla_deploy.supervisor.lifecycle import Record
+from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.usage import UsageMeter
+
+_SUPERVISOR = "supervisor"
+_UNKNOWN_USAGE = {"memory_mb": None, "rss_mb": None, "cpu_ratio": None}
+
+
+class Report:
+    """Write the `process_table` cell."""
+
+    def __init__(self, run_id: str, options: RunOptions, space: SharedSpace, clock: Clock) -> None:
+        self._cell = space.cell_writer("process_table")
+        self._meter = UsageMeter(clock.now_ns())
+        self._clock = clock
+        self._head = {
+            "run_id": run_id,
+            "robot": options.robot,
+            "profile": options.profile,
+            "twin": options.twin,
+            "supervisor_pid": os.getpid(),
+        }
+
+    def publish(self, records: Mapping[str, Record], crew: Crew) -> None:
+        """Measure every process and publish the table."""
+        pids = crew.pids()
+        measured = self._meter.sample({_SUPERVISOR: os.getpid(), **pids}, self._clock.now_ns())
+        usages = {
+            name: {
+                "memory_mb": round(usage.memory_mb, 1),
+                "rss_mb": round(usage.rss_mb, 1),
+                "cpu_ratio": round(usage.cpu_ratio, 3),
+            }
+            for name, usage in measured.items()
+        }
+        rows = [
+            {**_row(name, record, pids, crew), **usages.get(name, _UNKNOWN_USAGE)}
+            for name, record in records.items()
+        ]
+        self._cell.put_document(
+            {
+                **self._head,
+                "processes": rows,
+                "supervisor": usages[_SUPERVISOR],
+                "peak_memory_mb": round(self._meter.peak_memory_mb, 1),
+                "memory_kind": self._meter.memory_kind,
+            }
+        )
+
+
+def _row(name: str, record: Record, pids: Mapping[str, int], crew: Crew) -> dict[str, Any]:
+    return {
+        "name": name,
+        "state": record.state.value,
+        "pid": pids.get(name),
+        "fresh": name in pids and crew.is_fresh(name),
+        "restarts": record.restarts,
+        "exit_code": record.exit_code,
+        "reason": record.reason,
+    }

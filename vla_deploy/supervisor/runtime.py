@@ -1,0 +1,170 @@
+"""Own the directory of one run: its lock, its shared memory, and what dead runs left behind."""
+
+import fcntl
+import json
+import os
+import shutil
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+
+import psutil
+
+from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
+from vla_deploy.supervisor.orphans import end_orphans
+
+SHARED_MEMORY = Path("/dev/shm")
+_OWNER_FILE = "owner.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Owner:
+    """Identify the supervisor of a run; the start time tells it from a later process of its pid."""
+
+    pid: int
+    started: float
+    run_id: str
+    run_dir: str
+
+    def is_alive(self) -> bool:
+        """Tell whether that very process still runs."""
+        try:
+            return psutil.Process(self.pid).create_time() == self.started
+        except psutil.NoSuchProcess:
+            return False
+
+
+def default_base() -> Path:
+    """Return where runs live unless told otherwise."""
+    if os.getuid() == 0:
+        return Path("/run/vla-deploy")
+    user_runtime = os.environ.get("XDG_RUNTIME_DIR")
+    return (
+        Path(user_runtime) / "vla-deploy"
+        if user_runtime
+        else Path(f"/tmp/vla-deploy-{os.getuid()}")
+    )
+
+
+def running(base: Path) -> Owner | None:
+    """Return the supervisor that now holds `base`, or None."""
+    owner = _read_owner(base / "lock")
+    return owner if owner is not None and owner.is_alive() else None
+
+
+class Runtime:
+    """Hold `<base>/<run_id>/` for one run, remove it at the end.
+
+    Raises:
+        AlreadyRunning: another supervisor holds `base`.
+        RuntimeUnavailable: `base` cannot be made or belongs to someone else.
+    """
+
+    def __init__(self, base: Path, shared_memory: Path = SHARED_MEMORY) -> None:
+        self._base = base
+        self._shared_memory = shared_memory
+        _make_private(base)
+        self._lock_fd = _lock(base)
+        self.orphans = _sweep_runs(base)
+        _sweep_shared_memory(shared_memory)
+        self.run_id = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
+        self.run_dir = base / self.run_id
+        self._owner = Owner(
+            pid=os.getpid(),
+            started=psutil.Process().create_time(),
+            run_id=self.run_id,
+            run_dir=str(self.run_dir),
+        )
+        self.run_dir.mkdir(mode=0o700)
+        self.ipc_dir = self._make_ipc_dir()
+        _write_owner(base / "lock", self._owner)
+        _point_to(base / "current", self.run_id)
+
+    def close(self) -> None:
+        """Remove everything of this run and let the next supervisor in."""
+        (self._base / "current").unlink(missing_ok=True)
+        shutil.rmtree(self.ipc_dir, ignore_errors=True)
+        shutil.rmtree(self.run_dir, ignore_errors=True)
+        os.ftruncate(self._lock_fd, 0)
+        os.close(self._lock_fd)
+
+    def _make_ipc_dir(self) -> Path:
+        link = self.run_dir / "ipc"
+        if not self._shared_memory.is_dir():
+            link.mkdir(mode=0o700)
+            return link
+        directory = self._shared_memory / f"{_prefix()}{self.run_id}"
+        unfinished = directory.with_name(f".{directory.name}")
+        unfinished.mkdir(mode=0o700)
+        _write_owner(unfinished / _OWNER_FILE, self._owner)
+        unfinished.rename(directory)  # a sweeper never sees it without its owner
+        link.symlink_to(directory)
+        return directory
+
+
+def _prefix() -> str:
+    return f"vla-deploy-{os.getuid()}-"
+
+
+def _make_private(base: Path) -> None:
+    try:
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        owner_uid = base.stat().st_uid
+    except OSError as error:
+        raise RuntimeUnavailable(
+            f"runtime directory {base}: {error.strerror}; choose another with --runtime-base"
+        ) from error
+    if owner_uid != os.getuid():
+        raise RuntimeUnavailable(
+            f"runtime directory {base}: belongs to user {owner_uid}, expected {os.getuid()}; "
+            "choose another with --runtime-base"
+        )
+
+
+def _lock(base: Path) -> int:
+    path = base / "lock"
+    fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(fd)
+        owner = _read_owner(path)
+        who = f"pid {owner.pid}, run {owner.run_id}" if owner else "it is just starting or stopping"
+        raise AlreadyRunning(
+            f"a supervisor already runs in {base} ({who}); stop it with `vla-deploy stop`, "
+            "or choose another directory with --runtime-base"
+        ) from None
+    return fd
+
+
+def _sweep_runs(base: Path) -> list[int]:
+    stale = [path for path in base.iterdir() if path.is_dir() and not path.is_symlink()]
+    orphans = end_orphans({path.name for path in stale}) if stale else []
+    for path in stale:
+        shutil.rmtree(path, ignore_errors=True)
+    return orphans
+
+
+def _sweep_shared_memory(shared_memory: Path) -> None:
+    for directory in shared_memory.glob(f"{_prefix()}*"):
+        owner = _read_owner(directory / _OWNER_FILE)
+        if owner is None or not owner.is_alive():
+            shutil.rmtree(directory, ignore_errors=True)
+
+
+def _read_owner(path: Path) -> Owner | None:
+    try:
+        return Owner(**json.loads(path.read_text()))
+    except (FileNotFoundError, json.JSONDecodeError, TypeError):
+        return None
+
+
+def _write_owner(path: Path, owner: Owner) -> None:
+    path.write_text(json.dumps(asdict(owner)))
+
+
+def _point_to(link: Path, target: str) -> None:
+    fresh = link.with_name(f".{link.name}-{os.getpid()}")
+    fresh.unlink(missing_ok=True)
+    fresh.symlink_to(target)
+    fresh.replace(link)
