@@ -17,6 +17,7 @@ MAX_DEPTH_M = 3.0
 DEPTH_SIGMA_PER_M = 0.0012
 SMOOTHING_PX = 5
 UPRIGHT = 0.9
+EDGE_RATIO = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,14 +55,14 @@ def make_cloud(
     ).astype(np.float32)
     rotation = base_from_camera[:3, :3].astype(np.float32)
     origin = base_from_camera[:3, 3].astype(np.float32)
-    points: Floats = np.einsum("hwi,ji->hwj", rays * depth_m[..., None], rotation) + origin
+    points: Floats = (rays * depth_m[..., None]).reshape(-1, 3) @ rotation.T + origin
     valid = (depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)
     if ignore is not None:
         valid &= ~ignore
     return Cloud(
         rgb=rgb,
         depth_m=depth_m,
-        points=points,
+        points=points.reshape(height, width, 3),
         valid=valid,
         camera_position=base_from_camera[:3, 3].copy(),
         focal_px=camera.fx,
@@ -69,16 +70,26 @@ def make_cloud(
 
 
 def upward_area(cloud: Cloud) -> Floats:
-    """Return for each pixel the area in m^2 of horizontal surface that it shows, else 0."""
-    smooth = np.dstack(
-        [cv2.blur(cloud.points[..., axis], (SMOOTHING_PX, SMOOTHING_PX)) for axis in range(3)]
-    )
-    normal = np.zeros_like(smooth)
+    """Return for each pixel the area in m^2 of level, upward surface that it shows, else 0."""
+    smooth = cv2.blur(cloud.points, (SMOOTHING_PX, SMOOTHING_PX))
     along_u = smooth[1:-1, 2:] - smooth[1:-1, :-2]
     along_v = smooth[2:, 1:-1] - smooth[:-2, 1:-1]
-    normal[1:-1, 1:-1] = np.cross(along_u, along_v)
-    length = np.linalg.norm(normal, axis=2)
-    upright = np.abs(normal[..., 2]) > UPRIGHT * np.maximum(length, 1e-12)
+    # Rows run towards the robot: v x u looks up from a surface that faces the camera.
+    normal_x = along_v[..., 1] * along_u[..., 2] - along_v[..., 2] * along_u[..., 1]
+    normal_y = along_v[..., 2] * along_u[..., 0] - along_v[..., 0] * along_u[..., 2]
+    normal_z = along_v[..., 0] * along_u[..., 1] - along_v[..., 1] * along_u[..., 0]
+    length = np.sqrt(normal_x**2 + normal_y**2 + normal_z**2)
+    upright = (normal_z > UPRIGHT * length) & _on_one_surface(cloud)[1:-1, 1:-1]
+    area = np.zeros_like(cloud.depth_m)
     # The two differences span two pixels each way: a quarter of their parallelogram is the pixel.
-    area: Floats = np.where(upright & cloud.valid, length * 0.25, 0.0).astype(np.float32)
+    area[1:-1, 1:-1] = np.where(upright, length * 0.25, 0.0)
     return area
+
+
+def _on_one_surface(cloud: Cloud) -> Mask:
+    """Tell where the smoothing window crosses no edge in depth."""
+    kernel = np.ones((SMOOTHING_PX + 2, SMOOTHING_PX + 2), dtype=np.uint8)
+    depth = np.where(cloud.valid, cloud.depth_m, 0.0).astype(np.float32)
+    nearest = cv2.erode(depth, kernel)
+    smooth: Mask = (nearest > 0.0) & (cv2.dilate(depth, kernel) - nearest < EDGE_RATIO * depth)
+    return smooth

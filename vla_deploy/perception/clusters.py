@@ -14,7 +14,6 @@ MIN_HEIGHT_M = 0.004
 MIN_HEIGHT_ON_FLOOR_M = 0.012
 NOISE_SIGMAS = 2.5
 MAX_HEIGHT_M = 0.42
-TALL_MARGIN_CELLS = 3
 OUTLINE_MARGIN_M = 0.02
 HIGHER_MARGIN_M = 0.05
 MAX_EXTENT_M = 0.55
@@ -86,13 +85,11 @@ def _label(xy: Floats, heights: Floats, cell_m: float) -> NDArray[np.int32]:
     cells = ((xy - xy.min(axis=0)) / cell_m).astype(np.intp) + 1
     grid = np.zeros(cells.max(axis=0) + 2, dtype=np.uint8)
     grid[cells[:, 0], cells[:, 1]] = 1
-    tall = np.zeros_like(grid)
-    reaching = cells[heights > MAX_HEIGHT_M]
-    tall[reaching[:, 0], reaching[:, 1]] = 1
-    tall = cv2.dilate(tall, np.ones((TALL_MARGIN_CELLS, TALL_MARGIN_CELLS), dtype=np.uint8))
     closed = cv2.morphologyEx(grid, cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8))
-    _, labels = cv2.connectedComponents(closed * (1 - tall), connectivity=8)
+    _, labels = cv2.connectedComponents(closed, connectivity=8)
     numbered: NDArray[np.int32] = labels[cells[:, 0], cells[:, 1]]
+    too_tall = np.unique(numbered[heights > MAX_HEIGHT_M])
+    numbered[np.isin(numbered, too_tall)] = 0
     return numbered
 
 

@@ -21,7 +21,7 @@ ANY_HUE = (0, 179)
 # The first row that holds wins; the last rows catch what is left of the hue circle.
 COLOURS: tuple[ColourRange, ...] = (
     ColourRange("black", ANY_HUE, (0, 255), (0, 38)),
-    ColourRange("black", ANY_HUE, (0, 90), (39, 64)),
+    ColourRange("black", ANY_HUE, (0, 140), (39, 66)),
     ColourRange("white", ANY_HUE, (0, 38), (175, 255)),
     ColourRange("grey", ANY_HUE, (0, 48), (39, 255)),
     ColourRange("pink", (145, 179), (49, 150), (150, 255)),

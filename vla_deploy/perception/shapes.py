@@ -59,14 +59,13 @@ def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
     height_m = float(np.percentile(cluster.heights, 98.0))
     xy = cluster.points[:, :2]
     slice_m = max(TOP_SLICE_M, TOP_SLICE_RATIO * height_m)
-    top_xy = xy[cluster.heights > height_m - slice_m]
-    top = rectangle_of(top_xy, pixel_m)
+    top = rectangle_of(xy[cluster.heights > height_m - slice_m], pixel_m)
     return Shape(
         height_m=height_m,
         across_m=_across(xy, camera_position) + pixel_m,
         footprint=rectangle_of(xy, pixel_m),
         top=top,
-        hole_m=_hole(cluster, top_xy, height_m),
+        hole_m=_hole(cluster, top, height_m),
         sphere=_sphere(cluster.points[cluster.heights > SPHERE_MIN_HEIGHT_M]),
     )
 
@@ -101,15 +100,14 @@ def _across(xy: Floats, camera_position: Point) -> float:
     return float(high - low)
 
 
-def _hole(cluster: Cluster, rim_xy: Floats, height_m: float) -> float:
+def _hole(cluster: Cluster, rim: Rectangle, height_m: float) -> float:
     """Return how deep the middle lies below the rim around it."""
-    hull = cv2.convexHull(np.ascontiguousarray(rim_xy, dtype=np.float32))
-    if len(hull) < 4:
-        return 0.0
-    depth_inside = [
-        cv2.pointPolygonTest(hull, (float(x), float(y)), True) for x, y in cluster.points[:, :2]
-    ]
-    middle = cluster.heights[np.array(depth_inside) > RIM_MARGIN_M]
+    c, s = math.cos(rim.yaw_rad), math.sin(rim.yaw_rad)
+    local = np.abs((cluster.points[:, :2] - rim.centre) @ np.array([[c, -s], [s, c]]))
+    within = (local[:, 0] < 0.5 * rim.length_m - RIM_MARGIN_M) & (
+        local[:, 1] < 0.5 * rim.width_m - RIM_MARGIN_M
+    )
+    middle = cluster.heights[within]
     return max(0.0, height_m - float(np.median(middle))) if middle.size > 10 else 0.0
 
 
