@@ -95,7 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--parent-pid", type=int, required=True)
     options = parser.parse_args(argv)
     die_with_parent(options.parent_pid, signal.SIGKILL)
-    # Ctrl-C reaches the whole group; the twin tells this process when to end, by closing the mirror.
+    # Ctrl-C reaches the whole group; the twin ends this process by closing the mirror.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     mirror = socket.socket(fileno=options.mirror_fd)
     try:

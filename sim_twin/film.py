@@ -15,43 +15,72 @@ Image = NDArray[np.uint8]
 
 WIDTH, HEIGHT = 640, 360
 INSET_WIDTH, INSET_HEIGHT = 160, 120
-FPS = 6.0
+FPS = 5.0
+CHASE_ANGLE_DEG = 40.0
+CHASE_ELEVATIONS_DEG = (-28.0, -34.0, -40.0, -46.0, -52.0, -58.0, -64.0, -70.0, -76.0)
+CHASE_HEIGHTS_M = (0.1, 0.9)
 SHEET_ROWS, SHEET_COLUMNS = 4, 3
 FOURCC = {".webm": "VP80", ".mp4": "mp4v", ".avi": "MJPG"}
+_FURNITURE_GROUPS = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _MARGIN = 10
 _INK = (250, 250, 250)
 _SHADE = 0.45
 
 
 class ChaseCamera:
-    """Follow the robot from behind and above, slowly enough to be watched."""
+    """Follow the robot from behind, slowly enough to be watched, and look over walls."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self.view = mujoco.MjvCamera()
         self.view.type = mujoco.mjtCamera.mjCAMERA_FREE.value
-        self.view.distance = 2.6
-        self.view.elevation = -38.0
+        self.view.distance = 2.7
+        self._model = model
+        self._data = data
         self._root = model.body(ROBOT_ROOT).id
-        self._started = False
+        self._move(share=1.0)
 
-    def follow(self, data: mujoco.MjData) -> mujoco.MjvCamera:
+    def follow(self) -> mujoco.MjvCamera:
         """Move towards the robot as it is now and return the view."""
-        matrix = data.xmat[self._root]
-        ahead = np.array([matrix[0], matrix[3], 0.0])
-        look_at = data.xpos[self._root] + 0.35 * ahead + [0.0, 0.0, 0.65]
-        azimuth = float(np.degrees(np.arctan2(ahead[1], ahead[0]))) + 40.0
-        share = 0.12 if self._started else 1.0
-        self._started = True
-        self.view.lookat[:] += share * (look_at - self.view.lookat)
-        turn = (azimuth - self.view.azimuth + 180.0) % 360.0 - 180.0
-        self.view.azimuth += share * turn
+        self._move(share=0.12)
         return self.view
+
+    def _move(self, share: float) -> None:
+        matrix = self._data.xmat[self._root]
+        ahead = np.array([matrix[0], matrix[3], 0.0])
+        look_at = self._data.xpos[self._root] + 0.35 * ahead + [0.0, 0.0, 0.6]
+        heading = float(np.degrees(np.arctan2(ahead[1], ahead[0])))
+        turn = (heading + CHASE_ANGLE_DEG - self.view.azimuth + 180.0) % 360.0 - 180.0
+        self.view.lookat[:] += share * (look_at - self.view.lookat)
+        self.view.azimuth += share * turn
+        self.view.elevation += share * (self._clear_elevation() - self.view.elevation)
+
+    def _clear_elevation(self) -> float:
+        """Return the lowest elevation from which no wall hides the robot."""
+        for elevation in CHASE_ELEVATIONS_DEG:
+            if all(self._sees(elevation, height) for height in CHASE_HEIGHTS_M):
+                return elevation
+        return CHASE_ELEVATIONS_DEG[-1]
+
+    def _sees(self, elevation_deg: float, height_m: float) -> bool:
+        """Return whether a ray from the robot to where the camera would be meets nothing."""
+        azimuth, elevation = np.radians([self.view.azimuth, elevation_deg])
+        level = np.cos(elevation)
+        back = -np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+        eye = self.view.lookat + self.view.distance * back
+        start = self._data.xpos[self._root] + [0.0, 0.0, height_m]
+        ray = eye - start
+        hit = mujoco.mj_ray(
+            self._model, self._data, start, ray, _FURNITURE_GROUPS, True, -1, None, None
+        )
+        return bool(hit < 0.0 or hit > 1.0)
 
 
 class Film:
     """Write frames to a video file and, at the end, a contact sheet beside it."""
 
-    def __init__(self, model: mujoco.MjModel, path: Path, fps: float = FPS) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, path: Path, fps: float = FPS
+    ) -> None:
         """Open the file; its ending chooses the codec.
 
         Raises:
@@ -62,18 +91,19 @@ class Film:
         self.sheet_path = path.with_suffix(".png")
         self.caption = ""
         self.frames = 0
+        self._data = data
         self._writer = _open_writer(path, fps)
-        self._chase = ChaseCamera(model)
+        self._chase = ChaseCamera(model, data)
         self._head = fixed_camera(model, "head_camera")
         self._renderer = Renderer(model, WIDTH, HEIGHT)
         self._inset_renderer = Renderer(model, INSET_WIDTH, INSET_HEIGHT)
         self._kept: list[Image] = []
         self._keep_every = 1
 
-    def shoot(self, data: mujoco.MjData) -> Image:
+    def shoot(self) -> Image:
         """Add one frame of the present state; return it (RGB)."""
-        image = self._renderer.render(data, self._chase.follow(data))[0]
-        self._paste_inset(image, self._inset_renderer.render(data, self._head)[0])
+        image = self._renderer.render(self._data, self._chase.follow())[0]
+        self._paste_inset(image, self._inset_renderer.render(self._data, self._head)[0])
         _write_caption(image, self.caption)
         self._writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
         self._keep(image)

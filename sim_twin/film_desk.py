@@ -45,7 +45,7 @@ class FilmDesk:
         if self._film is None or now_ns < self._due_ns:
             return
         self._due_ns = max(self._due_ns + round(NS_PER_S / FPS), now_ns)
-        self._film.shoot(self._data)
+        self._film.shoot()
 
     def close(self) -> None:
         """Finish a film that still runs."""
@@ -58,7 +58,7 @@ class FilmDesk:
         path = request.get("path")
         if not isinstance(path, str) or not path:
             raise RefereeRefusal(f"film_start: expected a path, got {path!r}")
-        self._film = Film(self._model, Path(path))
+        self._film = Film(self._model, self._data, Path(path))
         return {"path": path}
 
     def _stop(self, _request: _Text) -> dict[str, Any]:

@@ -1,22 +1,13 @@
 """Load a robot into a world: the composed model, and its state at the start of a run."""
 
-from pathlib import Path
-
 import mujoco
 
 from sim_twin.compose import ROBOT_ROOT, compose
 from sim_twin.engine import Engine
 from sim_twin.errors import ModelMismatch
 from sim_twin.shafts import Shaft
-from sim_twin.worlds.placement import draw_poses
+from sim_twin.worlds.placement import draw_poses, load_world
 from vla_deploy.robots import RobotDescription
-
-WORLDS_DIR = Path(__file__).parent / "worlds"
-
-
-def world_names() -> tuple[str, ...]:
-    """Return the names of the worlds that come with the twin."""
-    return tuple(sorted(path.stem for path in WORLDS_DIR.glob("*.xml")))
 
 
 def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
@@ -25,11 +16,10 @@ def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
     Raises:
         ModelMismatch: there is no such world, or the two do not fit together.
     """
-    path = WORLDS_DIR / f"{world}.xml"
-    if not path.is_file():
-        known = ", ".join(world_names())
-        raise ModelMismatch(f"no world {world!r} in {WORLDS_DIR}; there are {known}")
-    return compose(robot.mjcf_path, path)
+    try:
+        return compose(robot.mjcf_path, load_world(world).mjcf_path)
+    except FileNotFoundError as error:
+        raise ModelMismatch(str(error)) from error
 
 
 def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:
@@ -55,8 +45,7 @@ def servo_shafts(robot: RobotDescription) -> list[Shaft]:
 
 
 def drive_shafts(robot: RobotDescription) -> list[Shaft]:
-    """Return how each drive's shaft turns its wheel."""
+    """Return how each drive's gear turns its wheel; the emulated drive knows its own sign."""
     return [
-        Shaft(joint=drive.joint, ratio=drive.sign / drive.gear_ratio)
-        for drive in robot.can_bus.drives
+        Shaft(joint=drive.joint, ratio=1.0 / drive.gear_ratio) for drive in robot.can_bus.drives
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import Any, Protocol
 
 import mujoco
@@ -55,12 +56,14 @@ class Renderer:
         self._far_m = model.vis.map.zfar * model.stat.extent
         self._gl = open_gl_context(width, height)
         self._gl.make_current()
+        self._context: Any = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         self._scene = mujoco.MjvScene(model, maxgeom=2000)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = VISIBLE_GROUPS
         self._perturb = mujoco.MjvPerturb()
-        self._context: Any = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        self._release = weakref.finalize(self, _release, self._gl, self._context)
+        self._release.atexit = False  # EGL is gone by then
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         self._rect = mujoco.MjrRect(0, 0, width, height)
@@ -87,18 +90,20 @@ class Renderer:
 
     def close(self) -> None:
         """Release the OpenGL objects; closing twice is allowed."""
-        if self._context is None:
-            return
-        self._gl.make_current()
-        self._context.free()
-        self._context = None
-        self._gl.free()
+        self._release()
 
     def _metres(self, buffer: NDArray[np.float32]) -> NDArray[np.float32]:
         """Turn the reversed depth buffer (1 is near, 0 is far) into metres."""
         near, far = self._near_m, self._far_m
         metres: NDArray[np.float32] = near * far / (near + buffer * np.float32(far - near))
         return metres
+
+
+def _release(gl: GLContext, context: Any) -> None:
+    """Free MuJoCo's OpenGL names in the context that owns them, not in whichever is current."""
+    gl.make_current()
+    context.free()
+    gl.free()
 
 
 def fixed_camera(model: mujoco.MjModel, name: str) -> mujoco.MjvCamera:

@@ -1,0 +1,97 @@
+"""Join the physics to every emulated device: what a bus says moves a motor, and back."""
+
+import numpy as np
+
+from drivers.dynamixel.control_table import BAUD_RATES
+from sim_twin.can import CanWire, WheelDrive
+from sim_twin.device import WireDevice
+from sim_twin.head_camera import HeadCamera
+from sim_twin.load import load_engine
+from sim_twin.sensors.imu import ImuDevice
+from sim_twin.sensors.lidar import LidarDevice
+from sim_twin.servos import EmulatedServoSpec, ServoBank
+from vla_deploy.robots import RobotDescription
+
+SUPPLY_V = 12.0
+
+
+class Twin:
+    """Be the robot's machine: physics, servos, drives, lidar and IMU, stepped as one."""
+
+    def __init__(self, robot: RobotDescription, world: str = "flat", seed: int = 0) -> None:
+        """Build the robot in its world.
+
+        Raises:
+            ModelMismatch: there is no such world, or robot and world do not fit together.
+        """
+        self.robot = robot
+        self.engine = load_engine(robot, world, seed)
+        self.servos = ServoBank(_servo_specs(robot))
+        self.drives = tuple(
+            WheelDrive(drive.node_id, sign=drive.sign) for drive in robot.can_bus.drives
+        )
+        self.can_wire = CanWire(self.drives)
+        self.lidar = LidarDevice(self.engine.lidar.cast, seed=seed)
+        self.imu = ImuDevice(self.engine.imu.read, seed=seed)
+        self.serial_devices: dict[str, WireDevice] = {
+            robot.servo_bus.device: self.servos,
+            robot.lidar.device: self.lidar,
+            robot.imu.device: self.imu,
+        }
+        self._camera: HeadCamera | None = None
+        self._seed = seed
+
+    @property
+    def now_ns(self) -> int:
+        """Return simulated time in nanoseconds."""
+        return self.engine.now_ns
+
+    @property
+    def camera(self) -> HeadCamera:
+        """Return the head camera, which renders in this process from its first use on."""
+        if self._camera is None:
+            engine = self.engine
+            self._camera = HeadCamera(engine.model, engine.data, self.robot.camera, self._seed)
+        return self._camera
+
+    def step(self) -> None:
+        """Let the firmware act, the physics follow and the sensors look."""
+        self._drive_motors()
+        self.engine.step()
+        now_ns = self.engine.now_ns
+        self.servos.step(now_ns)
+        self.lidar.step(now_ns)
+        self.imu.step(now_ns)
+        if self._camera is not None:
+            self._camera.device.step(now_ns)
+
+    def close(self) -> None:
+        """Release OpenGL where the camera was used."""
+        if self._camera is not None:
+            self._camera.close()
+
+    def _drive_motors(self) -> None:
+        engine, now_ns = self.engine, self.engine.now_ns
+        shafts = engine.servos
+        duty = self.servos.advance(
+            now_ns, shafts.position_rad(), shafts.velocity_rad_s(), shafts.effort(), SUPPLY_V
+        )
+        shafts.command(duty)
+        wheels = zip(
+            self.drives,
+            engine.drives.position_rad().tolist(),
+            engine.drives.velocity_rad_s().tolist(),
+            strict=True,
+        )
+        torque_nm = [drive.advance(now_ns, angle, speed) for drive, angle, speed in wheels]
+        engine.drives.command(np.array(torque_nm))
+
+
+def _servo_specs(robot: RobotDescription) -> list[EmulatedServoSpec]:
+    """Return the bus as its integrator left it: ids and baud rate set, all else as delivered."""
+    bauds = {speed: value for value, speed in BAUD_RATES.items()}
+    eeprom = {"baud_rate": bauds[robot.servo_bus.baud]}
+    return [
+        EmulatedServoSpec(id=servo.id, model_name=servo.model, eeprom=eeprom)
+        for servo in robot.servo_bus.servos
+    ]
