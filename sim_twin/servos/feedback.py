@@ -102,7 +102,7 @@ class Feedback:
         profile = self._motion.profile
         in_velocity_mode = self._columns.operating_mode == OperatingMode.VELOCITY
         self._velocity_trajectory[:] = np.where(
-            in_velocity_mode, self._columns.goal_velocity, profile.velocity / PULSES_S_PER_UNIT
+            in_velocity_mode, self._motion.ramped_velocity, profile.velocity / PULSES_S_PER_UNIT
         )
         self._position_trajectory[:] = profile.position
 

@@ -84,14 +84,14 @@ class Firmware:
         supply_v: float,
     ) -> Floats:
         """Sense, run the control loops and return the duty for the next step."""
-        dt_s = (now_ns - self._advanced_ns) / NS_PER_S
-        self._advanced_ns = now_ns
-        self.set_time(now_ns)
         if self._stale:
             self._reload()
+        self.set_time(now_ns)
         self._motion.sense(position_rad, velocity_rad_s)
         if not self._pose_known:
             self._take_first_pose()
+        dt_s = (now_ns - self._advanced_ns) / NS_PER_S
+        self._advanced_ns = now_ns
         if (supply_v >= self._options.brownout_v) != self._powered:
             self._switch_power(on=not self._powered)
         np.divide(torque_nm, self._stall_nm, out=self._feedback.effort_ratio)
@@ -172,6 +172,7 @@ class Firmware:
 
     def _take_first_pose(self) -> None:
         self._pose_known = True
+        self._advanced_ns = self._checked_ns = self.now_ns
         for row in range(len(self.registers)):
             self._motion.home(row)
         self._stale = True

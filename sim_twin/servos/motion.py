@@ -69,7 +69,7 @@ class Motion:
         self._last_setpoint = np.zeros(count)
         self._position_sum = np.zeros(count)
         self._velocity_sum = np.zeros(count)
-        self._ramped_velocity = np.zeros(count)
+        self.ramped_velocity = np.zeros(count)
         self.reload()
 
     def reload(self) -> None:
@@ -120,7 +120,7 @@ class Motion:
         self._last_setpoint[row] = self.pulses[row]
         self._position_sum[row] = 0.0
         self._velocity_sum[row] = 0.0
-        self._ramped_velocity[row] = 0.0
+        self.ramped_velocity[row] = 0.0
 
     def advance(self, dt_s: float) -> Floats:
         """Return the duty, -1..1 in shaft coordinates, for the next `dt_s`."""
@@ -166,9 +166,9 @@ class Motion:
         goal = columns.goal_velocity[rows].astype(np.float64)
         ramp = columns.profile_acceleration[rows] * (PULSES_S2_PER_UNIT / PULSES_S_PER_UNIT * dt_s)
         ramp[ramp == 0.0] = np.inf
-        before = self._ramped_velocity[rows]
+        before = self.ramped_velocity[rows]
         asked = np.clip(goal, before - ramp, before + ramp)
-        self._ramped_velocity[rows] = asked
+        self.ramped_velocity[rows] = asked
         error = asked - self.velocity_rad_s[rows] / self._motors.velocity_unit_rad_s[rows]
         i_gain = columns.velocity_i_gain[rows] / 65536.0
         bound = PWM_FULL / np.maximum(i_gain, 1e-9)

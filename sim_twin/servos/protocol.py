@@ -33,7 +33,7 @@ _FAST_OVERHEAD_BYTES: Final = 4  # error, id, CRC
 _FAST_PREFIX_BYTES: Final = 8  # header .. instruction
 _FAST: Final = frozenset({Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ})
 
-_REPLY_LEVELS: Final = {
+_REPLY_LEVELS: Final[dict[int, StatusReturnLevel]] = {
     Instruction.PING: StatusReturnLevel.PING,
     Instruction.READ: StatusReturnLevel.READ,
 }
@@ -79,13 +79,13 @@ def _bulk_writes(params: bytes) -> Iterator[tuple[int, int, bytes]]:
         yield servo_id, address, params[start - length : start]
 
 
-_READ_REQUESTS: Final = {
+_READ_REQUESTS: Final[dict[int, Callable[[bytes], list[_Request]]]] = {
     Instruction.SYNC_READ: _sync_read_requests,
     Instruction.FAST_SYNC_READ: _sync_read_requests,
     Instruction.BULK_READ: _bulk_read_requests,
     Instruction.FAST_BULK_READ: _bulk_read_requests,
 }
-_GROUP_WRITES: Final = {
+_GROUP_WRITES: Final[dict[int, Callable[[bytes], Iterator[tuple[int, int, bytes]]]]] = {
     Instruction.SYNC_WRITE: _sync_writes,
     Instruction.BULK_WRITE: _bulk_writes,
 }
@@ -116,6 +116,8 @@ class BusProtocol:
 
     def execute(self, packet: Packet) -> bytes:
         """Return what the servos answer to a packet."""
+        if packet.instruction == Instruction.STATUS:  # an echo, or another servo's answer
+            return b""
         try:
             if packet.instruction in _READ_REQUESTS:
                 return self._group_read(packet)
@@ -138,7 +140,7 @@ class BusProtocol:
     def _single(self, row: int, packet: Packet) -> bytes:
         table = self._tables[row]
         servo_id, alert = table.get("id"), self._alert(row)
-        level = _REPLY_LEVELS.get(Instruction(packet.instruction), StatusReturnLevel.ALL)
+        level = _REPLY_LEVELS.get(packet.instruction, StatusReturnLevel.ALL)
         answers = table.get("status_return_level") >= level and (
             packet.servo_id != BROADCAST_ID or packet.instruction == Instruction.PING
         )
@@ -208,7 +210,7 @@ class BusProtocol:
     # Several servos by one packet
 
     def _group_read(self, packet: Packet) -> bytes:
-        requests = _READ_REQUESTS[Instruction(packet.instruction)](packet.params)
+        requests = _READ_REQUESTS[packet.instruction](packet.params)
         self._feed(self._known(request[0] for request in requests))
         for address, length in {request[1:] for request in requests}:
             self._firmware.refresh(address, length)
@@ -254,7 +256,7 @@ class BusProtocol:
             return self._alert(row) | refusal.number, b""
 
     def _group_write(self, packet: Packet) -> bytes:
-        writes = list(_GROUP_WRITES[Instruction(packet.instruction)](packet.params))
+        writes = list(_GROUP_WRITES[packet.instruction](packet.params))
         self._feed(self._known(write[0] for write in writes))
         for servo_id, address, data in writes:
             row = self.rows.get(servo_id)
