@@ -131,7 +131,7 @@ def _lock(base: Path) -> int:
         owner = _read_owner(path)
         who = f"pid {owner.pid}, run {owner.run_id}" if owner else "it is just starting or stopping"
         raise AlreadyRunning(
-            f"a supervisor already runs in {base} ({who}); stop it with `vla-deploy stop`, "
+            f"a supervisor already runs in {base} ({who}); end it with `vla-deploy shutdown`, "
             "or choose another directory with --runtime-base"
         ) from None
     return fd

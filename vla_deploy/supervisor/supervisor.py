@@ -165,7 +165,9 @@ class _Run:
         run_dir = self.runtime.run_dir
         try:
             self.space = SharedSpace(run_dir / "ipc", clock)
-            self.crew = Crew(table, options, run_dir, readiness_of(table, run_dir, self.space, clock))
+            self.crew = Crew(
+                table, options, run_dir, readiness_of(table, run_dir, self.space, clock)
+            )
             self.report = Report(self.runtime.run_id, options, self.space, clock)
         except BaseException:
             self.runtime.close()

@@ -1,0 +1,81 @@
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+from vla_deploy.supervisor import ProcessSpec, RestartPolicy, RunOptions, Supervisor
+
+CHILD = str(Path(__file__).with_name("child.py"))
+QUICK = RestartPolicy(initial_s=0.05, cap_s=0.1, max_restarts=3)
+
+
+class Stage:
+    """Build supervisors over tiny children, and read what the children have told."""
+
+    def __init__(self, directory: Path) -> None:
+        self.base = directory / "base"
+        self.events_path = directory / "events"
+
+    def row(self, name: str, behaviour: str = "run", **changes: object) -> ProcessSpec:
+        changes = {"restart": QUICK, "stop_timeout_s": 5.0, **changes}
+        return ProcessSpec(
+            name=name,
+            command=(CHILD, "{run_dir}", name, str(self.events_path), behaviour),
+            ready_files=(f"ready/{name}",),
+            **changes,
+        )
+
+    def supervisor(self, *table: ProcessSpec, **options: object) -> Supervisor:
+        return Supervisor(RunOptions(runtime_base=self.base, **options), table)
+
+    def events(self) -> list[str]:
+        return [line.rpartition(" ")[0] for line in self._lines()]
+
+    def pids(self, name: str) -> list[int]:
+        return [
+            int(line.split()[-1]) for line in self._lines() if line.startswith(f"{name} started")
+        ]
+
+    def leftovers(self) -> list[str]:
+        left = {path.name for path in self.base.iterdir()} - {"lock"}
+        shared = Path("/dev/shm").glob("*vla-deploy-*")
+        return [*left, *(path.name for path in shared if self._is_ours(path))]
+
+    def _is_ours(self, shared: Path) -> bool:
+        owner = shared / "owner.json"
+        return not owner.is_file() or str(self.base) in owner.read_text()
+
+    def _lines(self) -> list[str]:
+        return self.events_path.read_text().splitlines() if self.events_path.exists() else []
+
+
+@pytest.fixture
+def stage(tmp_path: Path):
+    stage = Stage(tmp_path)
+    yield stage
+    for name in ("a", "b", "c", "grandchild"):
+        for pid in stage.pids(name):
+            if psutil.pid_exists(pid) and CHILD in " ".join(psutil.Process(pid).cmdline()):
+                psutil.Process(pid).send_signal(signal.SIGKILL)
+
+
+@pytest.fixture
+def eventually() -> Callable[[Callable[[], bool]], bool]:
+    def wait(condition: Callable[[], bool], timeout_s: float = 10.0) -> bool:
+        until_ns = time.monotonic_ns() + round(timeout_s * 1e9)
+        while not condition():
+            if time.monotonic_ns() > until_ns:
+                return False
+            time.sleep(0.02)
+        return True
+
+    return wait
+
+
+@pytest.fixture
+def python() -> str:
+    return sys.executable

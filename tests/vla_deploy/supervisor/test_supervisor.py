@@ -1,0 +1,196 @@
+"""Supervise real, tiny processes."""
+
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import psutil
+import pytest
+
+from platforms import ProfileError
+from vla_deploy.supervisor import AlreadyRunning, StartFailed, Supervisor, running
+
+pytestmark = pytest.mark.stack
+
+RUN_FOREVER = """
+import sys
+from pathlib import Path
+from vla_deploy.supervisor import ProcessSpec, RunOptions, Supervisor
+child, events, base = sys.argv[1:]
+table = tuple(
+    ProcessSpec(
+        name=name,
+        command=(child, "{run_dir}", name, events, behaviour),
+        ready_files=(f"ready/{name}",),
+    )
+    for name, behaviour in (("a", "run"), ("b", "family"))
+)
+with Supervisor(RunOptions(runtime_base=Path(base)), table) as supervisor:
+    supervisor.start()
+    print("ready", flush=True)
+    supervisor.run_until_stopped()
+"""
+
+
+def step_until(supervisor: Supervisor, eventually, condition) -> bool:
+    def look() -> bool:
+        supervisor.step()
+        return condition()
+
+    return eventually(look)
+
+
+def rows(supervisor: Supervisor) -> dict[str, dict]:
+    document = supervisor.space.cell_reader("process_table").latest().document()
+    return {row["name"]: row for row in document["processes"]}
+
+
+def test_processes_start_and_stop_in_order_and_leave_nothing(stage):
+    with stage.supervisor(stage.row("a"), stage.row("b"), stage.row("c")) as supervisor:
+        supervisor.start()
+        assert stage.events() == ["a started", "b started", "c started"]
+        assert (stage.base / "current").resolve() == supervisor.run_dir
+        assert (supervisor.run_dir / "ipc").resolve().parent == Path("/dev/shm")
+    stops = [f"{name} {what}" for name in "cba" for what in ("asked to stop", "stopped")]
+    assert stage.events()[3:] == stops
+    assert stage.leftovers() == []
+
+
+def test_a_killed_process_is_restarted_and_the_table_says_so(stage, eventually):
+    with stage.supervisor(stage.row("a"), stage.row("b")) as supervisor:
+        supervisor.start()
+        os.kill(stage.pids("a")[0], signal.SIGKILL)
+        assert step_until(supervisor, eventually, lambda: rows(supervisor)["a"]["restarts"] == 1)
+        assert step_until(supervisor, eventually, lambda: rows(supervisor)["a"]["state"] == "ready")
+        row = rows(supervisor)["a"]
+        assert (row["pid"], row["exit_code"]) == (stage.pids("a")[1], -9)
+        assert len(stage.pids("b")) == 1
+
+
+def test_the_table_reports_memory_and_cpu_of_every_process(stage, eventually):
+    with stage.supervisor(stage.row("a")) as supervisor:
+        supervisor.start()
+        reader = supervisor.space.cell_reader("process_table")
+        first = reader.latest().sequence
+        assert step_until(supervisor, eventually, lambda: reader.latest().sequence > first + 1)
+        document = reader.latest().document()
+    child, own = document["processes"][0], document["supervisor"]
+    assert 1 < child["memory_mb"] <= child["rss_mb"] < 200
+    assert 0 < child["cpu_ratio"] < 1.5
+    assert document["peak_memory_mb"] >= child["memory_mb"] + own["memory_mb"] - 1
+    assert document["memory_kind"] in {"pss", "rss"}
+    assert document["supervisor_pid"] == os.getpid()
+
+
+def test_a_process_that_keeps_crashing_fails_the_start(stage):
+    supervisor = stage.supervisor(stage.row("a"), stage.row("b", "crash"), stage.row("c"))
+    with pytest.raises(StartFailed, match=r"b did not start: exit code 3; given up after 4 fail"):
+        supervisor.start()
+    assert stage.events().count("b started") == 4
+    assert "c started" not in stage.events()
+    assert stage.events()[-1] == "a stopped"
+    assert stage.leftovers() == []
+
+
+def test_a_refusal_fails_the_start_at_once_with_the_process_own_words(stage):
+    with pytest.raises(StartFailed, match=r"b did not start: exit code 2\nrobot\.toml: servo 3"):
+        stage.supervisor(stage.row("a"), stage.row("b", "refuse")).start()
+    assert stage.events().count("b started") == 1
+
+
+def test_a_process_that_never_gets_ready_fails_the_start(stage):
+    row = stage.row("a", "never-ready", ready_timeout_s=0.1)
+    with pytest.raises(StartFailed, match=r"not ready within 0\.1 s"):
+        stage.supervisor(row).start()
+
+
+def test_a_stubborn_process_is_killed_after_its_stop_timeout(stage):
+    with stage.supervisor(stage.row("a", "stubborn", stop_timeout_s=0.2)) as supervisor:
+        supervisor.start()
+    assert stage.events() == ["a started", "a asked to stop"]
+    assert not psutil.pid_exists(stage.pids("a")[0])
+
+
+def test_what_a_process_started_itself_in_its_group_ends_with_it(stage, tmp_path, eventually):
+    script = tmp_path / "parent.py"
+    script.write_text(
+        "import subprocess, sys, pathlib, time\n"
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])\n"
+        "pathlib.Path(sys.argv[1]).write_text(str(child.pid))\n"
+        "time.sleep(60)\n"
+    )
+    told = tmp_path / "pid"
+    row = stage.row("a")
+    row = type(row)(name="a", command=(str(script), str(told)), ready_files=("../../pid",))
+    with stage.supervisor(row) as supervisor:
+        supervisor.start()
+        pid = int(told.read_text())
+    assert eventually(lambda: not is_running(pid))
+
+
+def test_a_second_supervisor_is_refused_with_who_and_what_to_do(stage):
+    with stage.supervisor(stage.row("a")) as supervisor:
+        supervisor.start()
+        with pytest.raises(AlreadyRunning, match=rf"pid {os.getpid()}, run .*vla-deploy stop"):
+            stage.supervisor(stage.row("b")).start()
+        assert running(stage.base).run_dir == str(supervisor.run_dir)
+    assert running(stage.base) is None
+    assert stage.events() == ["a started", "a asked to stop", "a stopped"]
+
+
+def test_arming_is_asked_for_once_everything_is_ready(stage):
+    with stage.supervisor(stage.row("a"), arm=True) as supervisor:
+        supervisor.start()
+        (event,) = supervisor.space.ring_reader("operator", from_start=True).drain()
+    assert event.payload["act"] == "arm"
+
+
+def test_a_broken_profile_starts_nothing(stage):
+    with pytest.raises(ProfileError):
+        stage.supervisor(stage.row("a"), profile="no-such").start()
+    assert stage.events() == []
+    assert not stage.base.exists()
+
+
+def test_sigterm_ends_the_run_in_order(stage, python):
+    supervisor = start_supervisor(stage, python)
+    supervisor.terminate()
+    assert supervisor.wait(timeout=20) == 0
+    assert stage.events()[-2:] == ["a asked to stop", "a stopped"]
+    assert stage.leftovers() == []
+
+
+def test_kill_9_of_the_supervisor_ends_its_children_and_the_next_start_sweeps_the_rest(
+    stage, python, eventually
+):
+    supervisor = start_supervisor(stage, python)
+    (a,), (b,), (grandchild,) = (stage.pids(name) for name in ("a", "b", "grandchild"))
+    supervisor.kill()
+    supervisor.wait(timeout=10)
+    assert eventually(lambda: not is_running(a) and not is_running(b), 3.0)
+    assert is_running(grandchild)
+    assert running(stage.base) is None
+    assert len(stage.leftovers()) == 3  # the run, `current`, the shared memory
+    with stage.supervisor(stage.row("c")) as later:
+        later.start()
+        assert not is_running(grandchild)
+    assert stage.leftovers() == []
+
+
+def start_supervisor(stage, python) -> subprocess.Popen:
+    child = str(Path(__file__).with_name("child.py"))
+    arguments = [child, str(stage.events_path), str(stage.base)]
+    supervisor = subprocess.Popen(
+        [python, "-c", RUN_FOREVER, *arguments], stdout=subprocess.PIPE, text=True
+    )
+    with supervisor.stdout:
+        assert supervisor.stdout.readline() == "ready\n"
+    return supervisor
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
