@@ -11,43 +11,35 @@ from numpy.typing import NDArray
 
 from vla_deploy.navigation.errors import MapInvalid
 
-FREE, OCCUPIED, UNKNOWN = 0, 100, 255
 REQUIRED_KEYS = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
+# The map's drawer paints black only what crosses the lidar's plane, dark grey what is above or below.
+LIDAR_THRESH = 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GridMap:
     """Hold a map of square cells; row 0 is the southernmost, as y grows with the row.
 
-    `origin` is the map-frame position of the outer corner of cell (0, 0).
+    `origin_m` is the map-frame position of the outer corner of cell (0, 0). `blocked` marks where
+    the robot must not go: occupied and unknown cells. `seen_by_lidar` marks what crosses the
+    lidar's plane, for localisation; None means all that is blocked.
     """
 
     resolution_m: float
-    origin: tuple[float, float]
-    occupancy: NDArray[np.uint8]
-
-    @property
-    def blocked(self) -> NDArray[np.bool_]:
-        """Return where the robot must not go: occupied and unknown cells."""
-        blocked: NDArray[np.bool_] = self.occupancy != FREE
-        return blocked
-
-    @property
-    def occupied(self) -> NDArray[np.bool_]:
-        """Return where something stands."""
-        occupied: NDArray[np.bool_] = self.occupancy == OCCUPIED
-        return occupied
+    origin_m: tuple[float, float]
+    blocked: NDArray[np.bool_]
+    seen_by_lidar: NDArray[np.bool_] | None = None
 
     def world_to_cell(self, x_m: float, y_m: float) -> tuple[int, int]:
         """Return row and column of the cell that holds a point; it may lie off the map."""
-        column = math.floor((x_m - self.origin[0]) / self.resolution_m)
-        row = math.floor((y_m - self.origin[1]) / self.resolution_m)
+        column = math.floor((x_m - self.origin_m[0]) / self.resolution_m)
+        row = math.floor((y_m - self.origin_m[1]) / self.resolution_m)
         return row, column
 
     def cell_to_world(self, row: int, column: int) -> tuple[float, float]:
         """Return x and y of a cell's centre."""
-        x_m = self.origin[0] + (column + 0.5) * self.resolution_m
-        y_m = self.origin[1] + (row + 0.5) * self.resolution_m
+        x_m = self.origin_m[0] + (column + 0.5) * self.resolution_m
+        y_m = self.origin_m[1] + (row + 0.5) * self.resolution_m
         return x_m, y_m
 
 
@@ -70,20 +62,14 @@ def load_map(yaml_path: Path) -> GridMap:
     image = cv2.imread(str(image_path), cv2.IMREAD_GRAYSCALE) if image_path.is_file() else None
     if image is None:
         raise MapInvalid(f"{image_path}: expected a grey image, found none or an unreadable one")
+    image = np.flipud(image)
+    dark = image / 255.0 if entries.get("negate") else (255 - image) / 255.0
     return GridMap(
         resolution_m=float(resolution_m),
-        origin=(float(origin[0]), float(origin[1])),
-        occupancy=_occupancy(np.flipud(image), entries),
+        origin_m=(float(origin[0]), float(origin[1])),
+        blocked=~(dark < float(str(entries["free_thresh"]))),
+        seen_by_lidar=dark > max(LIDAR_THRESH, float(str(entries["occupied_thresh"]))),
     )
-
-
-def _occupancy(image: NDArray[np.uint8], entries: dict[str, object]) -> NDArray[np.uint8]:
-    """Apply map_server's "trinary" thresholds."""
-    dark = image / 255.0 if entries.get("negate") else (255 - image) / 255.0
-    occupancy = np.full(image.shape, UNKNOWN, dtype=np.uint8)
-    occupancy[dark > float(str(entries["occupied_thresh"]))] = OCCUPIED
-    occupancy[dark < float(str(entries["free_thresh"]))] = FREE
-    return occupancy
 
 
 def _read_entries(path: Path) -> dict[str, object]:

@@ -62,7 +62,8 @@ class DistanceField:
 
     def __init__(self, grid: GridMap) -> None:
         self._grid = grid
-        occupied = grid.occupied.astype(np.uint8)
+        walls = grid.blocked if grid.seen_by_lidar is None else grid.seen_by_lidar
+        occupied = walls.astype(np.uint8)
         outside = cv2.distanceTransform(1 - occupied, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         inside = cv2.distanceTransform(occupied, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         # Distances run between cell centres; the surface lies half a cell before the next one.
@@ -72,7 +73,7 @@ class DistanceField:
     def sample(self, points: Points) -> tuple[NDArray[np.float64], Points]:
         """Return distance and gradient at (n, 2) map points, by bilinear interpolation."""
         rows, columns = self._field_m.shape
-        at = (points - self._grid.origin) / self._grid.resolution_m - 0.5
+        at = (points - self._grid.origin_m) / self._grid.resolution_m - 0.5
         u = np.clip(at[:, 0], 0.0, columns - 1.001)
         v = np.clip(at[:, 1], 0.0, rows - 1.001)
         i, j = v.astype(np.intp), u.astype(np.intp)

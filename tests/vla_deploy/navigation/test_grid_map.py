@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.navigation.errors import MapInvalid
-from vla_deploy.navigation.grid_map import FREE, OCCUPIED, UNKNOWN, load_map
+from vla_deploy.navigation.grid_map import load_map
 
 YAML = """# a flat
 image: flat.pgm
@@ -20,21 +20,20 @@ free_thresh: 0.196
 def write(folder: Path, yaml: str = YAML) -> Path:
     image = np.full((4, 6), 254, dtype=np.uint8)
     image[0, 0] = 0  # top left: the northernmost row
-    image[3, 5] = 205
+    image[3, 5] = 205  # unknown
+    image[3, 4] = 60  # a table top, above the lidar
     cv2.imwrite(str(folder / "flat.pgm"), image)
     path = folder / "flat.yaml"
     path.write_text(yaml)
     return path
 
 
-def test_row_zero_is_the_south_and_thresholds_make_three_kinds(tmp_path: Path) -> None:
+def test_row_zero_is_the_south_and_only_black_is_seen_by_the_lidar(tmp_path: Path) -> None:
     grid = load_map(write(tmp_path))
-    assert grid.occupancy.shape == (4, 6)
-    assert grid.occupancy[3, 0] == OCCUPIED
-    assert grid.occupancy[0, 5] == UNKNOWN
-    assert grid.occupancy[1, 1] == FREE
-    assert np.count_nonzero(grid.blocked) == 2
-    assert np.count_nonzero(grid.occupied) == 1
+    assert grid.blocked.shape == (4, 6)
+    assert np.argwhere(grid.blocked).tolist() == [[0, 4], [0, 5], [3, 0]]
+    assert grid.seen_by_lidar is not None
+    assert np.argwhere(grid.seen_by_lidar).tolist() == [[3, 0]]
 
 
 def test_cells_and_world_points_agree(tmp_path: Path) -> None:

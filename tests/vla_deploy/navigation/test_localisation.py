@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.grid_map import FREE, OCCUPIED, GridMap
+from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.localisation import DistanceField, Localiser, Pose2D
 
 # Axis-parallel solid boxes: x0, y0, x1, y1 in metres.
@@ -24,12 +24,12 @@ RESOLUTION_M = 0.05
 
 
 def flat_map() -> GridMap:
-    occupancy = np.full((110, 130), FREE, dtype=np.uint8)
+    blocked = np.zeros((110, 130), dtype=np.bool_)
     origin = (-0.25, -0.25)
     for box in SOLIDS:
         x0, y0, x1, y1 = np.rint((box - np.tile(origin, 2)) / RESOLUTION_M).astype(int)
-        occupancy[y0:y1, x0:x1] = OCCUPIED
-    return GridMap(resolution_m=RESOLUTION_M, origin=origin, occupancy=occupancy)
+        blocked[y0:y1, x0:x1] = True
+    return GridMap(resolution_m=RESOLUTION_M, origin_m=origin, blocked=blocked)
 
 
 def trace(pose: Pose2D, solids: NDArray[np.float64] = SOLIDS) -> NDArray[np.float32]:
