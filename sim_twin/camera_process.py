@@ -95,8 +95,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--parent-pid", type=int, required=True)
     options = parser.parse_args(argv)
     die_with_parent(options.parent_pid, signal.SIGKILL)
-    # Ctrl-C reaches the whole group; the twin ends this process by closing the mirror.
+    # Both may reach the whole group; the twin ends this process by closing the mirror.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     mirror = socket.socket(fileno=options.mirror_fd)
     try:
         studio = Studio(options.robot, options.world, options.seed, options.devices_dir)

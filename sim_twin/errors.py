@@ -5,6 +5,7 @@ TwinError
 ├── ModelMismatch    robot file and world do not fit together: fix the named file
 ├── RefereeRefusal   the referee does not know the object, container or operation
 ├── FilmFault        a film cannot be written: choose another path or ending
+├── CameraFailed     the rendering process did not start: its own message says why
 └── Unreachable      no twin answers under the run directory: start one
 """
 
@@ -31,3 +32,7 @@ class Unreachable(TwinError):
 
 class FilmFault(TwinError):
     """Say why a film cannot be written."""
+
+
+class CameraFailed(TwinError):
+    """Say that the rendering process did not start."""

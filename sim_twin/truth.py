@@ -12,7 +12,7 @@ from sim_twin.errors import RefereeRefusal
 
 REST_SPEED_M_S = 0.02
 REST_RATE_RAD_S = 0.3
-_SCALAR_JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+_SCALAR_JOINTS = (mujoco.mjtJoint.mjJNT_HINGE.value, mujoco.mjtJoint.mjJNT_SLIDE.value)
 
 
 class Referee:
@@ -28,7 +28,7 @@ class Referee:
         self._joints = {
             model.joint(i).name: i
             for i in range(model.njnt)
-            if model.jnt_type[i] in _SCALAR_JOINTS
+            if int(model.jnt_type[i]) in _SCALAR_JOINTS
             and model.body_rootid[model.jnt_bodyid[i]] == root
         }
 

@@ -1,0 +1,151 @@
+"""Run the twin on the wall clock: physics paced, buses answered between any two steps."""
+
+import json
+import os
+import select
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivers.clock import NS_PER_S, Clock
+from sim_twin.camera_link import CameraLink
+from sim_twin.can import CanHub
+from sim_twin.engine import STEP_NS
+from sim_twin.errors import RefereeRefusal
+from sim_twin.json_line_server import JsonLineServer
+from sim_twin.pacer import Pacer, RealTimeFactor
+from sim_twin.pty_line import PtyLine
+from sim_twin.referee import REFEREE_SOCKET
+from sim_twin.twin import Twin
+from vla_deploy.robots import load_robot
+
+READY_FILE = "ready"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwinOptions:
+    """Say which robot lives in which world, and where its devices are served."""
+
+    robot: str
+    world: str
+    seed: int
+    run_dir: Path
+    camera: bool = True
+
+    @property
+    def devices_dir(self) -> Path:
+        """Return the folder of the device files."""
+        return self.run_dir / "dev"
+
+
+class TwinProcess:
+    """Serve one twin's devices under `<run_dir>/dev` from a single-threaded loop."""
+
+    def __init__(self, options: TwinOptions, clock: Clock) -> None:
+        """Serve every device; the file `ready` appears last.
+
+        Raises:
+            TwinError: the model does not load, or the camera cannot render.
+            DeviceBusy: another twin serves the same folder.
+        """
+        devices = options.devices_dir
+        devices.mkdir(parents=True, exist_ok=True)
+        self._ready = devices / READY_FILE
+        self._ready.unlink(missing_ok=True)
+        self._clock = clock
+        robot = load_robot(options.robot)
+        self._twin = Twin(robot, options.world, options.seed)
+        self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
+        self._camera = _start_camera(options)
+        self._lines = [
+            PtyLine(device, devices / name) for name, device in self._twin.serial_devices.items()
+        ]
+        self._referee = JsonLineServer(devices / REFEREE_SOCKET, self.answer)
+        self._operations: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
+            "truth": self._truth,
+            "inside": self._inside,
+        }
+        now_ns = clock.now_ns()
+        self._pacer = Pacer(STEP_NS, now_ns)
+        self._factor = RealTimeFactor(now_ns, self._twin.now_ns)
+        self._ready.write_text(json.dumps({"pid": os.getpid()}), encoding="utf-8")
+
+    def run(self, should_stop: Callable[[], bool]) -> None:
+        """Step and serve until `should_stop()`."""
+        while not should_stop():
+            wall_ns = self._clock.now_ns()
+            if self._pacer.due(wall_ns):
+                self._step(wall_ns)
+            wait_ns = self._pacer.wait_ns(self._clock.now_ns())
+            ready, _, _ = select.select(self._filenos(), [], [], wait_ns / NS_PER_S)
+            if ready:
+                self._serve(set(ready))
+
+    def close(self) -> None:
+        """Take every device away."""
+        self._ready.unlink(missing_ok=True)
+        self._referee.close()
+        self._hub.close()
+        for line in self._lines:
+            line.close()
+        if self._camera is not None:
+            self._camera.close()
+
+    def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Answer the referee's `truth` and `inside`.
+
+        Raises:
+            RefereeRefusal: the operation, object or container is unknown.
+        """
+        operation = self._operations.get(str(request.get("op")))
+        if operation is None:
+            known = ", ".join(self._operations)
+            raise RefereeRefusal(f"no operation {request.get('op')!r}; there are {known}")
+        return operation(request)
+
+    def _step(self, wall_ns: int) -> None:
+        self._twin.step()
+        self._pacer.stepped()
+        for line in self._lines:
+            line.poll_once()
+        now_ns = self._twin.now_ns
+        self._factor.update(wall_ns, now_ns)
+        if self._camera is not None:
+            self._camera.show(now_ns, wall_ns, self._twin.engine.data.qpos)
+
+    def _filenos(self) -> list[int]:
+        lines = [line.fileno() for line in self._lines]
+        return [*lines, *self._hub.filenos(), *self._referee.filenos()]
+
+    def _serve(self, ready: set[int]) -> None:
+        for line in self._lines:
+            if line.fileno() in ready:
+                line.poll_once()
+        if not ready.isdisjoint(self._hub.filenos()):
+            self._hub.poll_once()
+        if not ready.isdisjoint(self._referee.filenos()):
+            self._referee.poll_once()
+
+    def _truth(self, _request: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            **self._twin.engine.referee.truth(),
+            "real_time_factor": self._factor.value,
+            "slipped_s": self._pacer.slipped_ns / NS_PER_S,
+        }
+
+    def _inside(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        names = str(request.get("object")), str(request.get("container"))
+        return self._twin.engine.referee.inside(*names)
+
+
+def _start_camera(options: TwinOptions) -> CameraLink | None:
+    if not options.camera:
+        return None
+    camera = CameraLink(options.robot, options.world, options.seed, options.devices_dir)
+    try:
+        camera.wait_ready()
+    except BaseException:
+        camera.close()
+        raise
+    return camera
