@@ -3,11 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 STAMP := $(VENV)/.installed
 
-.PHONY: help demo test check campaign lock clean
+.PHONY: help demo test campaign lock clean
 help:
 	@echo "make demo      install what is needed, then pick up the red cup on the twin"
-	@echo "make test      install what is needed, then run all tests (under 10 minutes)"
-	@echo "make check     format, lint, types, import rules, tests: the one gate"
+	@echo "make test      install what is needed, then format, lint, types, import rules and all tests"
 	@echo "make campaign  the long tests: ten seeds of pick and place"
 	@echo "make lock      pin every dependency afresh"
 
@@ -21,9 +20,6 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	scripts/system-packages
-	$(VENV)/bin/python -m pytest
-
-check: $(STAMP)
 	scripts/check
 
 campaign: $(STAMP)

@@ -1,0 +1,36 @@
+"""`vla-deploy bench`: measure beside a peer or a limit, in the same run."""
+
+import argparse
+import subprocess
+import sys
+from typing import Any
+
+from vla_deploy.cli.example import add_command
+
+# Started by name: the robot's code never imports the benchmarks.
+BENCHMARKS = {
+    "bus": "16-servo cycle against dynamixel-sdk on the same emulated bus",
+    "twin": "twin steps against raw mj_step, and the lock-step real-time factor",
+}
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    bench = add_command(
+        commands,
+        "bench",
+        "measure beside a peer or a limit, in the same run",
+        "  vla-deploy bench bus --json\n  vla-deploy bench twin\n",
+    )
+    listed = "; ".join(f"{name}: {summary}" for name, summary in BENCHMARKS.items())
+    bench.add_argument("benchmark", choices=sorted(BENCHMARKS), help=listed)
+    bench.add_argument("--json", action="store_true", help="print the figures as JSON")
+    bench.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run one benchmark in a process of its own."""
+    command = [sys.executable, "-m", f"benchmarks.{arguments.benchmark}"]
+    if arguments.json:
+        command.append("--json")
+    return subprocess.run(command, check=False).returncode

@@ -1,0 +1,51 @@
+"""`vla-deploy check` and `vla-deploy schema`: look at files without running anything."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from platforms import load_profile
+from vla_deploy.cli.example import add_command
+from vla_deploy.cli.say import read_plan
+from vla_deploy.planning import check_plan, parse_plan, plan_schema
+from vla_deploy.planning.node import world_of
+from vla_deploy.robots import load_robot
+
+
+def register(commands: Any) -> None:
+    """Add the commands."""
+    check = add_command(
+        commands,
+        "check",
+        "check a robot, a profile or a plan, and report all faults",
+        "  vla-deploy check --robot butler\n  vla-deploy check --plan plan.json\n",
+    )
+    check.add_argument("--robot", default="butler", help="name or folder of a robot")
+    check.add_argument("--profile", default="desktop", help="name or file of a profile")
+    check.add_argument("--plan", type=Path, help="a plan to check against the robot")
+    check.set_defaults(run=run)
+    schema = add_command(
+        commands, "schema", "print the JSON Schema of a plan", "  vla-deploy schema\n"
+    )
+    schema.set_defaults(run=run_schema)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check what was named; a fault ends in one message and exit code 2."""
+    robot = load_robot(arguments.robot)
+    profile = load_profile(arguments.profile)
+    print(f"robot {robot.name}: {len(robot.joint_names)} servos, {len(robot.places)} places: ok")
+    print(f"profile {profile.name}: ok")
+    if arguments.plan:
+        plan = parse_plan(read_plan(arguments.plan))
+        check_plan(plan, world_of(robot, {}))
+        print(f"plan {arguments.plan}: {len(plan.actions)} actions: ok")
+    return 0
+
+
+def run_schema(arguments: argparse.Namespace) -> int:
+    """Print the schema."""
+    del arguments
+    print(json.dumps(plan_schema(), indent=2))
+    return 0

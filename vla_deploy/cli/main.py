@@ -1,0 +1,55 @@
+"""Read the command line and run one command."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from vla_deploy.cli import bench, check, demo, operate, run, say, status
+from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
+
+COMMANDS = (run, demo, say, status, operate, check, bench)
+EPILOG = """examples:
+  vla-deploy demo                                 pick and place on the twin
+  vla-deploy run --twin                           keep a twin running
+  vla-deploy say "go to the kitchen"              in another terminal
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of every command."""
+    top = argparse.ArgumentParser(
+        prog="vla-deploy",
+        description="Run a language-commanded robot, or its digital twin.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument(
+        "--runtime-base",
+        type=Path,
+        metavar="DIR",
+        help="where runs live (default: /run/vla-deploy for root, else XDG_RUNTIME_DIR)",
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for command in COMMANDS:
+        command.register(commands)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; return 0 on success, 1 when the robot failed, 2 for a bad request."""
+    arguments = parser().parse_args(argv)
+    try:
+        return int(arguments.run(arguments))
+    except CommandFailed as error:
+        print(f"vla-deploy: {error}", file=sys.stderr)
+        return 1
+    except USER_ERRORS as error:
+        print(f"vla-deploy: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

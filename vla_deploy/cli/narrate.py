@@ -1,0 +1,45 @@
+"""Tell a command's events to a person, one line each."""
+
+from collections.abc import Mapping
+from typing import Any
+
+SIGNS: Mapping[str, str] = {
+    "active": "…",
+    "succeeded": "✓",
+    "aborted": "✗",
+    "cancelled": "-",
+    "rejected": "✗",
+}
+
+
+def line_of(event: Mapping[str, Any]) -> str | None:
+    """Return one line for an event, or None for one that says nothing new."""
+    match event["event"]:
+        case "plan":
+            steps = [action_words(action) for action in event["plan"]["actions"]]
+            return "plan: " + "; ".join(steps)
+        case "action":
+            return _action_line(event)
+        case "said":
+            return f"robot says: {event['text']}"
+        case "rejected":
+            return f"refused: {event['reason']}"
+        case "finished":
+            return "done" if event["success"] else f"failed: {event['error']}"
+    return None
+
+
+def action_words(action: Mapping[str, Any]) -> str:
+    """Return an action in words: "pick up red cup"."""
+    values = [
+        f"{value:g}" if isinstance(value, float) else str(value)
+        for value in action["parameters"].values()
+    ]
+    return " ".join([action["skill"].replace("_", " "), *values])
+
+
+def _action_line(event: Mapping[str, Any]) -> str:
+    line = f"{SIGNS.get(event['status'], event['status'])} {action_words(event)}"
+    if event["status"] != "active":
+        line += f"  ({event['execution_time_s']:.1f} s)"
+    return f"{line}  {event['error']}" if event["error"] else line

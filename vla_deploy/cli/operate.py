@@ -1,0 +1,111 @@
+"""`vla-deploy estop | reset | arm | disarm | stop | shutdown`: an operator's acts."""
+
+import argparse
+import json
+import os
+import signal
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from drivers.clock import NS_PER_S
+from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.cli.example import add_command
+from vla_deploy.cli.session import POLL_NS, Session, attach
+from vla_deploy.supervisor import default_base, running
+
+WAIT_S = 5.0
+
+Reached = Callable[[Mapping[str, Any]], bool]
+
+ACTS: Mapping[str, tuple[str, Reached]] = {
+    "estop": (
+        "stop the robot now and latch the stop (a software stop)",
+        lambda status: bool(status["estop_latched"]),
+    ),
+    "reset": (
+        "release a latched stop; nothing moves, arm the robot next",
+        lambda status: status["state"] == "disarmed",
+    ),
+    "arm": (
+        "put power on the joints where they are, so that commands may move them",
+        lambda status: status["state"] == "armed",
+    ),
+    "disarm": ("take power off the joints", lambda status: status["state"] == "disarmed"),
+}
+
+
+def register(commands: Any) -> None:
+    """Add the commands."""
+    for act, (summary, _) in ACTS.items():
+        command = add_command(commands, act, summary, f"  vla-deploy {act}\n")
+        command.add_argument("--reason", default="", help="why, for the log")
+        command.add_argument("--json", action="store_true", help="print control's status as JSON")
+        command.set_defaults(run=run, act=act)
+    stop = add_command(
+        commands, "stop", "stop what the robot does; it stays ready", "  vla-deploy stop\n"
+    )
+    stop.set_defaults(run=run_stop)
+    shutdown = add_command(
+        commands, "shutdown", "end the run in order, as Ctrl-C does", "  vla-deploy shutdown\n"
+    )
+    shutdown.set_defaults(run=run_shutdown)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Publish the act and wait until control shows it.
+
+    Raises:
+        CommandFailed: control did not do it in time.
+    """
+    session = attach(arguments.runtime_base)
+    session.operate(arguments.act, arguments.reason)
+    status = _wait(session, ACTS[arguments.act][1])
+    if arguments.json:
+        print(json.dumps(status, indent=2))
+    else:
+        print(f"control: {status['state']}" + (f" ({status['cause']})" if status["cause"] else ""))
+    return 0
+
+
+def _wait(session: Session, reached: Reached) -> dict[str, Any]:
+    end_ns = session.clock.now_ns() + round(WAIT_S * NS_PER_S)
+    status = None
+    while session.clock.now_ns() < end_ns:
+        status = session.document("control_status", age_limit_s=1.0)
+        if status is not None and reached(status):
+            return status
+        session.clock.sleep_until(session.clock.now_ns() + POLL_NS)
+    if status is None:
+        raise CommandFailed("control does not answer; see: vla-deploy status")
+    raise CommandFailed(
+        f"control is still {status['state']}: "
+        f"{status['detail'] or status['cause'] or 'no reason given'}"
+    )
+
+
+def run_stop(arguments: argparse.Namespace) -> int:
+    """Cancel the running command; the robot comes to rest and stays armed."""
+    attach(arguments.runtime_base).cancel()
+    print("stopped; the robot is ready")
+    return 0
+
+
+def run_shutdown(arguments: argparse.Namespace) -> int:
+    """Ask the supervisor to stop everything in order, and wait for it.
+
+    Raises:
+        CommandFailed: it did not end in time.
+    """
+    session = attach(arguments.runtime_base)
+    base = arguments.runtime_base or default_base()
+    owner = running(base)
+    if owner is None:
+        return 0
+    os.kill(owner.pid, signal.SIGTERM)
+    end_ns = session.clock.now_ns() + 30 * NS_PER_S
+    while owner.is_alive():
+        if session.clock.now_ns() > end_ns:
+            raise CommandFailed(f"the supervisor (pid {owner.pid}) did not end within 30 s")
+        session.clock.sleep_until(session.clock.now_ns() + POLL_NS)
+    print("the run has ended")
+    return 0

@@ -1,0 +1,57 @@
+"""`vla-deploy run`: keep a robot, or its twin, running until Ctrl-C."""
+
+import argparse
+import logging
+from typing import Any
+
+from vla_deploy.cli.example import add_command
+from vla_deploy.supervisor import RunOptions, Supervisor
+
+EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
+  vla-deploy run --twin --seed 7        other places for the objects
+  vla-deploy run --robot butler         the real robot; arm it when it is safe: vla-deploy arm
+"""
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    run = add_command(commands, "run", "run the robot until Ctrl-C", EXAMPLES)
+    add_robot_arguments(run)
+    run.add_argument("--twin", action="store_true", help="replace the hardware by the twin")
+    run.add_argument(
+        "--arm",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="arm once everything is ready (default: only with --twin)",
+    )
+    run.set_defaults(run=main)
+
+
+def add_robot_arguments(command: argparse.ArgumentParser) -> None:
+    """Add what chooses robot, profile and world."""
+    command.add_argument("--robot", default="butler", help="name or folder (default: butler)")
+    command.add_argument("--profile", default="desktop", help="platform profile")
+    command.add_argument("--world", default="flat", help="the twin's world")
+    command.add_argument("--seed", type=int, default=0, help="where the objects lie")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Run until SIGINT or SIGTERM."""
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    arm = arguments.twin if arguments.arm is None else arguments.arm
+    options = RunOptions(
+        robot=arguments.robot,
+        profile=arguments.profile,
+        twin=arguments.twin,
+        seed=arguments.seed,
+        world=arguments.world,
+        runtime_base=arguments.runtime_base,
+        arm=arm,
+    )
+    with Supervisor(options) as supervisor:
+        supervisor.start()
+        if not supervisor.stop_requested:
+            print('ready; in another terminal: vla-deploy say "go to the kitchen"', flush=True)
+        supervisor.run_until_stopped()
+    print("stopped in order")
+    return 0

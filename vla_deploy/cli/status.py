@@ -1,0 +1,103 @@
+"""`vla-deploy status`: what runs, what control says, where the robot is, what it does."""
+
+import argparse
+import json
+import math
+from typing import Any
+
+from vla_deploy.cli.example import add_command
+from vla_deploy.cli.session import Session, attach
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    status = add_command(
+        commands,
+        "status",
+        "tell what runs and how the robot is",
+        "  vla-deploy status\n  vla-deploy status --json\n",
+    )
+    status.add_argument("--json", action="store_true", help="print everything as JSON")
+    status.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the status of the run on this machine."""
+    status = collect(attach(arguments.runtime_base))
+    print(json.dumps(status, indent=2) if arguments.json else as_text(status))
+    return 0
+
+
+def collect(session: Session) -> dict[str, Any]:
+    """Return everything that the processes tell of themselves; what is silent is null."""
+    pose = session.space.cell_reader("pose").latest()
+    return {
+        "run_dir": str(session.run_dir),
+        "process_table": session.document("process_table"),
+        "control": session.document("control_status", age_limit_s=1.0),
+        "executor": session.document("executor_status", age_limit_s=2.0),
+        "pose": None
+        if pose is None or pose.age_s(session.clock.now_ns()) > 1.0
+        else {name: float(pose.data[name]) for name in ("x_m", "y_m", "yaw_rad", "match_ratio")},
+        "scene": session.document("scene", age_limit_s=5.0),
+        "dashboard_url": None,
+    }
+
+
+def as_text(status: dict[str, Any]) -> str:
+    """Return the status as lines for a person."""
+    return "\n".join(
+        [*_processes(status), _control(status), _pose(status), _task(status), _scene(status)]
+    )
+
+
+def _processes(status: dict[str, Any]) -> list[str]:
+    table = status["process_table"]
+    if table is None:
+        return ["supervisor: silent"]
+    lines = [f"{'process':<12} {'state':<10} {'pid':>7} {'restarts':>8} {'MB':>7} {'core':>6}"]
+    for row in table["processes"]:
+        memory = "-" if row["memory_mb"] is None else f"{row['memory_mb']:.0f}"
+        share = "-" if row["cpu_ratio"] is None else f"{100 * row['cpu_ratio']:.0f} %"
+        lines.append(
+            f"{row['name']:<12} {row['state']:<10} {row['pid'] or '-':>7} {row['restarts']:>8} "
+            f"{memory:>7} {share:>6}"
+        )
+    return lines
+
+
+def _control(status: dict[str, Any]) -> str:
+    control = status["control"]
+    if control is None:
+        return "control: silent"
+    why = ": ".join(word for word in (control["cause"], control["detail"]) if word)
+    latched = ", emergency stop latched" if control["estop_latched"] else ""
+    return f"control: {control['state']}{latched}" + (f" ({why})" if why else "")
+
+
+def _pose(status: dict[str, Any]) -> str:
+    pose = status["pose"]
+    if pose is None:
+        return "pose: unknown"
+    degrees = math.degrees(pose["yaw_rad"])
+    return f"pose: x {pose['x_m']:.2f} m, y {pose['y_m']:.2f} m, heading {degrees:.0f} degrees"
+
+
+def _task(status: dict[str, Any]) -> str:
+    executor = status["executor"]
+    if executor is None:
+        return "executor: silent"
+    held = [f"{hand}: {what}" for hand, what in executor["holding"].items() if what]
+    doing = executor["skill"] or executor["state"]
+    return f"doing: {doing}; holding: {', '.join(held) or 'nothing'}"
+
+
+def _scene(status: dict[str, Any]) -> str:
+    scene = status["scene"]
+    if scene is None:
+        return "sees: nothing yet"
+    seen = [
+        f"{one['colour']} {one['class']} at {one['position_m'][0]:.2f}, {one['position_m'][1]:.2f}"
+        for one in scene["objects"]
+    ]
+    return f"sees: {'; '.join(seen) or 'nothing'}"
