@@ -1,0 +1,18 @@
+from drivers.dynamixel.bus import DynamixelBus
+from drivers.dynamixel.control_table import HardwareError, OperatingMode
+from drivers.dynamixel.counters import BusCounters
+from drivers.dynamixel.handshake import ServoSetup
+from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.state import BusState
+from drivers.dynamixel.watchdog import WatchdogState
+
+__all__ = [
+    "BusCounters",
+    "BusState",
+    "DynamixelBus",
+    "HardwareError",
+    "OperatingMode",
+    "ServoSetup",
+    "ServoSpec",
+    "WatchdogState",
+]

@@ -43,7 +43,7 @@ class StateReader:
         offsets = np.array([servo.offset_rad for servo in servos])
         self._at_pulse_zero = offsets - CENTRE_PULSE * self._per_pulse
         self._per_velocity = np.array(
-            [servo.model.velocity_unit_rad_s * servo.sign * servo.joint_per_rad for servo in servos]
+            [servo.model.velocity_unit_rad_s * servo.sign * servo.travel_per_rad for servo in servos]
         )
         self._per_effort = np.array(
             [servo.model.effort_unit_ratio * servo.sign for servo in servos]

@@ -16,9 +16,9 @@ from drivers.dynamixel.control_table import (
 class ServoSpec:
     """Describe a servo as the robot file declares it.
 
-        joint value = sign * (pulse - 2048) * 2 pi / 4096 * joint_per_rad + offset_rad
+        joint value = sign * (pulse - 2048) * 2 pi / 4096 * travel_per_rad + offset_rad
 
-    `joint_per_rad` is 1 for a revolute joint; for a finger on a rack it is metres per servo radian,
+    `travel_per_rad` is 1 for a revolute joint; for a finger on a rack it is metres per servo radian,
     and then `offset_rad` and all values of this joint are in metres.
     """
 
@@ -27,7 +27,7 @@ class ServoSpec:
     joint: str
     sign: int = 1
     offset_rad: float = 0.0
-    joint_per_rad: float = 1.0
+    travel_per_rad: float = 1.0
     operating_mode: OperatingMode = OperatingMode.POSITION
 
     def __post_init__(self) -> None:
@@ -41,7 +41,7 @@ class ServoSpec:
             (not 0 <= self.id <= MAX_SERVO_ID, f"id must be 0..{MAX_SERVO_ID}, got {self.id}"),
             (not known, f"model must be one of {sorted(MODELS)}, got {self.model_name!r}"),
             (self.sign not in (-1, 1), f"sign must be -1 or 1, got {self.sign}"),
-            (self.joint_per_rad <= 0, f"joint_per_rad must be positive, got {self.joint_per_rad}"),
+            (self.travel_per_rad <= 0, f"travel_per_rad must be positive, got {self.travel_per_rad}"),
             (
                 known and self.operating_mode not in self.model.operating_modes,
                 f"{self.model_name} has no operating mode {self.operating_mode.name}",
@@ -56,7 +56,7 @@ class ServoSpec:
     @property
     def joint_per_pulse(self) -> float:
         """Return the joint's signed travel per pulse."""
-        return self.sign * PULSE_RAD * self.joint_per_rad
+        return self.sign * PULSE_RAD * self.travel_per_rad
 
     def to_joint(self, pulse: float) -> float:
         """Return the joint value at a pulse count."""
