@@ -1,16 +1,15 @@
 """Start, signal and reap one child process, with everything it started itself."""
 
 import contextlib
-import ctypes
 import os
 import signal
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-_PR_SET_PDEATHSIG = 1
+_LAUNCH = str(Path(__file__).with_name("launch.py"))
 
 
 class ChildProcess:
@@ -25,14 +24,12 @@ class ChildProcess:
         log_path.parent.mkdir(parents=True, exist_ok=True)
         with log_path.open("ab") as log:
             self._popen = subprocess.Popen(
-                [sys.executable, *command],
+                [sys.executable, "-I", "-S", _LAUNCH, str(os.getpid()), *command],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                # Set before exec, so that it holds for programs that know nothing of it.
-                preexec_fn=_die_with_parent(os.getpid()),
             )
 
     @property
@@ -69,14 +66,3 @@ def last_lines(log_path: Path, count: int) -> list[str]:
         return []
     with log_path.open(errors="replace") as log:
         return [line.rstrip() for line in deque(log, maxlen=count)]
-
-
-def _die_with_parent(parent_pid: int) -> Callable[[], None]:
-    libc = ctypes.CDLL(None)
-
-    def in_child() -> None:
-        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-        if os.getppid() != parent_pid:  # it died before the request was in place
-            os._exit(1)
-
-    return in_child

@@ -132,7 +132,7 @@ def test_what_a_process_started_itself_in_its_group_ends_with_it(stage, tmp_path
 def test_a_second_supervisor_is_refused_with_who_and_what_to_do(stage):
     with stage.supervisor(stage.row("a")) as supervisor:
         supervisor.start()
-        with pytest.raises(AlreadyRunning, match=rf"pid {os.getpid()}, run .*vla-deploy stop"):
+        with pytest.raises(AlreadyRunning, match=rf"pid {os.getpid()}, run .*vla-deploy shutdown"):
             stage.supervisor(stage.row("b")).start()
         assert running(stage.base).run_dir == str(supervisor.run_dir)
     assert running(stage.base) is None

@@ -1,0 +1,121 @@
+import logging
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from platforms import load_profile
+from vla_deploy import process_main
+
+pytestmark = pytest.mark.stack
+
+NODE = """
+import sys
+from pathlib import Path
+from drivers.errors import DeviceMissing
+from vla_deploy.process_main import main
+
+class Node:
+    period_s = 0.01
+    def __init__(self, context):
+        self.context, self.steps = context, 0
+    def start(self):
+        if self.context.robot == "unwired":
+            raise DeviceMissing("servos: /dev/ttyUSB0 does not exist; plug it in")
+        print("start", self.context.devices_dir, Path("/proc/self/comm").read_text().strip())
+    def step(self):
+        self.steps += 1
+        if self.context.robot == "buggy":
+            raise KeyError("elbow")
+        if self.steps == 3:
+            print("three steps", flush=True)
+    def stop(self):
+        print("stop", flush=True)
+
+sys.exit(main("planner", Node))
+"""
+
+
+def arguments(tmp_path: Path, robot: str, profile: str = "desktop") -> list[str]:
+    options = ["--run-dir", str(tmp_path), "--robot", robot, "--profile", profile]
+    return [sys.executable, "-c", NODE, *options]
+
+
+def run(tmp_path: Path, robot: str, profile: str = "desktop") -> subprocess.CompletedProcess:
+    command = arguments(tmp_path, robot, profile)
+    return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stop_signal_ends_the_node_in_order(tmp_path, number):
+    command = [*arguments(tmp_path, "any"), "--devices-dir", "/devices"]
+    ready_file = tmp_path / "ready" / "planner"
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "start /devices vla-planner\n"
+        assert process.stdout.readline() == "three steps\n"
+        assert ready_file.read_text() == f"{process.pid}\n"
+        process.send_signal(number)
+        assert process.stdout.read() == "stop\n"
+    assert process.returncode == 0
+    assert not ready_file.exists()
+
+
+def test_a_missing_device_is_one_line_and_exit_code_2(tmp_path):
+    done = run(tmp_path, "unwired")
+    assert done.returncode == 2
+    assert done.stderr == ("planner: ERROR: servos: /dev/ttyUSB0 does not exist; plug it in\n")
+    assert not (tmp_path / "ready" / "planner").exists()
+
+
+def test_an_unknown_profile_is_one_line_and_exit_code_2(tmp_path):
+    done = run(tmp_path, "any", "deskop")
+    assert done.returncode == 2
+    assert done.stderr.startswith("planner: ERROR: no profile 'deskop'")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_missing_run_directory_is_exit_code_2(tmp_path):
+    done = run(tmp_path / "gone", "any")
+    assert done.returncode == 2
+    assert "gone: no such directory; is the run still up?" in done.stderr
+
+
+def test_a_crash_stops_the_node_and_leaves_its_trace_in_the_log(tmp_path):
+    done = run(tmp_path, "buggy")
+    assert done.returncode == 1
+    assert done.stdout.endswith("stop\n")
+    assert "planner: ERROR: crashed\nTraceback" in done.stderr
+    assert "KeyError: 'elbow'" in done.stderr
+
+
+@pytest.fixture
+def fifo_profile(tmp_path):
+    text = (Path(process_main.__file__).parents[1] / "platforms/profiles/desktop.toml").read_text()
+    path = tmp_path / "rt.toml"
+    path.write_text(text.replace("realtime_priority = 0", "realtime_priority = 40"))
+    return load_profile(path)
+
+
+def test_control_asks_for_the_profiles_realtime_priority(monkeypatch, fifo_profile):
+    asked = []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *given: asked.append(given))
+    process_main._raise_priority(fifo_profile)
+    assert asked == [(0, os.SCHED_FIFO, os.sched_param(40))]
+
+
+def test_a_forbidden_realtime_priority_is_logged_as_degraded(monkeypatch, fifo_profile, caplog):
+    def forbid(*_: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(os, "sched_setscheduler", forbid)
+    with caplog.at_level(logging.WARNING):
+        process_main._raise_priority(fifo_profile)
+    assert "degraded: no SCHED_FIFO priority 40" in caplog.text
+
+
+def test_a_profile_without_priority_asks_for_none(monkeypatch):
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *_: pytest.fail("asked for a priority"))
+    process_main._raise_priority(load_profile("desktop"))

@@ -1,0 +1,25 @@
+"""Become another Python program that gets SIGTERM when the supervisor ends, however it ends.
+
+Run as a script, `launch.py SUPERVISOR_PID COMMAND...`, before the program: so it holds for programs
+that know nothing of it, and no Python code runs between fork and exec of a threaded process.
+"""
+
+import ctypes
+import os
+import signal
+import sys
+
+_PR_SET_PDEATHSIG = 1
+
+
+def main() -> None:
+    """Ask the kernel for the signal, then replace this program by the wanted one."""
+    supervisor_pid, command = int(sys.argv[1]), sys.argv[2:]
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    if os.getppid() != supervisor_pid:  # it died before the request was in place
+        sys.exit(f"the supervisor, pid {supervisor_pid}, has already ended")
+    os.execv(sys.executable, [sys.executable, *command])
+
+
+if __name__ == "__main__":
+    main()
