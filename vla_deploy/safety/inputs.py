@@ -11,9 +11,10 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveSample:
-    """Describe one wheel drive; `fault_code` 0 means none."""
+    """Describe one wheel drive; its driver judges whether it is `lost`, `fault_code` 0 is none."""
 
     name: str
+    lost: bool
     age_s: float
     fault_code: int
 
@@ -22,7 +23,7 @@ class DriveSample:
 class SafetyInputs:
     """Carry one tick's measurements, joint arrays in the order of the robot file.
 
-    `energised` is true while any actuator may move: from arming until torque is off.
+    `energised` is true from arming until the robot is disarmed again.
     An age of None means that nothing has ever arrived, so there is nothing to lose yet.
     """
 
@@ -59,6 +60,5 @@ class SafetyLimits:
     velocity: Floats
     following_error: Floats
     servo_age_s: float
-    drive_age_s: float
     base_command_age_s: float
     supervisor_age_s: float

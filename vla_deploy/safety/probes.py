@@ -85,17 +85,12 @@ def servo_watchdog_tripped(inputs: SafetyInputs, limits: SafetyLimits) -> Findin
 
 
 def can_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
-    """Find a CAN bus whose link is gone, or a wheel drive that has been silent for too long."""
+    """Find a CAN bus whose link is gone, or a wheel drive that its driver calls lost."""
     if inputs.lost_can_buses:
         return Finding(subject=inputs.lost_can_buses[0])
     for drive in inputs.drives:
-        if drive.age_s > limits.drive_age_s:
-            return Finding(
-                subject=drive.name,
-                measured=drive.age_s,
-                limit=limits.drive_age_s,
-                age_s=drive.age_s,
-            )
+        if drive.lost:
+            return Finding(subject=drive.name, measured=drive.age_s, age_s=drive.age_s)
     return None
 
 

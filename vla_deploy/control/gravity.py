@@ -1,0 +1,44 @@
+"""Offset goals so that position servos without an integral part carry the arm's own weight.
+
+Such a servo turns position error into duty, so at rest it sags until the error makes the holding
+torque. Asking for q + g(q) / kp makes it rest on q. This is done here and nowhere else.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vla_deploy.control.axes import Floats
+from vla_deploy.robots import RobotDescription
+
+# Full duty at this error with the factory P gain of 800: 885 / (800 / 128) pulses of 0.0015 rad.
+FULL_DUTY_ERROR_RAD = 0.217
+_MAX_OFFSET_RAD = 0.2
+
+
+def stiffness(robot: RobotDescription) -> Floats:
+    """Return each joint's holding torque per unit of position error (N m/rad, or N/m)."""
+    return np.array(
+        [
+            robot.servo_models[servo.model].stall_torque_nm
+            / FULL_DUTY_ERROR_RAD
+            / servo.travel_per_rad**2
+            for servo in robot.servo_bus.servos
+        ]
+    )
+
+
+class GravityOffset:
+    """Tell how far above its setpoint each joint's goal must be."""
+
+    def __init__(self, robot: RobotDescription, gravity: Callable[[Floats], Floats]) -> None:
+        """Take the function that returns every servo joint's gravity torque at a pose."""
+        self._gravity = gravity
+        self._compliance = 1.0 / stiffness(robot)
+        travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
+        self._limit = _MAX_OFFSET_RAD * travel
+
+    def at(self, position: Floats) -> Floats:
+        """Return the offsets for the setpoints `position`."""
+        offset = self._gravity(position) * self._compliance
+        return np.clip(offset, -self._limit, self._limit)

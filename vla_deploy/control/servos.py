@@ -1,0 +1,177 @@
+"""Keep the servo bus: open, lose and reopen it, and take servos in and out of power one by one."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S, Clock
+from drivers.dynamixel import BusState, DynamixelBus, ServoSpec
+from drivers.errors import DriverError, LinkLost, NoReply
+from drivers.opener import DeviceOpener
+from platforms import Profile
+from vla_deploy.control.axes import Axes, Floats
+from vla_deploy.robots import RobotDescription
+
+REOPEN_NS = NS_PER_S
+_FIRST_READS = 10
+
+
+class ServoLine:
+    """Own the bus of all servos; a lost link is remembered, not raised, after `open`."""
+
+    def __init__(
+        self, robot: RobotDescription, profile: Profile, devices: DeviceOpener, clock: Clock
+    ) -> None:
+        self.name = robot.servo_bus.device
+        self.lost = False
+        self.failure = ""
+        self._devices = devices
+        self._clock = clock
+        self._baud = robot.servo_bus.baud
+        self._watchdog_s = profile.bus_watchdog_s
+        self._specs = [
+            ServoSpec(
+                id=servo.id,
+                model_name=servo.model,
+                joint=servo.joint,
+                sign=servo.sign,
+                offset_rad=servo.offset,
+                travel_per_rad=servo.travel_per_rad,
+            )
+            for servo in robot.servo_bus.servos
+        ]
+        self._ids = [spec.id for spec in self._specs]
+        self._bus: DynamixelBus | None = None
+        self._next_open_ns = 0
+        self.state = BusState.of(len(self._specs))
+
+    def open(self) -> None:
+        """Connect and read once; torque is left as the servos have it.
+
+        Raises:
+            DriverError: the line is missing or busy, or a servo is silent or not as declared.
+        """
+        transport = self._devices.serial(self.name)
+        bus = DynamixelBus(
+            transport, self._clock, self._specs, baud=self._baud, watchdog_s=self._watchdog_s
+        )
+        try:
+            bus.connect()
+            self.state = _first_state(bus)
+        except DriverError:
+            bus.close()
+            raise
+        self._bus = bus
+        self.lost = False
+
+    def try_reopen(self) -> bool:
+        """Open a lost line again, at most once a second, and tell whether it is back."""
+        if not self.lost or self._clock.now_ns() < self._next_open_ns:
+            return False
+        self._next_open_ns = self._clock.now_ns() + REOPEN_NS
+        try:
+            self.open()
+        except DriverError as error:
+            self.failure = str(error)
+            return False
+        self.failure = ""
+        return True
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Return what the bus has counted; empty before it was opened."""
+        return {} if self._bus is None else self._bus.counters.as_dict()
+
+    @property
+    def watchdog_tripped(self) -> NDArray[np.bool_]:
+        """Tell which servos have stopped by themselves."""
+        return self.state.watchdog < 0
+
+    @property
+    def unguarded(self) -> Axes:
+        """Return the servos that hold no torque under an armed watchdog."""
+        return np.flatnonzero(~self.state.torque_on | (self.state.watchdog <= 0))
+
+    def read(self) -> None:
+        """Refresh `state`; values grow old while the line is lost."""
+        if self._bus is None or self.lost:
+            return
+        try:
+            self._bus.read_state()
+        except LinkLost as error:
+            self._note_loss(error)
+
+    def write(self, goals: Floats) -> None:
+        """Send a goal to every servo."""
+        if self._bus is None or self.lost:
+            return
+        try:
+            self._bus.write_goals(goals)
+        except LinkLost as error:
+            self._note_loss(error)
+
+    def energise(self, servo: int) -> bool:
+        """Hold one servo where it is, its watchdog armed; False with `failure` when it refuses."""
+        return self._attempt(lambda bus: bus.enable_torque([self._ids[servo]]))
+
+    def clear_watchdogs(self) -> bool:
+        """Let servos that have stopped by themselves take goals again."""
+        return self._attempt(lambda bus: bus.clear_watchdog())
+
+    def reboot_faulted(self) -> bool:
+        """Restart the servos that report a hardware error, the only way out of it."""
+        faulted = np.flatnonzero(self.state.error)
+        return self._attempt(lambda bus: [bus.reboot(self._ids[servo]) for servo in faulted])
+
+    def remove_power(self, servos: Axes) -> bool:
+        """Switch torque off; False with `failure` when a servo did not confirm it."""
+        return self._attempt(lambda bus: self._disable(bus, servos))
+
+    def limit_effort(self, ratios: dict[int, float]) -> bool:
+        """Bound the duty of some servos, given by their place in the joint order."""
+        by_id = {self._ids[servo]: ratio for servo, ratio in ratios.items()}
+        return self._attempt(lambda bus: _raise_first(bus.write_goal_pwm(by_id)))
+
+    def close(self) -> None:
+        """Release the line; the servos keep what they do until their watchdog stops them."""
+        if self._bus is not None:
+            self._bus.close()
+
+    def _disable(self, bus: DynamixelBus, servos: Axes) -> None:
+        if len(servos) > 0:
+            _raise_first(bus.disable_torque([self._ids[servo] for servo in servos]))
+
+    def _attempt(self, act: Callable[[DynamixelBus], object]) -> bool:
+        if self._bus is None or self.lost:
+            self.failure = f"{self.name}: the servo bus is lost"
+            return False
+        try:
+            act(self._bus)
+        except LinkLost as error:
+            self._note_loss(error)
+            return False
+        except DriverError as error:
+            self.failure = str(error)
+            return False
+        return True
+
+    def _note_loss(self, error: LinkLost) -> None:
+        self.failure = str(error)
+        self.lost = True
+        self.close()
+
+
+def _first_state(bus: DynamixelBus) -> BusState:
+    """Read until every servo has told its position once."""
+    for _ in range(_FIRST_READS):
+        state = bus.read_state()
+        if np.isfinite(state.position_rad).all():
+            return state
+    silent = np.flatnonzero(~np.isfinite(state.position_rad))
+    raise NoReply(f"no position from {', '.join(str(bus.servos[n]) for n in silent)}; see cables")
+
+
+def _raise_first(failures: dict[int, DriverError]) -> None:
+    for error in failures.values():
+        raise error

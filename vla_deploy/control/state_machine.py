@@ -1,0 +1,68 @@
+"""Decide control's mode: one pure function of mode, verdict and acts."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from vla_deploy.safety import Reaction
+
+
+class Mode(Enum):
+    """Name what control is doing about power and motion."""
+
+    DISARMED = "disarmed"
+    ARMING = "arming"
+    ARMED = "armed"
+    DISARMING = "disarming"
+    STOPPING = "stopping"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeInputs:
+    """Carry what the next mode depends on; `armed` is None while arming is under way."""
+
+    reaction: Reaction
+    latched: bool
+    arm: bool
+    disarm: bool
+    armed: bool | None
+    at_rest: bool
+
+
+def next_mode(mode: Mode, inputs: ModeInputs) -> Mode:
+    """Return the mode of the next tick; a stop goes before everything else.
+
+    DISARMED gets there only by arming, and STOPPED is left only when nothing demands the stop any
+    more, which for a latched cause takes a reset.
+    """
+    stop = inputs.reaction >= Reaction.HOLD
+    match mode:
+        case Mode.DISARMED:
+            if stop and inputs.latched:
+                return Mode.STOPPING
+            return Mode.ARMING if inputs.arm and not stop else mode
+        case Mode.ARMING:
+            if stop:
+                return Mode.STOPPING
+            if inputs.disarm:
+                return Mode.DISARMING
+            return {None: mode, True: Mode.ARMED, False: Mode.DISARMED}[inputs.armed]
+        case Mode.ARMED:
+            if stop:
+                return Mode.STOPPING
+            return Mode.DISARMING if inputs.disarm else mode
+        case Mode.DISARMING:
+            if stop:
+                return Mode.STOPPING
+            return Mode.DISARMED if inputs.at_rest else mode
+        case Mode.STOPPING:
+            return Mode.STOPPED if inputs.at_rest else mode
+        case Mode.STOPPED:
+            return mode if stop else Mode.DISARMED
+
+
+def status_name(mode: Mode, reaction: Reaction) -> str:
+    """Return the mode in the words of `control_status`; fault: it cannot be armed at present."""
+    if mode is Mode.DISARMED and reaction >= Reaction.HOLD:
+        return "fault"
+    return {Mode.ARMING: "disarmed", Mode.DISARMING: "stopping"}.get(mode, mode.value)

@@ -1,0 +1,175 @@
+"""Keep the wheel drives: open, lose and reopen their bus, drive the base, tell where it went."""
+
+import numpy as np
+
+from drivers.canopen import DriveSpec, DriveState, WheelDriveBus
+from drivers.clock import NS_PER_S, Clock
+from drivers.errors import DriverError, LinkLost
+from drivers.opener import DeviceOpener
+from platforms import Profile
+from vla_deploy.control.odometry import DifferentialDrive, Odometry
+from vla_deploy.robots import RobotDescription
+from vla_deploy.safety import DriveSample
+
+REOPEN_NS = NS_PER_S
+_COUNTS_PER_REV = 16384
+_STILL_RAD_S = 0.02
+_UNKNOWN_FAULT = 0xFFFF
+
+
+class Wheels:
+    """Own the bus of both drives, left before right; a lost link is remembered after `open`."""
+
+    def __init__(
+        self, robot: RobotDescription, profile: Profile, devices: DeviceOpener, clock: Clock
+    ) -> None:
+        self.name = robot.can_bus.device
+        self.lost = False
+        self.failure = ""
+        self.state: DriveState | None = None
+        self._devices = devices
+        self._clock = clock
+        self._heartbeat_s = profile.can_heartbeat_s
+        self._specs = [
+            DriveSpec(
+                node_id=drive.node_id,
+                joint=drive.joint,
+                sign=drive.sign,
+                counts_per_rev=round(_COUNTS_PER_REV * drive.gear_ratio),
+            )
+            for drive in robot.can_bus.drives
+        ]
+        self._geometry = DifferentialDrive(
+            wheel_radius_m=robot.base.wheel_radius_m, track_m=robot.base.track_m
+        )
+        self.odometry = Odometry(self._geometry)
+        self.v_m_s = 0.0
+        self.w_rad_s = 0.0
+        self._bus: WheelDriveBus | None = None
+        self._next_open_ns = 0
+
+    def open(self) -> None:
+        """Reset, check and configure the drives; they end up disabled.
+
+        Raises:
+            DriverError: the interface is missing, or a drive is silent or not as declared.
+        """
+        bus = WheelDriveBus(
+            self._devices.can(self.name), self._clock, self._specs, heartbeat_s=self._heartbeat_s
+        )
+        try:
+            bus.connect()
+        except DriverError:
+            bus.close()
+            raise
+        self._bus = bus
+        self.lost = False
+        self.odometry.forget_wheels()
+
+    def try_reopen(self) -> bool:
+        """Open a lost bus again, at most once a second, and tell whether it is back.
+
+        It waits for the drives to boot, so nothing else may depend on this tick.
+        """
+        if not self.lost or self._clock.now_ns() < self._next_open_ns:
+            return False
+        self._next_open_ns = self._clock.now_ns() + REOPEN_NS
+        self.close()
+        try:
+            self.open()
+        except DriverError as error:
+            self.failure = str(error)
+            return False
+        self.failure = ""
+        return True
+
+    @property
+    def enabled(self) -> bool:
+        """Tell whether both drives follow the commanded speed."""
+        return self._bus is not None and not self.lost and self._bus.enabled
+
+    @property
+    def faulted(self) -> bool:
+        """Tell whether a drive is in a fault state."""
+        return self.state is not None and any(self.state.faulted)
+
+    @property
+    def still(self) -> bool:
+        """Tell whether the wheels stand, or cannot be driven any more."""
+        if self.lost or self.state is None:
+            return True
+        return bool(np.abs(self.state.velocity_rad_s).max() < _STILL_RAD_S)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Return what the bus has counted; empty before it was opened."""
+        return {} if self._bus is None else self._bus.counters
+
+    def samples(self) -> tuple[DriveSample, ...]:
+        """Return what the safety judge wants to know of each drive."""
+        state = self.state
+        if state is None:
+            return ()
+        return tuple(
+            DriveSample(
+                name=spec.joint,
+                lost=state.lost[row],
+                age_s=float(state.age_s[row]),
+                fault_code=_fault_code(state, row),
+            )
+            for row, spec in enumerate(self._specs)
+        )
+
+    def cycle(self, v_m_s: float, w_rad_s: float) -> None:
+        """Command a base velocity, take in the drives' state and move the odometry on."""
+        if self._bus is None or self.lost:
+            return
+        try:
+            wanted = np.array(self._geometry.wheel_speeds(v_m_s, w_rad_s))
+            state = self._bus.cycle(wanted)
+        except LinkLost as error:
+            self.failure = str(error)
+            self.lost = True
+            self.v_m_s = self.w_rad_s = 0.0
+            return
+        self.state = state
+        self.lost = any(state.lost)
+        left, right = state.position_rad
+        self.odometry.update(float(left), float(right))
+        left_speed, right_speed = state.velocity_rad_s
+        self.v_m_s, self.w_rad_s = self._geometry.base_velocity(
+            float(left_speed), float(right_speed)
+        )
+
+    def enable(self) -> None:
+        """Begin to power the drives; `enabled` tells when they follow."""
+        if self._bus is not None:
+            self._bus.enable()
+
+    def disable(self) -> None:
+        """Take the power off both drives."""
+        if self._bus is not None:
+            self._bus.disable()
+
+    def quick_stop(self) -> None:
+        """Let the drives brake on their own ramp and then take their power off."""
+        if self._bus is not None:
+            self._bus.quick_stop()
+
+    def reset_fault(self) -> None:
+        """Ask faulted drives to leave their fault; they stay disabled."""
+        if self._bus is not None and self.faulted:
+            self._bus.reset_fault()
+
+    def close(self) -> None:
+        """Brake, and leave the bus."""
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            bus.close()
+
+
+def _fault_code(state: DriveState, row: int) -> int:
+    if not state.faulted[row]:
+        return 0
+    emergency = state.emergency[row]
+    return _UNKNOWN_FAULT if emergency is None else emergency.code
