@@ -18,6 +18,8 @@ TUCK = "tuck"
 # Where a loaded hand travels, in the base frame: pointing down, close in front of the chest.
 CARRY_POINT_M = (0.27, 0.16, 0.72)
 CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30))
+# One yaw out of reach is no loss: another is tried at once.
+RESTARTS = 2
 FULL_EFFORT = 0.5
 GENTLE_EFFORT = 0.25
 # An empty gripper stops where it was sent; fingers on an object stop this much earlier, pressing.
@@ -139,7 +141,7 @@ def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
     found = []
     for yaw_rad in CARRY_YAWS_RAD:
         try:
-            found.append(arm.solve(hand_down(point, yaw_rad), now).positions)
+            found.append(arm.solve(hand_down(point, yaw_rad), now, restarts=RESTARTS).positions)
         except ManipulationError:
             continue  # not every yaw is within the wrist's range
     if not found:

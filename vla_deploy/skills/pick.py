@@ -11,6 +11,7 @@ from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
+    RESTARTS,
     carry,
     feel,
     lift,
@@ -139,9 +140,8 @@ def _solve(context: SkillContext, hand: str, grasp: Grasp, reasons: list[str]) -
     arm = context.arms[hand]
     x_m, y_m, z_m = grasp.point_m
     try:
-        at = arm.solve(hand_down(grasp.point_m, grasp.yaw_rad), context.link.positions).positions
         high = hand_down((x_m, y_m, z_m + PREGRASP_M), grasp.yaw_rad)
-        above = arm.solve(high, at).positions
+        above = arm.solve(high, context.link.positions, restarts=RESTARTS).positions
         arm.straight_line(above, hand_down(grasp.point_m, grasp.yaw_rad))
     except ManipulationError as error:
         reasons.append(str(error))

@@ -11,7 +11,14 @@ from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import ObjectQuery, parse_object
-from vla_deploy.skills.arms import carry, lift, move_straight, opening_of, set_opening
+from vla_deploy.skills.arms import (
+    RESTARTS,
+    carry,
+    lift,
+    move_straight,
+    opening_of,
+    set_opening,
+)
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.frames import to_base
@@ -97,7 +104,8 @@ def _solve_above(
     found, reason = [], ""
     for yaw_rad in YAWS_RAD:
         try:
-            above = arm.solve(hand_down((x_m, y_m, z_m + ABOVE_M), yaw_rad), now).positions
+            high = hand_down((x_m, y_m, z_m + ABOVE_M), yaw_rad)
+            above = arm.solve(high, now, restarts=RESTARTS).positions
             arm.straight_line(above, hand_down(release_m, yaw_rad))
         except ManipulationError as error:
             reason = str(error)
