@@ -8,6 +8,7 @@ from vla_deploy.ipc import CellWriter, RingReader, RingWriter, SharedSpace
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.grid_map import load_map
 from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.navigation.zones import with_zones
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.readiness import refusal_of
@@ -44,7 +45,9 @@ class ExecutorNode:
         self._skills = SkillContext(
             robot=self._robot,
             link=RobotLink(self._space, self._clock, self._robot),
-            planner=PathPlanner(load_map(self._robot.home.map_path), radius_m),
+            planner=PathPlanner(
+                with_zones(load_map(self._robot.home.map_path), self._robot.home.zones), radius_m
+            ),
             arms={name: ArmKinematics(self._robot, name) for name in self._robot.hands},
             say=self._say,
         )

@@ -1,0 +1,106 @@
+"""Run the whole robot stack in lock-step: the processes' nodes, one thread, simulated time."""
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+from platforms import load_profile
+from sim_twin.lockstep import Lockstep
+from vla_deploy.control.node import ControlNode
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.node import Node
+from vla_deploy.perception.node import PerceptionNode
+from vla_deploy.planning.node import PlannerNode
+from vla_deploy.skills.node import ExecutorNode
+
+READY_TIMEOUT_S = 10.0
+COMMAND_TIMEOUT_S = 300.0
+
+
+class NotReady(Exception):
+    """Say that the stack did not come up."""
+
+
+class LockstepStack:
+    """Own a twin and every node of the robot; give commands and read what became of them."""
+
+    def __init__(self, tmp_path: Path, seed: int = 0, profile: str = "desktop") -> None:
+        self.lockstep = Lockstep(seed=seed, profile=profile, tmp_path=tmp_path)
+        self.robot = self.lockstep.robot
+        self._profile = load_profile(profile)
+        self.space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)
+        self.operator = self.space.ring_writer("operator")
+        self._utterances = self.space.ring_writer("utterance")
+        self._events = self.space.ring_reader("task_event", from_start=True)
+        self._status = self.space.cell_reader("control_status")
+        self._numbers = itertools.count(1)
+        self.events: list[dict[str, Any]] = []
+        context, devices = self.lockstep.context, self.lockstep.devices
+        self.control: Node = ControlNode(context, self.robot, self._profile, devices)
+        self.perception: Node = PerceptionNode(context, self.robot, self._profile, devices)
+        self.planner: Node = PlannerNode(context, self.robot)
+        rate_hz = self._profile.executor_rate_hz
+        self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
+        for node in (self.control, self.perception, self.planner, self.executor):
+            self.lockstep.add(node)
+
+    def restart_control(self) -> None:
+        """Start control anew, as the supervisor does after it died."""
+        context, devices = self.lockstep.context, self.lockstep.devices
+        self.control = ControlNode(context, self.robot, self._profile, devices)
+        self.lockstep.add(self.control)
+
+    def status(self) -> dict[str, Any]:
+        """Return control's newest status, or an empty document before the first."""
+        sample = self._status.latest()
+        return sample.document() if sample is not None else {}
+
+    def operate(self, act: str) -> None:
+        """Publish an operator's act."""
+        self.operator.publish({"act": act, "source": "test", "reason": ""})
+
+    def arm(self) -> None:
+        """Wait for control, arm it, and wait until it is armed.
+
+        Raises:
+            NotReady: it does not get there.
+        """
+        clock = self.lockstep
+        if not clock.run_until(lambda: bool(self.status()), READY_TIMEOUT_S):
+            raise NotReady("control tells no status")
+        self.operate("arm")
+        if not clock.run_until(lambda: self.status()["state"] == "armed", READY_TIMEOUT_S):
+            raise NotReady(f"control does not arm: {self.status()}")
+
+    def give(self, **utterance: Any) -> str:
+        """Give a command without waiting; return its id."""
+        command_id = f"command-{next(self._numbers)}"
+        self._utterances.publish({"command_id": command_id, "source": "test"} | utterance)
+        return command_id
+
+    def outcome(self, command_id: str) -> dict[str, Any] | None:
+        """Return a command's last event, once it has one."""
+        self.events += [event.payload for event in self._events.drain()]
+        for event in self.events:
+            ended = event["event"] in ("finished", "rejected")
+            if ended and event["command_id"] == command_id:
+                return event
+        return None
+
+    def say(self, text: str, timeout_s: float = COMMAND_TIMEOUT_S) -> dict[str, Any]:
+        """Give a command and run until it has ended.
+
+        Raises:
+            NotReady: it does not end in time.
+        """
+        command_id = self.give(text=text)
+        if not self.lockstep.run_until(lambda: self.outcome(command_id) is not None, timeout_s):
+            raise NotReady(f'"{text}" did not end within {timeout_s:g} s')
+        outcome = self.outcome(command_id)
+        assert outcome is not None, "run_until saw it"
+        return outcome
+
+    def close(self) -> None:
+        """Stop every node and release the twin."""
+        self.lockstep.close()
+        self.space.close()
