@@ -46,7 +46,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="twin",
         command=("-m", "sim_twin", *_TWIN),
         needs_twin=True,
-        ready_files=("dev/servos", "dev/can", "dev/lidar", "dev/imu", "dev/camera"),
+        ready_files=("dev/ready",),
         ready_timeout_s=60.0,
     ),
     ProcessSpec(

@@ -1,6 +1,6 @@
 """Measure the memory and CPU of the run's processes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import psutil
@@ -19,52 +19,44 @@ class Usage:
     cpu_ratio: float
 
 
-@dataclass(slots=True)
-class _Spent:
-    pid: int = 0
-    cpu_s: float = 0.0
-    earlier_cpu_s: float = 0.0
-
-
 class UsageMeter:
     """Keep the CPU time of every process and the peak memory of all together.
 
-    Memory is PSS, which counts shared pages once; RSS stands in where PSS cannot be read, and
-    `memory_kind` says so.
+    What a process has started itself counts as its own. Memory is PSS, which counts shared pages
+    once; RSS stands in where PSS cannot be read, and `memory_kind` says so.
     """
 
     def __init__(self, start_ns: int) -> None:
         self.peak_memory_mb = 0.0
         self.memory_kind = "pss"
         self._start_ns = start_ns
-        self._spent: dict[str, _Spent] = {}
+        self._cpu_s: dict[tuple[str, int], float] = {}
 
     def sample(self, pids: Mapping[str, int], now_ns: int) -> dict[str, Usage]:
         """Measure every process that still runs."""
         elapsed_s = max(now_ns - self._start_ns, 1) / NS_PER_S
-        usages: dict[str, Usage] = {}
-        for name, pid in pids.items():
-            try:
-                usages[name] = self._measure(name, pid, elapsed_s)
-            except psutil.NoSuchProcess:
-                continue  # it ended meanwhile; its CPU time so far stays counted
+        usages = {
+            name: self._measure(name, members, elapsed_s)
+            for name, members in _families(pids).items()
+        }
         total_mb = sum(usage.memory_mb for usage in usages.values())
         self.peak_memory_mb = max(self.peak_memory_mb, total_mb)
         return usages
 
-    def _measure(self, name: str, pid: int, elapsed_s: float) -> Usage:
-        process = psutil.Process(pid)
-        times = process.cpu_times()
-        rss_bytes = process.memory_info().rss
-        spent = self._spent.setdefault(name, _Spent(pid=pid))
-        if spent.pid != pid:
-            spent.earlier_cpu_s += spent.cpu_s
-            spent.pid = pid
-        spent.cpu_s = times.user + times.system
+    def _measure(self, name: str, members: Sequence[psutil.Process], elapsed_s: float) -> Usage:
+        memory_bytes = rss_bytes = 0
+        for process in members:
+            try:
+                times = process.cpu_times()
+                rss = process.memory_info().rss
+                memory_bytes += self._proportional_bytes(process, rss)
+            except psutil.NoSuchProcess:
+                continue  # it ended meanwhile; its CPU time so far stays counted
+            rss_bytes += rss
+            self._cpu_s[name, process.pid] = times.user + times.system
+        spent_s = sum(spent for (owner, _), spent in self._cpu_s.items() if owner == name)
         return Usage(
-            memory_mb=self._proportional_bytes(process, rss_bytes) / _MB,
-            rss_mb=rss_bytes / _MB,
-            cpu_ratio=(spent.cpu_s + spent.earlier_cpu_s) / elapsed_s,
+            memory_mb=memory_bytes / _MB, rss_mb=rss_bytes / _MB, cpu_ratio=spent_s / elapsed_s
         )
 
     def _proportional_bytes(self, process: psutil.Process, rss_bytes: int) -> int:
@@ -74,3 +66,31 @@ class UsageMeter:
             self.memory_kind = "rss"
             return rss_bytes
         return pss
+
+
+def _families(pids: Mapping[str, int]) -> dict[str, list[psutil.Process]]:
+    """Group the named processes with their descendants, by one look at the process list."""
+    names = {pid: name for name, pid in pids.items()}
+    own = psutil.Process()
+    known = {process.pid: process for process in (own, *own.children(recursive=True))}
+    families: dict[str, list[psutil.Process]] = {
+        name: [] for name, pid in pids.items() if pid in known
+    }
+    for process in known.values():
+        name = _named_ancestor(process.pid, names, known)
+        if name is not None:
+            families[name].append(process)
+    return families
+
+
+def _named_ancestor(
+    pid: int, names: Mapping[int, str], known: Mapping[int, psutil.Process]
+) -> str | None:
+    while pid in known:
+        if pid in names:
+            return names[pid]
+        try:
+            pid = known[pid].ppid()
+        except psutil.NoSuchProcess:
+            return None
+    return None

@@ -38,15 +38,31 @@ def test_cpu_counts_over_the_run_and_all_restarts(burnt):
     assert 0.29 <= both < 0.6
 
 
-def test_the_peak_is_kept_of_all_processes_together():
-    meter = UsageMeter(0)
-    one = meter.sample({"a": os.getpid()}, NS_PER_S)["a"]
-    assert meter.peak_memory_mb == pytest.approx(one.memory_mb)
-    meter.sample({"a": os.getpid(), "b": os.getpid()}, NS_PER_S)
-    assert meter.peak_memory_mb == pytest.approx(2 * one.memory_mb, rel=0.1)
+@pytest.mark.stack
+def test_the_peak_is_kept_of_all_processes_together(burnt):
+    meter, pids = UsageMeter(0), {"a": burnt(), "b": burnt()}
+    both = meter.sample(pids, NS_PER_S)
+    assert meter.peak_memory_mb == both["a"].memory_mb + both["b"].memory_mb
     peak = meter.peak_memory_mb
-    meter.sample({}, NS_PER_S)
+    meter.sample({"a": pids["a"]}, NS_PER_S)
     assert meter.peak_memory_mb == peak
+
+
+@pytest.mark.stack
+def test_what_a_process_started_itself_counts_as_its_own():
+    script = (
+        "import subprocess, sys;"
+        "subprocess.Popen([sys.executable, '-c', sys.argv[1]], start_new_session=True).wait()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script, BURN], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as family:
+        family.stdout.readline()
+        usage = UsageMeter(0).sample({"a": family.pid}, NS_PER_S)["a"]
+        alone_mb = psutil.Process(family.pid).memory_info().rss / 1e6
+        family.communicate(b"\n", timeout=10)
+    assert usage.cpu_ratio >= 0.29
+    assert usage.rss_mb > 1.5 * alone_mb
 
 
 def test_memory_is_proportional_and_rss_stands_in_where_that_is_forbidden(monkeypatch):
