@@ -14,11 +14,12 @@ Document = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfNames:
-    """List what an MJCF file offers to a robot file."""
+    """List what an MJCF file offers to a robot file; `mimics` gives each follower its leader."""
 
     root_bodies: tuple[str, ...]
     joint_ranges: Mapping[str, tuple[float, float] | None]
     sites: frozenset[str]
+    mimics: Mapping[str, str]
 
 
 def read_mjcf_names(path: Path) -> MjcfNames:
@@ -28,13 +29,17 @@ def read_mjcf_names(path: Path) -> MjcfNames:
         OSError: the file cannot be read.
         ElementTree.ParseError: it is not XML.
     """
-    world = ElementTree.parse(path).getroot().find("worldbody")
-    if world is None:
-        return MjcfNames(root_bodies=(), joint_ranges={}, sites=frozenset())
+    root = ElementTree.parse(path).getroot()
     return MjcfNames(
-        root_bodies=tuple(body.get("name", "") for body in world.findall("body")),
-        joint_ranges={joint.get("name", ""): _range_of(joint) for joint in world.iter("joint")},
-        sites=frozenset(site.get("name", "") for site in world.iter("site")),
+        root_bodies=tuple(body.get("name", "") for body in root.findall("worldbody/body")),
+        joint_ranges={
+            joint.get("name", ""): _range_of(joint) for joint in root.findall("worldbody//joint")
+        },
+        sites=frozenset(site.get("name", "") for site in root.findall("worldbody//site")),
+        mimics={
+            couple.get("joint1", ""): couple.get("joint2", "")
+            for couple in root.findall("equality/joint")
+        },
     )
 
 
