@@ -101,10 +101,11 @@ class Feedback:
     def _write_trajectory(self) -> None:
         profile = self._motion.profile
         in_velocity_mode = self._columns.operating_mode == OperatingMode.VELOCITY
-        self._velocity_trajectory[:] = np.where(
+        asked = np.where(
             in_velocity_mode, self._motion.ramped_velocity, profile.velocity / PULSES_S_PER_UNIT
         )
-        self._position_trajectory[:] = profile.position
+        self._velocity_trajectory[:] = np.rint(asked)
+        self._position_trajectory[:] = np.rint(profile.position)
 
     def _write_supply(self) -> None:
         self._voltage[:] = round(self.supply_v / VOLTAGE_UNIT_V)

@@ -8,8 +8,9 @@ What the firmware does at the edges:
 - torque on: the goal position becomes the present one, unless it was written since torque went off;
 - a hardware error that Shutdown (63) names cuts torque, and only a reboot lets it come back: until
   then torque_enable takes a 1 without an error and stays 0;
-- a tripped bus watchdog holds the present position (velocity mode brakes, current and PWM mode go
-  limp), clears the profile and refuses goals until 0 is written to it;
+- a tripped bus watchdog makes the present position the goal (velocity mode brakes, current and PWM
+  mode go limp), clears the profile and refuses goals until 0 is written to it; position and
+  velocity modes brake with their own gains, so a heavy joint swings out first;
 - a reboot or loss of supply gives the RAM its defaults and forgets the turns counted.
 """
 
@@ -222,6 +223,7 @@ class Firmware:
         if not self._goal_is_fresh[row]:
             columns.goal_position[row] = self._motion.pulses[row]
         self._motion.restart(row)
+        self._motion.profile.on_goal(row)
         self._watchdog.reload(row, self.now_ns)
 
     def _on_mode(self, row: int) -> None:

@@ -35,7 +35,7 @@ _CURRENT_MODES: Final = (OperatingMode.CURRENT, OperatingMode.CURRENT_BASED_POSI
 Rows = NDArray[np.intp]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Motors:
     """Hold what the control loops know of each motor, from its model."""
 

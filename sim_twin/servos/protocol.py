@@ -8,12 +8,13 @@ instruction. Return delay and secondary id are stored without effect.
 """
 
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from drivers.dynamixel.codec import (
     ALERT,
     BROADCAST_ID,
+    MAX_LENGTH,
     Instruction,
     Packet,
     StatusError,
@@ -22,11 +23,11 @@ from drivers.dynamixel.codec import (
 )
 from drivers.dynamixel.control_table import Register, StatusReturnLevel
 from sim_twin.servos.firmware import Firmware
+from sim_twin.servos.params import GROUP_WRITES, READ_REQUESTS, Request, address_of, range_of
 from sim_twin.servos.registers import Refused
 from sim_twin.servos.spec import FirmwareOptions
 
-_RANGE: Final = struct.Struct("<HH")
-_BULK: Final = struct.Struct("<BHH")
+_PING: Final = struct.Struct("<HB")
 _CLEAR_TURNS: Final = b"\x01\x44\x58\x4c\x22"
 _RESET_EVERYTHING: Final = 0xFF
 _FAST_OVERHEAD_BYTES: Final = 4  # error, id, CRC
@@ -38,57 +39,6 @@ _REPLY_LEVELS: Final[dict[int, StatusReturnLevel]] = {
     Instruction.READ: StatusReturnLevel.READ,
 }
 """The status_return_level an instruction needs for an answer; all others need ALL."""
-
-_Request = tuple[int, int, int]  # id, address, length
-
-
-def _range_of(params: bytes) -> tuple[int, int]:
-    if len(params) < _RANGE.size:
-        raise Refused(StatusError.DATA_LENGTH)
-    address, length = _RANGE.unpack_from(params)
-    return address, length
-
-
-def _address_of(params: bytes) -> int:
-    if len(params) < 2:
-        raise Refused(StatusError.DATA_LENGTH)
-    return int.from_bytes(params[:2], "little")
-
-
-def _sync_read_requests(params: bytes) -> list[_Request]:
-    address, length = _range_of(params)
-    return [(servo_id, address, length) for servo_id in params[_RANGE.size :]]
-
-
-def _bulk_read_requests(params: bytes) -> list[_Request]:
-    whole = len(params) // _BULK.size * _BULK.size
-    return list(_BULK.iter_unpack(params[:whole]))
-
-
-def _sync_writes(params: bytes) -> Iterator[tuple[int, int, bytes]]:
-    address, length = _range_of(params)
-    for start in range(_RANGE.size, len(params) - length, length + 1):
-        yield params[start], address, params[start + 1 : start + 1 + length]
-
-
-def _bulk_writes(params: bytes) -> Iterator[tuple[int, int, bytes]]:
-    start = 0
-    while start + _BULK.size <= len(params):
-        servo_id, address, length = _BULK.unpack_from(params, start)
-        start += _BULK.size + length
-        yield servo_id, address, params[start - length : start]
-
-
-_READ_REQUESTS: Final[dict[int, Callable[[bytes], list[_Request]]]] = {
-    Instruction.SYNC_READ: _sync_read_requests,
-    Instruction.FAST_SYNC_READ: _sync_read_requests,
-    Instruction.BULK_READ: _bulk_read_requests,
-    Instruction.FAST_BULK_READ: _bulk_read_requests,
-}
-_GROUP_WRITES: Final[dict[int, Callable[[bytes], Iterator[tuple[int, int, bytes]]]]] = {
-    Instruction.SYNC_WRITE: _sync_writes,
-    Instruction.BULK_WRITE: _bulk_writes,
-}
 
 
 class BusProtocol:
@@ -119,9 +69,9 @@ class BusProtocol:
         if packet.instruction == Instruction.STATUS:  # an echo, or another servo's answer
             return b""
         try:
-            if packet.instruction in _READ_REQUESTS:
+            if packet.instruction in READ_REQUESTS:
                 return self._group_read(packet)
-            if packet.instruction in _GROUP_WRITES:
+            if packet.instruction in GROUP_WRITES:
                 return self._group_write(packet)
         except Refused:  # too short to be meant for anybody
             return b""
@@ -164,19 +114,19 @@ class BusProtocol:
 
     def _ping(self, row: int, _params: bytes) -> bytes:
         table = self._tables[row]
-        return struct.pack("<HB", table.get("model_number"), table.get("firmware_version"))
+        return _PING.pack(table.get("model_number"), table.get("firmware_version"))
 
     def _read(self, row: int, params: bytes) -> bytes:
-        address, length = _range_of(params)
+        address, length = range_of(params)
         self._firmware.refresh(address, length)
         return self._tables[row].read(address, length)
 
     def _write(self, row: int, params: bytes) -> bytes:
-        self._store(row, self._tables[row].check_write(_address_of(params), params[2:]))
+        self._store(row, self._tables[row].check_write(address_of(params), params[2:]))
         return b""
 
     def _reg_write(self, row: int, params: bytes) -> bytes:
-        self._registered[row] = self._tables[row].check_write(_address_of(params), params[2:])
+        self._registered[row] = self._tables[row].check_write(address_of(params), params[2:])
         self._tables[row].put("registered_instruction", 1)
         return b""
 
@@ -210,7 +160,7 @@ class BusProtocol:
     # Several servos by one packet
 
     def _group_read(self, packet: Packet) -> bytes:
-        requests = _READ_REQUESTS[packet.instruction](packet.params)
+        requests = READ_REQUESTS[packet.instruction](packet.params)
         self._feed(self._known(request[0] for request in requests))
         for address, length in {request[1:] for request in requests}:
             self._firmware.refresh(address, length)
@@ -226,8 +176,10 @@ class BusProtocol:
                 replies.append(self._status(row, servo_id, error, data))
         return b"".join(replies)
 
-    def _fast_reply(self, requests: list[_Request]) -> bytes:
+    def _fast_reply(self, requests: list[Request]) -> bytes:
         """Return the joint reply, cut where a servo is missing although LEN counts it."""
+        if sum(length + _FAST_OVERHEAD_BYTES for _, _, length in requests) >= MAX_LENGTH:
+            return b""
         entries, intact_bytes, whole = [], _FAST_PREFIX_BYTES, True
         for servo_id, address, length in requests:
             row = self._reader(servo_id)
@@ -239,7 +191,7 @@ class BusProtocol:
             return b""
         return self._spoil_fast(encode_fast_status(entries)[:intact_bytes], requests)
 
-    def _spoil_fast(self, reply: bytes, requests: list[_Request]) -> bytes:
+    def _spoil_fast(self, reply: bytes, requests: list[Request]) -> bytes:
         spoiled, end = bytearray(reply), _FAST_PREFIX_BYTES
         for servo_id, _, length in requests:
             end += length + _FAST_OVERHEAD_BYTES
@@ -256,7 +208,7 @@ class BusProtocol:
             return self._alert(row) | refusal.number, b""
 
     def _group_write(self, packet: Packet) -> bytes:
-        writes = list(_GROUP_WRITES[packet.instruction](packet.params))
+        writes = list(GROUP_WRITES[packet.instruction](packet.params))
         self._feed(self._known(write[0] for write in writes))
         for servo_id, address, data in writes:
             row = self.rows.get(servo_id)

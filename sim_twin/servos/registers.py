@@ -6,7 +6,7 @@ between them.
 
 Source: ROBOTIS e-manual, "DYNAMIXEL Protocol 2.0" (status packet, error) and "XM430-W350". A read
 of addresses that hold no register gives zeros, as long as it ends within the table. A write is
-refused as a whole when any part of it is.
+refused as a whole when any part of it is. Indirect addresses are not in the table.
 """
 
 from collections.abc import Sequence

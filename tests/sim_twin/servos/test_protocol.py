@@ -96,6 +96,25 @@ def test_fast_sync_read_ends_where_a_servo_is_missing(trio: Any) -> None:
     assert fast_read(trio, [1, 2, 3]) == b""
 
 
+def test_a_fast_sync_read_longer_than_any_packet_stays_unanswered(trio: Any) -> None:
+    params = struct.pack("<HH", 0, 65_535) + b"\1\2\3"
+    assert trio.send(BROADCAST_ID, Instruction.FAST_SYNC_READ, params) == []
+    assert len(trio.send(1, Instruction.PING)) == 1
+
+
+def test_a_fast_sync_read_past_the_table_tells_the_error_of_every_servo(trio: Any) -> None:
+    params = struct.pack("<HH", 600, 2) + b"\1\2"
+    trio.bank.receive(encode_instruction(BROADCAST_ID, Instruction.FAST_SYNC_READ, params))
+    entries = decode_fast_entries(trio.bank.transmit(), 2)
+    assert entries == [(StatusError.ACCESS, n, b"\0\0") for n in (1, 2)]
+
+
+def test_a_bulk_write_that_ends_early_leaves_its_last_servo_alone(trio: Any) -> None:
+    params = struct.pack("<BHHB", 1, 65, 1, 1) + struct.pack("<BHHB", 2, 65, 2, 1)
+    trio.send(BROADCAST_ID, Instruction.BULK_WRITE, params)
+    assert (trio.read("led", 1), trio.read("led", 2)) == (1, 0)
+
+
 def test_a_corrupted_reply_fails_its_crc_once(trio: Any) -> None:
     trio.bank.corrupt_next(2)
     request = encode_instruction(BROADCAST_ID, Instruction.SYNC_READ, POSITION + b"\1\2\3")
@@ -183,6 +202,11 @@ def test_clear_forgets_turns_at_standstill_only(bench: Any) -> None:
     bench.run(0.5)
     assert bench.read("present_position") == pytest.approx(2048, abs=2)
     assert abs(bench.rotors.velocity_rad_s[0]) < 0.02
+
+
+def test_a_status_packet_on_the_bus_is_nobodys_instruction(trio: Any) -> None:
+    assert trio.send(1, Instruction.STATUS, b"\x00") == []
+    assert trio.send(BROADCAST_ID, Instruction.STATUS, b"\x00") == []
 
 
 @pytest.mark.parametrize("instruction", [Instruction.CONTROL_TABLE_BACKUP, 0x30, 0xFF])

@@ -1,0 +1,119 @@
+import os
+import select
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.errors import LinkLost
+from sim_twin.pty_line import PtyLine
+
+EVERY_BYTE = bytes(range(256))
+
+
+class Echo:
+    """A device that sends back what it got, and drops what was ready when asked too late."""
+
+    def __init__(self) -> None:
+        self.ready = b""
+
+    def receive(self, data: bytes) -> None:
+        self.ready += data
+
+    def transmit(self) -> bytes:
+        ready, self.ready = self.ready, b""
+        return ready
+
+    def step(self, now_ns: int) -> None:
+        """Have nothing of its own to say."""
+
+
+@pytest.fixture
+def device() -> Echo:
+    return Echo()
+
+
+@pytest.fixture
+def line(device: Echo, tmp_path: Path) -> Iterator[PtyLine]:
+    line = PtyLine(device, tmp_path / "dev" / "servos")
+    yield line
+    line.close()
+
+
+def open_host(line: PtyLine) -> int:
+    return os.open(line.link_path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+
+def readable(descriptor: int, timeout_ms: int) -> bool:
+    poller = select.poll()
+    poller.register(descriptor, select.POLLIN)
+    return bool(poller.poll(timeout_ms))
+
+
+def test_every_byte_passes_unchanged_in_both_directions(line: PtyLine) -> None:
+    host = open_host(line)
+    os.write(host, EVERY_BYTE)
+    assert readable(line.fileno(), 1000)
+    assert line.poll_once()
+    assert readable(host, 1000)
+    assert os.read(host, 4096) == EVERY_BYTE
+    os.close(host)
+
+
+def test_a_line_without_bytes_is_idle_also_before_and_after_a_host(line: PtyLine) -> None:
+    assert not readable(line.fileno(), 0)
+    assert not line.poll_once()
+    os.close(open_host(line))
+    assert not readable(line.fileno(), 10)
+    assert not line.poll_once()
+
+
+def test_bytes_that_nobody_fetches_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
+    for _ in range(200):
+        device.ready = EVERY_BYTE
+        line.poll_once()
+    assert line.lost_bytes > 0
+    host = open_host(line)
+    received = 0
+    while readable(host, 50):
+        received += len(os.read(host, 65_536))
+    assert received + line.lost_bytes == 200 * len(EVERY_BYTE)
+    os.close(host)
+
+
+def test_unplugging_ends_the_hosts_session_and_removes_the_path(line: PtyLine) -> None:
+    host = open_host(line)
+    line.unplug()
+    with pytest.raises(OSError, match="Input/output error"):
+        os.write(host, b"x")
+    assert not line.link_path.is_symlink()
+    with pytest.raises(LinkLost, match="unplugged"):
+        line.poll_once()
+    os.close(host)
+
+
+def test_replugging_gives_a_fresh_terminal_behind_the_same_path(
+    line: PtyLine, device: Echo
+) -> None:
+    host = open_host(line)
+    line.unplug()
+    device.ready = b"stale"
+    line.replug()
+    fresh = open_host(line)
+    os.write(fresh, b"hello")
+    assert readable(line.fileno(), 1000)
+    line.poll_once()
+    assert readable(fresh, 1000)
+    assert os.read(fresh, 64) == b"hello"
+    os.close(host)
+    os.close(fresh)
+
+
+def test_a_stale_link_is_replaced(device: Echo, tmp_path: Path) -> None:
+    path = tmp_path / "servos"
+    path.symlink_to("/dev/pts/gone")
+    line = PtyLine(device, path)
+    assert path.resolve().is_char_device()
+    line.close()
+    line.close()
+    assert list(tmp_path.iterdir()) == []
