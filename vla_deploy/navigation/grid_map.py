@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vla_deploy.navigation.errors import MapInvalid
 
 REQUIRED_KEYS = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
-# The map's drawer paints black only what crosses the lidar's plane, dark grey what is above or below.
+# Black crosses the plane of the lidar; dark grey stands above or below it, like a table top.
 LIDAR_THRESH = 0.95
 
 

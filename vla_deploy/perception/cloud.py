@@ -55,14 +55,14 @@ def make_cloud(
     ).astype(np.float32)
     rotation = base_from_camera[:3, :3].astype(np.float32)
     origin = base_from_camera[:3, 3].astype(np.float32)
-    points: Floats = (rays * depth_m[..., None]).reshape(-1, 3) @ rotation.T + origin
+    points = (rays * depth_m[..., None]).reshape(-1, 3) @ rotation.T + origin
     valid = (depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)
     if ignore is not None:
         valid &= ~ignore
     return Cloud(
         rgb=rgb,
         depth_m=depth_m,
-        points=points.reshape(height, width, 3),
+        points=points.reshape(height, width, 3).astype(np.float32, copy=False),
         valid=valid,
         camera_position=base_from_camera[:3, 3].copy(),
         focal_px=camera.fx,

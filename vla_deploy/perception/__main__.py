@@ -1,0 +1,23 @@
+"""Run the perception process: `python -m vla_deploy.perception --run-dir D --robot butler`."""
+
+import sys
+
+from drivers.opener import PathOpener
+from platforms import load_profile
+from vla_deploy.node import NodeContext
+from vla_deploy.perception.node import PerceptionNode
+from vla_deploy.process_main import main
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.links import device_links
+
+
+def build(context: NodeContext) -> PerceptionNode:
+    """Build the node from what the process was started with."""
+    robot = load_robot(context.robot)
+    links = device_links(robot, context.devices_dir)
+    opener = PathOpener(links, context.clock)
+    return PerceptionNode(context, robot, load_profile(context.profile), opener)
+
+
+if __name__ == "__main__":
+    sys.exit(main("perception", build))

@@ -1,0 +1,230 @@
+"""Run perception: sensors in; robot pose, scan, attitude, images and the scene out."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.rgbd_stream import RgbdCamera, RgbdFrame
+from drivers.clock import NS_PER_S
+from drivers.imu.bno085_rvc import Imu, ImuSample
+from drivers.lidar.ld19 import Lidar
+from drivers.opener import DeviceOpener
+from platforms import Profile
+from vla_deploy.ipc import CellReader, CellWriter, FrameWriter, SharedSpace
+from vla_deploy.navigation.grid_map import load_map
+from vla_deploy.navigation.localisation import Localiser, Pose2D
+from vla_deploy.node import NodeContext
+from vla_deploy.perception.body import BodyMask
+from vla_deploy.perception.history import JointHistory
+from vla_deploy.perception.scene import Scene
+from vla_deploy.perception.sensor_slot import SensorSlot
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import SerialSensor
+from vla_deploy.robots.model import RobotModel, full_positions
+
+Array = NDArray[np.float64]
+
+STALE_JOINTS_NS = NS_PER_S // 10
+# An image is used only where the camera was nearly still before its exposure.
+STILL_WINDOW_NS = 60_000_000
+MAX_CAMERA_TURN_RAD_S = 0.35
+SCENE_PERIOD_NS = NS_PER_S // 2
+MILLIMETRE_M = 0.001
+
+
+class PerceptionNode:
+    """See, and know where the robot is, from what its sensors say and nothing else."""
+
+    period_s = 0.02
+
+    def __init__(
+        self,
+        context: NodeContext,
+        robot: RobotDescription,
+        profile: Profile,
+        devices: DeviceOpener,
+    ) -> None:
+        """Read the map and the kinematics.
+
+        Raises:
+            MapInvalid: the robot file's map cannot be used.
+            RobotFileError: the MJCF does not fit the robot file.
+        """
+        self._clock = context.clock
+        self._space = SharedSpace(context.run_dir / "ipc", context.clock)
+        self._robot = robot
+        self._profile = profile
+        self._devices = devices
+        self._model = RobotModel(robot)
+        self._body = BodyMask(robot)
+        self._joints = JointHistory()
+        self._scene = Scene()
+        self._localiser = self._make_localiser()
+        self._imu_yaw_rad: float | None = None
+        self._next_look_ns = 0
+        self._next_scene_ns = 0
+        self._base_stamp_ns = -1
+
+    def start(self) -> None:
+        """Open sensors and topics.
+
+        Raises:
+            DriverError: a sensor is missing or busy.
+        """
+        space = self._space
+        self._joint_state: CellReader = space.cell_reader("joint_state")
+        self._base_state: CellReader = space.cell_reader("base_state")
+        self._writers: dict[str, CellWriter] = {
+            name: space.cell_writer(name) for name in ("imu", "scan", "pose", "scene")
+        }
+        self._images: FrameWriter = space.frame_writer("rgbd")
+        self._lidar = SensorSlot("lidar", self._open_lidar, self._clock)
+        self._imu = SensorSlot("imu", self._open_imu, self._clock)
+        self._camera = SensorSlot("camera", self._open_camera, self._clock)
+        for slot in (self._lidar, self._imu, self._camera):
+            slot.open()
+
+    def step(self) -> None:
+        """Take what the sensors have and publish what follows from it."""
+        self._read_joints()
+        self._read_imu()
+        self._move()
+        self._read_scan()
+        self._read_camera()
+        self._publish_scene()
+
+    def stop(self) -> None:
+        """Stop the camera's stream and release every sensor."""
+        for slot in (self._lidar, self._imu, self._camera):
+            slot.close()
+        self._space.close()
+
+    def _read_joints(self) -> None:
+        sample = self._joint_state.latest()
+        if sample is not None:
+            count = len(self._robot.joint_names)
+            positions = np.array(sample.data["position"][:count], dtype=np.float64)
+            self._joints.add(sample.stamp_ns, positions)
+
+    def _read_imu(self) -> None:
+        none: list[ImuSample] = []
+        samples = self._imu.poll(lambda imu: imu.poll(), none)
+        if not samples:
+            return
+        newest = samples[-1]
+        self._imu_yaw_rad = newest.yaw_rad
+        self._writers["imu"].put(
+            yaw_rad=newest.yaw_rad,
+            pitch_rad=newest.pitch_rad,
+            roll_rad=newest.roll_rad,
+            acceleration_m_s2=newest.acceleration_m_s2,
+        )
+
+    def _move(self) -> None:
+        """Dead-reckon; without wheel odometry the robot is taken to stand still."""
+        sample = self._base_state.latest()
+        if sample is not None and sample.stamp_ns != self._base_stamp_ns:
+            self._base_stamp_ns = sample.stamp_ns
+            data = sample.data
+            odometry = Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
+            self._localiser.predict(sample.stamp_ns, odometry, self._imu_yaw_rad)
+        pose = self._localiser.pose
+        self._writers["pose"].put(
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            yaw_rad=pose.yaw_rad,
+            match_ratio=self._localiser.match_ratio,
+        )
+
+    def _read_scan(self) -> None:
+        scan = self._lidar.poll(lambda lidar: lidar.poll(), None)
+        if scan is not None:
+            self._writers["scan"].put(range_m=scan.range_m)
+            self._localiser.correct(scan.range_m, scan.beam_stamp_ns)
+
+    def _read_camera(self) -> None:
+        frame = self._camera.poll(lambda camera: camera.poll(), None)
+        if frame is None or self._clock.now_ns() < self._next_look_ns:
+            return
+        self._next_look_ns = self._clock.now_ns() + round(
+            0.9 * NS_PER_S / self._profile.perception_rate_hz
+        )
+        self._publish_image(frame)
+        positions = self._joints.at(frame.stamp_ns, STALE_JOINTS_NS)
+        if positions is None or self._camera_turn(frame.stamp_ns) > MAX_CAMERA_TURN_RAD_S:
+            return
+        self._scene.look(
+            frame.rgb,
+            frame.depth_m(),
+            frame.intrinsics,
+            self._model.camera_pose(positions),
+            self._localiser.pose_at(frame.stamp_ns),
+            self._body.mask(positions, frame.intrinsics),
+            frame.stamp_ns,
+        )
+        self._next_scene_ns = 0
+
+    def _camera_turn(self, stamp_ns: int) -> float:
+        """Return how fast the camera turned, in the map frame, up to a moment."""
+        before = self._view_rotation(stamp_ns - STILL_WINDOW_NS)
+        turn = before.T @ self._view_rotation(stamp_ns)
+        angle_rad = math.acos(min(1.0, max(-1.0, (float(np.trace(turn)) - 1.0) / 2.0)))
+        return angle_rad * NS_PER_S / STILL_WINDOW_NS
+
+    def _view_rotation(self, stamp_ns: int) -> Array:
+        positions = self._joints.at(stamp_ns, STALE_JOINTS_NS)
+        if positions is None:
+            return np.eye(3)
+        yaw_rad = self._localiser.pose_at(stamp_ns).yaw_rad
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        map_from_base = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        rotation: Array = map_from_base @ self._model.camera_pose(positions)[:3, :3]
+        return rotation
+
+    def _publish_image(self, frame: RgbdFrame) -> None:
+        depth = frame.depth
+        if frame.depth_unit_m != np.float32(MILLIMETRE_M):
+            depth = np.rint(frame.depth_m() / MILLIMETRE_M).clip(0, 65_535).astype("<u2")
+        self._images.put(
+            frame.rgb.tobytes() + depth.tobytes(),
+            width=frame.intrinsics.width,
+            height=frame.intrinsics.height,
+            stamp_ns=frame.stamp_ns,
+        )
+
+    def _publish_scene(self) -> None:
+        if self._clock.now_ns() >= self._next_scene_ns:
+            self._next_scene_ns = self._clock.now_ns() + SCENE_PERIOD_NS
+            self._writers["scene"].put_document(self._scene.document())
+
+    def _make_localiser(self) -> Localiser:
+        start = self._robot.start_pose
+        return Localiser(
+            Pose2D(start.x_m, start.y_m, start.yaw_rad),
+            load_map(self._robot.home.map_path),
+            self._place(self._robot.lidar),
+        )
+
+    def _place(self, sensor: SerialSensor) -> Pose2D:
+        """Return where a sensor sits on the base; beams already count from the robot's front."""
+        pose = self._site(sensor.site)
+        return Pose2D(float(pose[0, 3]), float(pose[1, 3]), 0.0)
+
+    def _site(self, site: str) -> Array:
+        return self._model.site_pose(site, full_positions(self._robot))
+
+    def _open_lidar(self) -> Lidar:
+        robot_lidar = self._robot.lidar
+        pose = self._site(robot_lidar.site)
+        yaw_rad = math.atan2(pose[1, 0], pose[0, 0])
+        line = self._devices.serial(robot_lidar.device)
+        return Lidar(line, self._clock, mounting_yaw_rad=yaw_rad)
+
+    def _open_imu(self) -> Imu:
+        return Imu(self._devices.serial(self._robot.imu.device), self._clock)
+
+    def _open_camera(self) -> RgbdCamera:
+        camera = RgbdCamera(self._devices.stream(self._robot.camera.device), self._clock)
+        camera.start(self._profile.camera_rate_hz)
+        return camera

@@ -1,0 +1,89 @@
+"""Keep the scene: detections of each image, moved to the map frame, tracked over time."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.protocol import Intrinsics
+from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.perception.cloud import Cloud, make_cloud
+from vla_deploy.perception.detection import Detection, detect
+from vla_deploy.perception.shapes import half_turn
+from vla_deploy.perception.tracking import Track, Tracker, View
+
+# A missing thing is missed only where its kind would surely be found.
+CLEAR_RANGE_M = 1.6
+BORDER_PX = 12
+PATCH_PX = 2
+IN_FRONT_M = 0.05
+
+
+class Scene:
+    """Hold the known things around the robot."""
+
+    def __init__(self) -> None:
+        self._tracker = Tracker()
+        self.stamp_ns = 0
+        self.detections: list[Detection] = []
+
+    def look(
+        self,
+        rgb: NDArray[np.uint8],
+        depth_m: NDArray[np.float32],
+        camera: Intrinsics,
+        base_from_camera: NDArray[np.float64],
+        base: Pose2D,
+        body: NDArray[np.bool_],
+        stamp_ns: int,
+    ) -> None:
+        """Take one image; `base` is the robot's map pose, `body` masks the robot itself."""
+        cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body)
+        self.detections = [_on_map(detection, base) for detection in detect(cloud)]
+        views = {
+            id(track): _view(track, cloud, camera, base_from_camera, base)
+            for track in self._tracker.tracks
+        }
+        self._tracker.update(self.detections, views, stamp_ns)
+        self.stamp_ns = stamp_ns
+
+    def document(self) -> dict[str, Any]:
+        """Return the scene topic's document."""
+        objects = [track.document() for track in self._tracker.objects]
+        return {"stamp_ns": self.stamp_ns, "objects": objects}
+
+
+def _on_map(detection: Detection, base: Pose2D) -> Detection:
+    x, y, z = detection.position_m
+    placed = base.compose(Pose2D(x, y, 0.0))
+    return replace(
+        detection,
+        position_m=(placed.x_m, placed.y_m, z),
+        yaw_rad=half_turn(detection.yaw_rad + base.yaw_rad),
+    )
+
+
+def _view(
+    track: Track,
+    cloud: Cloud,
+    camera: Intrinsics,
+    base_from_camera: NDArray[np.float64],
+    base: Pose2D,
+) -> View:
+    """Tell whether the image shows a track's place with nothing in front of it."""
+    local = Pose2D(track.position_m[0], track.position_m[1], 0.0).relative_to(base)
+    point = np.array([local.x_m, local.y_m, track.position_m[2]])
+    x, y, z = base_from_camera[:3, :3].T @ (point - base_from_camera[:3, 3])
+    if not 0.2 < z < CLEAR_RANGE_M:
+        return View.HIDDEN
+    border = BORDER_PX + math.ceil(0.5 * camera.fx * max(track.size_m) / z)
+    u, v = round(camera.fx * x / z + camera.cx), round(camera.fy * y / z + camera.cy)
+    if not (border <= u < camera.width - border and border <= v < camera.height - border):
+        return View.HIDDEN
+    patch = np.s_[v - PATCH_PX : v + PATCH_PX + 1, u - PATCH_PX : u + PATCH_PX + 1]
+    if not cloud.valid[patch].all():
+        return View.HIDDEN
+    reach_m = 0.5 * max(track.size_m) + IN_FRONT_M
+    return View.CLEAR if np.median(cloud.depth_m[patch]) > z - reach_m else View.HIDDEN
