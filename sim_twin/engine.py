@@ -1,7 +1,7 @@
 """Step the physics: motors in, shaft motion and sensor readings out, the same bits every time."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -51,6 +51,20 @@ class Engine:
         self.data.qpos[address : address + 7] = pose
         mujoco.mj_forward(self.model, self.data)
 
+    def pose(self, joints: Mapping[str, float]) -> None:
+        """Set joints, and those coupled to them, before the simulation runs.
+
+        Raises:
+            ModelMismatch: the model has no such joint.
+        """
+        for name, value in joints.items():
+            joint = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name)
+            if joint < 0:
+                raise ModelMismatch(f"expected a joint {name!r}, the model has none")
+            self.data.qpos[self.model.jnt_qposadr[joint]] = value
+        self._follow_couplings()
+        mujoco.mj_forward(self.model, self.data)
+
     def step(self) -> None:
         """Advance the physics by one step."""
         mujoco.mj_step(self.model, self.data)
@@ -62,6 +76,15 @@ class Engine:
         if joint < 0 or self.model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
             raise ModelMismatch(f"expected a body {body!r} with a free joint, found none")
         return int(self.model.jnt_qposadr[joint])
+
+    def _follow_couplings(self) -> None:
+        """Move mimic joints to where their equality constraint wants them."""
+        coupled = self.model.eq_type == mujoco.mjtEq.mjEQ_JOINT.value
+        for row in np.flatnonzero(coupled):
+            follower = self.model.jnt_qposadr[self.model.eq_obj1id[row]]
+            leader = self.model.jnt_qposadr[self.model.eq_obj2id[row]]
+            value = np.polynomial.Polynomial(self.model.eq_data[row, :5])(self.data.qpos[leader])
+            self.data.qpos[follower] = value
 
     def _move_joints_into_range(self) -> None:
         """Start every limited joint inside its range; zero may lie outside."""

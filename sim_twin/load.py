@@ -9,6 +9,9 @@ from sim_twin.shafts import Shaft
 from sim_twin.worlds.placement import draw_poses, load_world
 from vla_deploy.robots import RobotDescription
 
+REST_POSE = "rest"
+"""The robot file's name for how its joints lie without power."""
+
 
 def load_model(robot: RobotDescription, world: str) -> mujoco.MjModel:
     """Compose robot and world.
@@ -31,6 +34,7 @@ def load_engine(robot: RobotDescription, world: str, seed: int) -> Engine:
     engine = Engine(load_model(robot, world), servo_shafts(robot), drive_shafts(robot))
     start = robot.start_pose
     engine.place(ROBOT_ROOT, start.x_m, start.y_m, 0.0, start.yaw_rad)
+    engine.pose(robot.poses.get(REST_POSE, {}))
     for name, pose in draw_poses(world, seed).items():
         engine.place(name, *pose.position_m, pose.yaw_rad)
     return engine
