@@ -62,10 +62,7 @@ class CanHub:
         self.packets_malformed = 0
         self._frames_dropped = 0
         _remove_stale(path)
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._listener.setblocking(False)
-        self._listener.bind(str(path))
-        self._listener.listen()
+        self._listener = _listening_at(path)
 
     @property
     def frames_dropped(self) -> int:
@@ -123,6 +120,18 @@ class CanHub:
             self._dismiss(client)
         self._listener.close()
         self._path.unlink(missing_ok=True)
+
+
+def _listening_at(path: Path) -> socket.socket:
+    """Listen under a passing name first, so that whoever sees `path` can connect."""
+    passing = path.with_name(f"{path.name}.new")
+    passing.unlink(missing_ok=True)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listener.setblocking(False)
+    listener.bind(str(passing))
+    listener.listen()
+    passing.rename(path)
+    return listener
 
 
 def _remove_stale(path: Path) -> None:

@@ -1,0 +1,49 @@
+"""Serve wheel drives with freely turning wheels on a CAN hub, to try a CANopen tool against.
+
+`python -m sim_twin.can --socket /tmp/can.sock --nodes 1 2`; another process then opens
+`can.Bus(interface="vla_hub", channel="/tmp/can.sock")`.
+"""
+
+import argparse
+import select
+from collections.abc import Sequence
+from pathlib import Path
+
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from sim_twin.can.drive import WheelDrive
+from sim_twin.can.free_wheel import STEP_NS, FreeWheel
+from sim_twin.can.hub import CanHub
+from sim_twin.can.wire import CanWire
+
+
+def serve(hub: CanHub, wheels: Sequence[FreeWheel], clock: Clock) -> None:
+    """Carry frames as they come and turn the wheels every 2 ms, until interrupted."""
+    step_at_ns = clock.now_ns()
+    while True:
+        wait_s = max(0.0, (step_at_ns - clock.now_ns()) / NS_PER_S)
+        if select.select(hub.filenos(), [], [], wait_s)[0]:
+            hub.poll_once()
+        if clock.now_ns() >= step_at_ns:
+            for wheel in wheels:
+                wheel.step(clock.now_ns(), STEP_NS / NS_PER_S)
+            step_at_ns = max(step_at_ns + STEP_NS, clock.now_ns())
+
+
+def main() -> None:
+    """Serve until interrupted."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--socket", type=Path, required=True, help="path of the hub's socket")
+    parser.add_argument("--nodes", type=int, nargs="+", default=[1, 2], help="node ids")
+    arguments = parser.parse_args()
+    wheels = [FreeWheel(WheelDrive(node_id)) for node_id in arguments.nodes]
+    hub = CanHub(CanWire([wheel.drive for wheel in wheels]), arguments.socket)
+    try:
+        serve(hub, wheels, MonotonicClock())
+    except KeyboardInterrupt:
+        return
+    finally:
+        hub.close()
+
+
+if __name__ == "__main__":
+    main()
