@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Axes = NDArray[np.intp]
+Flags = NDArray[np.bool_]
 
 _TINY = 1e-9
 

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from vla_deploy.control.axes import Floats
+from vla_deploy.control.axes import Flags, Floats
 
 # A plan that keeps its velocity limit passes untouched, also over a tick that came late.
 _STEP_SLACK = 1.25
-MAX_OFFSET_RAD = 0.2
 
 
 class SetpointGate:
@@ -28,9 +27,9 @@ class SetpointGate:
         """Tell whether the last setpoints had to be changed."""
         return bool(self._clamped.any())
 
-    def place(self, position: Floats) -> None:
-        """Start from the measured position, without a step."""
-        self.sent = position.copy()
+    def place(self, position: Floats, joints: Flags) -> None:
+        """Start some joints from their measured position, without a step."""
+        self.sent = np.where(joints, position, self.sent)
 
     def limit(self, setpoint: Floats, period_s: float) -> Floats:
         """Return the setpoints that may be sent; NaN keeps the last one."""

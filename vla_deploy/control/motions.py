@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vla_deploy.control.axes import Axes, AxisLimits, AxisState, Floats
+from vla_deploy.control.axes import Axes, AxisLimits, AxisState, Flags, Floats
 from vla_deploy.control.profile_motion import plan_stop
 
 
@@ -74,12 +74,11 @@ class MotionSet:
         """Tell whether no joint's setpoint moves."""
         return not self._motions
 
-    def place(self, position: Floats) -> None:
-        """Put the setpoints at rest on `position`; motions must have been stopped before."""
-        self._motions.clear()
-        self.state.position[:] = position
-        self.state.velocity[:] = 0.0
-        self.state.acceleration[:] = 0.0
+    def place(self, position: Floats, joints: Flags) -> None:
+        """Put the setpoints of joints that hold nothing at rest on their measured position."""
+        np.copyto(self.state.position, position, where=joints)
+        self.state.velocity[joints] = 0.0
+        self.state.acceleration[joints] = 0.0
 
     def start(self, motion_id: int, axes: Axes, curve: Curve) -> list[MotionResult]:
         """Begin a motion from the present state and return the motions that lost joints to it."""

@@ -121,8 +121,7 @@ class ServoLine:
 
     def reboot_faulted(self) -> bool:
         """Restart the servos that report a hardware error, the only way out of it."""
-        faulted = np.flatnonzero(self.state.error)
-        return self._attempt(lambda bus: [bus.reboot(self._ids[servo]) for servo in faulted])
+        return self._attempt(self._reboot_faulted)
 
     def remove_power(self, servos: Axes) -> bool:
         """Switch torque off; False with `failure` when a servo did not confirm it."""
@@ -142,7 +141,11 @@ class ServoLine:
         if len(servos) > 0:
             _raise_first(bus.disable_torque([self._ids[servo] for servo in servos]))
 
-    def _attempt(self, act: Callable[[DynamixelBus], object]) -> bool:
+    def _reboot_faulted(self, bus: DynamixelBus) -> None:
+        for servo in np.flatnonzero(self.state.error):
+            bus.reboot(self._ids[servo])
+
+    def _attempt(self, act: Callable[[DynamixelBus], None]) -> bool:
         if self._bus is None or self.lost:
             self.failure = f"{self.name}: the servo bus is lost"
             return False

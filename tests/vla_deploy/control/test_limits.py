@@ -9,12 +9,13 @@ from vla_deploy.control.limits import SetpointGate
 
 LOWER, UPPER, VELOCITY = np.array([-1.0, 0.0]), np.array([1.0, 0.04]), np.array([2.0, 0.08])
 PERIOD_S = 0.004
+BOTH = np.array([True, True])
 
 
 @pytest.fixture
 def gate() -> SetpointGate:
     gate = SetpointGate(LOWER, UPPER, VELOCITY)
-    gate.place(np.array([0.0, 0.02]))
+    gate.place(np.array([0.0, 0.02]), BOTH)
     return gate
 
 
@@ -37,7 +38,7 @@ def test_a_setpoint_beyond_the_range_stops_at_its_end(gate: SetpointGate) -> Non
 
 
 def test_a_joint_placed_outside_its_range_stays_and_may_only_come_back(gate: SetpointGate) -> None:
-    gate.place(np.array([1.2, 0.02]))
+    gate.place(np.array([1.2, 9.0]), np.array([True, False]))
     assert gate.limit(np.array([1.2, 0.02]), PERIOD_S)[0] == 1.2
     assert gate.limit(np.array([1.3, 0.02]), PERIOD_S)[0] == 1.2
     assert gate.limit(np.array([1.19, 0.02]), PERIOD_S)[0] == 1.19
@@ -51,7 +52,7 @@ def test_a_setpoint_that_is_no_number_keeps_the_last_one(gate: SetpointGate) -> 
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=1, max_size=30))
 def test_no_input_gets_out_of_range_or_too_fast(wanted: list[float]) -> None:
     gate = SetpointGate(LOWER, UPPER, VELOCITY)
-    gate.place(np.array([0.5, 0.02]))
+    gate.place(np.array([0.5, 0.02]), BOTH)
     last = gate.sent
     for value in wanted:
         sent = gate.limit(np.array([value, value]), PERIOD_S)

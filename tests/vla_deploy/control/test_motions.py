@@ -101,10 +101,7 @@ def test_a_stop_at_rest_moves_nothing(motions: MotionSet) -> None:
     assert motions.at_rest
 
 
-def test_placing_puts_all_setpoints_at_rest(motions: MotionSet) -> None:
-    go(motions, 1, LEFT, 1.0)
-    run(motions, 0.1)
-    motions.place(np.array([0.1, 0.2, 0.3]))
-    assert motions.at_rest
-    assert motions.state.position.tolist() == [0.1, 0.2, 0.3]
+def test_placing_puts_the_setpoints_of_some_joints_at_rest(motions: MotionSet) -> None:
+    motions.place(np.array([0.1, 0.2, 0.3]), np.array([True, False, True]))
+    assert motions.state.position.tolist() == [0.1, 0.0, 0.3]
     assert not motions.state.velocity.any()

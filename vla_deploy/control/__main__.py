@@ -1,0 +1,26 @@
+"""Run the control process: `python -m vla_deploy.control --run-dir D --robot butler`."""
+
+import gc
+import sys
+
+from drivers.opener import PathOpener
+from platforms import load_profile
+from vla_deploy.control.node import ControlNode
+from vla_deploy.node import NodeContext
+from vla_deploy.process_main import main
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.links import device_links
+
+
+def build(context: NodeContext) -> ControlNode:
+    """Build the node, and keep the collector away from everything that was built with it."""
+    robot = load_robot(context.robot)
+    devices = PathOpener(device_links(robot, context.devices_dir), context.clock)
+    node = ControlNode(context, robot, load_profile(context.profile), devices)
+    gc.collect()
+    gc.freeze()
+    return node
+
+
+if __name__ == "__main__":
+    sys.exit(main("control", build))
