@@ -17,6 +17,7 @@ MAX_HEIGHT_M = 0.42
 OUTLINE_MARGIN_M = 0.02
 HIGHER_MARGIN_M = 0.05
 MAX_EXTENT_M = 0.55
+FLOATING_M = 0.08
 MIN_PIXELS = 14
 NEAR_CELL_M, FAR_CELL_M = 0.01, 0.02
 NEAR_M = 1.5
@@ -41,16 +42,15 @@ class Cluster:
 def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
     """Return the things on each support; furniture and walls are none."""
     clusters: list[Cluster] = []
+    flat_points = cloud.points.reshape(-1, 3)
     for index, support in enumerate(supports):
         heights = cv2.medianBlur(support.heights_above(cloud), 3)
         lowest_m = MIN_HEIGHT_ON_FLOOR_M if support.is_floor else MIN_HEIGHT_M
         least = np.maximum(lowest_m, NOISE_SIGMAS * cloud.sigma_m())
-        standing = cloud.valid & (heights > least)
-        standing[standing] = inside(
-            support.outline, cloud.points[standing][:, :2], OUTLINE_MARGIN_M
-        )
+        standing = np.flatnonzero(cloud.valid & (heights > least))
+        standing = standing[inside(support.outline, flat_points[standing], OUTLINE_MARGIN_M)]
         for higher in supports[:index]:
-            standing[standing] = ~_belongs_to(higher, support, cloud.points[standing])
+            standing = standing[~_belongs_to(higher, support, flat_points[standing])]
         clusters += _split(cloud, support, heights, standing)
     return clusters
 
@@ -59,13 +59,15 @@ def _belongs_to(higher: Support, lower: Support, points: Floats) -> Mask:
     """Tell which points are part of, under, or on a higher surface."""
     if np.allclose(higher.plane, lower.plane):
         return np.zeros(len(points), dtype=np.bool_)
-    return inside(higher.outline, points[:, :2], HIGHER_MARGIN_M)
+    return inside(higher.outline, points, HIGHER_MARGIN_M)
 
 
-def _split(cloud: Cloud, support: Support, heights: Floats, standing: Mask) -> list[Cluster]:
-    rows, columns = np.nonzero(standing)
-    if rows.size < MIN_PIXELS:
+def _split(
+    cloud: Cloud, support: Support, heights: Floats, standing: NDArray[np.intp]
+) -> list[Cluster]:
+    if standing.size < MIN_PIXELS:
         return []
+    rows, columns = np.unravel_index(standing, heights.shape)
     points = cloud.points[rows, columns]
     cell_m = NEAR_CELL_M if np.median(cloud.depth_m[rows, columns]) < NEAR_M else FAR_CELL_M
     labels = _label(points[:, :2], heights[rows, columns], cell_m)
@@ -75,7 +77,9 @@ def _split(cloud: Cloud, support: Support, heights: Floats, standing: Mask) -> l
             continue
         member = labels == label
         extent = np.ptp(points[member][:, :2], axis=0)
-        if extent.max() < MAX_EXTENT_M:
+        # What hangs in the air is carried by a hand, or is a part of the robot.
+        lowest_m = float(np.percentile(heights[rows[member], columns[member]], 5.0))
+        if extent.max() < MAX_EXTENT_M and lowest_m < FLOATING_M:
             clusters.append(_cluster(cloud, support, heights, (rows[member], columns[member])))
     return clusters
 

@@ -18,6 +18,7 @@ Vector = tuple[float, float, float]
 CONFIDENCE_KNOWN = 0.9
 CONFIDENCE_OTHER = 0.5
 FEW_PIXELS = 60
+FACE_WIDTH_M, FACE_HEIGHT_M = 0.03, 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +89,14 @@ def detect(cloud: Cloud) -> list[Detection]:
     """Return the things in view, the nearest first."""
     clusters = find_clusters(cloud, find_supports(cloud))
     clusters.sort(key=lambda cluster: cluster.depth_m)
-    return [_detection(cluster, cloud) for cluster in clusters]
+    found = [_detection(cluster, cloud) for cluster in clusters]
+    return [detection for detection in found if not _is_bare_face(detection)]
+
+
+def _is_bare_face(detection: Detection) -> bool:
+    """Tell whether this is one upright side of something larger, such as a sofa's arm."""
+    _, width_m, height_m = detection.size_m
+    return detection.class_name == OTHER and width_m < FACE_WIDTH_M and height_m > FACE_HEIGHT_M
 
 
 def _detection(cluster: Cluster, cloud: Cloud) -> Detection:

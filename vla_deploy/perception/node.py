@@ -2,6 +2,7 @@
 
 import math
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,6 +73,8 @@ class PerceptionNode:
         Raises:
             DriverError: a sensor is missing or busy.
         """
+        # OpenCV's own threads would compete with control for the cores and gain nothing here.
+        cv2.setNumThreads(1)
         space = self._space
         self._joint_state: CellReader = space.cell_reader("joint_state")
         self._base_state: CellReader = space.cell_reader("base_state")

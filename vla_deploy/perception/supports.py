@@ -13,6 +13,9 @@ MIN_AREA_M2 = 0.04
 MAX_SUPPORTS = 6
 CELL_M = 0.02
 FLOOR_M = 0.04
+STRIDE = 2
+FIT_POINTS = 2000
+CORNER_M = 0.003
 _FIT_ROUNDS = 3
 
 
@@ -42,8 +45,10 @@ class Support:
 
 def find_supports(cloud: Cloud) -> list[Support]:
     """Return the surfaces in view, the highest first."""
-    area = upward_area(cloud)
-    z = cloud.points[..., 2]
+    # Surfaces are large: every other pixel of every other row is plenty.
+    area = upward_area(cloud)[::STRIDE, ::STRIDE] * np.float32(STRIDE**2)
+    points = cloud.points[::STRIDE, ::STRIDE]
+    z = points[..., 2]
     supports: list[Support] = []
     left = area > 0.0
     for _ in range(MAX_SUPPORTS):
@@ -51,22 +56,21 @@ def find_supports(cloud: Cloud) -> list[Support]:
         if level is None:
             break
         layer = left & (np.abs(z - level) < 2.0 * LAYER_M)
-        plane = _fit_plane(cloud.points[layer], level)
-        on_plane = left & (np.abs(_above(cloud.points, plane)) < LAYER_M)
-        supports += _pieces(cloud.points, on_plane, area, plane)
+        plane = _fit_plane(points[layer], level)
+        on_plane = left & (np.abs(_above(points, plane)) < LAYER_M)
+        supports += _pieces(points, on_plane, area, plane)
         left &= ~(on_plane | (np.abs(z - level) < LAYER_M))
     return sorted(supports, key=lambda s: -s.height_m(*map(float, s.outline.mean(axis=0))))
 
 
-def inside(outline: Floats, xy: Floats, margin_m: float) -> Mask:
-    """Tell which of (n, 2) points lie within a convex outline widened by `margin_m`."""
-    following = np.roll(outline, -1, axis=0)
-    edge = following - outline
-    length = np.maximum(np.linalg.norm(edge, axis=1), 1e-9)
-    normal = np.column_stack((edge[:, 1], -edge[:, 0])) / length[:, None]
-    offsets = np.einsum("ij,ij->i", normal, outline)
-    distance = xy @ normal.T - offsets
-    within: Mask = np.all(distance < margin_m, axis=1)
+def inside(outline: Floats, points: Floats, margin_m: float) -> Mask:
+    """Tell which of (n, 2 or 3) points lie within a convex outline widened by `margin_m`."""
+    edges = np.roll(outline, -1, axis=0) - outline
+    x, y = points[:, 0], points[:, 1]
+    within = np.ones(len(points), dtype=np.bool_)
+    for (corner_x, corner_y), (edge_x, edge_y) in zip(outline, edges, strict=True):
+        outwards = edge_y * (x - corner_x) - edge_x * (y - corner_y)
+        within &= outwards < margin_m * np.hypot(edge_x, edge_y)
     return within
 
 
@@ -91,8 +95,9 @@ def _above(points: Floats, plane: tuple[float, float, float]) -> Floats:
 def _fit_plane(points: Floats, level: float) -> tuple[float, float, float]:
     """Fit a nearly level plane; small tilts are the camera's calibration errors."""
     plane = (0.0, 0.0, level)
+    sample = points[:: max(1, len(points) // FIT_POINTS)]
     for _ in range(_FIT_ROUNDS):
-        near = points[np.abs(_above(points, plane)) < LAYER_M].astype(np.float64)
+        near = sample[np.abs(_above(sample, plane)) < LAYER_M].astype(np.float64)
         if len(near) < 30:
             break
         a, b, c = np.linalg.lstsq(
@@ -122,7 +127,8 @@ def _pieces(
 
 
 def _outline(xy: Floats) -> Floats:
-    hull: Floats = cv2.convexHull(np.ascontiguousarray(xy, dtype=np.float32)).reshape(-1, 2)
+    full = cv2.convexHull(np.ascontiguousarray(xy, dtype=np.float32))
+    hull: Floats = cv2.approxPolyDP(full, CORNER_M, True).reshape(-1, 2)
     # `inside` needs counter-clockwise corners.
     x, y = hull.T
     area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
