@@ -123,8 +123,8 @@ class DynamixelBus:
         self._reader.read()
         if self.watchdog is WatchdogState.ARMED and silent_ns > self._gap_ns:
             self._read_watchdogs()
-        self._health.step()
-        self._note_watchdogs()
+        if self._health.step():
+            self._note_watchdogs()
         return self.state
 
     def write_goals(self, position_rad: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -264,6 +264,7 @@ class DynamixelBus:
         values = self._registers.read_many("bus_watchdog", self.servos)
         for servo_id, value in values.items():
             self.state.watchdog[self._by_id[servo_id]] = value
+        self._note_watchdogs()
 
     def _note_watchdogs(self) -> None:
         if (self.state.watchdog == WATCHDOG_TRIPPED).any():

@@ -1,13 +1,14 @@
 """Write goals for all servos, converted from the joint side and clamped to the servo's range."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.dynamixel.codec import Instruction
-from drivers.dynamixel.control_table import CENTRE_PULSE, PWM_FULL
+from drivers.dynamixel.control_table import PWM_FULL
 from drivers.dynamixel.handshake import ServoSetup
 from drivers.dynamixel.link import Link, Patience
 from drivers.dynamixel.registers import Registers
@@ -38,10 +39,11 @@ class GoalWriter:
         self._joints = [servo.joint for servo in servos]
         self._patience = Patience(margin_s=margin_s, attempts=2)
         self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
-        offsets = np.array([servo.offset_rad for servo in servos])
-        self._at_pulse_zero = offsets - CENTRE_PULSE * self._per_pulse
-        self._minimum = np.array([setup.minimum_pulse for setup in setups])
-        self._maximum = np.array([setup.maximum_pulse for setup in setups])
+        self._pulses_per = 1.0 / self._per_pulse
+        self._at_pulse_zero = np.array([servo.to_joint(0) for servo in servos])
+        self._pulse_at_zero = -self._at_pulse_zero * self._pulses_per
+        self._minimum = np.array([float(setup.minimum_pulse) for setup in setups])
+        self._maximum = np.array([float(setup.maximum_pulse) for setup in setups])
         self._pwm_limit = {
             servo.id: setup.pwm_limit for servo, setup in zip(servos, setups, strict=True)
         }
@@ -57,11 +59,16 @@ class GoalWriter:
             LinkLost: the adapter is gone.
         """
         self._check(position_rad)
-        pulses = np.rint((position_rad - self._at_pulse_zero) / self._per_pulse)
-        np.clip(pulses, self._minimum, self._maximum, out=pulses)
+        pulses = position_rad * self._pulses_per
+        np.add(pulses, self._pulse_at_zero, out=pulses)
+        np.rint(pulses, out=pulses)
+        np.maximum(pulses, self._minimum, out=pulses)
+        np.minimum(pulses, self._maximum, out=pulses)
         self._records["pulse"] = pulses
         self._link.broadcast(Instruction.SYNC_WRITE, _GOAL_POSITION_HEAD + self._records.tobytes())
-        return np.asarray(pulses * self._per_pulse + self._at_pulse_zero, dtype=np.float64)
+        np.multiply(pulses, self._per_pulse, out=pulses)
+        np.add(pulses, self._at_pulse_zero, out=pulses)
+        return pulses
 
     def write_pwm(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit the PWM of servos, where it changed; return those that did not take it.
@@ -100,7 +107,7 @@ class GoalWriter:
     def _check(self, position_rad: Floats) -> None:
         if position_rad.shape != (len(self._joints),):
             raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
-        finite = np.isfinite(position_rad)
-        if not finite.all():
+        finite = [isfinite(goal) for goal in position_rad.tolist()]
+        if not all(finite):
             bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
             raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")

@@ -50,10 +50,11 @@ class HealthPoll:
         self._cycle = 0
         self._turn = 0
         self._seen_alert: NDArray[np.bool_] = np.zeros(len(servos), dtype=np.bool_)
+        self._seen_alert_bytes = self._seen_alert.tobytes()
         self._urgent: deque[int] = deque()
 
-    def step(self) -> None:
-        """Make at most one transaction after a cycle's block read.
+    def step(self) -> bool:
+        """Make at most one transaction after a cycle's block read; tell whether there was one.
 
         Raises:
             LinkLost: the adapter is gone.
@@ -61,10 +62,12 @@ class HealthPoll:
         self._note_alerts()
         if self._urgent:
             self._read_status(self._urgent.popleft())
-            return
+            return True
         self._cycle += 1
-        if self._cycle % self._every_cycles == 0:
-            self._take_turn()
+        if self._cycle % self._every_cycles:
+            return False
+        self._take_turn()
+        return True
 
     def ask_soon(self, index: int) -> None:
         """Read a servo's status in one of the next cycles."""
@@ -73,12 +76,14 @@ class HealthPoll:
 
     def _note_alerts(self) -> None:
         alert = self._state.alert
-        if not (alert != self._seen_alert).any():
+        alert_bytes = alert.tobytes()
+        if alert_bytes == self._seen_alert_bytes:  # much cheaper than comparing arrays
             return
         for index in np.flatnonzero(alert & ~self._seen_alert):
             self.ask_soon(int(index))
         self._state.error[~alert] = 0
         self._seen_alert[:] = alert
+        self._seen_alert_bytes = alert_bytes
 
     def _take_turn(self) -> None:
         self._turn += 1

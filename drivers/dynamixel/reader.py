@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.block import BlockRead, Records, records_of
 from drivers.dynamixel.codec import ALERT
-from drivers.dynamixel.control_table import CENTRE_PULSE
 from drivers.dynamixel.link import Link
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
 
 _NEVER_NS: Final = -1
-_EVERYONE: Final = slice(None)
-_Rows = slice | NDArray[np.intp]
+_Rows = NDArray[np.intp]
 
 
 class StateReader:
@@ -40,15 +38,19 @@ class StateReader:
         self._fast = fast_sync
         self._margin_s = margin_s
         self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
-        offsets = np.array([servo.offset_rad for servo in servos])
-        self._at_pulse_zero = offsets - CENTRE_PULSE * self._per_pulse
+        self._at_pulse_zero = np.array([servo.to_joint(0) for servo in servos])
         self._per_velocity = np.array(
-            [servo.model.velocity_unit_rad_s * servo.sign * servo.travel_per_rad for servo in servos]
+            [
+                servo.model.velocity_unit_rad_s * servo.sign * servo.travel_per_rad
+                for servo in servos
+            ]
         )
         self._per_effort = np.array(
             [servo.model.effort_unit_ratio * servo.sign for servo in servos]
         )
         self._stamps_ns = np.full(len(servos), _NEVER_NS, dtype=np.int64)
+        self._rows: _Rows | None = None
+        self._all_fresh = False
         self.rebuild()
 
     def rebuild(self) -> None:
@@ -56,7 +58,8 @@ class StateReader:
         polled = self._roster.polled
         ids = [self._servos[index].id for index in polled]
         self._block = BlockRead(ids, fast=self._fast)
-        self._rows: _Rows = _EVERYONE if len(ids) == len(self._servos) else np.array(polled)
+        everyone = len(ids) == len(self._servos)
+        self._rows = None if everyone else np.array(polled, dtype=np.intp)
 
     def read(self) -> None:
         """Run one block read and update the state's first group.
@@ -73,7 +76,10 @@ class StateReader:
         records = self._block.match(reply)
         if records is not None:
             self._roster.note_complete()
-            self._store(records, self._rows)
+            if self._rows is None:
+                self._store_all(records)
+            else:
+                self._store(records, self._rows)
             return
         records, indices = self._frame_anew(reply, deadline_ns)
         complete = len(indices) == len(self._roster.polled)
@@ -95,22 +101,32 @@ class StateReader:
             self._link.counters.suspensions += len(dropped)
             self.rebuild()
 
-    def _store(self, records: Records, rows: _Rows) -> None:
+    def _store_all(self, records: Records) -> None:
+        """Do what `_store` does when all servos have answered, without scatter and temporaries."""
         state = self._state
-        now_ns = self._link.now_ns()
-        state.position_rad[rows] = (
-            records["position"] * self._per_pulse[rows] + self._at_pulse_zero[rows]
-        )
+        np.multiply(records["position"], self._per_pulse, out=state.position_rad)
+        np.add(state.position_rad, self._at_pulse_zero, out=state.position_rad)
+        np.multiply(records["velocity"], self._per_velocity, out=state.velocity_rad_s)
+        np.multiply(records["effort"], self._per_effort, out=state.effort_ratio)
+        np.greater_equal(records["error"], ALERT, out=state.alert)
+        state.stamp_ns = self._link.now_ns()
+        self._stamps_ns.fill(state.stamp_ns)
+        if not self._all_fresh:
+            self._all_fresh = True
+            state.valid.fill(True)
+            state.age_s.fill(0.0)
+
+    def _store(self, records: Records, rows: _Rows) -> None:
+        self._all_fresh = False
+        state = self._state
+        position = records["position"] * self._per_pulse[rows]
+        state.position_rad[rows] = position + self._at_pulse_zero[rows]
         state.velocity_rad_s[rows] = records["velocity"] * self._per_velocity[rows]
         state.effort_ratio[rows] = records["effort"] * self._per_effort[rows]
         state.alert[rows] = records["error"] >= ALERT
         state.valid[:] = False
         state.valid[rows] = True
-        self._stamps_ns[rows] = now_ns
-        state.stamp_ns = now_ns
-        if isinstance(rows, slice):
-            state.age_s[:] = 0.0
-        else:
-            state.age_s[:] = np.where(
-                self._stamps_ns == _NEVER_NS, np.inf, (now_ns - self._stamps_ns) / NS_PER_S
-            )
+        state.stamp_ns = self._link.now_ns()
+        self._stamps_ns[rows] = state.stamp_ns
+        age_s = (state.stamp_ns - self._stamps_ns) / NS_PER_S
+        state.age_s[:] = np.where(self._stamps_ns == _NEVER_NS, np.inf, age_s)

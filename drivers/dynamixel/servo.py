@@ -18,7 +18,7 @@ class ServoSpec:
 
         joint value = sign * (pulse - 2048) * 2 pi / 4096 * travel_per_rad + offset_rad
 
-    `travel_per_rad` is 1 for a revolute joint; for a finger on a rack it is metres per servo radian,
+    `travel_per_rad` is 1 for a revolute joint; for a finger on a rack it is metres per radian,
     and then `offset_rad` and all values of this joint are in metres.
     """
 
@@ -41,7 +41,10 @@ class ServoSpec:
             (not 0 <= self.id <= MAX_SERVO_ID, f"id must be 0..{MAX_SERVO_ID}, got {self.id}"),
             (not known, f"model must be one of {sorted(MODELS)}, got {self.model_name!r}"),
             (self.sign not in (-1, 1), f"sign must be -1 or 1, got {self.sign}"),
-            (self.travel_per_rad <= 0, f"travel_per_rad must be positive, got {self.travel_per_rad}"),
+            (
+                self.travel_per_rad <= 0,
+                f"travel_per_rad must be positive, got {self.travel_per_rad}",
+            ),
             (
                 known and self.operating_mode not in self.model.operating_modes,
                 f"{self.model_name} has no operating mode {self.operating_mode.name}",

@@ -69,6 +69,8 @@ def test_a_goal_that_is_no_number_or_too_few_goals_are_refused(bench: Any) -> No
         bench.bus.write_goals(np.array([0.0, np.nan, 0.0, np.inf]))
     with pytest.raises(ValueError, match="expected 4 goals"):
         bench.bus.write_goals(np.zeros(3))
+    with pytest.raises(ValueError, match="for joint_1, joint_2"):
+        bench.bus.write_goals(np.array([np.inf, -np.inf, 0.0, 0.0]))
 
 
 def test_the_watchdog_is_armed_with_torque_and_fed_by_the_cycle(bench: Any) -> None:

@@ -1,6 +1,7 @@
 """Golden packets of the e-manual, round trips with stuffing anywhere, a parser nothing upsets."""
 
 import pytest
+from dynamixel_sdk.protocol2_packet_handler import Protocol2PacketHandler
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -88,6 +89,12 @@ def test_fast_sync_reply_carries_the_manuals_cumulative_crcs() -> None:
 @given(data=st.binary(max_size=300))
 def test_both_crcs_agree(data: bytes) -> None:
     assert crc16(data) == table_crc16(data)
+
+
+@given(data=st.binary(max_size=300))
+def test_the_vendors_crc_agrees(data: bytes) -> None:
+    vendor = Protocol2PacketHandler()
+    assert crc16(data) == vendor.updateCRC(0, list(data), len(data))
 
 
 @given(payload=STUFFED_BYTES)

@@ -1,0 +1,82 @@
+"""The register maps are consistent, and their round trip is exact."""
+
+import pytest
+
+from drivers.dynamixel.control_table import (
+    BAUD_RATES,
+    MODELS,
+    MODELS_BY_NUMBER,
+    HardwareError,
+    Model,
+    OperatingMode,
+)
+
+ALL_MODELS = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+
+
+@ALL_MODELS
+def test_registers_do_not_overlap_and_are_found_by_address(model: Model) -> None:
+    end = 0
+    for register in model.registers.values():
+        assert register.address >= end
+        end = register.address + register.size
+        assert model.registers_by_address[register.address] is register
+
+
+@ALL_MODELS
+def test_the_block_read_each_cycle_has_no_gap(model: Model) -> None:
+    effort = model.registers_by_address[126]
+    assert effort.name == ("present_load" if model.current_unit_a is None else "present_current")
+    assert effort.size == 2
+    assert model.registers["present_velocity"].address == 128
+    assert model.registers["present_position"].address == 132
+    assert model.registers["present_position"].size == 4
+
+
+@ALL_MODELS
+def test_eeprom_ends_where_ram_begins(model: Model) -> None:
+    assert all(register.eeprom == (register.address < 64) for register in model.registers.values())
+
+
+@ALL_MODELS
+def test_initial_values_are_in_range_and_limits_fit_the_bytes(model: Model) -> None:
+    for register in model.registers.values():
+        limits = (register.minimum, register.initial, register.maximum)
+        known = [value for value in limits if value is not None]
+        assert known == sorted(known), register.name
+        assert [register.from_bytes(register.to_bytes(value)) for value in known] == known
+
+
+def test_models_are_told_apart_by_their_numbers() -> None:
+    numbers = {model.number: model.name for model in MODELS_BY_NUMBER.values()}
+    assert numbers == {
+        1020: "XM430-W350",
+        1120: "XM540-W270",
+        1060: "XL430-W250",
+        1070: "XC430-W150",
+    }
+
+
+def test_models_without_current_sensing_have_no_current_modes() -> None:
+    assert OperatingMode.CURRENT in MODELS["XM430-W350"].operating_modes
+    assert OperatingMode.CURRENT not in MODELS["XL430-W250"].operating_modes
+    assert "goal_current" not in MODELS["XC430-W150"].registers
+
+
+def test_one_ampere_of_stall_current_is_its_share_of_effort() -> None:
+    model = MODELS["XM430-W350"]
+    assert model.effort_unit_ratio * round(2.3 / 2.69e-3) == pytest.approx(1.0, abs=1e-3)
+    assert MODELS["XL430-W250"].effort_unit_ratio * 1000 == pytest.approx(1.0)
+
+
+def test_negative_values_are_two_s_complement() -> None:
+    velocity = MODELS["XL430-W250"].registers["present_velocity"]
+    assert velocity.from_bytes(b"\xfd\xff\xff\xff") == -3
+    assert MODELS["XL430-W250"].registers["bus_watchdog"].from_bytes(b"\xff") == -1
+
+
+def test_documented_constants() -> None:
+    assert BAUD_RATES[3] == 1_000_000
+    assert HardwareError(52) == (
+        HardwareError.OVERLOAD | HardwareError.ELECTRICAL_SHOCK | HardwareError.OVERHEATING
+    )

@@ -1,0 +1,104 @@
+"""Every wait is bounded by the wire time plus the margin, also on a babbling or silent line."""
+
+import pytest
+
+from drivers.clock import NS_PER_S
+from drivers.dynamixel import DynamixelBus, ServoSpec
+from drivers.dynamixel.codec import Instruction
+from drivers.dynamixel.counters import BusCounters
+from drivers.dynamixel.errors import ServoSilent
+from drivers.dynamixel.link import Link, Patience
+
+BYTE_NS = 10_000  # at 1 Mbps
+SPECS = [ServoSpec(id=n, model_name="XM430-W350", joint=f"joint_{n}") for n in range(1, 17)]
+
+
+class StillClock:
+    def __init__(self) -> None:
+        self.time_ns = 5 * NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+
+
+class SilentLine:
+    """Wait until the deadline, as a real port does, and bring nothing."""
+
+    def __init__(self, clock: StillClock) -> None:
+        self._clock = clock
+        self.written = 0
+
+    def write(self, data: bytes) -> None:
+        self.written += len(data)
+
+    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
+        self._clock.sleep_until(deadline_ns)
+        return b""
+
+    def discard_input(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class BabblingLine(SilentLine):
+    """Never stop sending bytes that mean nothing; each read takes their time on the wire."""
+
+    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
+        if self._clock.time_ns >= deadline_ns:
+            return b""
+        self._clock.time_ns += 20 * BYTE_NS
+        return b"\x00" * min(20, max_bytes)
+
+
+class FloodedLine(SilentLine):
+    """Have bytes without end already waiting."""
+
+    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
+        self._clock.time_ns += BYTE_NS
+        return b"\x55" * max_bytes
+
+
+@pytest.mark.parametrize("fast_sync", [True, False])
+@pytest.mark.parametrize("line_type", [SilentLine, BabblingLine])
+def test_a_cycle_without_answers_costs_the_wire_time_and_two_milliseconds(
+    line_type: type[SilentLine], fast_sync: bool
+) -> None:
+    clock = StillClock()
+    line = line_type(clock)
+    bus = DynamixelBus(
+        line, clock, SPECS, baud=1_000_000, fast_sync=fast_sync, health_every_cycles=1000
+    )
+    start_ns = clock.time_ns
+    bus.read_state()
+    wire_ns = (30 + (232 if fast_sync else 336)) * BYTE_NS
+    assert clock.time_ns - start_ns <= wire_ns + 2_000_000 + 20 * BYTE_NS
+    assert not bus.state.valid.any()
+    assert bus.counters.timeouts == 16
+
+
+def test_bytes_without_end_do_not_hold_the_bus() -> None:
+    clock = StillClock()
+    link = Link(FloodedLine(clock), clock, 1_000_000, BusCounters())
+    link.send(b"request")
+    assert link.counters.late == 16
+    assert clock.time_ns - 5 * NS_PER_S < NS_PER_S
+
+
+def test_a_request_is_repeated_as_often_as_asked() -> None:
+    clock = StillClock()
+    line = SilentLine(clock)
+    link = Link(line, clock, 1_000_000, BusCounters())
+    with pytest.raises(ServoSilent, match="ping servo 1: no answer in 4 attempts"):
+        link.request(
+            1,
+            Instruction.PING,
+            b"",
+            answer_bytes=3,
+            patience=Patience(margin_s=0.001, attempts=4),
+            name="ping servo 1",
+        )
+    assert line.written == 40
+    assert (link.counters.timeouts, link.counters.retries) == (4, 3)
