@@ -98,7 +98,7 @@ class RobotModel:
 
 def full_positions(robot: RobotDescription, named: Sequence[tuple[str, float]] = ()) -> Array:
     """Return a joint array: each named joint at its value, the others at the nearest to zero."""
-    positions = np.clip(0.0, robot.position_min, robot.position_max)
+    positions: Array = np.clip(0.0, robot.position_min, robot.position_max)
     index = robot.joint_index
     for name, value in named:
         positions[index[name]] = value

@@ -1,0 +1,162 @@
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from vla_deploy.robots import RobotFileError, load_robot, robot_names
+from vla_deploy.robots.description import StopCategory
+from vla_deploy.robots.loader import ROBOTS_DIR
+
+
+@pytest.fixture
+def butler_copy(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(ROBOTS_DIR / "butler", tmp_path / "butler")) / "robot.toml"
+
+
+def edit(file: Path, *changes: tuple[str, str]) -> Path:
+    text = file.read_text()
+    for pattern, replacement in changes:
+        text, count = re.subn(pattern, replacement, text, count=1, flags=re.MULTILINE)
+        assert count == 1, f"{pattern!r} is not in {file}"
+    file.write_text(text)
+    return file
+
+
+def faults_of(file: Path) -> dict[str, str]:
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(file)
+    found: dict[str, str] = {}
+    for fault in caught.value.faults:
+        found[fault.key] = f"{found.get(fault.key, '')}\n{fault}"
+    return found
+
+
+def test_butler_loads_by_name_by_folder_and_by_file() -> None:
+    by_name = load_robot("butler")
+
+    assert by_name == load_robot(ROBOTS_DIR / "butler")
+    assert by_name == load_robot(ROBOTS_DIR / "butler" / "robot.toml")
+    assert "butler" in robot_names()
+
+
+def test_joint_order_is_servo_order_and_arrays_follow_it() -> None:
+    robot = load_robot("butler")
+
+    assert len(robot.joint_names) == 16
+    assert robot.joint_names == tuple(servo.joint for servo in robot.servo_bus.servos)
+    for name, index in robot.joint_index.items():
+        assert robot.position_min[index] == robot.limits[name].min
+        assert robot.velocity_max[index] == robot.limits[name].velocity
+
+
+def test_arms_keep_power_in_an_emergency_stop_and_the_base_does_not() -> None:
+    robot = load_robot("butler")
+
+    assert robot.group("left_arm").stop_category is StopCategory.STOP_KEEP_POWER
+    assert robot.group("base").stop_category is StopCategory.STOP_THEN_REMOVE_POWER
+    with pytest.raises(KeyError, match="no joint group 'tail'; it has left_arm"):
+        robot.group("tail")
+
+
+def test_device_paths_come_from_the_file_or_from_one_folder() -> None:
+    robot = load_robot("butler")
+
+    assert robot.device_path("can") == "can0"
+    assert robot.device_path("servos", Path("/run/dev")) == "/run/dev/servos"
+    with pytest.raises(KeyError, match="no device 'sonar'"):
+        robot.device_path("sonar")
+
+
+TEN_FAULTS: tuple[tuple[tuple[str, str], str, str], ...] = (
+    ((r"^baud = 3000000", "baud = 31337"), "servo_bus.baud", "one of 57600"),
+    ((r"id = 2,", "id = 1,"), "servo_bus.servos[1].id", "not used by servo_bus.servos[0].id"),
+    ((r'id = 3, model = "XM430-W350"', 'id = 3, model = "XM999"'), "servo_bus.servos[2].model",
+     "a key of servo_models"),
+    ((r'joint = "left_forearm_roll"', 'joint = "left_knee"'), "servo_bus.servos[3].joint",
+     "a joint of the MJCF"),
+    ((r"^bitrate = 1000000\n", ""), "can_bus.bitrate", "got nothing"),
+    ((r"^track_m = 0.34", "track_m = -0.34"), "base.track_m", "a number above 0"),
+    ((r"^left_elbow = \{ min = 0.03", "left_elbow = { min = 9.0"), "limits.left_elbow.min",
+     "below max 2.57"),
+    ((r"^site = \"imu\"", 'site = "belly"'), "imu.site", "a site of the MJCF"),
+    ((r"^head_tilt = 0.8", "head_tilt = 8.0"), "poses.look_down.head_tilt", "inside the limits"),
+    ((r"^start = .*", 'start = "attic"\ncolour = "white"'), "home.start", "a place"),
+)  # fmt: skip
+
+
+def test_ten_faults_in_one_file_are_all_reported_with_key_and_expectation(
+    butler_copy: Path,
+) -> None:
+    faults = faults_of(edit(butler_copy, *(change for change, _, _ in TEN_FAULTS)))
+
+    for _, key, words in TEN_FAULTS:
+        assert words in faults[key]
+    assert "an unknown key" in faults["home.colour"]
+
+
+@pytest.mark.parametrize(("change", "key", "words"), TEN_FAULTS)
+def test_each_fault_alone_is_reported_too(
+    butler_copy: Path, change: tuple[str, str], key: str, words: str
+) -> None:
+    assert words in faults_of(edit(butler_copy, change))[key]
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        ((r'^mjcf = "butler.xml"', 'mjcf = "ghost.xml"'), "mjcf", "a file under"),
+        ((r'^map = "maps/flat.yaml"', 'map = "maps/ghost.yaml"'), "home.map", "a file under"),
+        ((r"velocity = 1.4", "velocity = 14.0"), "limits.left_shoulder_yaw.velocity", "no-load"),
+        ((r"offset = 0.2,", "offset = 4.0,"), "limits.left_shoulder_yaw.min", "servo's offset"),
+        ((r"max = 1.57, velocity = 1.4", "max = 1.9, velocity = 1.4"), "limits.left_shoulder_yaw",
+         "inside the MJCF range"),
+        ((r'^joints = \["head_pan", "head_tilt"\]', 'joints = ["head_pan"]'), "groups",
+         "each joint in a group"),
+        ((r'^grip_site = "left_grip"', 'grip_site = "left_toe"'), "hands.left.grip_site", "a site"),
+        ((r'^gripper = "left_gripper"', 'gripper = "left_arm"'), "hands.left.gripper", "one joint"),
+        ((r'"charger", ', '"dock", '), "home.places.charging_station.aliases", "not used by"),
+        ((r"^\[can_bus\]", "[can_bus_2]"), "can_bus", "a table"),
+    ],
+)  # fmt: skip
+def test_contradictions_inside_the_file_are_found(
+    butler_copy: Path, change: tuple[str, str], key: str, words: str
+) -> None:
+    assert words in faults_of(edit(butler_copy, change))[key]
+
+
+def test_an_mjcf_with_two_root_bodies_is_refused(butler_copy: Path) -> None:
+    edit(butler_copy.parent / "butler.xml", ("<worldbody>", '<worldbody><body name="table"/>'))
+
+    assert "exactly one root body" in faults_of(butler_copy)["mjcf"]
+
+
+def test_a_broken_mjcf_is_a_fault_and_not_a_crash(butler_copy: Path) -> None:
+    (butler_copy.parent / "butler.xml").write_text("<mujoco>")
+
+    assert "an MJCF file" in faults_of(butler_copy)["mjcf"]
+
+
+def test_a_file_that_is_no_toml_is_refused_with_the_place(butler_copy: Path) -> None:
+    butler_copy.write_text("name = butler\n")
+
+    assert "line 1" in faults_of(butler_copy)["(file)"]
+
+
+def test_an_unknown_robot_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(RobotFileError, match=r"one of .*butler"):
+        load_robot("hal9000")
+
+
+@pytest.mark.parametrize("value", ["3", '"x"', "[]", "true", "[[1, 2]]", "nan"])
+def test_a_value_of_any_wrong_kind_never_crashes_the_loader(butler_copy: Path, value: str) -> None:
+    text = butler_copy.read_text()
+    keys = re.findall(r"^(\w+) = ", text, flags=re.MULTILINE)
+    for key in sorted(set(keys)):
+        broken = re.sub(rf"^{key} = (\{{.*\}}|\[\n(.*\n)*?\]|.*)$", f"{key} = {value}", text,
+                        count=1, flags=re.MULTILINE)  # fmt: skip
+        butler_copy.write_text(broken)
+        try:
+            load_robot(butler_copy)
+        except RobotFileError as error:
+            assert error.faults
