@@ -1,0 +1,23 @@
+"""The bus comparison runs against the emulated bus and prints what others rely on."""
+
+import json
+
+import pytest
+
+from benchmarks.bus import main
+
+pytestmark = pytest.mark.stack
+
+
+def test_the_report_holds_the_ratio_and_every_client(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--rounds", "1", "--seconds", "0.1", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["cpu_ratio_vs_dynamixel_sdk"] > 1.0
+    assert report["cycles_per_s"] > 0
+    assert set(report["clients"]) == {
+        "ours",
+        "ours_fast",
+        "dynamixel_sdk",
+        "dynamixel_sdk_fast",
+    }
+    assert report["clients"]["ours_fast"]["wire_bytes_per_cycle"] == 356
