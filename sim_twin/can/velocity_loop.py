@@ -5,7 +5,9 @@ def ramp_towards(present: float, target: float, up: float, down: float) -> float
     """Move `present` towards `target` by at most `up` away from zero or `down` towards it."""
     speeding_up = abs(target) > abs(present) and target * present >= 0.0
     step = up if speeding_up else down
-    return present + min(max(target - present, -step), step)
+    if abs(target - present) <= step:
+        return target
+    return present + (step if target > present else -step)
 
 
 class VelocityLoop:

@@ -59,16 +59,16 @@ def test_the_emulated_machine_makes_every_transition_of_the_standard(
     assert machine.state is PowerState(target.lower())
 
 
-@given(st.lists(st.integers(0, 0xFFFF), max_size=30))
-def test_no_controlword_leaves_a_fault_without_the_reset_bit_rising(words: list[int]) -> None:
+@given(st.lists(st.tuples(st.booleans(), st.sampled_from([0x00, 0x06, 0x0F, 0x80, 0x8F]))))
+def test_only_a_rising_reset_bit_leaves_a_fault(steps: list[tuple[bool, int]]) -> None:
     machine = PowerStateMachine()
     machine.initialise()
-    machine.fail(2)
     previous = 0
-    for word in words:
-        rising = word & 0x80 and not previous & 0x80
+    for fails, word in steps:
+        if fails:
+            machine.fail(0)
         was_fault = machine.state is PowerState.FAULT
-        machine.command(word, 2)
-        if was_fault and not rising:
-            assert machine.state is PowerState.FAULT
+        cleared = machine.command(word, 2)
+        assert cleared == (was_fault and bool(word & ~previous & 0x80))
+        assert (machine.state is PowerState.FAULT) == (was_fault and not cleared)
         previous = word

@@ -58,6 +58,15 @@ def test_another_encoder_is_the_wrong_device() -> None:
     bus.close()
 
 
+def test_another_pdo_layout_is_the_wrong_device() -> None:
+    one = world(WheelDrive(1))
+    one.wheels[0].drive._objects.live[0x1A01, 2] = lambda: 0x60780010
+    bus = driver(one, LEFT)
+    with pytest.raises(WrongDevice, match="PDO mapping 0x1A01:2 is 0x60780010"):
+        bus.connect()
+    bus.close()
+
+
 def test_a_refused_parameter_names_object_and_value() -> None:
     one = world(WheelDrive(1))
     bus = driver(one, DriveSpec(node_id=1, joint="left_wheel", acceleration_rad_s2=1e-5))

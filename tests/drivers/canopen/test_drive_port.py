@@ -1,3 +1,5 @@
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -46,16 +48,17 @@ def test_frames_of_a_wrong_length_are_refused(data: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
+    "wrong",
     [
-        ("node_id", 0),
-        ("node_id", 128),
-        ("sign", 0),
-        ("counts_per_rev", 0),
-        ("quick_stop_rad_s2", 0.0),
-        ("acceleration_rad_s2", -1.0),
+        {"node_id": 0},
+        {"node_id": 128},
+        {"sign": 0},
+        {"counts_per_rev": 0},
+        {"quick_stop_rad_s2": 0.0},
+        {"acceleration_rad_s2": -1.0},
     ],
 )
-def test_a_spec_out_of_range_names_joint_and_field(field: str, value: float) -> None:
+def test_a_spec_out_of_range_names_joint_and_field(wrong: dict[str, Any]) -> None:
+    (field,) = wrong
     with pytest.raises(ValueError, match=f"drive wheel: {field}"):
-        DriveSpec(**{"node_id": 1, "joint": "wheel", field: value})
+        DriveSpec(**{"node_id": 1, "joint": "wheel", **wrong})

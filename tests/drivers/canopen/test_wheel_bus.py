@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivers.canopen import DriveSpec, DriveState, PowerState, WheelDriveBus
+from drivers.canopen.objects import RPDO1
 from drivers.canopen.wheel_bus import HOST_NODE_ID
 from drivers.errors import LinkLost
 from sim_twin.can import MemoryBus, WheelDrive
@@ -120,8 +121,19 @@ def test_acceleration_keeps_to_the_configured_ramp(enabled: Bench) -> None:
 
 
 def test_no_velocity_is_sent_before_all_drives_are_enabled(bench: Bench) -> None:
+    targets: list[int] = []
+
+    def listen(frame: can.Message) -> None:
+        if frame.arbitration_id in (0x201, 0x202):
+            targets.append(RPDO1.wire.unpack(frame.data)[1])
+
+    bench.wire.attach(listen)
+    bench.right._on_setpoint = lambda data: None  # type: ignore[method-assign]
+    bench.bus.enable()
     bench.run(0.2, FORWARD)
-    assert bench.velocities == [0.0, 0.0]
+    assert bench.left.power_state is PowerState.OPERATION_ENABLED
+    assert len(targets) > 50
+    assert set(targets) == {0}
 
 
 def test_disabling_lets_the_wheels_coast(enabled: Bench) -> None:
@@ -206,6 +218,27 @@ def test_a_drive_that_reboots_in_between_is_lost_until_connected_anew(enabled: B
     assert enabled.run(0.5).lost == (True, False)
     enabled.bus.connect()
     assert enabled.run(0.1).healthy
+
+
+def test_a_drive_that_was_rebooted_and_started_by_others_stays_lost(enabled: Bench) -> None:
+    enabled.inject(0x000, bytes((0x81, 1)))
+    enabled.inject(0x000, bytes((0x01, 1)))
+    assert enabled.run(0.5).lost == (True, False)
+
+
+def test_a_drive_whose_process_data_stop_is_lost_although_its_heart_beats(enabled: Bench) -> None:
+    enabled.left._on_sync = lambda: None  # type: ignore[method-assign]
+    assert not any(enabled.run(HEARTBEAT_S - 0.01).lost)
+    assert enabled.run(0.02).lost == (True, False)
+
+
+def test_a_drive_that_falls_out_of_operation_is_not_enabled_again(enabled: Bench) -> None:
+    enabled.run(0.5, FORWARD)
+    enabled.inject(0x201, RPDO1.wire.pack(0x0000, 0))
+    state = enabled.run(0.5, FORWARD)
+    assert both(state, PowerState.SWITCH_ON_DISABLED)
+    assert state.healthy
+    assert abs(enabled.velocities[1]) < 0.02
 
 
 def test_a_drive_that_leaves_operational_is_lost(enabled: Bench) -> None:

@@ -69,13 +69,13 @@ def host() -> Iterator[Host]:
 
 
 def test_process_data_flow_only_in_operational(host: Host) -> None:
-    host.command(0x06)
-    assert host.send(0x080) == []
-    assert host.drive.power_state is PowerState.SWITCH_ON_DISABLED
-    host.send(0x000, b"\x01\x00")
-    assert [can_id for can_id, _ in host.send(0x080)] == [0x181, 0x281]
-    host.command(0x06)
-    assert host.drive.power_state is PowerState.READY_TO_SWITCH_ON
+    states = []
+    for nmt, answers in ((b"\x80\x00", []), (b"\x01\x00", [0x181, 0x281])):
+        host.send(0x000, nmt)
+        assert [can_id for can_id, _ in host.send(0x080)] == answers
+        host.command(0x06)
+        states.append(host.drive.power_state)
+    assert states == [PowerState.SWITCH_ON_DISABLED, PowerState.READY_TO_SWITCH_ON]
 
 
 def test_stopped_answers_nothing_and_takes_the_motor_down(host: Host) -> None:
@@ -172,6 +172,20 @@ def test_the_quick_stop_brakes_at_its_own_deceleration(host: Host) -> None:
     assert host.wheel.velocity_rad_s == pytest.approx(3.0, abs=0.2)
 
 
+def test_a_blocked_wheel_keeps_its_power_until_the_ramp_has_ended(host: Host) -> None:
+    host.enable(4.0)
+    host.pass_time(0.5)
+    host.command(0x02)
+    states = []
+    for _ in range(100):
+        host.now_ns += STEP_NS
+        host.drive.advance(host.now_ns, 0.0, 0.0)
+        states.append(host.drive.power_state)
+    powered_steps = states.count(PowerState.QUICK_STOP_ACTIVE)
+    assert powered_steps * STEP_NS / 1e9 == pytest.approx(4.0 / 40.0, abs=0.005)
+    assert states[-1] is PowerState.SWITCH_ON_DISABLED
+
+
 def test_halt_brakes_but_keeps_the_power(host: Host) -> None:
     host.enable(4.0)
     host.pass_time(0.5)
@@ -215,6 +229,15 @@ def test_the_encoder_counts_whole_steps_from_power_on(host: Host) -> None:
     host.drive.advance(host.now_ns + 2 * STEP_NS, 1.0001, 0.0)
     _, (_, position) = host.send(0x080)[-2:]
     assert position[:4] == bytes(4)
+
+
+def test_a_power_cycle_forgets_the_parameters(host: Host) -> None:
+    host.write(0x1017, 0, 20, 2)
+    host.drive.set_supply(on=False)
+    host.drive.set_supply(on=True)
+    assert host.received() == [(0x701, b"\x00")]
+    host.pass_time(0.2)
+    assert host.received() == []
 
 
 def test_the_error_history_keeps_the_latest_first_and_can_be_cleared(host: Host) -> None:
