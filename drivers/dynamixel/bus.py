@@ -19,7 +19,7 @@ from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
-from drivers.dynamixel.torque import disable_torque, enable_torque
+from drivers.dynamixel.torque import disable_torque, enable_torque, write_kept
 from drivers.dynamixel.watchdog import WatchdogEvent, WatchdogState, next_state, watchdog_units
 from drivers.errors import DriverError
 
@@ -158,7 +158,7 @@ class DynamixelBus:
             WatchdogTripped: clear the watchdog first.
             ServoFault: a servo reports a hardware error.
             ServoSilent: a servo does not answer.
-            Rejected: a servo refuses a step.
+            NotKept: a servo refuses a step.
             LinkLost: the adapter is gone.
         """
         chosen = self._chosen(ids)
@@ -194,12 +194,11 @@ class DynamixelBus:
 
         Raises:
             ServoSilent: a servo does not answer.
-            Rejected: a servo refuses.
+            NotKept: a servo refuses.
             LinkLost: the adapter is gone.
         """
-        for index, servo in enumerate(self.servos):
-            self._registers.write(servo, "bus_watchdog", 0)
-            self.state.watchdog[index] = 0
+        write_kept(self._registers, "bus_watchdog", self.servos, dict.fromkeys(self._by_id, 0))
+        self.state.watchdog[:] = 0
         self.watchdog = next_state(self.watchdog, WatchdogEvent.CLEAR)
 
     def reboot(self, servo_id: int) -> None:

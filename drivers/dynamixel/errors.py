@@ -14,7 +14,8 @@ DriverError
     ├── RejectedResult, RejectedInstruction, RejectedCrc
     ├── RejectedRange        data range: also every goal while the Bus Watchdog is tripped
     ├── RejectedLength, RejectedLimit
-    └── RejectedAccess       read-only, undefined, or EEPROM while torque is on
+    ├── RejectedAccess       read-only, undefined, or EEPROM while torque is on
+    └── NotKept              written to many at once, and a servo still holds another value
 """
 
 from collections.abc import Mapping
@@ -75,6 +76,10 @@ class RejectedLimit(Rejected):
 
 class RejectedAccess(Rejected):
     """Say that the register is read-only, undefined, or locked while torque is on."""
+
+
+class NotKept(Rejected):
+    """Say which servos hold another value than was written to many at once."""
 
 
 REJECTIONS: Final[Mapping[int, tuple[type[Rejected], str]]] = MappingProxyType(

@@ -1,6 +1,6 @@
 """Read and write registers by name, one servo at a time or many at once."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from drivers.dynamixel.codec import Instruction
@@ -101,31 +101,51 @@ class Registers:
             name=f"write {servo} {name} = {value}",
         )
 
-    def read_many(self, name: str, servos: Sequence[ServoSpec]) -> dict[int, int]:
+    def read_many(
+        self, name: str, servos: Sequence[ServoSpec], patience: Patience = SETUP
+    ) -> dict[int, int]:
         """Return a register of many servos by id; silent servos are left out.
-
-        A sync read is a broadcast, so it feeds the Bus Watchdog of every servo.
 
         Raises:
             ValueError: a model has no such register.
+            LinkLost: the adapter is gone.
         """
-        register = register_of(servos[0], name)
-        ids = [servo.id for servo in servos]
-        entries = self._link.sync_read(
-            SyncRead(ids, register.address, register.size, fast=False), SETUP
-        )
-        return {servo_id: register.from_bytes(entry.data) for servo_id, entry in entries.items()}
+        register = _common_register(servos, name)
+        spans = self.read_span_many(servos, register.address, register.size, patience)
+        return {servo_id: register.from_bytes(span) for servo_id, span in spans.items()}
+
+    def read_span_many(
+        self, servos: Sequence[ServoSpec], address: int, size: int, patience: Patience = SETUP
+    ) -> dict[int, bytes]:
+        """Return the bytes of neighbouring registers of many servos by id, without silent ones.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        read = SyncRead([servo.id for servo in servos], address, size, fast=False)
+        entries = self._link.sync_read(read, patience)
+        return {servo_id: entry.data for servo_id, entry in entries.items()}
 
     def write_many(self, name: str, servos: Sequence[ServoSpec], value: int) -> None:
-        """Write a register of many servos at one instant; nobody answers.
+        """Write one value to a register of many servos at one instant; nobody answers.
 
         Raises:
             ValueError: no such register, not writable, or the value does not fit its bytes.
+            LinkLost: the adapter is gone.
         """
-        register = register_of(servos[0], name)
-        data = _encode(servos[0], register, value)
-        head = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
-        params = head + b"".join(bytes((servo.id,)) + data for servo in servos)
+        self.write_each(name, servos, {servo.id: value for servo in servos})
+
+    def write_each(self, name: str, servos: Sequence[ServoSpec], values: Mapping[int, int]) -> None:
+        """Write a register of many servos, each its own value by id; nobody answers.
+
+        Raises:
+            ValueError: no such register, not writable, or a value does not fit its bytes.
+            LinkLost: the adapter is gone.
+        """
+        register = _common_register(servos, name)
+        params = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
+        for servo in servos:
+            params += bytes((servo.id,)) + _encode(servo, register, values[servo.id])
         self._link.broadcast(Instruction.SYNC_WRITE, params)
 
     def reboot(self, servo: ServoSpec) -> None:
@@ -149,6 +169,16 @@ def decode(servo: ServoSpec, image: bytes, start: int, name: str) -> int:
     register = register_of(servo, name)
     first = register.address - start
     return register.from_bytes(image[first : first + register.size])
+
+
+def _common_register(servos: Sequence[ServoSpec], name: str) -> Register:
+    """Return the register by which all of the servos' models know a name."""
+    register = register_of(servos[0], name)
+    for servo in servos:
+        other = register_of(servo, name)
+        if (other.address, other.size) != (register.address, register.size):
+            raise ValueError(f"{servo}: {name} is not where {servos[0]} has it; write them singly")
+    return register
 
 
 def _encode(servo: ServoSpec, register: Register, value: int) -> bytes:

@@ -1,40 +1,46 @@
-"""Switch torque on without a bump and never without a watchdog; switch it off whatever happens."""
+"""Switch torque on without a bump and never without a watchdog; switch it off whatever happens.
 
-from collections.abc import Sequence
+All servos are addressed at once and then asked what they made of it. That takes some ten
+transactions however many servos there are, short enough to do between two control ticks; and a sync
+read or write, being a broadcast, feeds the Bus Watchdog of every servo meanwhile.
+"""
+
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
-from drivers.dynamixel.errors import ServoFault, ServoSilent, WatchdogTripped
+from drivers.dynamixel.errors import NotKept, ServoFault, ServoSilent, WatchdogTripped
 from drivers.dynamixel.link import Patience
-from drivers.dynamixel.registers import Registers
+from drivers.dynamixel.registers import Registers, decode
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import hardware_error_text
-from drivers.errors import DeviceFault, DriverError, LinkLost
+from drivers.errors import DriverError, LinkLost
 
+_ATTEMPTS: Final = 3
 _URGENT: Final = Patience(margin_s=0.005, attempts=2)
+_FITNESS_START: Final = 63  # shutdown .. bus_watchdog
+_FITNESS_BYTES: Final = 36
 
 
 def enable_torque(registers: Registers, servos: Sequence[ServoSpec], watchdog_units: int) -> None:
     """Hold the servos where they are; on any failure switch all of them off again.
 
-    The watchdog is armed before torque comes on. It runs only with torque on, so the host has no
-    moment with powered motors and no watchdog.
+    The watchdog is armed before torque comes on. It runs only with torque on, so the motors are
+    never powered without it.
 
     Raises:
         ServoFault: a servo reports a hardware error; reboot it once the cause is gone.
         WatchdogTripped: a servo's watchdog has tripped and was not cleared.
         ServoSilent: a servo does not answer.
-        Rejected: a servo refuses a step, for instance a pose outside its position limits.
+        NotKept: a servo refuses a step, for instance a pose outside its position limits.
         LinkLost: the adapter is gone; the watchdogs stop the servos.
     """
-    for servo in servos:
-        _check_fit(registers, servo)
+    _check_fitness(registers, servos)
     try:
-        for servo in servos:
-            registers.write(servo, "bus_watchdog", watchdog_units)
-        for servo in servos:
-            _hold_present_pose(registers, servo)
-        _verify(registers, servos)
+        write_kept(registers, "bus_watchdog", servos, dict.fromkeys(_ids(servos), watchdog_units))
+        present = _read_all(registers, "present_position", servos)
+        write_kept(registers, "goal_position", servos, present)
+        write_kept(registers, "torque_enable", servos, dict.fromkeys(_ids(servos), 1))
     except LinkLost:
         raise
     except DriverError:
@@ -43,14 +49,17 @@ def enable_torque(registers: Registers, servos: Sequence[ServoSpec], watchdog_un
 
 
 def disable_torque(registers: Registers, servos: Sequence[ServoSpec]) -> dict[int, DriverError]:
-    """Switch torque off everywhere at once, then ask each servo; return those that did not obey.
+    """Switch torque off everywhere at once and return the servos that did not obey.
 
     Raises:
         LinkLost: the adapter is gone; the watchdogs stop the servos.
     """
     registers.write_many("torque_enable", servos, 0)
+    torque = registers.read_many("torque_enable", servos, _URGENT)
     failures: dict[int, DriverError] = {}
     for servo in servos:
+        if torque.get(servo.id) == 0:
+            continue
         try:
             registers.write(servo, "torque_enable", 0, _URGENT)
         except LinkLost:
@@ -60,38 +69,61 @@ def disable_torque(registers: Registers, servos: Sequence[ServoSpec]) -> dict[in
     return failures
 
 
-def _check_fit(registers: Registers, servo: ServoSpec) -> None:
-    error = registers.read(servo, "hardware_error_status")
-    if error & registers.read(servo, "shutdown"):
-        raise ServoFault(
-            f"{servo}: hardware error: {hardware_error_text(error)}; remove the cause, "
-            "then reboot the servo"
-        )
-    if registers.read(servo, "bus_watchdog") == WATCHDOG_TRIPPED:
-        raise WatchdogTripped(
-            f"{servo}: the Bus Watchdog has tripped because the bus was silent; "
-            "clear the watchdog, then enable torque again"
-        )
+def write_kept(
+    registers: Registers, name: str, servos: Sequence[ServoSpec], values: Mapping[int, int]
+) -> None:
+    """Write a register of many servos, by id, and read back until all have kept it.
+
+    Raises:
+        ServoSilent: a servo does not answer.
+        NotKept: a servo holds another value after three attempts.
+        LinkLost: the adapter is gone.
+    """
+    wrong: list[str] = []
+    for _ in range(_ATTEMPTS):
+        registers.write_each(name, servos, values)
+        got = _read_all(registers, name, servos)
+        wrong = [
+            f"{servo}: {name} expected {values[servo.id]}, got {got[servo.id]}"
+            for servo in servos
+            if got[servo.id] != values[servo.id]
+        ]
+        if not wrong:
+            return
+    raise NotKept(
+        "; ".join(wrong) + "; check the servo's limit registers, hardware error and watchdog"
+    )
 
 
-def _hold_present_pose(registers: Registers, servo: ServoSpec) -> None:
-    # by sync read: being a broadcast it feeds the watchdogs of the servos that are on already
-    present = registers.read_many("present_position", [servo])
-    if servo.id not in present:
-        raise ServoSilent(f"{servo}: no answer while torque was being enabled; check its cable")
-    registers.write(servo, "goal_position", present[servo.id])
-    registers.write(servo, "torque_enable", 1)
+def _ids(servos: Sequence[ServoSpec]) -> list[int]:
+    return [servo.id for servo in servos]
 
 
-def _verify(registers: Registers, servos: Sequence[ServoSpec]) -> None:
-    torque = registers.read_many("torque_enable", servos)
-    watchdog = registers.read_many("bus_watchdog", servos)
-    bad = [str(servo) for servo in servos if torque.get(servo.id) != 1]
-    if bad:
-        raise DeviceFault(f"expected torque on, got off: {', '.join(bad)}; look for faults")
-    unarmed = [str(servo) for servo in servos if watchdog.get(servo.id, 0) <= 0]
-    if unarmed:
-        raise WatchdogTripped(
-            f"expected the Bus Watchdog armed, got it off or tripped: {', '.join(unarmed)}; "
-            "clear the watchdog, then enable torque again"
-        )
+def _read_all(registers: Registers, name: str, servos: Sequence[ServoSpec]) -> dict[int, int]:
+    values = registers.read_many(name, servos)
+    _require_all(values, servos)
+    return values
+
+
+def _require_all(answers: Mapping[int, object], servos: Sequence[ServoSpec]) -> None:
+    silent = [str(servo) for servo in servos if servo.id not in answers]
+    if silent:
+        raise ServoSilent(f"no answer from {', '.join(silent)}; check power and cable")
+
+
+def _check_fitness(registers: Registers, servos: Sequence[ServoSpec]) -> None:
+    spans = registers.read_span_many(servos, _FITNESS_START, _FITNESS_BYTES)
+    _require_all(spans, servos)
+    for servo in servos:
+        span = spans[servo.id]
+        error = decode(servo, span, _FITNESS_START, "hardware_error_status")
+        if error & decode(servo, span, _FITNESS_START, "shutdown"):
+            raise ServoFault(
+                f"{servo}: hardware error: {hardware_error_text(error)}; remove the cause, "
+                "then reboot the servo"
+            )
+        if decode(servo, span, _FITNESS_START, "bus_watchdog") == WATCHDOG_TRIPPED:
+            raise WatchdogTripped(
+                f"{servo}: the Bus Watchdog has tripped because the bus was silent; "
+                "clear the watchdog, then enable torque again"
+            )

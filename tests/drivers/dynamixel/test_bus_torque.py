@@ -9,7 +9,7 @@ import pytest
 from drivers.dynamixel import HardwareError, WatchdogState
 from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.errors import (
-    Rejected,
+    NotKept,
     RejectedAccess,
     RejectedLimit,
     RejectedRange,
@@ -17,6 +17,7 @@ from drivers.dynamixel.errors import (
     ServoSilent,
     WatchdogTripped,
 )
+from drivers.errors import LinkLost
 
 MakeBench = Callable[..., Any]
 
@@ -140,7 +141,9 @@ def test_a_servo_with_a_hardware_error_is_not_enabled_nor_are_the_others(bench: 
 def test_a_failure_half_way_switches_everything_off_again(bench: Any) -> None:
     bench.bus.write_register(3, "max_position_limit", 1000)
     bench.bus.write_register(3, "min_position_limit", 0)
-    with pytest.raises(Rejected, match=r"servo 3 .*goal_position = 2048"):
+    bench.rotors.position_rad[:] = np.pi / 4
+    bench.run(0.01)
+    with pytest.raises(NotKept, match=r"servo 3 .*goal_position expected 2560, got"):
         bench.bus.enable_torque()
     assert [bench.bank.register(n, "torque_enable") for n in (1, 2, 3, 4)] == [0, 0, 0, 0]
     assert watchdog_of(bench) is WatchdogState.OFF
@@ -209,3 +212,52 @@ def test_a_silent_servo_is_asked_again_and_then_named(bench: Any) -> None:
     bench.bank.corrupt_next(1)
     assert bench.bus.read_register(1, "led") == 0
     assert bench.bus.counters.crc_errors == 1
+
+
+def after_replies(bench: Any, count: int, act: Callable[[], None]) -> None:
+    """Do something to the bus once it has sent so many replies."""
+    sent = 0
+
+    def pass_on(reply: bytes) -> bytes:
+        nonlocal sent
+        sent += 1
+        if sent == count:
+            act()
+        return reply
+
+    bench.wire.edit = pass_on
+
+
+@pytest.mark.parametrize("replies", [1, 2, 3])
+def test_a_servo_that_falls_silent_while_enabling_leaves_the_others_off(
+    bench: Any, replies: int
+) -> None:
+    after_replies(bench, replies, lambda: bench.bank.silence(2))
+    with pytest.raises(ServoSilent, match=r"no answer from servo 2 \(joint_2"):
+        bench.bus.enable_torque()
+    assert [bench.bank.register(n, "torque_enable") for n in (1, 3, 4)] == [0, 0, 0]
+    assert bench.bus.watchdog is not WatchdogState.ARMED
+
+
+@pytest.mark.parametrize("replies", [1, 2, 3, 4])
+def test_unplugging_while_enabling_is_a_lost_link_and_no_motor_runs_unwatched(
+    bench: Any, replies: int
+) -> None:
+    after_replies(bench, replies, bench.line.unplug)
+    with pytest.raises(LinkLost):
+        bench.bus.enable_torque()
+        bench.bus.read_state()
+    for servo_id in (1, 2, 3, 4):
+        on = bench.bank.register(servo_id, "torque_enable")
+        assert not on or bench.bank.register(servo_id, "bus_watchdog") == 5
+
+
+def test_enabling_takes_few_transactions_however_many_servos(make_bench: MakeBench) -> None:
+    bench = make_bench(16)
+    bench.bus.connect()
+    bench.wire.sent.clear()
+    bench.bus.enable_torque()
+    assert len(bench.wire.sent) <= 10
+    bench.wire.sent.clear()
+    bench.bus.disable_torque()
+    assert len(bench.wire.sent) == 2
