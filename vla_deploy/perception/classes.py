@@ -24,6 +24,10 @@ def _top_ratio(shape: Shape) -> float:
     return shape.top.width_m / max(shape.across_m, 1e-6)
 
 
+def _squareness(shape: Shape) -> float:
+    return shape.footprint.width_m / max(shape.footprint.length_m, 1e-6)
+
+
 def _roundness(shape: Shape) -> float:
     """Return 1 for the visible part of a ball, 0 for anything else."""
     sphere = shape.sphere
@@ -44,6 +48,7 @@ MEASURES: dict[str, Measure] = {
     "hole_m": lambda shape: shape.hole_m,
     "flatness": _flatness,
     "slenderness": _slenderness,
+    "squareness": _squareness,
     "top_ratio": _top_ratio,
     "roundness": _roundness,
 }
@@ -61,7 +66,15 @@ OTHER = "object"
 RULES: tuple[Rule, ...] = (
     Rule("box", {"hole_m": (0.04, 0.4), "width_m": (0.13, 0.45), "height_m": (0.05, 0.4)}),
     Rule("ball", {"roundness": (1.0, 1.0), "across_m": (0.025, 0.3)}),
-    Rule("bottle", {"height_m": (0.13, 0.36), "across_m": (0.04, 0.11), "slenderness": (1.9, 6.0)}),
+    Rule(
+        "bottle",
+        {
+            "height_m": (0.13, 0.36),
+            "across_m": (0.04, 0.11),
+            "slenderness": (1.9, 6.0),
+            "squareness": (0.55, 1.0),
+        },
+    ),
     Rule(
         "cup",
         {

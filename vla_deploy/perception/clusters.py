@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.perception.cloud import Cloud, Floats, Mask
+from vla_deploy.perception.colour import colour_names
 from vla_deploy.perception.supports import Support, inside
 
 MIN_HEIGHT_M = 0.004
@@ -23,6 +24,7 @@ NEAR_CELL_M, FAR_CELL_M = 0.01, 0.02
 NEAR_M = 1.5
 OCCLUDER_M = 0.05
 OCCLUDED_SHARE = 0.2
+PART_SHARE = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,6 +35,7 @@ class Cluster:
     points: Floats
     heights: Floats
     rgb: NDArray[np.uint8]
+    pixels: NDArray[np.intp]
     depth_m: float
     box_px: tuple[int, int, int, int]
     truncated: bool
@@ -80,7 +83,7 @@ def _split(
         # What hangs in the air is carried by a hand, or is a part of the robot.
         lowest_m = float(np.percentile(heights[rows[member], columns[member]], 5.0))
         if extent.max() < MAX_EXTENT_M and lowest_m < FLOATING_M:
-            clusters.append(_cluster(cloud, support, heights, (rows[member], columns[member])))
+            clusters.append(_cluster(cloud, support, heights, standing[member]))
     return clusters
 
 
@@ -97,31 +100,41 @@ def _label(xy: Floats, heights: Floats, cell_m: float) -> NDArray[np.int32]:
     return numbered
 
 
-def _cluster(
-    cloud: Cloud,
-    support: Support,
-    heights: Floats,
-    pixels: tuple[NDArray[np.intp], NDArray[np.intp]],
-) -> Cluster:
-    rows, columns = pixels
+def split_by_colour(cluster: Cluster, cloud: Cloud) -> list[Cluster]:
+    """Return the parts of a cluster that have a colour of their own: things that touch."""
+    names = colour_names(cluster.rgb)
+    counts = np.bincount(names)
+    large = np.flatnonzero(counts >= max(MIN_PIXELS, PART_SHARE * names.size))
+    heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
+    heights.flat[cluster.pixels] = cluster.heights
+    if large.size < 2:
+        return [cluster]
+    return [
+        _cluster(cloud, cluster.support, heights, cluster.pixels[names == name]) for name in large
+    ]
+
+
+def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np.intp]) -> Cluster:
     height, width = cloud.depth_m.shape
+    rows, columns = np.unravel_index(pixels, heights.shape)
     box = (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1)
     return Cluster(
         support=support,
-        points=cloud.points[pixels],
-        heights=heights[pixels],
-        rgb=cloud.rgb[pixels],
-        depth_m=float(np.median(cloud.depth_m[pixels])),
+        points=cloud.points[rows, columns],
+        heights=heights[rows, columns],
+        rgb=cloud.rgb[rows, columns],
+        pixels=pixels,
+        depth_m=float(np.median(cloud.depth_m[rows, columns])),
         box_px=box,
         truncated=box[0] <= 1 or box[1] <= 1 or box[2] >= width - 1 or box[3] >= height - 1,
         occluded=_occluded(cloud.depth_m, pixels),
     )
 
 
-def _occluded(depth_m: Floats, pixels: tuple[NDArray[np.intp], NDArray[np.intp]]) -> bool:
+def _occluded(depth_m: Floats, pixels: NDArray[np.intp]) -> bool:
     """Tell whether much of the outline borders on something nearer to the camera."""
     member = np.zeros(depth_m.shape, dtype=np.uint8)
-    member[pixels] = 1
+    member.flat[pixels] = 1
     ring = (cv2.dilate(member, np.ones((5, 5), dtype=np.uint8)) - member).astype(np.bool_)
     own = np.where(member > 0, depth_m, 0.0).astype(np.float32)
     beside = cv2.dilate(own, np.ones((5, 5), dtype=np.uint8))

@@ -38,35 +38,27 @@ COLOURS: tuple[ColourRange, ...] = (
     ColourRange("red", (161, 179), (49, 255), (39, 255)),
 )
 UNNAMED = "grey"
+NAMES: tuple[str, ...] = tuple(dict.fromkeys(row.name for row in COLOURS))
 
 
 def colour_names(rgb: NDArray[np.uint8]) -> NDArray[np.intp]:
-    """Return for each of (n, 3) pixels the row of `COLOURS` that holds, -1 for none."""
+    """Return for each of (n, 3) pixels the index of its colour's name in `NAMES`."""
     hsv = cv2.cvtColor(np.ascontiguousarray(rgb).reshape(-1, 1, 3), cv2.COLOR_RGB2HSV)
     hue, saturation, value = hsv.reshape(-1, 3).T
-    rows = np.full(len(rgb), -1, dtype=np.intp)
-    for index, row in enumerate(COLOURS):
+    names = np.full(len(rgb), NAMES.index(UNNAMED), dtype=np.intp)
+    for row in reversed(COLOURS):
         holds = (
-            (rows < 0)
-            & _within(hue, row.hue)
-            & _within(saturation, row.saturation)
-            & _within(value, row.value)
+            _within(hue, row.hue) & _within(saturation, row.saturation) & _within(value, row.value)
         )
-        rows[holds] = index
-    return rows
+        names[holds] = NAMES.index(row.name)
+    return names
 
 
 def dominant_colour(rgb: NDArray[np.uint8]) -> tuple[str, float]:
     """Return the commonest colour name of (n, 3) pixels and the share of pixels it has."""
-    rows, counts = np.unique(colour_names(rgb), return_counts=True)
-    votes: dict[str, int] = {}
-    for row, count in zip(rows, counts, strict=True):
-        name = COLOURS[row].name if row >= 0 else UNNAMED
-        votes[name] = votes.get(name, 0) + int(count)
-    if not votes:
-        return UNNAMED, 0.0
-    best = max(votes, key=lambda name: votes[name])
-    return best, votes[best] / len(rgb)
+    counts = np.bincount(colour_names(rgb), minlength=len(NAMES))
+    best = int(np.argmax(counts))
+    return NAMES[best], float(counts[best] / max(1, len(rgb)))
 
 
 def _within(channel: NDArray[np.uint8], bounds: tuple[int, int]) -> NDArray[np.bool_]:

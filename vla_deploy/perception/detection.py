@@ -8,7 +8,7 @@ import numpy as np
 
 from vla_deploy.perception.classes import OTHER, classify
 from vla_deploy.perception.cloud import Cloud
-from vla_deploy.perception.clusters import Cluster, find_clusters
+from vla_deploy.perception.clusters import Cluster, find_clusters, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
 from vla_deploy.perception.shapes import Shape, measure
 from vla_deploy.perception.supports import find_supports
@@ -18,6 +18,7 @@ Vector = tuple[float, float, float]
 CONFIDENCE_KNOWN = 0.9
 CONFIDENCE_OTHER = 0.5
 FEW_PIXELS = 60
+BOX_FLOOR_M = 0.02
 FACE_WIDTH_M, FACE_HEIGHT_M = 0.03, 0.05
 
 
@@ -89,14 +90,35 @@ def detect(cloud: Cloud) -> list[Detection]:
     """Return the things in view, the nearest first."""
     clusters = find_clusters(cloud, find_supports(cloud))
     clusters.sort(key=lambda cluster: cluster.depth_m)
-    found = [_detection(cluster, cloud) for cluster in clusters]
-    return [detection for detection in found if not _is_bare_face(detection)]
+    found = [detection for cluster in clusters for detection in _detections(cluster, cloud)]
+    boxes = [detection for detection in found if detection.class_name == "box"]
+    return [
+        detection
+        for detection in found
+        if not _is_bare_face(detection) and not any(_is_floor_of(box, detection) for box in boxes)
+    ]
+
+
+def _is_floor_of(box: Detection, detection: Detection) -> bool:
+    """Tell whether this is the bottom of an open box, which shows between its walls."""
+    inside = math.dist(box.position_m[:2], detection.position_m[:2]) < 0.5 * box.size_m[1]
+    flat = detection.size_m[2] < BOX_FLOOR_M
+    return detection is not box and inside and flat and detection.colour == box.colour
 
 
 def _is_bare_face(detection: Detection) -> bool:
     """Tell whether this is one upright side of something larger, such as a sofa's arm."""
     _, width_m, height_m = detection.size_m
     return detection.class_name == OTHER and width_m < FACE_WIDTH_M and height_m > FACE_HEIGHT_M
+
+
+def _detections(cluster: Cluster, cloud: Cloud) -> list[Detection]:
+    """Return one thing, or several that touch where each part by itself is a known one."""
+    whole = _detection(cluster, cloud)
+    if whole.class_name != OTHER:
+        return [whole]
+    parts = [_detection(part, cloud) for part in split_by_colour(cluster, cloud)]
+    return [whole] if any(part.class_name == OTHER for part in parts) else parts
 
 
 def _detection(cluster: Cluster, cloud: Cloud) -> Detection:

@@ -13,6 +13,7 @@ from vla_deploy.perception.clusters import Cluster
 TOP_SLICE_M = 0.012
 TOP_SLICE_RATIO = 0.12
 RIM_MARGIN_M = 0.035
+SOLID_SHARE = 0.2
 SPHERE_MIN_HEIGHT_M = 0.006
 
 Point = NDArray[np.float64]
@@ -65,7 +66,7 @@ def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
         across_m=_across(xy, camera_position) + pixel_m,
         footprint=rectangle_of(xy, pixel_m),
         top=top,
-        hole_m=_hole(cluster, top, height_m),
+        hole_m=_hole(cluster, top, height_m, pixel_m),
         sphere=_sphere(cluster.points[cluster.heights > SPHERE_MIN_HEIGHT_M]),
     )
 
@@ -100,15 +101,18 @@ def _across(xy: Floats, camera_position: Point) -> float:
     return float(high - low)
 
 
-def _hole(cluster: Cluster, rim: Rectangle, height_m: float) -> float:
+def _hole(cluster: Cluster, rim: Rectangle, height_m: float, pixel_m: float) -> float:
     """Return how deep the middle lies below the rim around it."""
     c, s = math.cos(rim.yaw_rad), math.sin(rim.yaw_rad)
+    half = 0.5 * np.array([rim.length_m, rim.width_m]) - RIM_MARGIN_M
+    if half.min() <= 0.0:
+        return 0.0
     local = np.abs((cluster.points[:, :2] - rim.centre) @ np.array([[c, -s], [s, c]]))
-    within = (local[:, 0] < 0.5 * rim.length_m - RIM_MARGIN_M) & (
-        local[:, 1] < 0.5 * rim.width_m - RIM_MARGIN_M
-    )
-    middle = cluster.heights[within]
-    return max(0.0, height_m - float(np.median(middle))) if middle.size > 10 else 0.0
+    middle = cluster.heights[np.all(local < half, axis=1)]
+    if middle.size < SOLID_SHARE * 4.0 * half.prod() / pixel_m**2:
+        # A lid would fill the middle with points: one looks down onto the support.
+        return height_m
+    return max(0.0, height_m - float(np.median(middle)))
 
 
 def _sphere(points: Floats) -> Sphere | None:
