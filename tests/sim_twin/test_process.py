@@ -1,0 +1,190 @@
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from drivers.camera.rgbd_stream import RgbdCamera
+from drivers.clock import MonotonicClock
+from drivers.dynamixel.codec import Instruction, encode_instruction
+from drivers.opener import PathOpener
+from sim_twin.errors import RefereeRefusal, Unreachable
+from sim_twin.referee import ask
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.links import device_links
+
+START_TIMEOUT_S = 30.0
+END_TIMEOUT_S = 15.0
+PARENT = "import subprocess, sys; subprocess.run([sys.executable, '-m', 'sim_twin', *sys.argv[1:]])"
+
+pytestmark = pytest.mark.stack
+
+
+def await_that(what: str, holds: object, timeout_s: float) -> None:
+    deadline_s = time.monotonic() + timeout_s
+    while not holds():  # type: ignore[operator]
+        assert time.monotonic() < deadline_s, f"{what}: not within {timeout_s} s"
+        time.sleep(0.02)
+
+
+def start(run_dir: Path, *arguments: str) -> subprocess.Popen[bytes]:
+    twin = subprocess.Popen(
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir), *arguments],
+        stderr=subprocess.PIPE,
+    )
+    ready = run_dir / "dev" / "ready"
+    await_that("twin ready", lambda: ready.exists() or twin.poll() is not None, START_TIMEOUT_S)
+    assert twin.poll() is None
+    return twin
+
+
+def end(twin: subprocess.Popen[bytes]) -> int:
+    twin.terminate()
+    code = twin.wait(END_TIMEOUT_S)
+    assert twin.stderr is not None
+    twin.stderr.close()
+    return code
+
+
+def children(pid: int) -> list[int]:
+    tasks = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    return [int(word) for word in tasks.split()]
+
+
+def is_running(pid: int) -> bool:
+    """Return whether a process still runs; a zombie that nobody reaped does not."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except FileNotFoundError:
+        return False
+    return stat.rpartition(")")[2].split()[0] not in "ZX"
+
+
+@pytest.fixture(scope="module")
+def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    run_dir = tmp_path_factory.mktemp("twin")
+    twin = start(run_dir, "--no-camera")
+    yield run_dir
+    end(twin)
+
+
+@pytest.fixture
+def devices(run_dir: Path) -> PathOpener:
+    return PathOpener(device_links(load_robot("butler"), run_dir / "dev"), MonotonicClock())
+
+
+def test_servos_answer_a_ping_between_two_steps(devices: PathOpener) -> None:
+    clock = MonotonicClock()
+    line = devices.serial("servos")
+    waits_ns = []
+    for _ in range(50):
+        line.discard_input()
+        asked_ns = clock.now_ns()
+        line.write(encode_instruction(1, Instruction.PING))
+        reply = line.read(64, asked_ns + 1_000_000_000)
+        waits_ns.append(clock.now_ns() - asked_ns)
+        assert reply[:5] == b"\xff\xff\xfd\x00\x01"
+    line.close()
+    assert statistics.median(waits_ns) < 4_000_000
+
+
+def test_drives_send_heartbeats_and_answer(devices: PathOpener) -> None:
+    bus = devices.can("can")
+    bus.send(can.Message(arbitration_id=0x602, data=bytes(8), is_extended_id=False))
+    answer = bus.recv(timeout=2.0)
+    bus.shutdown()
+    assert answer is not None
+    assert answer.arbitration_id == 0x582
+
+
+@pytest.mark.parametrize(("name", "header"), [("lidar", b"\x54\x2c"), ("imu", b"\xaa\xaa")])
+def test_sensors_talk_by_themselves(devices: PathOpener, name: str, header: bytes) -> None:
+    line = devices.serial(name)
+    line.discard_input()
+    heard = b""
+    while len(heard) < 200:
+        heard += line.read(1000, MonotonicClock().now_ns() + 2_000_000_000)
+    line.close()
+    assert header in heard
+
+
+def test_the_referee_tells_the_truth_and_the_pace(run_dir: Path) -> None:
+    first = ask(run_dir, "truth")
+    second = ask(run_dir, "truth")
+    assert second["sim_s"] >= first["sim_s"]
+    assert second["real_time_factor"] <= 1.2
+    assert not ask(run_dir, "inside", object="red_cup", container="box")["inside"]
+
+
+def test_the_referee_refuses_with_a_reason(run_dir: Path) -> None:
+    with pytest.raises(RefereeRefusal, match="'spoon'"):
+        ask(run_dir, "inside", object="spoon", container="box")
+    with pytest.raises(RefereeRefusal, match="'explode'"):
+        ask(run_dir, "explode")
+
+
+def test_the_referees_command_line_prints_json(run_dir: Path) -> None:
+    command = [sys.executable, "-m", "sim_twin.referee", "--run-dir", str(run_dir)]
+    answer = subprocess.run([*command, "truth"], capture_output=True, check=True)
+    assert "red_cup" in json.loads(answer.stdout)["objects"]
+    refused = subprocess.run(
+        [*command, "inside", "--object", "cup"], capture_output=True, text=True, check=False
+    )
+    assert (refused.returncode, refused.stderr) == (2, "referee: inside needs --container\n")
+
+
+def test_without_a_twin_the_referee_is_unreachable(tmp_path: Path) -> None:
+    with pytest.raises(Unreachable, match="No such file"):
+        ask(tmp_path, "truth")
+
+
+@pytest.mark.gl
+def test_camera_and_film_are_served_and_sigterm_leaves_nothing(tmp_path: Path) -> None:
+    twin = start(tmp_path, "--seed", "3")
+    (studio,) = children(twin.pid)
+    clock = MonotonicClock()
+    opener = PathOpener(device_links(load_robot("butler"), tmp_path / "dev"), clock)
+    camera = RgbdCamera(opener.stream("camera"), clock)
+    ask(tmp_path, "film_start", path=str(tmp_path / "film.avi"))
+    ask(tmp_path, "caption", text="look")
+    camera.start(10.0)
+    await_that("frame", lambda: camera.poll() is not None, 10.0)
+    camera.close()
+    await_that("film", lambda: ask(tmp_path, "truth")["sim_s"] > 1.0, 20.0)
+    assert ask(tmp_path, "film_stop")["frames"] > 1
+    assert end(twin) == 0
+    assert not is_running(studio)
+    assert list((tmp_path / "dev").iterdir()) == []
+    assert (tmp_path / "film.png").exists()
+
+
+@pytest.mark.gl
+def test_the_twin_and_its_camera_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, "--run-dir", str(tmp_path)])
+    await_that("ready", (tmp_path / "dev" / "ready").exists, START_TIMEOUT_S)
+    (twin,) = children(parent.pid)
+    (studio,) = children(twin)
+    os.kill(parent.pid, signal.SIGKILL)
+    parent.wait(END_TIMEOUT_S)
+    await_that("all ended", lambda: not is_running(twin) and not is_running(studio), END_TIMEOUT_S)
+    assert not (tmp_path / "dev" / "ready").exists()
+
+
+def test_an_unknown_world_is_one_clear_line(tmp_path: Path) -> None:
+    refused = subprocess.run(
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(tmp_path), "--world", "moon"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert refused.returncode == 2
+    (line,) = refused.stderr.splitlines()
+    assert "'moon'" in line
+    assert "flat" in line
