@@ -1,0 +1,111 @@
+"""Give the tests a robot in the twin, in lock-step, with the far ends of control's topics."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from platforms import load_profile
+from sim_twin.lockstep import Lockstep
+from vla_deploy.control.node import ControlNode
+from vla_deploy.ipc import SharedSpace
+
+RESTING = "tuck"
+
+
+class Rig:
+    """Hold the twin, control, and what its neighbours would read and write."""
+
+    def __init__(self, tmp_path: Path) -> None:
+        self.lockstep = Lockstep(tmp_path=tmp_path)
+        self.robot = self.lockstep.robot
+        self.lockstep.twin.engine.pose(self.robot.poses[RESTING])
+        space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)
+        self._operator = space.ring_writer("operator")
+        self._commands = space.ring_writer("motion_command")
+        self._results = space.ring_reader("motion_result", from_start=True)
+        self._joints = space.cell_reader("joint_state")
+        self._base = space.cell_reader("base_state")
+        self._status = space.cell_reader("control_status")
+        self._base_command = space.cell_writer("base_command")
+        self.process_table = space.cell_writer("process_table")
+        self.control = self.new_control()
+
+    def new_control(self) -> ControlNode:
+        step = self.lockstep
+        return ControlNode(step.context, self.robot, load_profile("desktop"), step.devices)
+
+    def boot(self) -> None:
+        """Start control and let the arms, without power, come to rest."""
+        self.lockstep.add(self.control)
+        self.run(2.5)
+
+    def run(self, seconds: float) -> None:
+        self.lockstep.run_for(seconds)
+
+    def tick(self) -> None:
+        self.lockstep.run_for(self.control.period_s)
+
+    def ask(self, *acts: str, within_s: float = 0.6) -> None:
+        for act in acts:
+            self._operator.publish({"act": act, "source": "test", "reason": ""})
+        self.run(within_s)
+
+    def send(self, **command: Any) -> None:
+        self._commands.publish(command)
+
+    def go(self, motion_id: int, speed_ratio: float = 1.0, **targets: float) -> None:
+        self.send(kind="goal", motion_id=motion_id, targets=targets, speed_ratio=speed_ratio)
+
+    def results(self) -> list[dict[str, Any]]:
+        return [event.payload for event in self._results.drain()]
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        sample = self._joints.latest()
+        assert sample is not None
+        return np.array(sample.data[name][: len(self.robot.joint_names)], dtype=np.float64)
+
+    def joint(self, name: str, column: str = "position") -> float:
+        return float(self.column(column)[self.robot.joint_index[name]])
+
+    def true_speeds(self) -> NDArray[np.float64]:
+        joints = self.lockstep.truth()["joints"]
+        return np.abs([joints[name]["velocity"] for name in self.robot.joint_names])
+
+    def drive(self, v_m_s: float, w_rad_s: float, seconds: float) -> None:
+        for _ in range(round(seconds / 0.02)):
+            self._base_command.put(v_m_s=v_m_s, w_rad_s=w_rad_s)
+            self.run(0.02)
+
+    def base(self) -> dict[str, float]:
+        sample = self._base.latest()
+        assert sample is not None
+        return {name: float(sample.data[name]) for name in sample.data.dtype.names}
+
+    @property
+    def status(self) -> dict[str, Any]:
+        sample = self._status.latest()
+        assert sample is not None
+        return sample.document()
+
+    @property
+    def state(self) -> str:
+        return str(self.status["state"])
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Rig]:
+    rig = Rig(tmp_path)
+    yield rig
+    rig.lockstep.close()
+
+
+@pytest.fixture
+def armed(rig: Rig) -> Rig:
+    rig.boot()
+    rig.ask("arm")
+    assert rig.state == "armed", rig.status
+    return rig

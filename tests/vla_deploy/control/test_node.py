@@ -1,0 +1,326 @@
+"""Run control against the twin in lock-step: arming, motion, stops, losses and restarts."""
+
+from typing import Any
+from typing import Any as Rig  # the class in conftest.py, which no test can import
+
+import numpy as np
+import pytest
+
+from drivers.errors import DeviceMissing
+
+ELBOW, PITCH = "left_elbow", "left_shoulder_pitch"
+WATCHDOG_S = 0.1
+STANDSTILL_RAD_S = 0.02
+
+
+def start_a_long_motion(rig: Rig, motion_id: int = 1) -> None:
+    rig.go(motion_id, left_elbow=2.0, left_shoulder_pitch=0.8, head_pan=1.0)
+    rig.run(0.5)
+    assert rig.true_speeds().max() > 0.4
+
+
+def test_it_starts_disarmed_and_powers_nothing(rig: Rig) -> None:
+    rig.boot()
+    assert rig.state == "disarmed"
+    assert not rig.column("torque_enabled").any()
+    assert rig.base()["enabled"] == 0.0
+
+
+def test_arming_moves_no_joint(rig: Rig) -> None:
+    rig.boot()
+    before = rig.column("position")
+    rig.ask("arm")
+    assert rig.state == "armed"
+    assert rig.column("torque_enabled").all()
+    assert np.abs(rig.column("position") - before).max() < 0.005
+    assert np.abs(rig.column("position") - rig.column("setpoint")).max() < 0.005
+
+
+def test_a_goal_is_reached_and_reported(armed: Rig) -> None:
+    armed.go(5, left_elbow=1.6, left_shoulder_pitch=0.4, left_gripper=0.03, head_pan=0.4)
+    armed.run(3.0)
+    assert armed.results() == [{"motion_id": 5, "status": "done", "reason": ""}]
+    for name, target in (("left_elbow", 1.6), ("left_shoulder_pitch", 0.4), ("head_pan", 0.4)):
+        assert armed.joint(name) == pytest.approx(target, abs=0.01)
+    assert armed.joint("left_gripper") == pytest.approx(0.03, abs=0.001)
+
+
+def test_a_held_arm_does_not_sag(armed: Rig) -> None:
+    armed.go(1, left_shoulder_pitch=0.7, left_elbow=1.6, left_wrist_pitch=-0.4)
+    armed.run(3.0)
+    arm = [armed.robot.joint_index[name] for name in armed.robot.group("left_arm").joints]
+    sag = armed.column("position") - armed.column("setpoint")
+    assert np.abs(sag[arm]).max() < 0.012
+
+
+def test_a_trajectory_is_followed(armed: Rig) -> None:
+    start = armed.joint(ELBOW, "setpoint")
+    points = [[start], [start + 0.2], [start + 0.5], [start + 0.4]]
+    armed.send(
+        kind="trajectory",
+        motion_id=9,
+        joints=[ELBOW],
+        times_s=[0.0, 0.5, 1.2, 1.8],
+        positions=points,
+    )
+    armed.run(1.2)
+    assert armed.joint(ELBOW, "setpoint") == pytest.approx(start + 0.5, abs=0.02)
+    armed.run(1.0)
+    assert armed.results() == [{"motion_id": 9, "status": "done", "reason": ""}]
+    assert armed.joint(ELBOW) == pytest.approx(start + 0.4, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ({"kind": "goal", "targets": {"nose": 1.0}, "speed_ratio": 1.0}, "no joint nose"),
+        ({"kind": "goal", "targets": {ELBOW: 9.0}, "speed_ratio": 1.0}, "left_elbow: target 9"),
+        ({"kind": "goal", "targets": {ELBOW: 1.0}, "speed_ratio": 0.0}, "speed_ratio"),
+        ({"kind": "dance"}, "kind: expected"),
+        (
+            {"kind": "trajectory", "joints": [ELBOW], "times_s": [0, 1], "positions": [[9], [1]]},
+            "left_elbow: start",
+        ),
+    ],
+)
+def test_a_bad_command_is_refused_with_its_reason(
+    armed: Rig, command: dict[str, Any], reason: str
+) -> None:
+    armed.send(motion_id=3, **command)
+    armed.run(0.05)
+    (result,) = armed.results()
+    assert (result["motion_id"], result["status"]) == (3, "refused")
+    assert reason in result["reason"]
+    assert armed.state == "armed"
+
+
+def test_a_command_is_refused_while_disarmed(rig: Rig) -> None:
+    rig.boot()
+    rig.go(1, left_elbow=1.0)
+    rig.run(0.1)
+    (result,) = rig.results()
+    assert (result["status"], result["reason"]) == ("refused", "control is disarmed: arm first")
+
+
+def test_an_estop_ramps_the_setpoints_on_the_wire_within_two_ticks(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    bank = armed.lockstep.twin.serial_devices["servos"]
+    servo = next(s for s in armed.robot.servo_bus.servos if s.joint == ELBOW)
+
+    def goals(count: int) -> list[int]:
+        seen = []
+        for _ in range(count):
+            armed.tick()
+            seen.append(bank.register(servo.id, "goal_position"))
+        return seen
+
+    cruise = np.diff(goals(6)).mean()
+    armed._operator.publish({"act": "estop", "source": "test", "reason": ""})
+    steps = np.abs(np.diff(goals(150)))
+    assert armed.state == "stopped"
+    assert steps[1:20].mean() < abs(cruise)
+    assert steps[-10:].max() <= 1
+    speed = armed.robot.limits[ELBOW].velocity
+    limits = armed.robot.limits[ELBOW]
+    ramp_s = speed / limits.acceleration + limits.acceleration / limits.jerk
+    standing = int(np.flatnonzero(steps > 1)[-1]) + 1
+    assert standing * armed.control.period_s <= ramp_s + 2 * armed.control.period_s
+    assert armed.true_speeds().max() < STANDSTILL_RAD_S
+
+
+def test_an_estop_stops_each_group_by_its_category(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    armed.drive(0.3, 0.0, 1.0)
+    armed.ask("estop", within_s=1.0)
+    powered = dict(zip(armed.robot.joint_names, armed.column("torque_enabled"), strict=True))
+    assert not powered["head_pan"]
+    assert powered[ELBOW]
+    assert armed.base()["enabled"] == 0.0
+    assert abs(armed.base()["v_m_s"]) < 0.01
+    assert [r["status"] for r in armed.results()] == ["stopped"]
+
+
+def test_after_an_estop_commands_are_refused_until_reset_and_arm(armed: Rig) -> None:
+    armed.ask("estop")
+    assert armed.status["estop_latched"]
+    armed.go(1, left_elbow=1.2)
+    armed.ask("arm")
+    (result,) = armed.results()
+    assert result["status"] == "refused"
+    assert "reset, then arm" in result["reason"]
+    assert armed.state == "stopped"
+    assert "arm refused" in armed.status["detail"]
+    before = armed.column("position")
+    armed.ask("reset")
+    assert armed.state == "disarmed"
+    assert np.abs(armed.column("position") - before).max() < 0.005
+    armed.go(2, left_elbow=1.2)
+    armed.run(0.1)
+    assert [r["status"] for r in armed.results()] == ["refused"]
+    armed.ask("arm")
+    assert armed.state == "armed"
+    assert np.abs(armed.column("position") - before).max() < 0.005
+    armed.go(3, left_elbow=1.2)
+    armed.run(2.0)
+    assert [r["status"] for r in armed.results()] == ["done"]
+
+
+def test_reset_and_arm_in_one_breath_are_carried_out_in_order(armed: Rig) -> None:
+    armed.ask("estop")
+    armed.ask("reset", "arm", within_s=1.0)
+    assert armed.state == "armed"
+
+
+def test_an_estop_drops_the_acts_that_came_before_it(rig: Rig) -> None:
+    rig.boot()
+    rig.ask("arm", "estop")
+    assert rig.state == "stopped"
+    assert not rig.column("torque_enabled").any()
+
+
+def test_disarming_ramps_and_then_takes_all_power(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    armed.ask("disarm", within_s=1.0)
+    assert armed.state == "disarmed"
+    assert not armed.column("torque_enabled").any()
+    assert armed.base()["enabled"] == 0.0
+
+
+def test_a_killed_control_leaves_every_joint_standing_within_its_watchdog(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    armed.lockstep.kill(armed.control)
+    armed.run(WATCHDOG_S + 0.1)
+    for _ in range(20):
+        assert armed.true_speeds().max() < STANDSTILL_RAD_S
+        armed.run(0.05)
+
+
+def test_a_killed_control_leaves_the_base_standing(armed: Rig) -> None:
+    armed.drive(0.3, 0.0, 1.5)
+    assert armed.base()["v_m_s"] > 0.25
+    armed.lockstep.kill(armed.control)
+    armed.run(0.5)
+    here = armed.lockstep.truth()["robot"]
+    armed.run(0.5)
+    there = armed.lockstep.truth()["robot"]
+    assert there["x_m"] == pytest.approx(here["x_m"], abs=0.002)
+    assert there["y_m"] == pytest.approx(here["y_m"], abs=0.002)
+
+
+def test_a_restarted_control_starts_disarmed_drops_nothing_and_arms_again(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    armed.lockstep.kill(armed.control)
+    armed.run(0.3)
+    before = armed.column("position")
+    armed.control = armed.new_control()
+    armed.lockstep.add(armed.control)
+    armed.run(0.5)
+    assert armed.state == "disarmed"
+    arm = [armed.robot.joint_index[name] for name in armed.robot.group("left_arm").joints]
+    assert np.abs(armed.column("position") - before)[arm].max() < 0.1
+    before = armed.column("position")
+    assert armed.true_speeds().max() < STANDSTILL_RAD_S
+    armed.ask("arm")
+    assert armed.state == "armed"
+    assert np.abs(armed.column("position") - before).max() < 0.01
+
+
+def test_a_stale_base_command_ramps_to_zero_and_the_arms_go_on(armed: Rig) -> None:
+    armed.drive(0.4, 0.2, 1.5)
+    assert armed.base()["v_m_s"] == pytest.approx(0.4, abs=0.02)
+    armed.go(4, left_elbow=1.8)
+    armed.run(1.3)
+    assert armed.base()["v_m_s"] == pytest.approx(0.0, abs=0.01)
+    assert armed.status["cause"] == "stale_command"
+    assert armed.state == "armed"
+    armed.run(1.0)
+    assert [r["status"] for r in armed.results()] == ["done"]
+    armed.drive(0.2, 0.0, 1.0)
+    assert armed.base()["v_m_s"] == pytest.approx(0.2, abs=0.02)
+
+
+def test_odometry_agrees_with_where_the_base_went(armed: Rig) -> None:
+    start = armed.lockstep.truth()["robot"]
+    armed.drive(0.3, 0.4, 3.0)
+    armed.drive(0.0, 0.0, 1.0)
+    end, base = armed.lockstep.truth()["robot"], armed.base()
+    travelled = np.hypot(end["x_m"] - start["x_m"], end["y_m"] - start["y_m"])
+    assert np.hypot(base["x_m"], base["y_m"]) == pytest.approx(travelled, abs=0.02)
+    turned = (end["yaw_rad"] - start["yaw_rad"] + np.pi) % (2 * np.pi) - np.pi
+    assert base["yaw_rad"] == pytest.approx(turned, abs=0.05)
+
+
+def test_a_lost_supervisor_stops_the_robot_until_it_is_back_and_reset(armed: Rig) -> None:
+    armed.process_table.put_document({})
+    armed.run(2.9)
+    assert armed.state == "armed"
+    armed.run(0.5)
+    assert (armed.state, armed.status["cause"]) == ("stopped", "supervisor_lost")
+    armed.ask("reset", within_s=2.2)
+    assert armed.state == "stopped"
+    assert "reset refused" in armed.status["detail"]
+    armed.process_table.put_document({})
+    armed.ask("reset")
+    assert armed.state == "disarmed"
+
+
+def test_a_servo_with_a_hardware_error_stops_all_and_rejoins_after_reset(armed: Rig) -> None:
+    servo = next(s for s in armed.robot.servo_bus.servos if s.joint == ELBOW)
+    armed.lockstep.twin.serial_devices["servos"].set_alert(servo.id, 32)
+    armed.run(0.5)
+    assert (armed.state, armed.status["cause"]) == ("stopped", "servo_hardware_error")
+    assert ELBOW in armed.status["detail"]
+    armed.ask("reset", within_s=2.5)
+    assert armed.state == "disarmed", armed.status
+    armed.ask("arm", within_s=1.0)
+    assert armed.state == "armed", armed.status
+
+
+def test_a_silent_servo_stops_all_and_names_itself(armed: Rig) -> None:
+    servo = next(s for s in armed.robot.servo_bus.servos if s.joint == PITCH)
+    armed.lockstep.twin.serial_devices["servos"].silence(servo.id)
+    armed.run(0.5)
+    assert (armed.state, armed.status["cause"]) == ("stopped", "servo_bus_lost")
+    assert PITCH in armed.status["detail"]
+
+
+def test_a_drive_fault_stops_all_and_is_cleared_by_reset(armed: Rig) -> None:
+    armed.lockstep.twin.drives[0].raise_fault(0x2310)
+    armed.run(0.5)
+    assert (armed.state, armed.status["cause"]) == ("stopped", "drive_fault")
+    armed.ask("reset", within_s=1.0)
+    assert armed.state == "disarmed"
+    armed.ask("arm", within_s=1.0)
+    assert armed.state == "armed"
+
+
+def test_a_lost_servo_line_is_reopened_and_needs_reset_and_arm(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    armed.lockstep.devices.opened[0].unplug()
+    armed.run(0.1)
+    assert armed.status["cause"] == "servo_bus_lost"
+    armed.run(3.0)
+    assert armed.state == "stopped"
+    assert armed.true_speeds().max() < STANDSTILL_RAD_S
+    armed.ask("reset", "arm", within_s=1.5)
+    assert armed.state == "armed", armed.status
+
+
+def test_an_orderly_stop_ramps_and_then_takes_all_power(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    bank = armed.lockstep.twin.serial_devices["servos"]
+    armed.lockstep.remove(armed.control)
+    assert [r["status"] for r in armed.results()] == ["stopped"]
+    ids = [servo.id for servo in armed.robot.servo_bus.servos]
+    assert [bank.register(servo_id, "torque_enable") for servo_id in ids] == [0] * len(ids)
+
+
+def test_a_missing_servo_line_is_told_at_the_start(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(name: str) -> None:
+        raise DeviceMissing(f"{name}: not there")
+
+    monkeypatch.setattr(rig.lockstep.devices, "serial", missing)
+    with pytest.raises(DeviceMissing, match="servos: not there"):
+        rig.control.start()
