@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivers.canopen import DriveSpec, DriveState, PowerState, WheelDriveBus
-from drivers.canopen.objects import RPDO1
+from drivers.canopen.objects import HEARTBEAT_PRODUCER, RPDO1
 from drivers.canopen.wheel_bus import HOST_NODE_ID
 from drivers.errors import LinkLost
 from sim_twin.can import MemoryBus, WheelDrive
@@ -222,6 +222,7 @@ def test_a_drive_that_reboots_in_between_is_lost_until_connected_anew(enabled: B
 
 def test_a_drive_that_was_rebooted_and_started_by_others_stays_lost(enabled: Bench) -> None:
     enabled.inject(0x000, bytes((0x81, 1)))
+    enabled.left._objects.set(HEARTBEAT_PRODUCER, 0, 25)
     enabled.inject(0x000, bytes((0x01, 1)))
     assert enabled.run(0.5).lost == (True, False)
 
