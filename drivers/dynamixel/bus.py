@@ -21,7 +21,7 @@ from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
 from drivers.dynamixel.torque import disable_torque, enable_torque, write_kept
 from drivers.dynamixel.watchdog import WatchdogEvent, WatchdogState, next_state, watchdog_units
-from drivers.errors import DriverError
+from drivers.errors import DriverError, LinkLost
 
 _GAP_WARNING_RATIO: Final = 0.8
 
@@ -117,10 +117,14 @@ class DynamixelBus:
         values old, not those of the others.
 
         Raises:
-            LinkLost: the adapter is gone.
+            LinkLost: the adapter is gone; all values go on growing old with each call.
         """
         silent_ns = self._link.now_ns() - self._link.last_sent_ns
-        self._reader.read()
+        try:
+            self._reader.read()
+        except LinkLost:
+            self._reader.note_silence()
+            raise
         if self.watchdog is WatchdogState.ARMED and silent_ns > self._gap_ns:
             self._read_watchdogs()
         if self._health.step():

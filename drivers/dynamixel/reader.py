@@ -88,6 +88,13 @@ class StateReader:
         self._store(records, np.array(indices, dtype=np.intp))
         self._review_roster(indices)
 
+    def note_silence(self) -> None:
+        """Let all values grow old: the link is lost."""
+        self._all_fresh = False
+        self._state.valid[:] = False
+        self._state.stamp_ns = self._link.now_ns()
+        self._update_ages()
+
     def _frame_anew(self, reply: bytes, deadline_ns: int) -> tuple[Records, list[int]]:
         entries = self._link.collect(self._block.sync_read, reply, deadline_ns)
         indices = [index for index in self._roster.polled if self._servos[index].id in entries]
@@ -128,5 +135,8 @@ class StateReader:
         state.valid[rows] = True
         state.stamp_ns = self._link.now_ns()
         self._stamps_ns[rows] = state.stamp_ns
-        age_s = (state.stamp_ns - self._stamps_ns) / NS_PER_S
-        state.age_s[:] = np.where(self._stamps_ns == _NEVER_NS, np.inf, age_s)
+        self._update_ages()
+
+    def _update_ages(self) -> None:
+        age_s = (self._state.stamp_ns - self._stamps_ns) / NS_PER_S
+        self._state.age_s[:] = np.where(self._stamps_ns == _NEVER_NS, np.inf, age_s)

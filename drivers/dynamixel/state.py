@@ -19,7 +19,7 @@ class BusState:
 
     The first group comes with each cycle's block read. A servo that gave no value keeps its last
     one: then `valid` is False and `age_s` grows (infinite before the first value). The second group
-    is polled a servo at a time; NaN and -2 mean that it was not read yet.
+    is polled a servo at a time, and known in part since the handshake; NaN means not read yet.
     """
 
     position_rad: Floats
@@ -53,7 +53,7 @@ class BusState:
             alert=np.zeros(count, dtype=np.bool_),
             error=np.zeros(count, dtype=np.uint8),
             torque_on=np.zeros(count, dtype=np.bool_),
-            watchdog=np.full(count, -2, dtype=np.int16),
+            watchdog=np.zeros(count, dtype=np.int16),
             voltage_v=np.full(count, np.nan),
             temperature_c=np.full(count, np.nan),
         )

@@ -251,8 +251,11 @@ def test_an_unplugged_bus_says_so_at_once_every_time_and_is_counted_once(
     with pytest.raises(LinkLost, match="unplugged"):
         bench.bus.read_state()
     bench.line.replug()
+    bench.run(0.5)
     with pytest.raises(LinkLost, match="lost before"):
         bench.bus.read_state()
+    assert not bench.bus.state.valid.any()
+    assert bench.bus.state.age_s == pytest.approx(0.5)
     with pytest.raises(LinkLost, match="lost before"):
         bench.bus.disable_torque()
     assert bench.bus.counters.link_lost == 1
@@ -290,3 +293,20 @@ def test_a_finger_on_a_rack_is_in_metres(make_bench: MakeBench) -> None:
     bench.cycle()
     assert bench.bus.state.position_rad[0] == pytest.approx(0.035, abs=1e-4)
     assert finger.to_joint(finger.to_pulse(0.035)) == pytest.approx(0.035, abs=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_no_cycle_is_lost_in_a_hundred_thousand_with_stuffing(make_bench: MakeBench) -> None:
+    bench = connected(make_bench, 16, fast_sync=False)
+    random = np.random.default_rng(20_251)
+    bench.rotors._stall_nm[:] = 0.0
+    bench.rotors._damping[:] = 0.0
+    for cycle in range(100_000):
+        if cycle % 500 == 0:
+            bench.rotors.velocity_rad_s = random.uniform(-1.5, 0.2, 16)
+        bench.cycle()
+        assert bench.bus.state.valid.all()
+    counters = bench.bus.counters
+    assert counters.stuffed > 1000
+    assert counters.partial_cycles == counters.timeouts == counters.crc_errors == 0
