@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio
 from numpy.typing import NDArray
 
-from vla_deploy.manipulation.errors import ManipulationError
+from vla_deploy.manipulation.errors import Unreachable
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
 
@@ -28,16 +28,6 @@ DAMPING = 1e-2
 MAX_STEP_RAD = 0.4
 MAX_WAYPOINT_JUMP_RAD = 0.3
 AT_LIMIT_RAD = 1e-3
-
-
-class Unreachable(ManipulationError):
-    """Say that no posture within the limits brings the hand there."""
-
-    def __init__(self, reason: str, *, position_error_m: float, rotation_error_rad: float) -> None:
-        self.reason = reason
-        self.position_error_m = position_error_m
-        self.rotation_error_rad = rotation_error_rad
-        super().__init__(reason)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

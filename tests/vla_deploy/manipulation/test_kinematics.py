@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from vla_deploy.manipulation.errors import Unreachable
 from vla_deploy.manipulation.grasps import hand_down
-from vla_deploy.manipulation.kinematics import ArmKinematics, Unreachable
+from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.model import RobotModel, full_positions
 
