@@ -1,0 +1,1 @@
+pytest_plugins = ["sim_twin.pytest_plugin"]
