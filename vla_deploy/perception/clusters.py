@@ -24,12 +24,17 @@ NEAR_CELL_M, FAR_CELL_M = 0.01, 0.02
 NEAR_M = 1.5
 OCCLUDER_M = 0.05
 OCCLUDED_SHARE = 0.2
+TOP_HIDDEN_SHARE = 0.5
 PART_SHARE = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cluster:
-    """Hold one thing's visible points; `truncated` by the image, `occluded` by something nearer."""
+    """Hold one thing's visible points.
+
+    `truncated` means that the image's border or something nearer hides its end or its top, so that
+    no measure holds; `occluded` that something nearer hides a part of its side.
+    """
 
     support: Support
     points: Floats
@@ -100,24 +105,32 @@ def _label(xy: Floats, heights: Floats, cell_m: float) -> NDArray[np.int32]:
     return numbered
 
 
+def part_of(cluster: Cluster, cloud: Cloud, member: Mask) -> Cluster | None:
+    """Return a part of a cluster as one of its own, or None where it is too small."""
+    if np.count_nonzero(member) < MIN_PIXELS:
+        return None
+    heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
+    heights.flat[cluster.pixels] = cluster.heights
+    return _cluster(cloud, cluster.support, heights, cluster.pixels[member])
+
+
 def split_by_colour(cluster: Cluster, cloud: Cloud) -> list[Cluster]:
     """Return the parts of a cluster that have a colour of their own: things that touch."""
     names = colour_names(cluster.rgb)
     counts = np.bincount(names)
     large = np.flatnonzero(counts >= max(MIN_PIXELS, PART_SHARE * names.size))
-    heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
-    heights.flat[cluster.pixels] = cluster.heights
     if large.size < 2:
         return [cluster]
-    return [
-        _cluster(cloud, cluster.support, heights, cluster.pixels[names == name]) for name in large
-    ]
+    parts = [part_of(cluster, cloud, names == name) for name in large]
+    return [part for part in parts if part is not None]
 
 
 def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np.intp]) -> Cluster:
     height, width = cloud.depth_m.shape
     rows, columns = np.unravel_index(pixels, heights.shape)
     box = (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1)
+    at_border = box[0] <= 1 or box[1] <= 1 or box[2] >= width - 1 or box[3] >= height - 1
+    around, over_top = _hidden_shares(cloud.depth_m, pixels)
     return Cluster(
         support=support,
         points=cloud.points[rows, columns],
@@ -126,17 +139,25 @@ def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np
         pixels=pixels,
         depth_m=float(np.median(cloud.depth_m[rows, columns])),
         box_px=box,
-        truncated=box[0] <= 1 or box[1] <= 1 or box[2] >= width - 1 or box[3] >= height - 1,
-        occluded=_occluded(cloud.depth_m, pixels),
+        truncated=at_border or over_top > TOP_HIDDEN_SHARE,
+        occluded=around > OCCLUDED_SHARE,
     )
 
 
-def _occluded(depth_m: Floats, pixels: NDArray[np.intp]) -> bool:
-    """Tell whether much of the outline borders on something nearer to the camera."""
+def _hidden_shares(depth_m: Floats, pixels: NDArray[np.intp]) -> tuple[float, float]:
+    """Return how much of the outline, and of its upper edge, borders on something nearer."""
     member = np.zeros(depth_m.shape, dtype=np.uint8)
     member.flat[pixels] = 1
-    ring = (cv2.dilate(member, np.ones((5, 5), dtype=np.uint8)) - member).astype(np.bool_)
-    own = np.where(member > 0, depth_m, 0.0).astype(np.float32)
-    beside = cv2.dilate(own, np.ones((5, 5), dtype=np.uint8))
+    kernel = np.ones((5, 5), dtype=np.uint8)
+    ring = (cv2.dilate(member, kernel) - member).astype(np.bool_)
+    beside = cv2.dilate(np.where(member > 0, depth_m, 0.0).astype(np.float32), kernel)
     nearer = ring & (depth_m > 0.0) & (depth_m < beside - OCCLUDER_M)
-    return bool(np.count_nonzero(nearer) > OCCLUDED_SHARE * np.count_nonzero(ring))
+    above = np.zeros_like(ring)
+    above[:-2] = member[2:] > 0
+    above &= ring
+    return _share(nearer, ring), _share(nearer, above)
+
+
+def _share(part: Mask, whole: Mask) -> float:
+    count = int(np.count_nonzero(whole))
+    return int(np.count_nonzero(part & whole)) / count if count else 0.0

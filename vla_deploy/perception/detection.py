@@ -8,9 +8,9 @@ import numpy as np
 
 from vla_deploy.perception.classes import OTHER, classify
 from vla_deploy.perception.cloud import Cloud
-from vla_deploy.perception.clusters import Cluster, find_clusters, split_by_colour
+from vla_deploy.perception.clusters import Cluster, find_clusters, part_of, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
-from vla_deploy.perception.shapes import Shape, measure
+from vla_deploy.perception.shapes import Rectangle, Shape, inside_rectangle, measure
 from vla_deploy.perception.supports import find_supports
 
 Vector = tuple[float, float, float]
@@ -19,6 +19,7 @@ CONFIDENCE_KNOWN = 0.9
 CONFIDENCE_OTHER = 0.5
 FEW_PIXELS = 60
 BOX_FLOOR_M = 0.02
+WALL_M = 0.02
 FACE_WIDTH_M, FACE_HEIGHT_M = 0.03, 0.05
 
 
@@ -115,10 +116,24 @@ def _is_bare_face(detection: Detection) -> bool:
 def _detections(cluster: Cluster, cloud: Cloud) -> list[Detection]:
     """Return one thing, or several that touch where each part by itself is a known one."""
     whole = _detection(cluster, cloud)
+    if whole.class_name == "box":
+        return [whole, *_contents(whole, cluster, cloud)]
     if whole.class_name != OTHER:
         return [whole]
     parts = [_detection(part, cloud) for part in split_by_colour(cluster, cloud)]
     return [whole] if any(part.class_name == OTHER for part in parts) else parts
+
+
+def _contents(box: Detection, cluster: Cluster, cloud: Cloud) -> list[Detection]:
+    """Return the known thing that stands within a box's walls, if there is one."""
+    x, y, _ = box.position_m
+    length_m, width_m, _ = box.size_m
+    rim = Rectangle(centre=(x, y), length_m=length_m, width_m=width_m, yaw_rad=box.yaw_rad)
+    within = inside_rectangle(cluster.points[:, :2], rim, WALL_M)
+    part = part_of(cluster, cloud, within & (cluster.heights > BOX_FLOOR_M))
+    content = _detection(part, cloud) if part is not None else None
+    known = content is not None and content.class_name != OTHER and content.colour != box.colour
+    return [content] if content is not None and known else []
 
 
 def _detection(cluster: Cluster, cloud: Cloud) -> Detection:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.perception.cloud import Floats
+from vla_deploy.perception.cloud import Floats, Mask
 from vla_deploy.perception.clusters import Cluster
 
 TOP_SLICE_M = 0.012
@@ -101,15 +101,22 @@ def _across(xy: Floats, camera_position: Point) -> float:
     return float(high - low)
 
 
+def inside_rectangle(xy: Floats, rectangle: Rectangle, margin_m: float) -> Mask:
+    """Tell which of (n, 2) points lie at least `margin_m` inside a rectangle."""
+    c, s = math.cos(rectangle.yaw_rad), math.sin(rectangle.yaw_rad)
+    half = 0.5 * np.array([rectangle.length_m, rectangle.width_m]) - margin_m
+    local = np.abs((xy - rectangle.centre) @ np.array([[c, -s], [s, c]]))
+    within: Mask = np.all(local < half, axis=1)
+    return within
+
+
 def _hole(cluster: Cluster, rim: Rectangle, height_m: float, pixel_m: float) -> float:
     """Return how deep the middle lies below the rim around it."""
-    c, s = math.cos(rim.yaw_rad), math.sin(rim.yaw_rad)
-    half = 0.5 * np.array([rim.length_m, rim.width_m]) - RIM_MARGIN_M
-    if half.min() <= 0.0:
+    length_m, width_m = rim.length_m - 2.0 * RIM_MARGIN_M, rim.width_m - 2.0 * RIM_MARGIN_M
+    if min(length_m, width_m) <= 0.0:
         return 0.0
-    local = np.abs((cluster.points[:, :2] - rim.centre) @ np.array([[c, -s], [s, c]]))
-    middle = cluster.heights[np.all(local < half, axis=1)]
-    if middle.size < SOLID_SHARE * 4.0 * half.prod() / pixel_m**2:
+    middle = cluster.heights[inside_rectangle(cluster.points[:, :2], rim, RIM_MARGIN_M)]
+    if middle.size < SOLID_SHARE * length_m * width_m / pixel_m**2:
         # A lid would fill the middle with points: one looks down onto the support.
         return height_m
     return max(0.0, height_m - float(np.median(middle)))

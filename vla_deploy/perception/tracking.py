@@ -154,7 +154,7 @@ def _distance(track: Track, detection: Detection) -> float | None:
     doubtful = detection.truncated or detection.occluded
     alike = detection.class_name == track.class_name and detection.colour == track.colour
     reach_m = 0.5 * max(track.size_m[:2]) if doubtful else 0.0
-    gate_m = max(SAME_GATE_M if alike else OTHER_GATE_M, reach_m)
+    gate_m = max(SAME_GATE_M if alike or doubtful else OTHER_GATE_M, reach_m)
     return distance_m if distance_m < gate_m else None
 
 

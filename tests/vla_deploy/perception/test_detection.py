@@ -1,0 +1,152 @@
+"""Detection on images rendered in the twin's flat, against the truth."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.perception.body import BodyMask
+from vla_deploy.perception.cloud import make_cloud
+from vla_deploy.perception.detection import Detection, detect
+
+if TYPE_CHECKING:
+    from conftest import StillFlat
+
+pytestmark = pytest.mark.gl
+
+LOOK_RAD = {"coffee_table": 0.75, "kitchen_table": 0.75, "bedside_table": 0.8, "side_table": 0.85}
+BOX_RIM_M = 0.128
+
+
+def see(flat: "StillFlat", seed: int = 0) -> list[tuple[Detection, np.ndarray]]:
+    """Return what the robot detects, each with its position in the map."""
+    rgb, depth = flat.noisy_view(np.random.default_rng(seed))
+    pose = flat.kinematics.camera_pose(flat.joints)
+    body = BodyMask(flat.robot).mask(flat.joints, flat.intrinsics)
+    cloud = make_cloud(rgb, depth, flat.intrinsics, pose, body)
+    found = []
+    for detection in detect(cloud):
+        x, y, z = detection.position_m
+        placed = flat.base.compose(Pose2D(x, y, 0.0))
+        found.append((detection, np.array([placed.x_m, placed.y_m, z])))
+    return found
+
+
+def nearest(
+    found: list[tuple[Detection, np.ndarray]], truth: np.ndarray
+) -> tuple[Detection, np.ndarray]:
+    return min(found, key=lambda pair: float(np.linalg.norm(pair[1][:2] - truth[:2])))
+
+
+@pytest.mark.parametrize("place", LOOK_RAD)
+def test_things_on_a_table_have_class_colour_and_place(flat: "StillFlat", place: str) -> None:
+    errors: dict[str, list[float]] = {}
+    for seed in range(4):
+        flat.scatter(seed)
+        flat.stand_at_viewpoint(place, head_tilt=LOOK_RAD[place])
+        found = see(flat, seed)
+        for item in flat.world.objects.values():
+            if item.surface != place:
+                continue
+            truth = flat.truth(item.name)
+            detection, position = nearest(found, truth)
+            assert (detection.class_name, detection.colour) == (item.class_name, item.colour)
+            error_m = float(np.linalg.norm(position[:2] - truth[:2]))
+            assert error_m < 0.016
+            errors.setdefault(item.name, []).append(error_m)
+    for name, values in errors.items():
+        assert np.median(values) < 0.010, name
+
+
+def test_heights_are_those_of_the_things(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    flat.stand_at_viewpoint("coffee_table", head_tilt=0.75)
+    found = see(flat)
+    for name in ("red_cup", "blue_ball", "book"):
+        _, position = nearest(found, flat.truth(name))
+        assert position[2] == pytest.approx(flat.truth(name)[2], abs=0.005)
+    cup, _ = nearest(found, flat.truth("red_cup"))
+    assert cup.size_m == pytest.approx((0.066, 0.066, 0.095), abs=0.006)
+
+
+def test_a_box_is_placed_by_its_opening(flat: "StillFlat") -> None:
+    errors = []
+    for seed in range(4):
+        flat.scatter(seed)
+        flat.stand_at_viewpoint("side_table", head_tilt=0.85)
+        truth = flat.truth("box")
+        detection, position = nearest(see(flat, seed), truth)
+        assert detection.class_name == "box"
+        assert detection.size_m == pytest.approx((0.232, 0.232, BOX_RIM_M), abs=0.012)
+        assert position[2] == pytest.approx(truth[2] + BOX_RIM_M, abs=0.008)
+        errors.append(float(np.linalg.norm(position[:2] - truth[:2])))
+    assert max(errors) < 0.015
+
+
+def test_a_turned_box_tells_its_yaw(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    flat.put("box", (4.2, 0.46, 0.42), yaw_rad=0.35)
+    flat.stand_at_viewpoint("side_table", head_tilt=0.85)
+    detection, _ = nearest(see(flat), flat.truth("box"))
+    turned = (detection.yaw_rad + flat.base.yaw_rad - 0.35) % (math.pi / 2)
+    assert min(turned, math.pi / 2 - turned) < 0.06
+
+
+def test_a_cup_in_the_box_is_seen_there_and_the_box_stays_a_box(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    x, y, z = flat.truth("box")
+    flat.put("red_cup", (x, y, z + 0.008 + 0.0475))
+    flat.stand_at_viewpoint("side_table", head_tilt=0.85)
+    kinds = {(d.class_name, d.colour) for d, _ in see(flat)}
+    assert ("box", "orange") in kinds
+    assert ("cup", "red") in kinds
+
+
+def test_things_that_touch_are_told_apart_by_colour(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    flat.put("red_cup", (2.2, 1.55, 0.4975), yaw_rad=-1.57)
+    flat.put("phone", (2.31, 1.55, 0.456))
+    flat.put("blue_ball", (1.8, 1.55, 0.475))
+    flat.put("book", (2.6, 1.4, 0.47))
+    flat.stand_at_viewpoint("coffee_table", head_tilt=0.75)
+    found = see(flat)
+    for name, kind in (("red_cup", ("cup", "red")), ("phone", ("phone", "black"))):
+        detection, _ = nearest(found, flat.truth(name))
+        assert (detection.class_name, detection.colour) == kind
+
+
+def test_furniture_and_walls_are_no_things_to_pick(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    known = {(item.class_name, item.colour) for item in flat.world.objects.values()}
+    for place in ("living_room", "kitchen", "bedroom", "entrance", "charging_station"):
+        pose = flat.robot.places[place].pose
+        flat.stand(Pose2D(pose.x_m, pose.y_m, pose.yaw_rad), head_tilt=0.35)
+        for detection, position in see(flat):
+            if detection.truncated or detection.class_name == "object":
+                continue
+            gaps = [
+                float(np.linalg.norm(flat.truth(n)[:2] - position[:2])) for n in flat.world.objects
+            ]
+            assert min(gaps) < 0.05, (place, detection)
+            assert (detection.class_name, detection.colour) in known
+
+
+def test_the_robots_own_arm_is_masked(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    flat.stand_at_viewpoint(
+        "coffee_table",
+        head_tilt=0.9,
+        right_shoulder_yaw=0.0,
+        right_shoulder_pitch=0.9,
+        right_elbow=0.8,
+        right_wrist_pitch=-0.9,
+    )
+    _, with_robot = flat.camera.render()
+    _, without = flat.view_without_robot()
+    shown = with_robot < without - 0.02
+    mask = BodyMask(flat.robot).mask(flat.joints, flat.intrinsics)
+    assert np.count_nonzero(shown) > 3000
+    assert np.count_nonzero(shown & mask) > 0.97 * np.count_nonzero(shown)
+    assert np.count_nonzero(mask) < 2.0 * np.count_nonzero(shown)
