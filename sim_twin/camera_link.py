@@ -15,7 +15,7 @@ from sim_twin.errors import CameraFailed
 from sim_twin.mirror import MirrorState, mirror_pair, send_state
 
 START_TIMEOUT_S = 30.0
-STOP_TIMEOUT_S = 10.0
+STOP_TIMEOUT_S = 2.5
 PERIOD_NS = 20_000_000
 
 

@@ -59,12 +59,12 @@ class FilmDesk:
         if not isinstance(path, str) or not path:
             raise RefereeRefusal(f"film_start: expected a path, got {path!r}")
         self._film = Film(self._model, self._data, Path(path))
-        return {"path": path}
+        return {"film": path}
 
     def _stop(self, _request: _Text) -> dict[str, Any]:
         film, self._film = self._running(), None
         film.close()
-        return {"path": str(film.path), "sheet": str(film.sheet_path), "frames": film.frames}
+        return {"film": str(film.path), "sheet": str(film.sheet_path), "frames": film.frames}
 
     def _caption(self, request: _Text) -> dict[str, Any]:
         self._running().caption = str(request.get("text", ""))

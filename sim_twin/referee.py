@@ -86,6 +86,11 @@ def _exchange(path: Path, line: bytes) -> bytes:
     return bytes(reply)
 
 
+def _absolute(path: str) -> str:
+    """Return a path that holds in the twin's working directory too."""
+    return str(Path(path).resolve())
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m sim_twin.referee",
@@ -95,7 +100,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--run-dir", type=Path, required=True)
     parser.add_argument("op", choices=tuple(_SOCKET_AND_ARGUMENTS))
-    for name in ("object", "container", "path", "text"):
+    parser.add_argument("--path", type=_absolute, help="film to write: .webm, .mp4 or .avi")
+    for name in ("object", "container", "text"):
         parser.add_argument(f"--{name}")
     return parser
 
