@@ -1,0 +1,250 @@
+"""The perception process on simulated time: real drivers, emulated sensors, rendered images."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import can
+import numpy as np
+import pytest
+
+from platforms import load_profile
+from sim_twin.device import WireDevice
+from sim_twin.lines import MemoryLine
+from sim_twin.sensors.camera import CameraDevice
+from sim_twin.sensors.imu import ImuDevice, ImuTruth
+from sim_twin.sensors.lidar import LidarDevice
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.node import NodeContext
+from vla_deploy.perception.node import PerceptionNode
+
+if TYPE_CHECKING:
+    from conftest import StillFlat
+
+pytestmark = pytest.mark.gl
+
+STEP_NS = 5_000_000
+NODE_PERIOD_NS = 20_000_000
+VIEW = Pose2D(2.2, 2.05, -math.pi / 2)
+
+
+class Rig:
+    """Step sensors and node; stand in for control by telling the true joints and wheel odometry."""
+
+    def __init__(self, flat: "StillFlat", run_dir: Path, believed: Pose2D) -> None:
+        self.now = 1_000_000_000
+        self.flat = flat
+        self.head_tilt: Callable[[float], float] = lambda _: 0.75
+        self.base: Callable[[float], Pose2D] = lambda _: VIEW
+        flat.scatter(1)
+        self.devices: dict[str, WireDevice] = {
+            "lidar": LidarDevice(flat.lidar.cast, seed=1),
+            "imu": ImuDevice(self._feel, seed=1),
+            "camera": CameraDevice(flat.camera.render, flat.intrinsics, latency_s=0.03, seed=1),
+        }
+        self.lines = {name: MemoryLine(device, self) for name, device in self.devices.items()}
+        self.space = SharedSpace(run_dir / "ipc", self)
+        self._joint_state = self.space.cell_writer("joint_state")
+        self._base_state = self.space.cell_writer("base_state")
+        context = NodeContext(
+            run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=self
+        )
+        home = flat.robot.home
+        start = replace(
+            home.places[home.start].pose,
+            x_m=believed.x_m,
+            y_m=believed.y_m,
+            yaw_rad=believed.yaw_rad,
+        )
+        places = {**home.places, home.start: replace(home.places[home.start], pose=start)}
+        robot = replace(flat.robot, home=replace(home, places=places))
+        self.node = PerceptionNode(context, robot, load_profile("desktop"), self)
+        self.node.start()
+
+    def now_ns(self) -> int:
+        return self.now
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        raise AssertionError("perception never sleeps")
+
+    def serial(self, name: str) -> MemoryLine:
+        return self.lines[name]
+
+    def stream(self, name: str) -> MemoryLine:
+        return self.lines[name]
+
+    def can(self, name: str) -> can.BusABC:
+        raise AssertionError("perception has no business on the CAN bus")
+
+    def run_for(self, seconds: float) -> None:
+        end_ns = self.now + round(seconds * 1e9)
+        while self.now < end_ns:
+            self.now += STEP_NS
+            t = self.now / 1e9
+            self.flat.stand(self.base(t), head_tilt=self.head_tilt(t))
+            for device in self.devices.values():
+                device.step(self.now)
+            if self.now % NODE_PERIOD_NS == 0:
+                self._tell()
+                self.node.step()
+
+    def cell(self, name: str) -> Any:
+        sample = self.space.cell_reader(name).latest()
+        assert sample is not None, f"{name} was never published"
+        return sample.data
+
+    def scene(self) -> dict[str, Any]:
+        sample = self.space.cell_reader("scene").latest()
+        assert sample is not None
+        return sample.document()
+
+    def known(self) -> dict[str, dict[str, Any]]:
+        return {thing["id"]: thing for thing in self.scene()["objects"]}
+
+    def pose_error(self) -> tuple[float, float]:
+        data = self.cell("pose")
+        off = Pose2D(data["x_m"], data["y_m"], data["yaw_rad"]).relative_to(self.flat.base)
+        return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
+
+    def _feel(self) -> ImuTruth:
+        return ImuTruth(
+            yaw_rad=self.flat.base.yaw_rad,
+            pitch_rad=0.0,
+            roll_rad=0.0,
+            acceleration_m_s2=(0.0, 0.0, 9.81),
+        )
+
+    def _tell(self) -> None:
+        count = len(self.flat.joints)
+        zeros = np.zeros(count)
+        self._joint_state.put(
+            joint_count=count,
+            position=self.flat.joints,
+            velocity=zeros,
+            setpoint=self.flat.joints,
+            effort_ratio=zeros,
+            age_s=zeros,
+            error=zeros,
+            torque_enabled=np.ones(count),
+        )
+        moved = self.flat.base.relative_to(VIEW)
+        self._base_state.put(
+            x_m=1.05 * moved.x_m,
+            y_m=1.05 * moved.y_m,
+            yaw_rad=0.95 * moved.yaw_rad,
+            v_m_s=0.0,
+            w_rad_s=0.0,
+            enabled=1,
+        )
+
+
+@pytest.fixture
+def make_rig(flat: "StillFlat", tmp_path: Path) -> Iterator[Callable[..., Rig]]:
+    rigs = []
+
+    def make(believed: Pose2D = VIEW) -> Rig:
+        rigs.append(Rig(flat, tmp_path, believed))
+        return rigs[-1]
+
+    yield make
+    for rig in rigs:
+        rig.node.stop()
+
+
+def test_the_scene_is_right_in_the_map_although_the_start_was_wrong(
+    make_rig: Callable[..., Rig],
+) -> None:
+    rig = make_rig(VIEW.compose(Pose2D(0.06, -0.05, 0.04)))
+    rig.run_for(4.0)
+    position_m, yaw_rad = rig.pose_error()
+    assert position_m < 0.03
+    assert yaw_rad < 0.01
+    assert rig.cell("pose")["match_ratio"] > 0.7
+    things = rig.known()
+    assert {"cup_1", "ball_1", "book_1"} <= set(things)
+    for thing, body in (("cup_1", "red_cup"), ("ball_1", "blue_ball"), ("book_1", "book")):
+        truth = rig.flat.truth(body)
+        assert math.dist(things[thing]["position_m"], truth) < 0.035
+    assert (things["cup_1"]["class"], things["cup_1"]["colour"]) == ("cup", "red")
+
+
+def test_every_topic_is_published(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig()
+    rig.run_for(1.0)
+    assert np.count_nonzero(rig.cell("scan")["range_m"]) > 300
+    assert rig.cell("imu")["acceleration_m_s2"][2] == pytest.approx(9.81, abs=0.3)
+    frame = rig.space.frame_reader("rgbd").latest()
+    assert frame is not None
+    assert (frame.width, frame.height) == (320, 240)
+    assert len(frame.payload) == 320 * 240 * 5
+    rgb, _ = rig.flat.camera.render()
+    assert frame.payload[: rgb.size] == rgb.tobytes()
+
+
+def test_driving_is_followed_better_than_by_wheels_alone(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig()
+    rig.run_for(0.5)
+    began = rig.now / 1e9
+
+    def drive(t: float) -> Pose2D:
+        angle = 0.5 * (t - began)
+        return VIEW.compose(Pose2D(-0.25 * (t - began), 0.0, 0.0)).compose(Pose2D(0, 0, angle))
+
+    rig.base = drive
+    rig.head_tilt = lambda _: 0.2
+    rig.run_for(4.0)
+    position_m, yaw_rad = rig.pose_error()
+    assert position_m < 0.05
+    assert yaw_rad < 0.03
+
+
+def test_images_taken_while_the_head_turns_are_shown_but_not_believed(
+    make_rig: Callable[..., Rig],
+) -> None:
+    rig = make_rig()
+    rig.run_for(1.0)
+    before = rig.scene()["stamp_ns"]
+    began = rig.now / 1e9
+    rig.head_tilt = lambda t: 0.5 + 0.6 * abs(((t - began) % 1.0) - 0.5)
+    rig.run_for(1.0)
+    assert rig.scene()["stamp_ns"] <= before + 300_000_000
+    frame = rig.space.frame_reader("rgbd").latest()
+    assert frame is not None
+    assert frame.stamp_ns > before + 600_000_000
+    rig.head_tilt = lambda _: 0.75
+    rig.run_for(0.6)
+    assert rig.scene()["stamp_ns"] > before + 1_000_000_000
+
+
+def test_a_lost_camera_is_reopened_and_the_rest_goes_on(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig()
+    rig.run_for(0.5)
+    rig.lines["camera"].unplug()
+    scans = rig.space.cell_reader("scan").latest()
+    rig.run_for(0.5)
+    during = rig.space.cell_reader("scan").latest()
+    assert scans is not None
+    assert during is not None
+    assert during.sequence > scans.sequence
+    unplugged_ns = rig.scene()["stamp_ns"]
+    rig.lines["camera"].replug()
+    rig.run_for(1.5)
+    assert rig.scene()["stamp_ns"] > unplugged_ns + 1_000_000_000
+
+
+def test_a_cup_that_is_carried_off_is_forgotten_and_keeps_its_id_elsewhere(
+    make_rig: Callable[..., Rig],
+) -> None:
+    rig = make_rig()
+    rig.run_for(1.0)
+    assert "cup_1" in rig.known()
+    rig.flat.put("red_cup", (6.3, 4.4, 0.5475))
+    rig.run_for(1.6)
+    assert "cup_1" not in rig.known()
+    assert "ball_1" in rig.known()
+    rig.flat.put("red_cup", (2.2, 1.42, 0.4975))
+    rig.run_for(1.0)
+    assert math.dist(rig.known()["cup_1"]["position_m"][:2], (2.2, 1.42)) < 0.03
