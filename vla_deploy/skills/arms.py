@@ -137,7 +137,7 @@ def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
     arm = context.arms[hand]
     side = 1.0 if hand == "left" else -1.0
     point = (CARRY_POINT_M[0], side * CARRY_POINT_M[1], CARRY_POINT_M[2])
-    now = context.link.positions
+    now = context.link.setpoints
     found = []
     for yaw_rad in CARRY_YAWS_RAD:
         try:
@@ -157,8 +157,7 @@ def lift(context: SkillContext, hand: str, height_m: float, speed_ratio: float =
     Raises:
         NotPossible: the arm cannot follow the line.
     """
-    start = context.link.positions
-    target = context.arms[hand].forward(start)
+    target = context.arms[hand].forward(context.link.setpoints)
     target[2, 3] += height_m
     yield from move_straight(context, hand, target, speed_ratio)
 
@@ -170,7 +169,7 @@ def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: fl
         NotPossible: the arm cannot follow the line.
     """
     try:
-        waypoints = context.arms[hand].straight_line(context.link.positions, target)
+        waypoints = context.arms[hand].straight_line(context.link.setpoints, target)
     except ManipulationError as error:
         raise NotPossible(str(error)) from error
     joints = _arm_joints(context, hand)
@@ -193,7 +192,7 @@ def _smallest(context: SkillContext, hand: str) -> float:
 
 
 def _is_at(context: SkillContext, targets: Mapping[str, float]) -> bool:
-    now, index = context.link.positions, context.robot.joint_index
+    now, index = context.link.setpoints, context.robot.joint_index
     return all(
         abs(float(now[index[name]]) - value) < AT_POSE_RAD for name, value in targets.items()
     )

@@ -121,6 +121,8 @@ class PlanExecution:
         retryable = isinstance(error, TryAgain) and SKILLS[record.action.skill].retryable
         if retryable and record.retries < MAX_RETRIES:
             record.retries += 1
+            record.error = f"trying again after: {error}"
+            self._tell(record)
             self._resume_ns = now_ns + round(BACK_OFF_S * NS_PER_S)
             return
         self._end(record, ActionStatus.ABORTED, str(error))

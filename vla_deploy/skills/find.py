@@ -4,6 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.arms import carry
@@ -37,14 +40,24 @@ def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 
 def _viewpoints(context: SkillContext) -> list[FloorPose]:
-    """Return every viewpoint, nearest first, without the one the robot stands at."""
-    pose = context.link.pose
-    distances = [
-        (math.hypot(viewpoint.x_m - pose.x_m, viewpoint.y_m - pose.y_m), place.name, viewpoint)
-        for place in context.robot.places.values()
-        for viewpoint in place.viewpoints
+    """Return every viewpoint once, the one with the shortest way first."""
+    places = context.robot.places.values()
+    unique = dict.fromkeys(viewpoint for place in places for viewpoint in place.viewpoints)
+    ways = [
+        (_way_m(context, viewpoint), number, viewpoint) for number, viewpoint in enumerate(unique)
     ]
-    return [view for distance, _, view in sorted(distances, key=lambda d: d[:2]) if distance > 0.3]
+    return [
+        viewpoint for way_m, _, viewpoint in sorted(ways, key=lambda way: way[:2]) if way_m > 0.3
+    ]
+
+
+def _way_m(context: SkillContext, goal: FloorPose) -> float:
+    pose = context.link.pose
+    try:
+        points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
+    except NavigationError:
+        return math.inf
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 def _nowhere(context: SkillContext, query: ObjectQuery) -> str:

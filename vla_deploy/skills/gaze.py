@@ -23,10 +23,10 @@ DIRECTIONS: Mapping[str, tuple[float, float]] = {
     "down": (0.0, 0.9),
 }
 # Where the eyes sweep, as (pan, tilt), to cover the tables in front of the robot.
-SWEEP = ((0.0, 0.55), (0.55, 0.6), (-0.55, 0.6), (0.0, 0.9))
+SWEEP = ((0.0, 0.55), (0.7, 0.5), (-0.7, 0.5), (0.0, 0.95))
 FRESH_TIMEOUT_S = 4.0
 SIGHTINGS = 2
-SWEEP_PAUSE_S = 1.2
+SWEEP_PAUSE_S = 1.0
 MEMORY_S = 120.0
 
 

@@ -67,6 +67,15 @@ class RobotLink:
         return self._joints("position")
 
     @property
+    def setpoints(self) -> NDArray[np.float64]:
+        """Return where control holds every joint: what a motion that follows another starts from.
+
+        Raises:
+            TryAgain: control has not told the joints' state for a while.
+        """
+        return self._joints("setpoint")
+
+    @property
     def efforts(self) -> NDArray[np.float64]:
         """Return every joint's effort as a ratio of its stall torque.
 

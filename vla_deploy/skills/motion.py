@@ -12,6 +12,10 @@ from vla_deploy.skills.errors import RobotNotReady, TryAgain
 
 SETTLED_RAD_S = 0.03
 SETTLE_TIMEOUT_S = 1.5
+MIN_DURATION_S = 0.5
+POINT_PERIOD_S = 0.04
+# Waypoints closer together than this are one: their slopes would be noise.
+MIN_PACE_S = 1e-4
 
 
 def pause(context: SkillContext, duration_s: float) -> Skill:
@@ -62,28 +66,62 @@ def follow_joints(
         TryAgain: control refused or cancelled the motion.
         RobotNotReady: a stop ended it.
     """
-    limits = np.array([context.robot.limits[name].velocity for name in joints])
-    times_s, positions = minimum_jerk(waypoints, limits * speed_ratio)
+    limits = [context.robot.limits[name] for name in joints]
+    times_s, positions = minimum_jerk(
+        waypoints,
+        speed_ratio * np.array([limit.velocity for limit in limits]),
+        np.array([limit.acceleration for limit in limits]),
+    )
     motion_id = context.link.send_trajectory(joints, times_s, positions)
     yield from _finish(context, motion_id, f"moving {_named(joints)}")
 
 
 def minimum_jerk(
-    waypoints: NDArray[np.float64], velocity_limits: NDArray[np.float64], period_s: float = 0.04
+    waypoints: NDArray[np.float64],
+    velocity_limits: NDArray[np.float64],
+    acceleration_limits: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Time waypoints so that no joint exceeds its limit and the ends are at rest.
+    """Time waypoints so that no joint exceeds its limits and the ends are at rest.
 
     The path parameter is 10u^3 - 15u^4 + 6u^5 (Flash and Hogan 1985); its peak rate is 1.875.
     """
-    steps = np.abs(np.diff(waypoints, axis=0))
-    pace_s = (steps / velocity_limits).max(axis=1)
-    along = np.concatenate(([0.0], np.cumsum(np.maximum(pace_s, 1e-6))))
-    duration_s = max(0.5, 1.875 * float(along[-1]))
-    count = max(2, math.ceil(duration_s / period_s))
-    u = np.linspace(0.0, 1.0, count + 1)
+    pace_s = (np.abs(np.diff(waypoints, axis=0)) / velocity_limits).max(axis=1)
+    kept = np.concatenate(([True], pace_s > MIN_PACE_S))
+    along = np.concatenate(([0.0], np.cumsum(pace_s)))[kept]
+    duration_s = max(MIN_DURATION_S, 1.875 * float(along[-1]))
+    u = np.linspace(0.0, 1.0, max(4, math.ceil(duration_s / POINT_PERIOD_S)) + 1)
     s = (10 * u**3 - 15 * u**4 + 6 * u**5) * along[-1]
-    columns = [np.interp(s, along, column) for column in waypoints.T]
-    return u * duration_s, np.column_stack(columns)
+    positions = _smooth_through(along, waypoints[kept], s)
+    rates = np.gradient(positions, u, axis=0)
+    bends = np.gradient(rates, u, axis=0)
+    slowest_s = (np.abs(rates) / velocity_limits).max()
+    hardest_s = math.sqrt((np.abs(bends) / acceleration_limits).max())
+    return u * max(duration_s, slowest_s, hardest_s), positions
+
+
+def _smooth_through(
+    along: NDArray[np.float64], waypoints: NDArray[np.float64], s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return points at `s` of a curve through waypoints without corners or overshoot.
+
+    Tangents are harmonic means of the neighbouring slopes, 0 at turning points (Fritsch and
+    Butland 1984).
+    """
+    if len(along) < 2:
+        return np.repeat(waypoints[:1], len(s), axis=0)
+    slopes = np.diff(waypoints, axis=0) / np.diff(along)[:, None]
+    product = slopes[:-1] * slopes[1:]
+    mean = 2 * product / np.where(product > 0, slopes[:-1] + slopes[1:], 1.0)
+    tangents = np.vstack((slopes[:1], np.where(product > 0, mean, 0.0), slopes[-1:]))
+    index = np.clip(np.searchsorted(along, s, side="right") - 1, 0, len(along) - 2)
+    width = (along[index + 1] - along[index])[:, None]
+    t = ((s - along[index]) / width[:, 0])[:, None]
+    return np.asarray(
+        (2 * t**3 - 3 * t**2 + 1) * waypoints[index]
+        + (t**3 - 2 * t**2 + t) * width * tangents[index]
+        + (3 * t**2 - 2 * t**3) * waypoints[index + 1]
+        + (t**3 - t**2) * width * tangents[index + 1]
+    )
 
 
 def settle(context: SkillContext, joints: Sequence[str]) -> Skill:

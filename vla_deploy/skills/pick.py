@@ -49,20 +49,23 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         TryAgain: it was not seen, or the grasp did not hold.
     """
     query = parse_object(parameters["object"])
+    if _already_held(context, query):
+        return
     hands = _free_hands(context, parameters.get("arm"))
+    yield from carry(context)
     yield from see(context, query)
     seen = remembered(context, query)
     if seen is None:
         raise TryAgain(f"I lost sight of the {query}")
     choice = _choose(context, seen, hands)
-    yield from _approach(context, choice)
-    yield from _take(context, choice, query)
-    context.hands[choice.hand] = Held(
+    held = Held(
         kind=str(seen["class"]),
         colour=str(seen["colour"]),
         width_m=choice.grasp.width_m,
         below_grip_m=choice.grasp.below_grip_m,
     )
+    yield from _approach(context, choice)
+    yield from _take(context, choice, query, held)
     yield from carry(context)
 
 
@@ -77,25 +80,34 @@ def _approach(context: SkillContext, choice: Choice) -> Skill:
     yield from move_straight(context, choice.hand, target, STRAIGHT_SPEED_RATIO)
 
 
-def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
+def _take(context: SkillContext, choice: Choice, query: ObjectQuery, held: Held) -> Skill:
     """Close, feel, lift, feel again; open and back off when nothing is held."""
     grasp, hand = choice.grasp, choice.hand
     goal_m = max(grasp.width_m - 2 * SQUEEZE_M, 0.004)
     yield from set_opening(context, hand, goal_m, grasp.effort_ratio)
     touch = feel(context, hand, goal_m)
     if touch.holds(grasp.effort_ratio):
+        context.hands[hand] = held
         yield from lift(context, hand, LIFT_M)
         yield from pause(context, 0.3)
         touch = feel(context, hand, goal_m)
         if touch.holds(grasp.effort_ratio):
             return
+    context.hands[hand] = None
     yield from set_opening(context, hand, grasp.opening_m)
-    if touch.opening_m > 0:
-        yield from lift(context, hand, LIFT_M)
+    yield from lift(context, hand, LIFT_M)
     yield from carry(context)
     raise TryAgain(
         f"the {hand} hand does not hold the {query}: fingers {touch.opening_m * 1000:.0f} mm apart "
         f"(expected {grasp.width_m * 1000:.0f}), effort {touch.effort_ratio:.2f}"
+    )
+
+
+def _already_held(context: SkillContext, query: ObjectQuery) -> bool:
+    wanted = (query.kind, query.colour)
+    return any(
+        held is not None and wanted in ((held.kind, held.colour), (held.kind, ""))
+        for held in context.hands.values()
     )
 
 
@@ -128,7 +140,7 @@ def _choose(context: SkillContext, seen: Mapping[str, Any], hands: list[str]) ->
             raise NotPossible(str(error)) from error
         choices = [choice for grasp in grasps if (choice := _solve(context, hand, grasp, reasons))]
         if choices:
-            now = context.link.positions
+            now = context.link.setpoints
             return min(choices, key=lambda one: float(np.abs(one.above - now).max()))
     raise NotPossible(
         f"neither grasp of the {seen['class']} at {centre[0]:.2f}, {centre[1]:.2f}, "
@@ -141,7 +153,7 @@ def _solve(context: SkillContext, hand: str, grasp: Grasp, reasons: list[str]) -
     x_m, y_m, z_m = grasp.point_m
     try:
         high = hand_down((x_m, y_m, z_m + PREGRASP_M), grasp.yaw_rad)
-        above = arm.solve(high, context.link.positions, restarts=RESTARTS).positions
+        above = arm.solve(high, context.link.setpoints, restarts=RESTARTS).positions
         arm.straight_line(above, hand_down(grasp.point_m, grasp.yaw_rad))
     except ManipulationError as error:
         reasons.append(str(error))

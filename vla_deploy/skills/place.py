@@ -55,7 +55,7 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     index = context.robot.joint_index
     yield from move_joints(context, {name: float(above[index[name]]) for name in joints}, 0.5)
     yield from settle(context, joints)
-    down = context.arms[hand].forward(context.link.positions)
+    down = context.arms[hand].forward(context.link.setpoints)
     down[:3, 3] = release_m
     yield from move_straight(context, hand, down, 0.35)
     yield from set_opening(context, hand, held.width_m + 0.03)
@@ -99,7 +99,7 @@ def _solve_above(
     context: SkillContext, hand: str, release_m: tuple[float, float, float]
 ) -> NDArray[np.float64]:
     """Return the posture above the release point that moves the arm least and can descend."""
-    now, arm = context.link.positions, context.arms[hand]
+    now, arm = context.link.setpoints, context.arms[hand]
     x_m, y_m, z_m = release_m
     found, reason = [], ""
     for yaw_rad in YAWS_RAD:
