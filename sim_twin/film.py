@@ -16,9 +16,9 @@ Image = NDArray[np.uint8]
 WIDTH, HEIGHT = 640, 360
 INSET_WIDTH, INSET_HEIGHT = 160, 120
 FPS = 5.0
-CHASE_ANGLE_DEG = 40.0
+CHASE_ANGLE_DEG = 125.0
 CHASE_ELEVATIONS_DEG = (-28.0, -34.0, -40.0, -46.0, -52.0, -58.0, -64.0, -70.0, -76.0)
-CHASE_HEIGHTS_M = (0.1, 0.9)
+CHASE_HEIGHTS_M = (0.45, 0.95)
 SHEET_ROWS, SHEET_COLUMNS = 4, 3
 FOURCC = {".webm": "VP80", ".mp4": "mp4v", ".avi": "MJPG"}
 _FURNITURE_GROUPS = np.array([1, 0, 0, 0, 0, 0], np.uint8)
@@ -28,12 +28,12 @@ _SHADE = 0.45
 
 
 class ChaseCamera:
-    """Follow the robot from behind, slowly enough to be watched, and look over walls."""
+    """Watch the robot's hands from its front and right, slowly, and look over walls."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self.view = mujoco.MjvCamera()
         self.view.type = mujoco.mjtCamera.mjCAMERA_FREE.value
-        self.view.distance = 2.7
+        self.view.distance = 2.3
         self._model = model
         self._data = data
         self._root = model.body(ROBOT_ROOT).id

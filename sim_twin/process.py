@@ -1,5 +1,6 @@
 """Run the twin on the wall clock: physics paced, buses answered between any two steps."""
 
+import gc
 import json
 import os
 import select
@@ -15,6 +16,7 @@ from sim_twin.engine import STEP_NS
 from sim_twin.errors import RefereeRefusal
 from sim_twin.json_line_server import JsonLineServer
 from sim_twin.pacer import Pacer, RealTimeFactor
+from sim_twin.priority import claim_priority
 from sim_twin.pty_line import PtyLine
 from sim_twin.referee import REFEREE_SOCKET
 from sim_twin.twin import Twin
@@ -66,7 +68,10 @@ class TwinProcess:
             "truth": self._truth,
             "inside": self._inside,
         }
+        gc.collect()
+        gc.freeze()  # a full collection of the model and libraries takes longer than a step
         now_ns = clock.now_ns()
+        self._priority = claim_priority()
         self._pacer = Pacer(STEP_NS, now_ns)
         self._factor = RealTimeFactor(now_ns, self._twin.now_ns)
         self._ready.write_text(json.dumps({"pid": os.getpid()}), encoding="utf-8")
@@ -132,6 +137,7 @@ class TwinProcess:
             **self._twin.engine.referee.truth(),
             "real_time_factor": self._factor.value,
             "slipped_s": self._pacer.slipped_ns / NS_PER_S,
+            "priority": self._priority.value,
         }
 
     def _inside(self, request: Mapping[str, Any]) -> dict[str, Any]:

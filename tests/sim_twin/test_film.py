@@ -59,7 +59,7 @@ def test_the_sheet_spreads_over_the_whole_film() -> None:
 
 def test_the_chasing_camera_rises_to_look_over_a_wall(engine: Engine) -> None:
     free = ChaseCamera(engine.model, engine.data).view.elevation
-    engine.place("base", 2.6, 0.0, 0.0, 0.0)
+    engine.place("base", 1.5, 0.0, 0.0, 1.5)  # the wall stands between robot and camera
     assert ChaseCamera(engine.model, engine.data).view.elevation < free
 
 
