@@ -8,7 +8,7 @@ from vla_deploy.perception.shapes import Shape
 Range = tuple[float, float]
 Measure = Callable[[Shape], float]
 
-SPHERE_RESIDUAL = 0.12
+SPHERE_RESIDUAL = 0.06
 SPHERE_SIZE = (0.75, 1.3)
 
 

@@ -28,6 +28,7 @@ class Cloud:
     depth_m: Floats
     points: Floats
     valid: Mask
+    own_body: Mask
     camera_position: NDArray[np.float64]
     focal_px: float
 
@@ -42,11 +43,11 @@ def make_cloud(
     depth_m: Floats,
     camera: Intrinsics,
     base_from_camera: NDArray[np.float64],
-    ignore: Mask | None = None,
+    body: Mask | None = None,
 ) -> Cloud:
     """Back-project an image; `base_from_camera` is 4x4 from the optical frame (z forward).
 
-    `ignore` marks pixels that show the robot itself.
+    `body` marks pixels that show the robot itself.
     """
     height, width = depth_m.shape
     u, v = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
@@ -57,13 +58,13 @@ def make_cloud(
     origin = base_from_camera[:3, 3].astype(np.float32)
     points = (rays * depth_m[..., None]).reshape(-1, 3) @ rotation.T + origin
     valid = (depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)
-    if ignore is not None:
-        valid &= ~ignore
+    own_body = np.zeros_like(valid) if body is None else body
     return Cloud(
         rgb=rgb,
         depth_m=depth_m,
         points=points.reshape(height, width, 3).astype(np.float32, copy=False),
-        valid=valid,
+        valid=valid & ~own_body,
+        own_body=own_body,
         camera_position=base_from_camera[:3, 3].copy(),
         focal_px=camera.fx,
     )

@@ -130,7 +130,7 @@ def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np
     rows, columns = np.unravel_index(pixels, heights.shape)
     box = (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1)
     at_border = box[0] <= 1 or box[1] <= 1 or box[2] >= width - 1 or box[3] >= height - 1
-    around, over_top = _hidden_shares(cloud.depth_m, pixels)
+    around, over_top = _hidden_shares(cloud, pixels)
     return Cluster(
         support=support,
         points=cloud.points[rows, columns],
@@ -144,14 +144,15 @@ def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np
     )
 
 
-def _hidden_shares(depth_m: Floats, pixels: NDArray[np.intp]) -> tuple[float, float]:
+def _hidden_shares(cloud: Cloud, pixels: NDArray[np.intp]) -> tuple[float, float]:
     """Return how much of the outline, and of its upper edge, borders on something nearer."""
+    depth_m = cloud.depth_m
     member = np.zeros(depth_m.shape, dtype=np.uint8)
     member.flat[pixels] = 1
     kernel = np.ones((5, 5), dtype=np.uint8)
     ring = (cv2.dilate(member, kernel) - member).astype(np.bool_)
     beside = cv2.dilate(np.where(member > 0, depth_m, 0.0).astype(np.float32), kernel)
-    nearer = ring & (depth_m > 0.0) & (depth_m < beside - OCCLUDER_M)
+    nearer = cloud.own_body | ((depth_m > 0.0) & (depth_m < beside - OCCLUDER_M))
     above = np.zeros_like(ring)
     above[:-2] = member[2:] > 0
     above &= ring

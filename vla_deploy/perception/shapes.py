@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.perception.cloud import Floats, Mask
+from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Floats, Mask
 from vla_deploy.perception.clusters import Cluster
 
 TOP_SLICE_M = 0.012
@@ -31,7 +31,7 @@ class Rectangle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sphere:
-    """Hold a fitted sphere and how well the points agree with it."""
+    """Hold a fitted sphere and how far the points are off it, beyond the depth noise."""
 
     centre: tuple[float, float, float]
     radius_m: float
@@ -57,6 +57,7 @@ class Shape:
 def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
     """Measure one cluster."""
     pixel_m = cluster.depth_m / focal_px
+    sigma_m = DEPTH_SIGMA_PER_M * cluster.depth_m**2
     height_m = float(np.percentile(cluster.heights, 98.0))
     xy = cluster.points[:, :2]
     slice_m = max(TOP_SLICE_M, TOP_SLICE_RATIO * height_m)
@@ -67,7 +68,7 @@ def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
         footprint=rectangle_of(xy, pixel_m),
         top=top,
         hole_m=_hole(cluster, top, height_m, pixel_m),
-        sphere=_sphere(cluster.points[cluster.heights > SPHERE_MIN_HEIGHT_M]),
+        sphere=_sphere(cluster.points[cluster.heights > SPHERE_MIN_HEIGHT_M], sigma_m),
     )
 
 
@@ -122,7 +123,7 @@ def _hole(cluster: Cluster, rim: Rectangle, height_m: float, pixel_m: float) -> 
     return max(0.0, height_m - float(np.median(middle)))
 
 
-def _sphere(points: Floats) -> Sphere | None:
+def _sphere(points: Floats, sigma_m: float) -> Sphere | None:
     """Fit a sphere by linear least squares on |p|^2 = 2 c p + k."""
     if len(points) < 12:
         return None
@@ -139,5 +140,5 @@ def _sphere(points: Floats) -> Sphere | None:
     return Sphere(
         centre=(float(x), float(y), float(z)),
         radius_m=radius_m,
-        residual_ratio=float(np.sqrt(np.mean(off**2))) / radius_m,
+        residual_ratio=math.sqrt(max(0.0, float(np.mean(off**2)) - sigma_m**2)) / radius_m,
     )
