@@ -11,7 +11,8 @@ import numpy as np
 from vla_deploy.control.axes import Floats
 from vla_deploy.robots import RobotDescription
 
-# Full duty at this error with the factory P gain of 800: 885 / (800 / 128) pulses of 0.0015 rad.
+# Full duty at this error with the P gain of 800 that control writes (e-manual: P / 128):
+# 885 / (800 / 128) pulses of 0.0015 rad.
 FULL_DUTY_ERROR_RAD = 0.217
 _MAX_OFFSET_RAD = 0.2
 

@@ -16,6 +16,10 @@ from vla_deploy.robots import RobotDescription
 REOPEN_NS = NS_PER_S
 _FIRST_READS = 10
 
+# Written whenever a servo is powered, since a reboot forgets them. P is what the gravity offset
+# reckons with (control/gravity.py); without D a loaded elbow rings for half a second after a stop.
+GAINS = {"position_p_gain": 800, "position_i_gain": 0, "position_d_gain": 4000}
+
 
 class ServoLine:
     """Own the bus of all servos; a lost link is remembered, not raised, after `open`."""
@@ -113,7 +117,7 @@ class ServoLine:
 
     def energise(self, servo: int) -> bool:
         """Hold one servo where it is, its watchdog armed; False with `failure` when it refuses."""
-        return self._attempt(lambda bus: bus.enable_torque([self._ids[servo]]))
+        return self._attempt(lambda bus: self._energise(bus, self._ids[servo]))
 
     def clear_watchdogs(self) -> bool:
         """Let servos that have stopped by themselves take goals again."""
@@ -136,6 +140,11 @@ class ServoLine:
         """Release the line; the servos keep what they do until their watchdog stops them."""
         if self._bus is not None:
             self._bus.close()
+
+    def _energise(self, bus: DynamixelBus, servo_id: int) -> None:
+        for register, gain in GAINS.items():
+            bus.write_register(servo_id, register, gain)
+        bus.enable_torque([servo_id])
 
     def _disable(self, bus: DynamixelBus, servos: Axes) -> None:
         if len(servos) > 0:

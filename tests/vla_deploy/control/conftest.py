@@ -83,7 +83,8 @@ class Rig:
     def base(self) -> dict[str, float]:
         sample = self._base.latest()
         assert sample is not None
-        return {name: float(sample.data[name]) for name in sample.data.dtype.names}
+        names = ("x_m", "y_m", "yaw_rad", "v_m_s", "w_rad_s", "enabled")
+        return {name: float(sample.data[name]) for name in names}
 
     @property
     def status(self) -> dict[str, Any]:
