@@ -78,6 +78,7 @@ class PerceptionNode:
         space = self._space
         self._joint_state: CellReader = space.cell_reader("joint_state")
         self._base_state: CellReader = space.cell_reader("base_state")
+        self._executor_status: CellReader = space.cell_reader("executor_status")
         self._writers: dict[str, CellWriter] = {
             name: space.cell_writer(name) for name in ("imu", "scan", "pose", "scene")
         }
@@ -95,6 +96,7 @@ class PerceptionNode:
         self._move()
         self._read_scan()
         self._read_camera()
+        self._carry_held()
         self._publish_scene()
 
     def stop(self) -> None:
@@ -167,6 +169,18 @@ class PerceptionNode:
             frame.stamp_ns,
         )
         self._next_scene_ns = 0
+
+    def _carry_held(self) -> None:
+        """Let the things that hands hold, as the executor tells, move along with the hands."""
+        sample = self._executor_status.latest()
+        positions = self._joints.at(self._clock.now_ns(), STALE_JOINTS_NS)
+        if sample is None or positions is None:
+            return
+        for name, held in sample.document().get("holding", {}).items():
+            if held and name in self._robot.hands:
+                pose = self._model.site_pose(self._robot.hands[name].grip_site, positions)
+                grip = (float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3]))
+                self._scene.carry(held, grip, self._localiser.pose, self._clock.now_ns())
 
     def _camera_turn(self, stamp_ns: int) -> float:
         """Return how fast the camera turned, in the map frame, up to a moment."""

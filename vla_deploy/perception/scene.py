@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.localisation import Pose2D
 from vla_deploy.perception.cloud import Cloud, make_cloud
-from vla_deploy.perception.detection import Detection, detect
+from vla_deploy.perception.detection import Detection, Vector, detect
 from vla_deploy.perception.shapes import half_turn
 from vla_deploy.perception.tracking import Track, Tracker, View
 
@@ -48,6 +48,11 @@ class Scene:
         }
         self._tracker.update(self.detections, views, stamp_ns)
         self.stamp_ns = stamp_ns
+
+    def carry(self, class_name: str, grip: Vector, base: Pose2D, stamp_ns: int) -> None:
+        """Take note that a hand holds a thing; `grip` is where, in the base frame."""
+        placed = base.compose(Pose2D(grip[0], grip[1], 0.0))
+        self._tracker.carry(class_name, (placed.x_m, placed.y_m, grip[2]), stamp_ns)
 
     def document(self) -> dict[str, Any]:
         """Return the scene topic's document."""

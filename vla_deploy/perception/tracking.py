@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from vla_deploy.perception.classes import OTHER
 from vla_deploy.perception.detection import Detection, Vector
 from vla_deploy.perception.shapes import half_turn
 
@@ -13,6 +14,7 @@ CONFIRM_HITS = 2
 # Something of the same class and colour may have been pushed; anything else must be right there.
 SAME_GATE_M = 0.12
 OTHER_GATE_M = 0.05
+CARRY_GATE_M = 0.2
 LEAST_GAIN = 0.2
 DOUBTFUL_GAIN = 0.05
 MISSES_TO_FORGET = 5
@@ -46,7 +48,7 @@ class Track:
     @property
     def class_name(self) -> str:
         """Return the class most often seen."""
-        return self.classes.most_common(1)[0][0] if self.classes else "object"
+        return self.classes.most_common(1)[0][0] if self.classes else OTHER
 
     @property
     def colour(self) -> str:
@@ -98,12 +100,25 @@ class Tracker:
         for track, detection in pairs:
             _absorb(track, detection, stamp_ns)
         for detection in detections:
-            if id(detection) not in taken and not detection.truncated:
+            if id(detection) not in taken and _is_sure(detection):
                 self._tracks.append(_new_track(detection, stamp_ns))
         self._forget()
         for track in self._tracks:
             if not track.object_id and track.seen_count >= CONFIRM_HITS:
                 track.object_id = self._name(track)
+
+    def carry(self, class_name: str, grip_m: Vector, stamp_ns: int) -> None:
+        """Move the thing that a hand holds along with the hand: it is not where it was seen."""
+        near = [
+            (gap_m, track.object_id, track)
+            for track in self._tracks
+            if track.object_id
+            and track.class_name == class_name
+            and (gap_m := math.dist(track.position_m, grip_m)) < CARRY_GATE_M
+        ]
+        if near:
+            _, _, held = min(near)
+            held.position_m, held.last_seen_ns, held.misses = grip_m, stamp_ns, 0
 
     def _match(self, detections: list[Detection]) -> list[tuple[Track, Detection]]:
         """Pair each track with at most one detection, the closest pairs first."""
@@ -146,6 +161,12 @@ class Tracker:
                     return old.object_id
         self._used[track.class_name] += 1
         return f"{track.class_name}_{self._used[track.class_name]}"
+
+
+def _is_sure(detection: Detection) -> bool:
+    """Tell whether a sight is good enough to begin a track with."""
+    vague = detection.occluded and detection.class_name == OTHER
+    return not (detection.truncated or vague)
 
 
 def _distance(track: Track, detection: Detection) -> float | None:

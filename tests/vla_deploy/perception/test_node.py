@@ -39,6 +39,7 @@ class Rig:
         self.flat = flat
         self.head_tilt: Callable[[float], float] = lambda _: 0.75
         self.base: Callable[[float], Pose2D] = lambda _: VIEW
+        self.arm: dict[str, float] = {}
         flat.scatter(1)
         self.devices: dict[str, WireDevice] = {
             "lidar": LidarDevice(flat.lidar.cast, seed=1),
@@ -84,7 +85,7 @@ class Rig:
         while self.now < end_ns:
             self.now += STEP_NS
             t = self.now / 1e9
-            self.flat.stand(self.base(t), head_tilt=self.head_tilt(t))
+            self.flat.stand(self.base(t), head_tilt=self.head_tilt(t), **self.arm)
             for device in self.devices.values():
                 device.step(self.now)
             if self.now % NODE_PERIOD_NS == 0:
@@ -248,3 +249,39 @@ def test_a_cup_that_is_carried_off_is_forgotten_and_keeps_its_id_elsewhere(
     rig.flat.put("red_cup", (2.2, 1.42, 0.4975))
     rig.run_for(1.0)
     assert math.dist(rig.known()["cup_1"]["position_m"][:2], (2.2, 1.42)) < 0.03
+
+
+def reach(flat: "StillFlat", target: np.ndarray) -> dict[str, float]:
+    """Return right-arm joints that bring the grip near a point of the base frame."""
+    random = np.random.default_rng(0)
+    names = flat.robot.groups["right_arm"].joints
+    spans = [(flat.robot.limits[name].min, flat.robot.limits[name].max) for name in names]
+    tries = [
+        dict(zip(names, (random.uniform(*s) for s in spans), strict=True)) for _ in range(4000)
+    ]
+
+    def gap_m(joints: dict[str, float]) -> float:
+        grip = flat.kinematics.site_pose("right_grip", flat.positions(**joints))[:3, 3]
+        return float(np.linalg.norm(grip - target))
+
+    return min(tries, key=gap_m)
+
+
+def test_a_cup_in_the_hand_goes_where_the_hand_goes(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig()
+    rig.flat.put("red_cup", (2.1, 1.62, 0.4975))
+    rig.run_for(1.0)
+    cup = rig.known()["cup_1"]["position_m"]
+    local = Pose2D(cup[0], cup[1], 0.0).relative_to(VIEW)
+    rig.arm = reach(rig.flat, np.array([local.x_m, local.y_m, cup[2]]))
+    rig.run_for(0.1)
+    status = rig.space.cell_writer("executor_status")
+    status.put_document({"holding": {"left": None, "right": "cup"}})
+    rig.run_for(0.1)
+    rig.arm["right_shoulder_yaw"] += 0.1
+    rig.flat.put("red_cup", (6.3, 4.4, 0.5475))  # out of sight: only the hand tells
+    rig.run_for(1.5)
+    grip = rig.flat.kinematics.site_pose("right_grip", rig.flat.joints)[:3, 3]
+    placed = VIEW.compose(Pose2D(grip[0], grip[1], 0.0))
+    told = rig.known()["cup_1"]["position_m"]
+    assert told == pytest.approx((placed.x_m, placed.y_m, grip[2]), abs=0.02)

@@ -145,3 +145,32 @@ def test_a_truncated_sight_makes_no_thing_but_keeps_one_alive() -> None:
         objects = watcher.image(seen("object", at=(1.02, 2.0, 0.45), truncated=True))
     assert [(o["id"], o["class"]) for o in objects] == [("cup_1", "cup")]
     assert objects[0]["position_m"][0] < 1.01
+
+
+def test_what_a_hand_holds_moves_with_the_hand_and_is_not_missed() -> None:
+    watcher = Watcher()
+    pair = (seen(), seen(at=(1.3, 2.0, 0.5)))
+    watcher.image(*pair)
+    watcher.image(*pair)
+    for i in range(20):
+        watcher.tracker.carry("cup", (1.0, 2.0, 0.5 + 0.02 * i), 0)
+        objects = watcher.image(pair[1])
+    heights = {o["id"]: o["position_m"][2] for o in objects}
+    assert heights == {"cup_1": pytest.approx(0.88), "cup_2": 0.5}
+
+
+def test_a_hand_that_holds_something_unknown_moves_nothing() -> None:
+    watcher = Watcher()
+    watcher.image(seen())
+    watcher.image(seen())
+    watcher.tracker.carry("ball", (1.0, 2.0, 0.6), 0)
+    watcher.tracker.carry("cup", (1.0, 2.0, 1.2), 0)
+    (cup,) = watcher.image(seen())
+    assert cup["position_m"] == [1.0, 2.0, 0.5]
+
+
+def test_a_vague_sight_begins_no_track() -> None:
+    watcher = Watcher()
+    for _ in range(4):
+        objects = watcher.image(seen("object", "brown", occluded=True))
+    assert objects == []
