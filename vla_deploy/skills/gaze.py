@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,9 @@ DIRECTIONS: Mapping[str, tuple[float, float]] = {
 SWEEP = ((0.0, 0.55), (0.7, 0.5), (-0.7, 0.5), (0.0, 0.95))
 FRESH_TIMEOUT_S = 4.0
 SIGHTINGS = 2
-SWEEP_PAUSE_S = 1.0
+SWEEP_TIMEOUT_S = 2.0
+# Two images at the camera's rate: perception wants to see a thing twice.
+CONFIRMED_S = 0.4
 MEMORY_S = 120.0
 
 
@@ -95,16 +98,18 @@ def see(context: SkillContext, query: ObjectQuery) -> Skill:
 def sweep(context: SkillContext, query: ObjectQuery) -> Skill:
     """Let the eyes sweep until the object is seen or the sweep is over."""
     started_ns = context.link.clock.now_ns()
-
-    def seen() -> bool:
-        age_ns = context.link.clock.now_ns() - started_ns
-        return _nearest(context, query, age_ns) is not None
-
     for pan_rad, tilt_rad in SWEEP:
         yield from turn_head(context, pan_rad, tilt_rad)
-        yield from wait_until(context, seen, SWEEP_PAUSE_S)
-        if seen():
+        looked = partial(_looked, context, context.link.clock.now_ns())
+        yield from wait_until(context, looked, SWEEP_TIMEOUT_S)
+        age_ns = context.link.clock.now_ns() - started_ns
+        if _nearest(context, query, age_ns) is not None:
             return
+
+
+def _looked(context: SkillContext, since_ns: int) -> bool:
+    """Tell whether perception has judged enough images taken after a moment to confirm things."""
+    return context.link.scene_stamp_ns > since_ns + round(CONFIRMED_S * NS_PER_S)
 
 
 def _nearest(context: SkillContext, query: ObjectQuery, age_ns: int) -> Mapping[str, Any] | None:

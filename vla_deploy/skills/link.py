@@ -131,6 +131,12 @@ class RobotLink:
         return () if sample is None else sample.document().get("objects", ())
 
     @property
+    def scene_stamp_ns(self) -> int:
+        """Return when the newest image that perception judged was taken; 0 before the first."""
+        sample = self._scene.latest()
+        return 0 if sample is None else int(sample.document()["stamp_ns"])
+
+    @property
     def surfaces(self) -> Sequence[Mapping[str, Any]]:
         """Return the horizontal surfaces that perception saw last."""
         sample = self._scene.latest()
