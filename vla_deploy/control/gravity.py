@@ -42,4 +42,4 @@ class GravityOffset:
     def at(self, position: Floats) -> Floats:
         """Return the offsets for the setpoints `position`."""
         offset = self._gravity(position) * self._compliance
-        return np.clip(offset, -self._limit, self._limit)
+        return np.minimum(np.maximum(offset, -self._limit), self._limit)

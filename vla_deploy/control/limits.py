@@ -37,6 +37,6 @@ class SetpointGate:
         wanted = np.where(np.isnan(setpoint), self.sent, setpoint)
         low = np.maximum(self.sent - step, np.minimum(self._lower, self.sent))
         high = np.minimum(self.sent + step, np.maximum(self._upper, self.sent))
-        self.sent = np.clip(wanted, low, high)
+        self.sent = np.minimum(np.maximum(wanted, low), high)
         np.not_equal(self.sent, wanted, out=self._clamped)
         return self.sent

@@ -3,8 +3,6 @@
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
 from drivers.dynamixel import BusState
 from vla_deploy.control.axes import Floats
 from vla_deploy.control.motions import MotionResult
@@ -91,4 +89,4 @@ class TickClock:
         gap_s = (now_ns - last_ns) / 1e9
         self.late_ticks += gap_s > 1.5 * self._nominal_s
         self.period_s += 0.02 * (gap_s - self.period_s)
-        return float(np.clip(gap_s, 0.0, 2.0 * self._nominal_s))
+        return min(max(gap_s, 0.0), 2.0 * self._nominal_s)

@@ -64,7 +64,7 @@ def evaluate(
 
     A reset is refused while any latched cause is still found; it never arms anything.
     """
-    findings = tuple(rule.probe(inputs, limits) for rule in RULES)
+    findings = [rule.probe(inputs, limits) for rule in RULES]
     if state == _FRESH and not any(findings) and not inputs.reset_requested:
         return state, CLEAR
     latched, outcome = _reset(state.latched, findings, inputs.reset_requested)
@@ -85,7 +85,7 @@ _FRESH = SafetyState()
 
 
 def _reset(
-    latched: tuple[Verdict, ...], findings: tuple[Finding | None, ...], requested: bool
+    latched: tuple[Verdict, ...], findings: list[Finding | None], requested: bool
 ) -> tuple[tuple[Verdict, ...], ResetOutcome]:
     if not requested:
         return latched, ResetOutcome.NOT_ASKED

@@ -1,0 +1,17 @@
+"""Start the real control process where it cannot work, and read what it says."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+@pytest.mark.stack
+def test_a_missing_device_is_one_clear_line_and_exit_code_2(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "vla_deploy.control", "--run-dir", str(tmp_path)]
+    command += ["--robot", "butler", "--profile", "desktop", "--devices-dir", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert str(tmp_path / "servos") in line

@@ -1,0 +1,57 @@
+"""Hold power to the stop categories of the robot file, and gravity to the servos' stiffness."""
+
+import numpy as np
+import pytest
+
+from vla_deploy.control.gravity import GravityOffset, stiffness
+from vla_deploy.control.stop_plan import StopPlan
+from vla_deploy.robots import RobotDescription, load_robot
+from vla_deploy.robots.description import StopCategory
+from vla_deploy.robots.model import RobotModel
+from vla_deploy.safety import Reaction
+
+
+@pytest.fixture(scope="module")
+def robot() -> RobotDescription:
+    return load_robot("butler")
+
+
+def names(robot: RobotDescription, joints: np.ndarray[tuple[int], np.dtype[np.intp]]) -> set[str]:
+    return {robot.joint_names[joint] for joint in joints}
+
+
+def test_an_estop_takes_power_from_category_1_at_rest_only(robot: RobotDescription) -> None:
+    plan = StopPlan(robot)
+    assert len(plan.unpowered_at_once(Reaction.GROUP_STOP)) == 0
+    head = {"head_pan", "head_tilt"}
+    assert names(robot, plan.unpowered_at_rest(Reaction.GROUP_STOP)) == head
+    assert names(robot, plan.released) == head
+    assert plan.base_category(Reaction.GROUP_STOP) is StopCategory.STOP_THEN_REMOVE_POWER
+
+
+def test_a_protective_stop_keeps_all_power(robot: RobotDescription) -> None:
+    plan = StopPlan(robot)
+    assert len(plan.unpowered_at_once(Reaction.HOLD)) == 0
+    assert len(plan.unpowered_at_rest(Reaction.HOLD)) == 0
+    assert plan.base_category(Reaction.HOLD) is StopCategory.STOP_KEEP_POWER
+
+
+def test_a_servo_gives_its_stall_torque_at_its_full_duty_error(robot: RobotDescription) -> None:
+    by_joint = dict(zip(robot.joint_names, stiffness(robot), strict=True))
+    assert by_joint["left_shoulder_yaw"] == pytest.approx(10.6 / 0.217)
+    assert by_joint["left_gripper"] == pytest.approx(1.6 / 0.217 / 0.012**2)
+
+
+def test_the_offset_makes_the_holding_torque(robot: RobotDescription) -> None:
+    model = RobotModel(robot)
+    pose = np.clip(0.4, robot.position_min, robot.position_max)
+    offset = GravityOffset(robot, model.gravity).at(pose)
+    assert offset * stiffness(robot) == pytest.approx(model.gravity(pose), abs=1e-9)
+    assert np.abs(offset).max() > 0.01
+
+
+def test_the_offset_is_bounded_whatever_the_model_says(robot: RobotDescription) -> None:
+    heavy = GravityOffset(robot, lambda q: np.full(len(q), 1e6))
+    offset = dict(zip(robot.joint_names, heavy.at(np.zeros(16)), strict=True))
+    assert offset["left_elbow"] == pytest.approx(0.2)
+    assert offset["left_gripper"] == pytest.approx(0.2 * 0.012)
