@@ -11,7 +11,7 @@ from vla_deploy.perception.cloud import Cloud
 from vla_deploy.perception.clusters import Cluster, find_clusters, part_of, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
 from vla_deploy.perception.shapes import Rectangle, Shape, inside_rectangle, measure
-from vla_deploy.perception.supports import find_supports
+from vla_deploy.perception.supports import Support
 
 Vector = tuple[float, float, float]
 
@@ -87,9 +87,9 @@ PLACEMENT: dict[str, Callable[[Shape], _Pose]] = {
 }
 
 
-def detect(cloud: Cloud) -> list[Detection]:
-    """Return the things in view, the nearest first."""
-    clusters = find_clusters(cloud, find_supports(cloud))
+def detect(cloud: Cloud, supports: list[Support]) -> list[Detection]:
+    """Return the things that stand on the supports, the nearest first."""
+    clusters = find_clusters(cloud, supports)
     clusters.sort(key=lambda cluster: cluster.depth_m)
     found = [detection for cluster in clusters for detection in _detections(cluster, cloud)]
     boxes = [detection for detection in found if detection.class_name == "box"]

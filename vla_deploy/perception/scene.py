@@ -12,6 +12,7 @@ from vla_deploy.navigation.localisation import Pose2D
 from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
 from vla_deploy.perception.shapes import half_turn
+from vla_deploy.perception.supports import Support, find_supports
 from vla_deploy.perception.tracking import Track, Tracker, View
 
 # A missing thing is missed only where its kind would surely be found.
@@ -28,6 +29,7 @@ class Scene:
         self._tracker = Tracker()
         self.stamp_ns = 0
         self.detections: list[Detection] = []
+        self._surfaces: list[dict[str, Any]] = []
 
     def look(
         self,
@@ -41,7 +43,9 @@ class Scene:
     ) -> None:
         """Take one image; `base` is the robot's map pose, `body` masks the robot itself."""
         cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body)
-        self.detections = [_on_map(detection, base) for detection in detect(cloud)]
+        supports = find_supports(cloud)
+        self._surfaces = [_surface(s, base) for s in supports if not s.is_floor]
+        self.detections = [_on_map(detection, base) for detection in detect(cloud, supports)]
         views = {
             id(track): _view(track, cloud, camera, base_from_camera, base)
             for track in self._tracker.tracks
@@ -57,7 +61,17 @@ class Scene:
     def document(self) -> dict[str, Any]:
         """Return the scene topic's document."""
         objects = [track.document() for track in self._tracker.objects]
-        return {"stamp_ns": self.stamp_ns, "objects": objects}
+        return {"stamp_ns": self.stamp_ns, "objects": objects, "surfaces": self._surfaces}
+
+
+def _surface(support: Support, base: Pose2D) -> dict[str, Any]:
+    """Return a surface as the scene topic tells it: the part in view, in the map frame."""
+    x, y = (float(v) for v in support.outline.mean(axis=0))
+    corners = [base.compose(Pose2D(float(u), float(v), 0.0)) for u, v in support.outline]
+    return {
+        "height_m": round(support.height_m(x, y), 4),
+        "polygon_m": [[round(corner.x_m, 3), round(corner.y_m, 3)] for corner in corners],
+    }
 
 
 def _on_map(detection: Detection, base: Pose2D) -> Detection:

@@ -10,6 +10,7 @@ from vla_deploy.navigation.localisation import Pose2D
 from vla_deploy.perception.body import BodyMask
 from vla_deploy.perception.cloud import make_cloud
 from vla_deploy.perception.detection import Detection, detect
+from vla_deploy.perception.supports import find_supports
 
 if TYPE_CHECKING:
     from conftest import StillFlat
@@ -27,7 +28,7 @@ def see(flat: "StillFlat", seed: int = 0) -> list[tuple[Detection, np.ndarray]]:
     body = BodyMask(flat.robot).mask(flat.joints, flat.intrinsics)
     cloud = make_cloud(rgb, depth, flat.intrinsics, pose, body)
     found = []
-    for detection in detect(cloud):
+    for detection in detect(cloud, find_supports(cloud)):
         x, y, z = detection.position_m
         placed = flat.base.compose(Pose2D(x, y, 0.0))
         found.append((detection, np.array([placed.x_m, placed.y_m, z])))

@@ -172,6 +172,20 @@ def test_the_scene_is_right_in_the_map_although_the_start_was_wrong(
     assert (things["cup_1"]["class"], things["cup_1"]["colour"]) == ("cup", "red")
 
 
+def test_the_table_is_told_as_a_surface_with_its_height_and_outline(
+    make_rig: Callable[..., Rig],
+) -> None:
+    rig = make_rig()
+    rig.run_for(1.0)
+    table = min(rig.scene()["surfaces"], key=lambda s: abs(s["height_m"] - 0.45))
+    assert table["height_m"] == pytest.approx(0.45, abs=0.005)
+    outline = np.array(table["polygon_m"])
+    # The coffee table covers 1.7..2.7 m by 1.28..1.72 m.
+    assert outline.min(axis=0) == pytest.approx((1.7, 1.28), abs=0.05)
+    assert outline.max(axis=0) == pytest.approx((2.7, 1.72), abs=0.05)
+    assert all(surface["height_m"] > 0.1 for surface in rig.scene()["surfaces"])
+
+
 def test_every_topic_is_published(make_rig: Callable[..., Rig]) -> None:
     rig = make_rig()
     rig.run_for(1.0)
