@@ -27,8 +27,8 @@ FACE_WIDTH_M, FACE_HEIGHT_M = 0.03, 0.05
 class Detection:
     """Hold one thing as one image shows it.
 
-    `position_m` is its centre, for a box the centre of its opening; `size_m` is length along yaw,
-    width, height. The frame is that of the cloud. A truncated thing touches the image's border: its
+    `position_m` is its centre: that of the rim's rectangle for a box, whose rim is half its height
+    above. `size_m` is length along yaw, width, height. The frame is that of the cloud. A truncated thing touches the image's border: its
     class and measures are guesses.
     """
 
@@ -46,7 +46,6 @@ class Detection:
 @dataclass(frozen=True, slots=True)
 class _Pose:
     xy: tuple[float, float]
-    z_ratio: float
     length_m: float
     width_m: float
     yaw_rad: float
@@ -54,29 +53,29 @@ class _Pose:
 
 def _as_round(shape: Shape) -> _Pose:
     """Take the middle of the top: it is seen whole, while the far side is hidden."""
-    return _Pose(shape.top.centre, 0.5, shape.across_m, shape.across_m, 0.0)
+    return _Pose(shape.top.centre, shape.across_m, shape.across_m, 0.0)
 
 
 def _as_cup(shape: Shape) -> _Pose:
     """Take the rim: a handle sticks out below it."""
     rim_m = 0.5 * (shape.top.length_m + shape.top.width_m)
-    return _Pose(shape.top.centre, 0.5, rim_m, rim_m, 0.0)
+    return _Pose(shape.top.centre, rim_m, rim_m, 0.0)
 
 
 def _as_ball(shape: Shape) -> _Pose:
     sphere = shape.sphere
     assert sphere is not None, "only what fits a sphere is called a ball"
-    return _Pose(sphere.centre[:2], 0.5, 2 * sphere.radius_m, 2 * sphere.radius_m, 0.0)
+    return _Pose(sphere.centre[:2], 2 * sphere.radius_m, 2 * sphere.radius_m, 0.0)
 
 
 def _as_box(shape: Shape) -> _Pose:
     rim = shape.top
-    return _Pose(rim.centre, 1.0, rim.length_m, rim.width_m, rim.yaw_rad)
+    return _Pose(rim.centre, rim.length_m, rim.width_m, rim.yaw_rad)
 
 
 def _as_block(shape: Shape) -> _Pose:
     base = shape.footprint
-    return _Pose(base.centre, 0.5, base.length_m, base.width_m, base.yaw_rad)
+    return _Pose(base.centre, base.length_m, base.width_m, base.yaw_rad)
 
 
 PLACEMENT: dict[str, Callable[[Shape], _Pose]] = {
@@ -148,7 +147,7 @@ def _detection(cluster: Cluster, cloud: Cloud) -> Detection:
     return Detection(
         class_name=name,
         colour=colour,
-        position_m=(*pose.xy, ground_m + pose.z_ratio * shape.height_m),
+        position_m=(*pose.xy, ground_m + 0.5 * shape.height_m),
         size_m=(pose.length_m, pose.width_m, shape.height_m),
         yaw_rad=pose.yaw_rad,
         confidence=float(np.round(known * enough * whole * (0.7 + 0.3 * share), 3)),
