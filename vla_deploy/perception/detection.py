@@ -25,11 +25,11 @@ FACE_WIDTH_M, FACE_HEIGHT_M = 0.03, 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detection:
-    """Hold one thing as one image shows it.
+    """Hold one thing as one image shows it, in the frame of the cloud.
 
-    `position_m` is its centre: that of the rim's rectangle for a box, whose rim is half its height
-    above. `size_m` is length along yaw, width, height. The frame is that of the cloud. A truncated thing touches the image's border: its
-    class and measures are guesses.
+    `position_m` is its centre: for a box that of its rim's rectangle, half its height below the
+    rim. `size_m` is length along yaw, width, height. Of a truncated thing, class and measures are
+    guesses: the image's border or something nearer hides its end or its top.
     """
 
     class_name: str

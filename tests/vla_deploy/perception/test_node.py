@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.gl
 
-STEP_NS = 5_000_000
+STEP_NS = 10_000_000
 NODE_PERIOD_NS = 20_000_000
 VIEW = Pose2D(2.2, 2.05, -math.pi / 2)
 
