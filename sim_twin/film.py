@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_twin.compose import ROBOT_ROOT
+from sim_twin.chase_camera import ChaseCamera
 from sim_twin.errors import FilmFault
 from sim_twin.renderer import Renderer, fixed_camera
 
@@ -16,63 +16,11 @@ Image = NDArray[np.uint8]
 WIDTH, HEIGHT = 640, 360
 INSET_WIDTH, INSET_HEIGHT = 160, 120
 FPS = 5.0
-CHASE_ANGLE_DEG = 125.0
-CHASE_ELEVATIONS_DEG = (-28.0, -34.0, -40.0, -46.0, -52.0, -58.0, -64.0, -70.0, -76.0)
-CHASE_HEIGHTS_M = (0.45, 0.95)
 SHEET_ROWS, SHEET_COLUMNS = 4, 3
 FOURCC = {".webm": "VP80", ".mp4": "mp4v", ".avi": "MJPG"}
-_FURNITURE_GROUPS = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _MARGIN = 10
 _INK = (250, 250, 250)
 _SHADE = 0.45
-
-
-class ChaseCamera:
-    """Watch the robot's hands from its front and right, slowly, and look over walls."""
-
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        self.view = mujoco.MjvCamera()
-        self.view.type = mujoco.mjtCamera.mjCAMERA_FREE.value
-        self.view.distance = 2.3
-        self._model = model
-        self._data = data
-        self._root = model.body(ROBOT_ROOT).id
-        self._move(share=1.0)
-
-    def follow(self) -> mujoco.MjvCamera:
-        """Move towards the robot as it is now and return the view."""
-        self._move(share=0.12)
-        return self.view
-
-    def _move(self, share: float) -> None:
-        matrix = self._data.xmat[self._root]
-        ahead = np.array([matrix[0], matrix[3], 0.0])
-        look_at = self._data.xpos[self._root] + 0.35 * ahead + [0.0, 0.0, 0.6]
-        heading = float(np.degrees(np.arctan2(ahead[1], ahead[0])))
-        turn = (heading + CHASE_ANGLE_DEG - self.view.azimuth + 180.0) % 360.0 - 180.0
-        self.view.lookat[:] += share * (look_at - self.view.lookat)
-        self.view.azimuth += share * turn
-        self.view.elevation += share * (self._clear_elevation() - self.view.elevation)
-
-    def _clear_elevation(self) -> float:
-        """Return the lowest elevation from which no wall hides the robot."""
-        for elevation in CHASE_ELEVATIONS_DEG:
-            if all(self._sees(elevation, height) for height in CHASE_HEIGHTS_M):
-                return elevation
-        return CHASE_ELEVATIONS_DEG[-1]
-
-    def _sees(self, elevation_deg: float, height_m: float) -> bool:
-        """Return whether a ray from the robot to where the camera would be meets nothing."""
-        azimuth, elevation = np.radians([self.view.azimuth, elevation_deg])
-        level = np.cos(elevation)
-        back = -np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
-        eye = self.view.lookat + self.view.distance * back
-        start = self._data.xpos[self._root] + [0.0, 0.0, height_m]
-        ray = eye - start
-        hit = mujoco.mj_ray(
-            self._model, self._data, start, ray, _FURNITURE_GROUPS, True, -1, None, None
-        )
-        return bool(hit < 0.0 or hit > 1.0)
 
 
 class Film:

@@ -6,7 +6,7 @@ import pytest
 
 from sim_twin.engine import Engine
 from sim_twin.errors import FilmFault, RefereeRefusal
-from sim_twin.film import HEIGHT, WIDTH, ChaseCamera, Film, contact_sheet
+from sim_twin.film import HEIGHT, WIDTH, Film, contact_sheet
 from sim_twin.film_desk import FilmDesk
 
 
@@ -55,12 +55,6 @@ def test_the_sheet_spreads_over_the_whole_film() -> None:
     sheet = contact_sheet(frames)
     assert sheet[0, 0, 0] == 0
     assert sheet[-1, -1, 0] == 99
-
-
-def test_the_chasing_camera_rises_to_look_over_a_wall(engine: Engine) -> None:
-    free = ChaseCamera(engine.model, engine.data).view.elevation
-    engine.place("base", 1.5, 0.0, 0.0, 1.5)  # the wall stands between robot and camera
-    assert ChaseCamera(engine.model, engine.data).view.elevation < free
 
 
 @pytest.mark.gl
