@@ -8,12 +8,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from drivers.dynamixel.control_table import PULSE_RAD, PWM_FULL
 from vla_deploy.control.axes import Floats
+from vla_deploy.control.servos import GAINS
 from vla_deploy.robots import RobotDescription
 
-# Full duty at this error with the P gain of 800 that control writes (e-manual: P / 128):
-# 885 / (800 / 128) pulses of 0.0015 rad.
-FULL_DUTY_ERROR_RAD = 0.217
+# e-manual: duty in PWM units is the error in pulses times P / 128.
+FULL_DUTY_ERROR_RAD = PWM_FULL * 128.0 / GAINS["position_p_gain"] * PULSE_RAD
 _MAX_OFFSET_RAD = 0.2
 
 

@@ -13,8 +13,6 @@ from sim_twin.lockstep import Lockstep
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
 
-RESTING = "tuck"
-
 
 class Rig:
     """Hold the twin, control, and what its neighbours would read and write."""
@@ -22,7 +20,6 @@ class Rig:
     def __init__(self, tmp_path: Path) -> None:
         self.lockstep = Lockstep(tmp_path=tmp_path)
         self.robot = self.lockstep.robot
-        self.lockstep.twin.engine.pose(self.robot.poses[RESTING])
         space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)
         self._operator = space.ring_writer("operator")
         self._commands = space.ring_writer("motion_command")

@@ -258,15 +258,27 @@ def test_a_stale_base_command_ramps_to_zero_and_the_arms_go_on(armed: Rig) -> No
     assert armed.base()["v_m_s"] == pytest.approx(0.2, abs=0.02)
 
 
-def test_odometry_agrees_with_where_the_base_went(armed: Rig) -> None:
-    start = armed.lockstep.truth()["robot"]
+def wheel_yaw_rad(rig: Rig) -> float:
+    joints, base = rig.lockstep.truth()["joints"], rig.robot.base
+    turned = joints["right_wheel"]["position"] - joints["left_wheel"]["position"]
+    return float(turned * base.wheel_radius_m / base.track_m)
+
+
+def test_odometry_is_what_the_wheels_did_and_near_where_the_base_went(armed: Rig) -> None:
+    start, wheels_before, yaw_before = (
+        armed.lockstep.truth()["robot"],
+        wheel_yaw_rad(armed),
+        armed.base()["yaw_rad"],
+    )
     armed.drive(0.3, 0.4, 3.0)
     armed.drive(0.0, 0.0, 1.0)
     end, base = armed.lockstep.truth()["robot"], armed.base()
+    by_wheels = wheel_yaw_rad(armed) - wheels_before
+    assert base["yaw_rad"] - yaw_before == pytest.approx(by_wheels, abs=0.005)
     travelled = np.hypot(end["x_m"] - start["x_m"], end["y_m"] - start["y_m"])
-    assert np.hypot(base["x_m"], base["y_m"]) == pytest.approx(travelled, abs=0.02)
+    assert np.hypot(base["x_m"], base["y_m"]) == pytest.approx(travelled, abs=0.03)
     turned = (end["yaw_rad"] - start["yaw_rad"] + np.pi) % (2 * np.pi) - np.pi
-    assert base["yaw_rad"] == pytest.approx(turned, abs=0.05)
+    assert base["yaw_rad"] == pytest.approx(turned, rel=0.15)  # the wheels scrub in a turn
 
 
 def test_a_lost_supervisor_stops_the_robot_until_it_is_back_and_reset(armed: Rig) -> None:
