@@ -205,14 +205,18 @@ class Firmware:
         columns.bus_watchdog[row] = WATCHDOG_TRIPPED
         columns.profile_acceleration[row] = 0
         columns.profile_velocity[row] = 0
-        columns.goal_position[row] = self._motion.pulses[row]
+        if self._options.trip_holds_present:
+            columns.goal_position[row] = self._motion.pulses[row]
+            self._motion.restart(row)
+        else:
+            columns.goal_position[row] = round(float(self._motion.profile.position[row]))
+            self._motion.profile.restart(row, float(columns.goal_position[row]))
         columns.goal_velocity[row] = 0
         mode = columns.operating_mode[row]
         if mode == OperatingMode.PWM:
             columns.goal_pwm[row] = 0
         if mode == OperatingMode.CURRENT:
             columns.goal_current[row] = 0
-        self._motion.restart(row)
         self._stale = True
 
     def _on_torque(self, row: int) -> None:

@@ -65,7 +65,7 @@ def test_ten_faults_are_reported_as_ten(tmp_path):
 
 
 def test_a_watchdog_shorter_than_three_control_periods_is_a_fault(tmp_path):
-    text = GOOD.replace("bus_watchdog_s = 0.1 ", "bus_watchdog_s = 0.025 ").replace(
+    text = GOOD.replace("bus_watchdog_s = 0.3", "bus_watchdog_s = 0.025").replace(
         "control_rate_hz = 250", "control_rate_hz = 100"
     )
     assert faults_of(tmp_path, text) == (
@@ -76,7 +76,7 @@ def test_a_watchdog_shorter_than_three_control_periods_is_a_fault(tmp_path):
 def test_a_watchdog_of_exactly_three_control_periods_is_allowed(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(
-        GOOD.replace("bus_watchdog_s = 0.1 ", "bus_watchdog_s = 0.03 ").replace(
+        GOOD.replace("bus_watchdog_s = 0.3", "bus_watchdog_s = 0.03").replace(
             "control_rate_hz = 250", "control_rate_hz = 100"
         )
     )

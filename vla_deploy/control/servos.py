@@ -19,7 +19,7 @@ _FIRST_READS = 10
 # Written whenever a servo is powered, since a reboot forgets them. P is what the gravity offset
 # reckons with (control/gravity.py). With the factory's 800 and no D a loaded elbow rings for half a
 # second after a stop; with these it stands in half of that, and trails its setpoint half as far.
-GAINS = {"position_p_gain": 1600, "position_i_gain": 0, "position_d_gain": 5000}
+GAINS = {"position_p_gain": 1600, "position_i_gain": 0, "position_d_gain": 8000}
 
 
 class ServoLine:

@@ -185,3 +185,38 @@ def test_every_servo_has_its_own(make_bench: Callable[..., Any]) -> None:
         bench.run(0.05)
         bench.send(2, Instruction.PING)
     assert (watchdog(bench, 1), watchdog(bench, 2)) == (-1, PERIODS)
+
+
+def test_a_tripped_servo_keeps_the_setpoint_it_had(make_bench: Callable[..., Any]) -> None:
+    bench = make_bench()
+    arm(bench)
+    bench.write("goal_position", CENTRE + 40)
+    bench.run(0.2)
+    assert watchdog(bench) == -1
+    assert bench.bank.register(1, "goal_position") == CENTRE + 40
+
+
+def test_a_tripped_servo_in_mid_profile_stops_where_its_trajectory_is(
+    make_bench: Callable[..., Any],
+) -> None:
+    bench = make_bench()
+    bench.write("profile_velocity", 40)
+    arm(bench)
+    bench.write("goal_position", FAR)
+    bench.run(0.3)
+    held = bench.bank.register(1, "goal_position")
+    assert CENTRE < held < FAR
+    bench.run(0.5)
+    assert bench.bank.register(1, "present_position") == pytest.approx(held, abs=2)
+
+
+def test_the_option_makes_a_tripped_servo_take_its_present_position_as_goal(
+    make_bench: Callable[..., Any],
+) -> None:
+    bench = make_bench(options=FirmwareOptions(trip_holds_present=True))
+    bench.blocked = True
+    arm(bench)
+    bench.write("goal_position", CENTRE + 40)
+    bench.run(0.2)
+    assert watchdog(bench) == -1
+    assert bench.bank.register(1, "goal_position") == CENTRE

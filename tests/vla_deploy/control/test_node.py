@@ -196,21 +196,10 @@ def test_disarming_ramps_and_then_takes_all_power(armed: Rig) -> None:
     assert armed.base()["enabled"] == 0.0
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a tripped servo holds its present position, so a loaded joint sags without the offset",
-)
 def test_a_killed_control_leaves_every_joint_standing_within_its_watchdog(armed: Rig) -> None:
     start_a_long_motion(armed)
     armed.lockstep.kill(armed.control)
     armed.run(load_profile("desktop").bus_watchdog_s + 0.1)
-    stays_at_standstill(armed)
-
-
-def test_a_killed_control_leaves_every_joint_standing_soon_and_for_good(armed: Rig) -> None:
-    start_a_long_motion(armed)
-    armed.lockstep.kill(armed.control)
-    armed.run(load_profile("desktop").bus_watchdog_s + 0.4)
     stays_at_standstill(armed)
 
 

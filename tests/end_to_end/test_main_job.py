@@ -1,0 +1,61 @@
+"""The main job in lock-step, judged by the physics."""
+
+import json
+from collections.abc import Callable
+
+import pytest
+
+from sim_twin.stack import LockstepStack
+
+COMMAND = "pick up the red cup and put it in the box"
+MakeStack = Callable[[int], LockstepStack]
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.mark.timeout(240)
+def test_the_cup_ends_in_the_box_and_every_action_is_told(stack: LockstepStack) -> None:
+    outcome = stack.say(COMMAND)
+    assert outcome["error"] is None
+    assert outcome["success"]
+    assert stack.lockstep.inside("red_cup", "box")["inside"]
+    told = [
+        (event["action_id"], event["status"])
+        for event in stack.events
+        if event["event"] == "action"
+    ]
+    for action in outcome["actions"]:
+        assert (action["id"], "active") in told
+        assert (action["id"], "succeeded") in told
+
+
+@pytest.mark.timeout(120)
+def test_the_same_seed_moves_every_joint_the_same_to_the_last_bit(make_stack: MakeStack) -> None:
+    states = []
+    for _ in range(2):
+        stack = make_stack(5)
+        stack.arm()
+        stack.give(text=COMMAND)
+        stack.lockstep.run_for(8.0)
+        states.append(stack.lockstep.twin.engine.data.qpos.tobytes())
+    assert states[0] == states[1]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_at_least_eight_of_ten_seeds_succeed_and_failures_say_why(make_stack: MakeStack) -> None:
+    results = []
+    for seed in range(10):
+        stack = make_stack(seed)
+        stack.arm()
+        outcome = stack.say(COMMAND)
+        judged = stack.lockstep.inside("red_cup", "box")
+        results.append(
+            {"seed": seed, "told": outcome["success"], "error": outcome["error"]} | judged
+        )
+        stack.close()
+    print(json.dumps(results, indent=1))
+    assert sum(result["inside"] for result in results) >= 8
+    assert all(result["told"] or result["error"] for result in results)
+    # A robot that reports success where physics disagrees is worse than one that reports failure.
+    assert all(result["inside"] for result in results if result["told"])
