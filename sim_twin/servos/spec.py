@@ -40,9 +40,9 @@ class FirmwareOptions:
     A servo counts as overloaded when its effort stays above `overload_ratio` of stall for
     `overload_time_s`. The winding heats towards `stall_rise_c` above ambient at stall current.
 
-    When the Bus Watchdog trips, the manual says only that the servo stops. By default its trajectory
-    stops where it is: the servo holds the setpoint it had. With `trip_holds_present` it takes its
-    present position as goal instead, as DynamixelSDK issue 584 hints; under load it then sags until
+    When the Bus Watchdog trips, the manual says only that the servo stops. By default its path
+    stops where it is: it holds the setpoint it had. With `trip_holds_present` it takes its
+    present position as goal, as DynamixelSDK issue 584 hints; under load it then sags until
     the position error carries the load. Which of the two a given firmware does must be measured.
     """
 
