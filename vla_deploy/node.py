@@ -1,4 +1,4 @@
-"""Declare the shape of a robot process, so that the robot and the lock-step twin step the same code."""
+"""Declare the shape of a robot process: robot and lock-step twin step the same code."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Node(Protocol):
         ...
 
     def stop(self) -> None:
-        """Leave devices safe and close them; called once, also after a failure."""
+        """Leave devices safe and close them; called once, also when `start` failed half way."""
         ...
 
 
@@ -42,10 +42,13 @@ class NodeContext:
 
 
 def run_node(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> None:
-    """Step a node on absolute deadlines until `should_stop()`; skip periods that were missed."""
+    """Step a node on absolute deadlines until `should_stop()`; skip periods that were missed.
+
+    `stop` follows also when `start` or `step` fails.
+    """
     period_ns = round(node.period_s * NS_PER_S)
-    node.start()
     try:
+        node.start()
         deadline_ns = clock.now_ns()
         while not should_stop():
             node.step()

@@ -14,6 +14,7 @@ from drivers.errors import DriverError
 from platforms import Profile, ProfileError, load_profile
 from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_CRASHED, EXIT_OK
 from vla_deploy.ipc import IpcError
+from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.node import Node, NodeContext, run_node
 from vla_deploy.robots import RobotFileError
 
@@ -42,7 +43,7 @@ def main(
             _raise_priority(profile)
         node = _Announced(build(context), context.run_dir / READY_DIR / name)
         run_node(node, context.clock, lambda: bool(stop_signals))
-    except (DriverError, RobotFileError, ProfileError, IpcError) as error:
+    except (DriverError, RobotFileError, ProfileError, IpcError, MapInvalid) as error:
         _log.error("%s", error)
         return EXIT_CONFIGURATION
     except Exception:  # the last place where a crash can be told to the log

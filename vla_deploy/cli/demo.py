@@ -25,6 +25,7 @@ EXAMPLES = """  vla-deploy demo
 """
 SETTLE_S = 1.0
 ARM_TIMEOUT_S = 20.0
+STEP_NS = NS_PER_S // 20
 
 
 def register(commands: Any) -> None:
@@ -56,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         runtime_base=arguments.runtime_base,
         arm=True,
     )
-    arguments.out.mkdir(parents=True, exist_ok=True)
+    _make_folder(arguments.out)
     outcome = Demo(arguments, options).run()
     path = arguments.out / "outcome.json"
     path.write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
@@ -66,6 +67,13 @@ def run(arguments: argparse.Namespace) -> int:
     if not outcome["success"]:
         raise CommandFailed(outcome["error"] or "MuJoCo does not agree that the job is done")
     return 0
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"--out {path}: {error.strerror}; choose another folder") from error
 
 
 class Demo:
@@ -85,14 +93,14 @@ class Demo:
             supervisor.start()
             session = Session(supervisor.run_dir, _SteppingClock(self._clock, supervisor))
             self._wait_armed(session)
-            film = self._start_film(supervisor.run_dir)
+            film = self._start_film(session)
             started_ns = self._clock.now_ns()
             self._tell(f'command: "{self._arguments.order}"')
-            self._follow(session, supervisor.run_dir)
+            self._follow(session)
             wall_s = (self._clock.now_ns() - started_ns) / NS_PER_S
-            _pause(session, SETTLE_S)
-            judged = self._judge(supervisor.run_dir)
-            film_files = self._stop_film(supervisor.run_dir) if film else {}
+            session.pause(SETTLE_S)
+            judged = self._judge(session)
+            film_files = self._stop_film(session) if film else {}
             table = session.document("process_table") or {}
         return self._outcome(wall_s, judged, film_files, table)
 
@@ -104,9 +112,9 @@ class Demo:
                 return
             if self._clock.now_ns() > end_ns:
                 raise CommandFailed(f"the robot did not arm within {ARM_TIMEOUT_S:g} s: {status}")
-            _pause(session, 0.1)
+            session.pause(0.1)
 
-    def _follow(self, session: Session, run_dir: Path) -> None:
+    def _follow(self, session: Session) -> None:
         for event in session.command(text=self._arguments.order):
             self._last = event
             if event["event"] == "plan":
@@ -115,34 +123,34 @@ class Demo:
             if line:
                 self._tell(line)
             if event["event"] == "action" and event["status"] == "active":
-                self._film_op(run_dir, "caption", text=action_words(event))
+                self._film_op(session, "caption", text=action_words(event))
 
-    def _judge(self, run_dir: Path) -> dict[str, Any]:
+    def _judge(self, session: Session) -> dict[str, Any]:
         """Ask the referee where the plan's object ended, when it was to end in a box."""
         pair = _object_and_container(self._plan)
         if pair is None:
             return {"judged_by": "actions", "inside": None, "placement_error_m": None}
-        answer = _referee(run_dir, "inside", object=pair[0], container=pair[1])
+        answer = _referee(session, "inside", object=pair[0], container=pair[1])
         return {"judged_by": "mujoco", **answer}
 
-    def _start_film(self, run_dir: Path) -> bool:
+    def _start_film(self, session: Session) -> bool:
         if self._arguments.headless:
             return False
         path = (self._arguments.out / "demo.webm").resolve()
-        return self._film_op(run_dir, "film_start", path=str(path)) is not None
+        return self._film_op(session, "film_start", path=str(path)) is not None
 
-    def _stop_film(self, run_dir: Path) -> dict[str, Any]:
-        files = self._film_op(run_dir, "film_stop") or {}
+    def _stop_film(self, session: Session) -> dict[str, Any]:
+        files = self._film_op(session, "film_stop") or {}
         if files.get("film") and os.environ.get("DISPLAY") and shutil.which("xdg-open"):
             subprocess.Popen(["xdg-open", files["film"]], stderr=subprocess.DEVNULL)
         return files
 
-    def _film_op(self, run_dir: Path, op: str, **details: str) -> dict[str, Any] | None:
+    def _film_op(self, session: Session, op: str, **details: str) -> dict[str, Any] | None:
         """Ask for something of the film; a film that fails must not fail the job."""
         if self._arguments.headless:
             return None
         try:
-            return _referee(run_dir, op, **details)
+            return _referee(session, op, **details)
         except CommandFailed as error:
             self._tell(f"no film: {error}")
             return None
@@ -193,31 +201,41 @@ class _SteppingClock:
         return self._clock.now_ns()
 
     def sleep_until(self, deadline_ns: int) -> None:
-        self._supervisor.step()
-        if self._supervisor.stop_requested:
-            raise KeyboardInterrupt
-        self._clock.sleep_until(deadline_ns)
+        while True:
+            self._supervisor.step()
+            if self._supervisor.stop_requested:
+                raise KeyboardInterrupt
+            now_ns = self._clock.now_ns()
+            if now_ns >= deadline_ns:
+                return
+            self._clock.sleep_until(min(deadline_ns, now_ns + STEP_NS))
 
 
-def _pause(session: Session, duration_s: float) -> None:
-    end_ns = session.clock.now_ns() + round(duration_s * NS_PER_S)
-    while session.clock.now_ns() < end_ns:
-        session.clock.sleep_until(session.clock.now_ns() + NS_PER_S // 20)
-
-
-def _referee(run_dir: Path, op: str, **details: str) -> dict[str, Any]:
+def _referee(session: Session, op: str, **details: str) -> dict[str, Any]:
     """Ask the twin's referee, which is started by name: the robot's code never imports the twin.
+
+    It may take seconds, in which the robot must not lose its supervisor.
 
     Raises:
         CommandFailed: it gives no answer.
     """
-    command = [sys.executable, "-m", "sim_twin.referee", "--run-dir", str(run_dir), op]
+    command = [sys.executable, "-m", "sim_twin.referee", "--run-dir", str(session.run_dir), op]
     for name, value in details.items():
         command += [f"--{name}", value]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    if done.returncode != 0:
-        raise CommandFailed(done.stderr.strip() or f"the referee failed at {op}")
-    answer: dict[str, Any] = json.loads(done.stdout)
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+    ) as asked:
+        try:
+            while asked.poll() is None:
+                session.pause()
+        except BaseException:
+            asked.kill()
+            raise
+        answer_text, complaint = asked.communicate()
+    if asked.returncode != 0:
+        raise CommandFailed(complaint.strip() or f"the referee failed at {op}")
+    answer: dict[str, Any] = json.loads(answer_text)
     return answer
 
 

@@ -1,7 +1,15 @@
-"""Give every command a help text with an example."""
+"""Give every command a help text with an example, and every bad argument one line."""
 
 import argparse
-from typing import Any
+from typing import Any, NoReturn
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Say in one line what is wrong with the arguments; its commands do the same."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with code 2."""
+        self.exit(2, f"{self.prog}: {message}; see: {self.prog} --help\n")
 
 
 def add_command(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from vla_deploy.cli import bench, check, demo, operate, run, say, status
 from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
+from vla_deploy.cli.example import OneLineParser
 
 COMMANDS = (run, demo, say, status, operate, check, bench)
 EPILOG = """examples:
@@ -18,7 +19,7 @@ EPILOG = """examples:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of every command."""
-    top = argparse.ArgumentParser(
+    top = OneLineParser(
         prog="vla-deploy",
         description="Run a language-commanded robot, or its digital twin.",
         epilog=EPILOG,

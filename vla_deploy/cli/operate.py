@@ -10,7 +10,8 @@ from typing import Any
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
-from vla_deploy.cli.session import POLL_NS, Session, attach
+from vla_deploy.cli.session import Session, attach
+from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.supervisor import default_base, running
 
 WAIT_S = 5.0
@@ -24,7 +25,7 @@ ACTS: Mapping[str, tuple[str, Reached]] = {
     ),
     "reset": (
         "release a latched stop; nothing moves, arm the robot next",
-        lambda status: status["state"] == "disarmed",
+        lambda status: status["state"] in ("disarmed", "armed") and not status["estop_latched"],
     ),
     "arm": (
         "put power on the joints where they are, so that commands may move them",
@@ -74,7 +75,7 @@ def _wait(session: Session, reached: Reached) -> dict[str, Any]:
         status = session.document("control_status", age_limit_s=1.0)
         if status is not None and reached(status):
             return status
-        session.clock.sleep_until(session.clock.now_ns() + POLL_NS)
+        session.pause()
     if status is None:
         raise CommandFailed("control does not answer; see: vla-deploy status")
     raise CommandFailed(
@@ -85,8 +86,10 @@ def _wait(session: Session, reached: Reached) -> dict[str, Any]:
 
 def run_stop(arguments: argparse.Namespace) -> int:
     """Cancel the running command; the robot comes to rest and stays armed."""
-    attach(arguments.runtime_base).cancel()
-    print("stopped; the robot is ready")
+    session = attach(arguments.runtime_base)
+    session.cancel()
+    refusal = refusal_of(session.document("control_status", age_limit_s=1.0))
+    print(f"stopped; {refusal or 'the robot is ready'}")
     return 0
 
 
@@ -106,6 +109,6 @@ def run_shutdown(arguments: argparse.Namespace) -> int:
     while owner.is_alive():
         if session.clock.now_ns() > end_ns:
             raise CommandFailed(f"the supervisor (pid {owner.pid}) did not end within 30 s")
-        session.clock.sleep_until(session.clock.now_ns() + POLL_NS)
+        session.pause()
     print("the run has ended")
     return 0

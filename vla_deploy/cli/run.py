@@ -32,7 +32,13 @@ def add_robot_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--robot", default="butler", help="name or folder (default: butler)")
     command.add_argument("--profile", default="desktop", help="platform profile")
     command.add_argument("--world", default="flat", help="the twin's world")
-    command.add_argument("--seed", type=int, default=0, help="where the objects lie")
+    command.add_argument("--seed", type=_seed, default=0, help="where the objects lie")
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0, got {text!r}")
+    return int(text)
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -8,11 +8,11 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.cli.follow import follow_command
+from vla_deploy.ipc import CellReader, Sample, SharedSpace
 from vla_deploy.supervisor import default_base, running
 
 POLL_NS = NS_PER_S // 50
-ANSWER_TIMEOUT_S = 5.0
 
 
 class Session:
@@ -21,55 +21,57 @@ class Session:
     def __init__(self, run_dir: Path, clock: Clock | None = None) -> None:
         self.run_dir = run_dir
         self.clock: Clock = clock or MonotonicClock()
-        self.space = SharedSpace(run_dir / "ipc", self.clock)
+        self._space = SharedSpace(run_dir / "ipc", self.clock)
+        self._cells: dict[str, CellReader] = {}
         self._numbers = itertools.count(1)
 
+    def fresh(self, topic: str, age_limit_s: float | None = None) -> Sample | None:
+        """Return the newest sample of a cell, or None when there is none that young."""
+        if topic not in self._cells:
+            self._cells[topic] = self._space.cell_reader(topic)
+        sample = self._cells[topic].latest()
+        if sample is None or age_limit_s is None:
+            return sample
+        return sample if sample.age_s(self.clock.now_ns()) <= age_limit_s else None
+
     def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any] | None:
-        """Return the newest JSON document of a cell, or None when there is none that fresh."""
-        sample = self.space.cell_reader(topic).latest()
-        if sample is None:
-            return None
-        if age_limit_s is not None and sample.age_s(self.clock.now_ns()) > age_limit_s:
-            return None
-        return sample.document()
+        """Return the newest JSON document of a cell, or None when there is none that young."""
+        sample = self.fresh(topic, age_limit_s)
+        return None if sample is None else sample.document()
+
+    def pause(self, duration_s: float = POLL_NS / NS_PER_S) -> None:
+        """Wait a moment; a poll's worth unless told otherwise."""
+        self.clock.sleep_until(self.clock.now_ns() + round(duration_s * NS_PER_S))
 
     def operate(self, act: str, reason: str = "") -> None:
         """Publish an operator's act: estop, reset, arm or disarm; control reads it directly."""
         message = {"act": act, "source": "cli", "reason": reason}
-        self.space.ring_writer("operator").publish(message)
+        self._space.ring_writer("operator").publish(message)
 
     def command(self, **utterance: Any) -> Iterator[dict[str, Any]]:
         """Give a command and return its events, up to and including the last one.
 
         Raises:
-            UsageError: the planner does not answer.
+            CommandFailed: nobody answers; raised by the iterator.
         """
         command_id = f"cli-{os.getpid()}-{next(self._numbers)}"
-        events = self.space.ring_reader("task_event", from_start=False)
+        events = self._space.ring_reader("task_event", from_start=False)
         message = {"command_id": command_id, "source": "cli"} | utterance
-        self.space.ring_writer("utterance").publish(message)
-        return self._follow(events, command_id)
-
-    def _follow(self, events: Any, command_id: str) -> Iterator[dict[str, Any]]:
-        answer_by_ns = self.clock.now_ns() + round(ANSWER_TIMEOUT_S * NS_PER_S)
-        answered = False
-        while True:
-            for event in events.drain():
-                if event.payload.get("command_id") != command_id:
-                    continue
-                answered = True
-                yield event.payload
-                if event.payload["event"] in ("finished", "rejected"):
-                    return
-            if not answered and self.clock.now_ns() > answer_by_ns:
-                raise UsageError(
-                    f"no answer from the planner within {ANSWER_TIMEOUT_S:g} s; "
-                    "see what runs: vla-deploy status"
-                )
-            self.clock.sleep_until(self.clock.now_ns() + POLL_NS)
+        self._space.ring_writer("utterance").publish(message)
+        return follow_command(
+            command_id,
+            events=lambda: [event.payload for event in events.drain()],
+            executor=lambda: self.fresh("executor_status", age_limit_s=1.0),
+            clock=self.clock,
+            pause=self.pause,
+        )
 
     def cancel(self) -> None:
-        """Ask the executor to stop what it does; the robot stays ready."""
+        """Ask the executor to stop what it does; the robot stays ready.
+
+        Raises:
+            CommandFailed: nobody answers.
+        """
         for _ in self.command(cancel=True):
             pass
 
@@ -79,6 +81,7 @@ def attach(runtime_base: Path | None) -> Session:
 
     Raises:
         UsageError: none runs.
+        RuntimeUnavailable: the runtime directory belongs to someone else.
     """
     base = runtime_base or default_base()
     owner = running(base)

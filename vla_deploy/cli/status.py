@@ -30,14 +30,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def collect(session: Session) -> dict[str, Any]:
     """Return everything that the processes tell of themselves; what is silent is null."""
-    pose = session.space.cell_reader("pose").latest()
+    pose = session.fresh("pose", age_limit_s=1.0)
     return {
         "run_dir": str(session.run_dir),
-        "process_table": session.document("process_table"),
+        "process_table": session.document("process_table", age_limit_s=3.0),
         "control": session.document("control_status", age_limit_s=1.0),
         "executor": session.document("executor_status", age_limit_s=2.0),
         "pose": None
-        if pose is None or pose.age_s(session.clock.now_ns()) > 1.0
+        if pose is None
         else {name: float(pose.data[name]) for name in ("x_m", "y_m", "yaw_rad", "match_ratio")},
         "scene": session.document("scene", age_limit_s=5.0),
         "dashboard_url": None,

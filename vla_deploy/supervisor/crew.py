@@ -64,8 +64,10 @@ class Crew:
 
     def _see(self, name: str, child: ChildProcess) -> Seen:
         exit_code = child.exit_code()
-        ready = exit_code is None and self._readiness[name].is_ready(child.pid)
-        return Seen(exit_code=exit_code, ready=ready)
+        if exit_code is not None:
+            return Seen(exit_code=exit_code)
+        judge = self._readiness[name]
+        return Seen(ready=judge.is_ready(child.pid), silent=judge.is_silent(child.pid))
 
     def _spawn(self, name: str) -> None:
         self._readiness[name].forget()

@@ -44,10 +44,14 @@ class Record:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """Report what was observed of one process; `exit_code` is None while it runs."""
+    """Report what was observed of one process; `exit_code` is None while it runs.
+
+    `silent` tells that it has told nothing for longer than the table allows.
+    """
 
     exit_code: int | None = None
     ready: bool = False
+    silent: bool = False
 
 
 Step = tuple[Record, Act | None]
@@ -97,6 +101,9 @@ def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, no
 def _watch(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
     if seen.exit_code is not None:
         return _failed(spec, record, seen.exit_code, now_ns), None
+    if record.state is State.READY and seen.silent:
+        reason = f"silent for more than {spec.silence_limit_s:g} s"
+        return replace(record, reason=reason), Act.KILL
     if record.state is not State.STARTING:
         return record, None
     if seen.ready:
@@ -111,8 +118,9 @@ def _failed(spec: ProcessSpec, record: Record, exit_code: int, now_ns: int) -> R
     policy = spec.restart
     window_ns = round(policy.window_s * NS_PER_S)
     recent = (*(at for at in record.failures_ns if now_ns - at < window_ns), now_ns)
-    overdue = record.state is State.STARTING and bool(record.reason) and now_ns >= record.until_ns
-    why = record.reason if overdue else describe_exit(exit_code)
+    overdue = record.state is State.STARTING and now_ns >= record.until_ns
+    was_killed = bool(record.reason) and (overdue or record.state is State.READY)
+    why = record.reason if was_killed else describe_exit(exit_code)
     failed = replace(record, failures_ns=recent, exit_code=exit_code, reason=why)
     # What the file or the wiring says will not change by trying again before it ever worked.
     if exit_code == EXIT_CONFIGURATION and not record.was_ready:

@@ -47,7 +47,11 @@ def default_base() -> Path:
 
 
 def running(base: Path) -> Owner | None:
-    """Return the supervisor that now holds `base`, or None."""
+    """Return the supervisor that now holds `base`, or None.
+
+    Raises:
+        RuntimeUnavailable: `base` belongs to someone else.
+    """
     owner = _read_owner(base / "lock")
     return owner if owner is not None and owner.is_alive() else None
 
@@ -111,9 +115,7 @@ def _make_private(base: Path) -> None:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
         owner_uid = base.stat().st_uid
     except OSError as error:
-        raise RuntimeUnavailable(
-            f"runtime directory {base}: {error.strerror}; choose another with --runtime-base"
-        ) from error
+        raise _unavailable(base, error) from error
     if owner_uid != os.getuid():
         raise RuntimeUnavailable(
             f"runtime directory {base}: belongs to user {owner_uid}, expected {os.getuid()}; "
@@ -121,9 +123,18 @@ def _make_private(base: Path) -> None:
         )
 
 
+def _unavailable(base: Path, error: OSError) -> RuntimeUnavailable:
+    return RuntimeUnavailable(
+        f"runtime directory {base}: {error.strerror}; choose another with --runtime-base"
+    )
+
+
 def _lock(base: Path) -> int:
     path = base / "lock"
-    fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    except OSError as error:
+        raise _unavailable(base, error) from error
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -155,8 +166,10 @@ def _sweep_shared_memory(shared_memory: Path) -> None:
 def _read_owner(path: Path) -> Owner | None:
     try:
         return Owner(**json.loads(path.read_text()))
-    except (FileNotFoundError, json.JSONDecodeError, TypeError):
+    except (FileNotFoundError, NotADirectoryError, json.JSONDecodeError, TypeError):
         return None
+    except PermissionError as error:
+        raise _unavailable(path.parent, error) from error
 
 
 def _write_owner(path: Path, owner: Owner) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import load_profile
+from vla_deploy.exit_codes import EXIT_CONFIGURATION
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.crew import Crew
@@ -21,7 +22,7 @@ from vla_deploy.supervisor.table import TABLE, ProcessSpec
 _PERIOD_NS = NS_PER_S // 20
 _REPORT_NS = NS_PER_S // 2
 _LAST_WORDS = 12
-_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _TROUBLE = frozenset({State.BACKOFF, State.GIVEN_UP})
 _log = logging.getLogger(__name__)
 
@@ -96,7 +97,7 @@ class Supervisor:
         self._step(stopping=False)
 
     def run_until_stopped(self) -> None:
-        """Keep the processes running until SIGINT, SIGTERM or `request_stop`."""
+        """Keep the processes running until SIGINT, SIGTERM, SIGHUP or `request_stop`."""
         while not self.stop_requested:
             self._pause()
             self.step()
@@ -129,7 +130,9 @@ class Supervisor:
 
     def _failure(self, name: str, record: Record) -> str:
         words = self._started().crew.last_words(name, _LAST_WORDS)
-        return "\n".join([f"process {name} did not start: {record.reason}", *words])
+        if record.exit_code == EXIT_CONFIGURATION and words:
+            return f"{name} did not start: {_without_sender(name, words[-1])}"
+        return "\n".join([f"{name} did not start: {record.reason}", *words])
 
     def _step(self, *, stopping: bool) -> None:
         run, now_ns, before = self._started(), self._clock.now_ns(), self._records
@@ -173,7 +176,9 @@ class _Run:
             self.runtime.close()
             raise
         self._handlers = {
-            number: signal.signal(number, lambda *_: on_stop_signal()) for number in _STOP_SIGNALS
+            number: signal.signal(number, lambda *_: on_stop_signal())
+            for number in _STOP_SIGNALS
+            if signal.getsignal(number) is not signal.SIG_IGN  # such as nohup asks for
         }
 
     def close(self) -> None:
@@ -183,6 +188,11 @@ class _Run:
         self.runtime.close()
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
+
+
+def _without_sender(name: str, line: str) -> str:
+    """Return a process' last line without the name and level in front of it."""
+    return line.removeprefix(f"{name}: ").removeprefix("ERROR: ")
 
 
 def _arm(space: SharedSpace) -> None:

@@ -23,7 +23,9 @@ class ProcessSpec:
 
     `command` follows the Python interpreter, `{...}` are filled from the run's options;
     `twin_command` is added in twin mode. It is ready when `ready_topic` is fresh from its own pid
-    and all `ready_files`, relative to the run directory, exist.
+    and all `ready_files`, relative to the run directory, exist. Once ready it is killed, and so
+    started again, when `alive_topic`, which it writes whatever its devices do, is older than
+    `silence_limit_s`.
     """
 
     name: str
@@ -33,6 +35,8 @@ class ProcessSpec:
     ready_topic: str | None = None
     ready_files: tuple[str, ...] = ()
     ready_timeout_s: float = 20.0
+    alive_topic: str | None = None
+    silence_limit_s: float = 5.0
     stop_timeout_s: float = 3.0
     restart: RestartPolicy = RestartPolicy()
 
@@ -56,6 +60,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         ready_topic="joint_state",
         ready_files=("ready/control",),
         stop_timeout_s=5.0,
+        alive_topic="control_status",
     ),
     ProcessSpec(
         name="perception",
@@ -64,6 +69,8 @@ TABLE: tuple[ProcessSpec, ...] = (
         ready_topic="scan",
         ready_files=("ready/perception",),
         ready_timeout_s=40.0,
+        alive_topic="scene",
+        silence_limit_s=10.0,
     ),
     ProcessSpec(
         name="planner",
@@ -77,5 +84,6 @@ TABLE: tuple[ProcessSpec, ...] = (
         twin_command=_DEVICES,
         ready_topic="executor_status",
         ready_files=("ready/executor",),
+        alive_topic="executor_status",
     ),
 )

@@ -169,3 +169,25 @@ def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_
     assert [row.name for row in TABLE] == ["twin", "control", "perception", "planner", "executor"]
     assert [row.name for row in TABLE if row.needs_twin] == ["twin"]
     assert all(row.ready_files or row.ready_topic for row in TABLE)
+
+
+def test_a_ready_process_that_falls_silent_is_killed_and_started_again_with_that_reason():
+    play = Play().all_ready()
+    assert play.step(a=READY, b=Seen(silent=True), c=READY) == [(Act.KILL, "b")]
+    assert play.step(a=READY, b=Seen(exit_code=-9), c=READY) == []
+    assert play.state("b") is State.BACKOFF
+    assert play.records["b"].reason == "silent for more than 5 s"
+    play.now_s += POLICY.initial_s
+    assert play.step(a=READY, c=READY) == [(Act.SPAWN, "b")]
+    play.step(a=READY, b=READY, c=READY)
+    assert play.records["b"].reason == ""
+
+
+def test_a_process_that_ends_by_itself_after_a_restart_is_not_called_silent():
+    play = Play().all_ready()
+    play.step(a=READY, b=Seen(silent=True), c=READY)
+    play.step(a=READY, b=Seen(exit_code=-9), c=READY)
+    play.now_s += POLICY.initial_s
+    play.step(a=READY, c=READY)
+    play.step(a=READY, b=Seen(exit_code=1), c=READY)
+    assert play.records["b"].reason == "exit code 1"
