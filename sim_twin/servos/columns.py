@@ -47,6 +47,7 @@ class Columns:
         self.velocity_limit = self.named("velocity_limit")
         self.shutdown = self.named("shutdown")
         self.torque_enable = self.named("torque_enable")
+        self.status_return_level = self.named("status_return_level")
         self.hardware_error = self.named("hardware_error_status")
         self.velocity_i_gain = self.named("velocity_i_gain")
         self.velocity_p_gain = self.named("velocity_p_gain")

@@ -18,15 +18,18 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.control_table import (
     WATCHDOG_TRIPPED,
     OperatingMode,
     Register,
+    StatusReturnLevel,
 )
 from sim_twin.servos.columns import Columns
 from sim_twin.servos.feedback import Feedback
+from sim_twin.servos.goal_window import GoalWindow
 from sim_twin.servos.motion import Motion
 from sim_twin.servos.profile import Floats
 from sim_twin.servos.protection import CHECK_PERIOD_S, Protection
@@ -50,12 +53,14 @@ class Firmware:
         self._protection = Protection(self._columns, options)
         self._feedback = Feedback(self._columns, self._motion, self._protection)
         self._watchdog = BusWatchdog(self._columns)
+        self._goal_window = GoalWindow(self._columns)
         self._stall_nm = np.array([t.model.stall_torque_nm for t in self.registers.tables])
         self._boot_until_ns = [0] * len(specs)
         self._goal_is_fresh = [False] * len(specs)
         self._powered = True
         self._pose_known = False
-        self._stale = False
+        self._stale = True
+        self._all_readable = False
         self._advanced_ns = 0
         self._checked_ns = 0
         self.now_ns = 0
@@ -107,6 +112,9 @@ class Firmware:
         """Tell whether a servo is powered and has finished booting."""
         return self._powered and self.now_ns >= self._boot_until_ns[row]
 
+    def _all_answer(self) -> bool:
+        return self._powered and self.now_ns >= max(self._boot_until_ns)
+
     def feed_watchdog(self, rows: Sequence[int]) -> None:
         """Count a packet to these servos as communication."""
         self._watchdog.feed(rows, self.now_ns)
@@ -128,6 +136,29 @@ class Firmware:
                 self._on_write[register.name](row)
             if changed and register.name != "goal_position":
                 self._stale = True
+
+    def read_spans(self, rows: Sequence[int], address: int, length: int) -> list[bytes]:
+        """Return up-to-date bytes of several servos, or none unless all of them answer reads."""
+        if self._stale or not (self._all_answer() and self._all_readable):
+            return []
+        self.refresh(address, length)
+        return self.registers.spans(rows, address, length)
+
+    def alerts(self, rows: Sequence[int]) -> list[bool]:
+        """Tell which of these servos report a hardware error."""
+        flags: list[bool] = (self._columns.hardware_error[rows] != 0).tolist()
+        return flags
+
+    def take_goals(self, rows: Sequence[int], goals: NDArray[np.int32]) -> bool:
+        """Store goal positions of different servos at once, as `store` does one by one.
+
+        Return False, and do nothing, where more than storing is due: a refusal, or a servo whose
+        torque is off, whose profile is timed, or that is booting.
+        """
+        if self._stale or not (self._all_answer() and self._goal_window.admits(rows, goals)):
+            return False
+        self._columns.goal_position[rows] = goals
+        return True
 
     def reboot(self, row: int) -> None:
         """Start the firmware anew; the servo is silent while it boots."""
@@ -251,3 +282,6 @@ class Firmware:
     def _reload(self) -> None:
         self._stale = False
         self._motion.reload()
+        self._goal_window.reload()
+        levels = self._columns.status_return_level
+        self._all_readable = bool((levels >= StatusReturnLevel.READ).all())

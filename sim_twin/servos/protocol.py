@@ -11,6 +11,8 @@ import struct
 from collections.abc import Callable, Iterable
 from typing import Final
 
+import numpy as np
+
 from drivers.dynamixel.codec import (
     ALERT,
     BROADCAST_ID,
@@ -32,6 +34,9 @@ _CLEAR_TURNS: Final = b"\x01\x44\x58\x4c\x22"
 _RESET_EVERYTHING: Final = 0xFF
 _FAST_OVERHEAD_BYTES: Final = 4  # error, id, CRC
 _FAST_PREFIX_BYTES: Final = 8  # header .. instruction
+_RANGE_BYTES: Final = 4  # address, length
+_GOALS_HEAD: Final = struct.pack("<HH", 116, 4)
+_GOAL: Final = np.dtype([("id", "u1"), ("pulse", "<i4")])
 _FAST: Final = frozenset({Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ})
 
 _REPLY_LEVELS: Final[dict[int, StatusReturnLevel]] = {
@@ -62,6 +67,7 @@ class BusProtocol:
         self.silenced: set[int] = set()
         self.corrupted: set[int] = set()
         self.rows: dict[int, int] = {}
+        self._groups: dict[bytes, list[int]] = {}
         self._index_ids()
 
     def execute(self, packet: Packet) -> bytes:
@@ -160,6 +166,10 @@ class BusProtocol:
     # Several servos by one packet
 
     def _group_read(self, packet: Packet) -> bytes:
+        if packet.instruction == Instruction.FAST_SYNC_READ:
+            reply = self._read_block(packet.params)
+            if reply:
+                return reply
         requests = READ_REQUESTS[packet.instruction](packet.params)
         self._feed(self._known(request[0] for request in requests))
         for address, length in {request[1:] for request in requests}:
@@ -175,6 +185,22 @@ class BusProtocol:
                 error, data = self._entry(row, address, length)
                 replies.append(self._status(row, servo_id, error, data))
         return b"".join(replies)
+
+    def _read_block(self, params: bytes) -> bytes:
+        """Answer the fast sync read that comes in every cycle in one go; b"" if it is another."""
+        if self.silenced or self.corrupted:
+            return b""
+        address, length = range_of(params)
+        ids = params[_RANGE_BYTES:]
+        rows = self._group(ids)
+        if not rows or len(rows) * (length + _FAST_OVERHEAD_BYTES) >= MAX_LENGTH:
+            return b""
+        spans = self._firmware.read_spans(rows, address, length)
+        if not spans:
+            return b""
+        self._feed(rows)
+        alerts = [ALERT if alert else 0 for alert in self._firmware.alerts(rows)]
+        return encode_fast_status(list(zip(alerts, ids, spans, strict=True)))
 
     def _fast_reply(self, requests: list[Request]) -> bytes:
         """Return the joint reply, cut where a servo is missing although LEN counts it."""
@@ -208,6 +234,8 @@ class BusProtocol:
             return self._alert(row) | refusal.number, b""
 
     def _group_write(self, packet: Packet) -> bytes:
+        if packet.instruction == Instruction.SYNC_WRITE and self._write_goals(packet.params):
+            return b""
         writes = list(GROUP_WRITES[packet.instruction](packet.params))
         self._feed(self._known(write[0] for write in writes))
         for servo_id, address, data in writes:
@@ -215,6 +243,25 @@ class BusProtocol:
             if row is not None and self._listens(row):
                 self._try_write(row, address, data)
         return b""
+
+    def _write_goals(self, params: bytes) -> bool:
+        """Carry out the sync write that comes in every cycle in one go; False if it is another."""
+        whole = (len(params) - len(_GOALS_HEAD)) % _GOAL.itemsize == 0
+        if self.silenced or not whole or not params.startswith(_GOALS_HEAD):
+            return False
+        rows = self._group(params[len(_GOALS_HEAD) :: _GOAL.itemsize])
+        goals = np.frombuffer(params, _GOAL, offset=len(_GOALS_HEAD))["pulse"]
+        if not rows or not self._firmware.take_goals(rows, goals):
+            return False
+        self._feed(rows)
+        return True
+
+    def _group(self, ids: bytes) -> list[int]:
+        """Return the rows of servos that a packet names again and again; none if one is odd."""
+        if ids not in self._groups:
+            rows = self._known(ids)
+            self._groups = {ids: rows if len(set(rows)) == len(ids) else []}
+        return self._groups[ids]
 
     def _try_write(self, row: int, address: int, data: bytes) -> None:
         try:
@@ -262,3 +309,4 @@ class BusProtocol:
         """Map ids to servos; of two servos with one id the first answers."""
         ids = [table.get("id") for table in self._tables]
         self.rows = {ids[row]: row for row in reversed(range(len(ids)))}
+        self._groups.clear()

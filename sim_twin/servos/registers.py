@@ -9,8 +9,10 @@ of addresses that hold no register gives zeros, as long as it ends within the ta
 refused as a whole when any part of it is. Indirect addresses are not in the table.
 """
 
-from collections.abc import Sequence
-from typing import Final
+import struct
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -46,6 +48,9 @@ _LIMITS: Final = {
 }
 """The register that bounds each goal's magnitude."""
 
+_FORMATS: Final = {1: "b", 2: "h", 4: "i"}
+"""The struct code of a signed register by its bytes; an unsigned one has the capital."""
+
 _KEPT_BY_RESET: Final = {0xFF: (), 0x01: ("id",), 0x02: ("id", "baud_rate")}
 """What each factory reset option keeps."""
 
@@ -65,7 +70,10 @@ class ControlTable:
         self.model: Model = MODELS[spec.model_name]
         self._spec = spec
         self._memory = memory
-        self._end = max(r.address + r.size for r in self.model.registers.values())
+        self.end = max(r.address + r.size for r in self.model.registers.values())
+        self._unpackers = {
+            register.name: _unpacker(register, memory) for register in self.model.registers.values()
+        }
         self._load_defaults(eeprom=True)
         self._load_defaults(eeprom=False)
         self.put("firmware_version", spec.firmware_version)
@@ -75,9 +83,8 @@ class ControlTable:
 
     def get(self, name: str) -> int:
         """Return a register's value as the firmware sees it."""
-        register = self.model.registers[name]
-        end = register.address + register.size
-        return register.from_bytes(bytes(self._memory[register.address : end]))
+        value: int = self._unpackers[name]()[0]
+        return value
 
     def put(self, name: str, value: int) -> None:
         """Set a register from inside the firmware, unchecked."""
@@ -93,7 +100,7 @@ class ControlTable:
         """
         if length == 0:
             raise Refused(StatusError.DATA_LENGTH)
-        if address + length > self._end:
+        if address + length > self.end:
             raise Refused(StatusError.ACCESS)
         return bytes(self._memory[address : address + length])
 
@@ -175,6 +182,12 @@ class ControlTable:
         return self.get("min_position_limit") <= value <= self.get("max_position_limit")
 
 
+def _unpacker(register: Register, memory: memoryview) -> Callable[[], tuple[Any, ...]]:
+    code = _FORMATS[register.size]
+    form = struct.Struct("<" + (code if register.signed else code.upper()))
+    return partial(form.unpack_from, memory, register.address)
+
+
 class RegisterFile:
     """Hold the tables of all servos on a bus in one block of memory."""
 
@@ -186,9 +199,17 @@ class RegisterFile:
             ControlTable(spec, view[row * TABLE_BYTES : (row + 1) * TABLE_BYTES])
             for row, spec in enumerate(specs)
         )
+        self._shortest = min(table.end for table in self.tables)
 
     def __len__(self) -> int:
         return len(self.tables)
+
+    def spans(self, rows: Sequence[int], address: int, length: int) -> list[bytes]:
+        """Return the same bytes of several tables; none where one of them would refuse the read."""
+        if length == 0 or address + length > self._shortest:
+            return []
+        block = self._grid[rows, address : address + length].tobytes()
+        return [block[start : start + length] for start in range(0, len(block), length)]
 
     def column(self, address: int, dtype: DTypeLike) -> NDArray[np.int32]:
         """Return the register at `address` of all servos as one writable array."""
