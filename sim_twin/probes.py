@@ -16,7 +16,7 @@ _WORLD_GROUPS = np.array([1, 1, 0, 0, 0, 0], np.uint8)
 
 
 class RangeProbe:
-    """Cast 360 rays in the base's plane from the lidar; they pass the robot itself by."""
+    """Cast rays in the base's plane from the lidar; they pass the robot itself by."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, site: str = "lidar") -> None:
         self._model = model
@@ -24,29 +24,29 @@ class RangeProbe:
         self._site = model.site(site).id
         self._base = model.body(ROBOT_ROOT).id
         angles = np.radians(np.arange(BEAMS))
-        self._beams = np.stack([np.cos(angles), np.sin(angles), np.zeros(BEAMS)])
-        self._geoms = np.zeros(BEAMS, np.int32)
-        self._ranges_m = np.zeros(BEAMS)
+        self._directions = np.stack([np.cos(angles), np.sin(angles), np.zeros(BEAMS)], axis=1)
 
-    def cast(self) -> NDArray[np.float32]:
+    def cast(self, beams: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return ranges in metres, beam i at i degrees counter-clockwise; 0 is no return."""
         rotation = self._data.xmat[self._base].reshape(3, 3)
+        geoms = np.zeros(beams.size, np.int32)
+        ranges_m = np.zeros(beams.size)
         mujoco.mj_multiRay(
             self._model,
             self._data,
             self._data.site_xpos[self._site],
-            (rotation @ self._beams).T.ravel(),
+            (self._directions[beams] @ rotation.T).ravel(),
             _WORLD_GROUPS,
             True,
             -1,
-            self._geoms,
-            self._ranges_m,
+            geoms,
+            ranges_m,
             None,
-            BEAMS,
+            beams.size,
             RANGE_CUTOFF_M,
         )
-        hit = (self._geoms >= 0) & (self._ranges_m > 0.0)
-        return np.where(hit, self._ranges_m, 0.0).astype(np.float32)
+        hit = (geoms >= 0) & (ranges_m > 0.0)
+        return np.where(hit, ranges_m, 0.0).astype(np.float32)
 
 
 class MotionProbe:

@@ -2,6 +2,7 @@
 
 import math
 import struct
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -16,20 +17,23 @@ MAX_RANGE_M = 12.0
 INTENSITY = 200
 _NS_PER_MS = 1_000_000
 _HEAD = struct.Struct("<2sHH")
-_TAIL = struct.Struct("<HH")
+_END = struct.Struct("<H")
+_STAMP = struct.Struct("<H")
+_POINT = np.dtype([("distance_mm", "<u2"), ("intensity", "u1")])
 
 
 class LidarDevice:
     """Turn casts of the world into the LD19's packets.
 
-    `cast` returns 360 ranges in metres, beam i at i degrees counter-clockwise from the robot's
-    front, 0 for no return. It is called `casts_per_turn` times a turn, so that a moving robot
-    distorts the scan as it does in life.
+    `cast` returns the ranges in metres of the beams it is given, beam i at i degrees
+    counter-clockwise from the robot's front, 0 for no return. It is called `casts_per_turn` times a
+    turn for the points up to the next cast, so that a moving robot distorts the scan as it does in
+    life.
     """
 
     def __init__(
         self,
-        cast: Callable[[], NDArray[np.float32]],
+        cast: Callable[[NDArray[np.int64]], NDArray[np.float32]],
         rate_hz: float = 10.0,
         *,
         sigma_m: float = 0.005,
@@ -44,10 +48,10 @@ class LidarDevice:
         self._random = np.random.default_rng(seed)
         self._mounting_deg = math.degrees(mounting_yaw_rad)
         self._cast_every_ns = round(NS_PER_S / rate_hz / casts_per_turn)
-        self._ranges_m = np.zeros(BEAMS, dtype=np.float32)
         self._next_cast_ns = 0
         self._start_ns: int | None = None
         self._sent_packets = 0
+        self._bodies: deque[bytes] = deque()
         self._out = bytearray()
 
     def receive(self, data: bytes) -> None:
@@ -60,33 +64,42 @@ class LidarDevice:
         return data
 
     def step(self, now_ns: int) -> None:
-        """Measure every packet whose last point is due by `now_ns`."""
+        """Send every packet whose last point is due by `now_ns`."""
         if self._start_ns is None:
             self._start_ns = self._next_cast_ns = now_ns
         if now_ns >= self._next_cast_ns:
-            self._ranges_m = np.asarray(self._cast(), dtype=np.float32)
             self._next_cast_ns += self._cast_every_ns
-        points = (now_ns - self._start_ns) * POINTS_PER_S // NS_PER_S
-        while (self._sent_packets + 1) * POINTS_PER_PACKET <= points:
-            self._out += self._packet(now_ns)
+            self._measure(max(self._packets_due(self._next_cast_ns), self._packets_due(now_ns)))
+        for _ in range(self._sent_packets, self._packets_due(now_ns)):
+            stamp_ms = now_ns // _NS_PER_MS % STAMP_WRAP_MS
+            packet = self._bodies.popleft() + _STAMP.pack(stamp_ms)
+            self._out += packet + bytes((crc8(packet),))
             self._sent_packets += 1
 
-    def _packet(self, now_ns: int) -> bytes:
-        first = self._sent_packets * POINTS_PER_PACKET
-        angles_deg = np.arange(first, first + POINTS_PER_PACKET, dtype=np.float64) * self._step_deg
-        points = b"".join(
-            struct.pack("<HB", distance, INTENSITY if distance else 0)
-            for distance in self._measure_mm(angles_deg)
-        )
-        start, end = (round(a * 100) % 36_000 for a in (angles_deg[0], angles_deg[-1]))
-        stamp_ms = now_ns // _NS_PER_MS % STAMP_WRAP_MS
-        body = _HEAD.pack(HEADER, round(self._speed_deg_s), start) + points
-        body += _TAIL.pack(end, stamp_ms)
-        return body + bytes([crc8(body)])
+    def _packets_due(self, now_ns: int) -> int:
+        """Return how many packets have been measured to their last point by `now_ns`."""
+        assert self._start_ns is not None
+        return (now_ns - self._start_ns) * POINTS_PER_S // (NS_PER_S * POINTS_PER_PACKET)
 
-    def _measure_mm(self, angles_deg: NDArray[np.float64]) -> list[int]:
+    def _measure(self, end: int) -> None:
+        """Look at the world once for all packets not sent yet, up to the one before `end`."""
+        packets = np.arange(self._sent_packets, end)[:, None]
+        points = packets * POINTS_PER_PACKET + np.arange(POINTS_PER_PACKET)
+        angles_deg: NDArray[np.float64] = points * self._step_deg
+        readings = np.empty(points.shape, _POINT)
+        readings["distance_mm"] = self._distances_mm(angles_deg)
+        readings["intensity"] = np.where(readings["distance_mm"] > 0, INTENSITY, 0)
+        hundredths = np.rint(angles_deg * 100.0).astype(np.int64) % 36_000
+        edges = hundredths[:, [0, -1]].tolist()
+        speed = round(self._speed_deg_s)
+        self._bodies = deque(
+            _HEAD.pack(HEADER, speed, first) + row.tobytes() + _END.pack(last)
+            for (first, last), row in zip(edges, readings, strict=True)
+        )
+
+    def _distances_mm(self, angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64) % BEAMS
-        true_m = self._ranges_m[beams]
-        noisy_m = true_m + self._sigma_m * self._random.standard_normal(true_m.size)
+        true_m = self._cast(beams.ravel()).reshape(beams.shape)
+        noisy_m = true_m + self._sigma_m * self._random.standard_normal(true_m.shape)
         seen = (true_m >= MIN_RANGE_M) & (true_m <= MAX_RANGE_M)
-        return [int(v) for v in np.where(seen, np.rint(noisy_m * 1000.0).clip(1.0, 65_535.0), 0.0)]
+        return np.where(seen, np.rint(noisy_m * 1000.0).clip(1.0, 65_535.0), 0.0)
