@@ -18,6 +18,8 @@ robot's front.
 
 import math
 import struct
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +38,9 @@ MAX_STEP_DEG = 3.0
 MIN_COVERAGE_DEG = 300.0
 _NS_PER_MS = 1_000_000
 _READ_BYTES = 16_384
+_MAX_PIECES = 1024
 _FRAME = struct.Struct("<2sHH36sHHB")
+_POINT_NUMBERS = np.arange(POINTS_PER_PACKET, dtype=np.float64)
 _POINT = np.dtype([("distance_mm", "<u2"), ("intensity", "u1")])
 
 
@@ -93,6 +97,13 @@ class _Packet:
     step_deg: float
     stamp_ms: int
     distance_mm: NDArray[np.uint16]
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    angles_deg: NDArray[np.float64]
+    distance_mm: NDArray[np.uint16]
+    stamp_ns: int
 
 
 class Lidar:
@@ -160,38 +171,33 @@ class Lidar:
     def _take(self, packet: _Packet) -> Scan | None:
         """Add a packet's points to the scan; return the scan that it completes."""
         stamp_ns = self._device_clock.to_host_ns(packet.stamp_ms * _NS_PER_MS, self._clock.now_ns())
-        angles_deg = packet.start_deg + packet.step_deg * np.arange(
-            POINTS_PER_PACKET, dtype=np.float64
-        )
-        wrapped = angles_deg % 360.0
-        starts = np.flatnonzero(np.diff(wrapped, prepend=self._last_deg or 0.0) < -180.0)
-        self._last_deg = float(wrapped[-1])
-        if not starts.size:
+        wrapped: NDArray[np.float64] = (packet.start_deg + packet.step_deg * _POINT_NUMBERS) % 360.0
+        first_deg, last_deg = float(wrapped[0]), float(wrapped[-1])
+        goes_on = first_deg - (self._last_deg or 0.0) >= -180.0 and last_deg >= first_deg
+        before_deg, self._last_deg = self._last_deg, last_deg
+        if goes_on:
             self._add(packet, wrapped, slice(None), stamp_ns)
             return None
-        self._add(packet, wrapped, slice(0, starts[0]), stamp_ns)
+        start = int(np.argmax(np.diff(wrapped, prepend=before_deg or 0.0) < -180.0))
+        self._add(packet, wrapped, slice(0, start), stamp_ns)
         scan = self._finish(packet.speed_deg_s)
-        self._add(packet, wrapped, slice(starts[0], None), stamp_ns)
+        self._add(packet, wrapped, slice(start, None), stamp_ns)
         return scan
 
     def _add(
         self, packet: _Packet, angles_deg: NDArray[np.float64], part: slice, stamp_ns: int
     ) -> None:
-        distance = packet.distance_mm[part]
-        beams = np.rint(self._mounting_deg - angles_deg[part]).astype(np.int64) % BEAMS
-        self._coverage_deg += packet.step_deg * distance.size
-        self._stamps[beams] = stamp_ns
-        seen = distance > 0
-        # Two points may fall on one beam: the nearer one is what the robot could hit.
-        np.minimum.at(self._ranges_m, beams[seen], (distance[seen] / 1000.0).astype(np.float32))
+        distance_mm = packet.distance_mm[part]
+        self._pieces.append(_Piece(angles_deg[part], distance_mm, stamp_ns))
+        self._coverage_deg += packet.step_deg * distance_mm.size
 
     def _begin_scan(self) -> None:
-        self._ranges_m = np.full(BEAMS, np.inf, dtype=np.float32)
-        self._stamps = np.zeros(BEAMS, dtype=np.int64)
+        # A head that is stuck never ends its turn; only the newest of what it says counts.
+        self._pieces: deque[_Piece] = deque(maxlen=_MAX_PIECES)
         self._coverage_deg = 0.0
 
     def _finish(self, speed_deg_s: int) -> Scan | None:
-        ranges_m, stamps, coverage_deg = self._ranges_m, self._stamps, self._coverage_deg
+        pieces, coverage_deg = self._pieces, self._coverage_deg
         was_synced, self._synced = self._synced, True
         self._begin_scan()
         if coverage_deg < MIN_COVERAGE_DEG:
@@ -199,6 +205,7 @@ class Lidar:
             self.counters.incomplete_scans += was_synced
             return None
         self.counters.scans += 1
+        ranges_m, stamps = self._merge(pieces)
         stamp_ns = int(stamps.max())
         return Scan(
             stamp_ns=stamp_ns,
@@ -206,6 +213,20 @@ class Lidar:
             beam_stamp_ns=np.where(stamps > 0, stamps, stamp_ns),
             turn_hz=speed_deg_s / 360.0,
         )
+
+    def _merge(self, pieces: Sequence[_Piece]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """Return range, infinite without return, and stamp of each beam, 0 where none looked."""
+        angles_deg = np.concatenate([piece.angles_deg for piece in pieces])
+        distance_mm = np.concatenate([piece.distance_mm for piece in pieces])
+        beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64) % BEAMS
+        stamps = np.zeros(BEAMS, dtype=np.int64)
+        sizes = [piece.distance_mm.size for piece in pieces]
+        stamps[beams] = np.repeat([piece.stamp_ns for piece in pieces], sizes)
+        ranges_m = np.full(BEAMS, np.inf, dtype=np.float32)
+        seen = distance_mm > 0
+        # Two points may fall on one beam: the nearer one is what the robot could hit.
+        np.minimum.at(ranges_m, beams[seen], (distance_mm[seen] / 1000.0).astype(np.float32))
+        return ranges_m, stamps
 
 
 def _decode(raw: bytes) -> _Packet | None:

@@ -85,7 +85,7 @@ class LidarDevice:
         """Look at the world once for all packets not sent yet, up to the one before `end`."""
         packets = np.arange(self._sent_packets, end)[:, None]
         points = packets * POINTS_PER_PACKET + np.arange(POINTS_PER_PACKET)
-        angles_deg: NDArray[np.float64] = points * self._step_deg
+        angles_deg = np.multiply(points, self._step_deg, dtype=np.float64)
         readings = np.empty(points.shape, _POINT)
         readings["distance_mm"] = self._distances_mm(angles_deg)
         readings["intensity"] = np.where(readings["distance_mm"] > 0, INTENSITY, 0)
