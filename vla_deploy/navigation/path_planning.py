@@ -15,6 +15,8 @@ Cell = tuple[int, int]
 # Cells nearer than this to an obstacle cost more, up to WALL_COST times at the least clearance.
 COMFORT_M = 0.25
 WALL_COST = 4.0
+# What a scan shows this near to a blocked cell is that cell: scans and poses are a little off.
+MAPPED_M = 0.10
 _NEIGHBOURS = tuple(
     (dr, dc, math.hypot(dr, dc)) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if dr or dc
 )
@@ -39,8 +41,22 @@ class PathPlanner:
 
     def is_free(self, x_m: float, y_m: float) -> bool:
         """Tell whether the body fits at a point of the map frame."""
+        return self.room_m(x_m, y_m) >= self._radius_m
+
+    def room_m(self, x_m: float, y_m: float) -> float:
+        """Return the distance from a point of the map frame to what blocks; 0 off the map."""
         cell = self._grid.world_to_cell(x_m, y_m)
-        return self._inside(cell) and bool(self._clearance_m[cell] >= self._radius_m)
+        return float(self._clearance_m[cell]) if self._inside(cell) else 0.0
+
+    def is_mapped(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which of (n, 2) points of the map frame the map shows as blocked, or nearly."""
+        cells = np.floor((points - self._grid.origin_m) / self._grid.resolution_m).astype(np.intp)
+        rows, columns = cells[:, 1], cells[:, 0]
+        height, width = self._clearance_m.shape
+        on_map = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+        mapped: NDArray[np.bool_] = ~on_map
+        mapped[on_map] = self._clearance_m[rows[on_map], columns[on_map]] < MAPPED_M
+        return mapped
 
     def plan(self, start: tuple[float, float], goal: tuple[float, float]) -> NDArray[np.float64]:
         """Return the way from start to goal as (n, 2) points in the map frame.

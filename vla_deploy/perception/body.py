@@ -1,4 +1,4 @@
-"""Mask the robot's own arms and hands in its camera's image, from the MJCF's collision shapes."""
+"""Mask the robot's own arms and hands in its camera's image, from the MJCF's shapes."""
 
 from dataclasses import dataclass
 
@@ -35,12 +35,11 @@ class BodyMask:
         self._model = pinocchio.buildModelFromMJCF(path)
         self._data = self._model.createData()
         self._neutral = pinocchio.neutral(self._model)
-        shapes = pinocchio.buildGeomFromMJCF(self._model, path, pinocchio.GeometryType.COLLISION)
         camera = self._model.getFrameId(robot.camera.site)
         self._camera_frame = camera
         head = self._model.frames[camera].parentJoint
         self._balls = [
-            _fill(shape) for shape in shapes.geometryObjects if shape.parentJoint != head
+            _fill(shape) for shape in _shapes(self._model, path) if shape.parentJoint != head
         ]
         mimics = read_mjcf_names(robot.mjcf_path).mimics
         leaders = {**{name: name for name in robot.joint_names}, **mimics}
@@ -64,6 +63,13 @@ class BodyMask:
                 image, balls.centres @ pose.rotation.T + pose.translation, balls.radius_m, camera
             )
         return image.astype(np.bool_)
+
+
+def _shapes(model: pinocchio.Model, path: str) -> list[pinocchio.GeometryObject]:
+    """Return what is seen of the robot; a description may have no more than collision shapes."""
+    kinds = (pinocchio.GeometryType.VISUAL, pinocchio.GeometryType.COLLISION)
+    found = (pinocchio.buildGeomFromMJCF(model, path, kind).geometryObjects for kind in kinds)
+    return next((list(shapes) for shapes in found if len(shapes)), [])
 
 
 def _fill(shape: pinocchio.GeometryObject) -> _Balls:

@@ -24,6 +24,10 @@ def _top_ratio(shape: Shape) -> float:
     return shape.top.width_m / max(shape.across_m, 1e-6)
 
 
+def _rim_ratio(shape: Shape) -> float:
+    return shape.top.width_m / max(shape.footprint.width_m, 1e-6)
+
+
 def _squareness(shape: Shape) -> float:
     return shape.footprint.width_m / max(shape.footprint.length_m, 1e-6)
 
@@ -50,6 +54,9 @@ MEASURES: dict[str, Measure] = {
     "slenderness": _slenderness,
     "squareness": _squareness,
     "top_ratio": _top_ratio,
+    "rim_m": lambda shape: shape.top.width_m,
+    "rim_ratio": _rim_ratio,
+    "rim_share": lambda shape: shape.rim_share,
     "roundness": _roundness,
 }
 
@@ -64,7 +71,17 @@ class Rule:
 
 OTHER = "object"
 RULES: tuple[Rule, ...] = (
-    Rule("box", {"hole_m": (0.04, 0.4), "width_m": (0.13, 0.45), "height_m": (0.05, 0.4)}),
+    Rule(
+        "box",
+        {
+            "hole_m": (0.04, 0.4),
+            "rim_m": (0.13, 0.45),
+            "rim_ratio": (0.75, 1.2),
+            "rim_share": (0.5, 1.0),
+            "length_m": (0.13, 0.55),
+            "height_m": (0.05, 0.4),
+        },
+    ),
     Rule("ball", {"roundness": (1.0, 1.0), "across_m": (0.025, 0.3)}),
     Rule(
         "bottle",

@@ -15,7 +15,7 @@ MIN_DEPTH_M = 0.2
 MAX_DEPTH_M = 3.0
 # Stereo depth noise grows with the square of the distance.
 DEPTH_SIGMA_PER_M = 0.0012
-SMOOTHING_PX = 5
+SMOOTHING_PX = 3
 UPRIGHT = 0.9
 EDGE_RATIO = 0.15
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vla_deploy.perception.classes import OTHER, classify
-from vla_deploy.perception.cloud import Cloud
+from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.clusters import Cluster, find_clusters, part_of, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
 from vla_deploy.perception.shapes import Rectangle, Shape, inside_rectangle, measure
@@ -18,6 +18,7 @@ Vector = tuple[float, float, float]
 CONFIDENCE_KNOWN = 0.9
 CONFIDENCE_OTHER = 0.5
 FEW_PIXELS = 60
+FLAT_SIGMAS = 4.0
 BOX_FLOOR_M = 0.02
 WALL_M = 0.02
 FACE_WIDTH_M, FACE_HEIGHT_M = 0.03, 0.05
@@ -135,9 +136,14 @@ def _contents(box: Detection, cluster: Cluster, cloud: Cloud) -> list[Detection]
     return [content] if content is not None and known else []
 
 
+def _least_height_m(cluster: Cluster) -> float:
+    """Return the height below which the depth noise alone may look like a flat thing."""
+    return FLAT_SIGMAS * DEPTH_SIGMA_PER_M * cluster.depth_m**2
+
+
 def _detection(cluster: Cluster, cloud: Cloud) -> Detection:
     shape = measure(cluster, cloud.camera_position, cloud.focal_px)
-    name = classify(shape)
+    name = classify(shape) if shape.height_m > _least_height_m(cluster) else OTHER
     colour, share = dominant_colour(cluster.rgb)
     pose = PLACEMENT.get(name, _as_block)(shape)
     ground_m = cluster.support.height_m(*pose.xy)

@@ -97,12 +97,14 @@ def _view(
     x, y, z = base_from_camera[:3, :3].T @ (point - base_from_camera[:3, 3])
     if not 0.2 < z < CLEAR_RANGE_M:
         return View.HIDDEN
-    border = BORDER_PX + math.ceil(0.5 * camera.fx * max(track.size_m) / z)
+    half = math.ceil(0.5 * camera.fx * max(track.size_m) / z)
+    border = BORDER_PX + half
     u, v = round(camera.fx * x / z + camera.cx), round(camera.fy * y / z + camera.cy)
     if not (border <= u < camera.width - border and border <= v < camera.height - border):
         return View.HIDDEN
+    around = np.s_[v - half : v + half + 1, u - half : u + half + 1]
     patch = np.s_[v - PATCH_PX : v + PATCH_PX + 1, u - PATCH_PX : u + PATCH_PX + 1]
-    if not cloud.valid[patch].all():
+    if cloud.own_body[around].any() or not cloud.valid[patch].all():
         return View.HIDDEN
     reach_m = 0.5 * max(track.size_m) + IN_FRONT_M
     return View.CLEAR if np.median(cloud.depth_m[patch]) > z - reach_m else View.HIDDEN

@@ -14,6 +14,7 @@ TOP_SLICE_M = 0.012
 TOP_SLICE_RATIO = 0.12
 RIM_MARGIN_M = 0.035
 SOLID_SHARE = 0.2
+SECTORS = 16
 SPHERE_MIN_HEIGHT_M = 0.006
 
 Point = NDArray[np.float64]
@@ -43,7 +44,8 @@ class Shape:
     """Hold the measures that the class rules look at.
 
     `across_m` is the width as seen from the camera, which no far side can hide. `hole_m` is how far
-    the inside lies below the rim, 0 for what has no rim. `sphere` is None where none fits.
+    the inside lies below the rim, 0 for what has no rim; `rim_share` is how much of the way around
+    the middle the rim is seen. `sphere` is None where none fits.
     """
 
     height_m: float
@@ -51,6 +53,7 @@ class Shape:
     footprint: Rectangle
     top: Rectangle
     hole_m: float
+    rim_share: float
     sphere: Sphere | None
 
 
@@ -61,13 +64,15 @@ def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
     height_m = float(np.percentile(cluster.heights, 98.0))
     xy = cluster.points[:, :2]
     slice_m = max(TOP_SLICE_M, TOP_SLICE_RATIO * height_m)
-    top = rectangle_of(xy[cluster.heights > height_m - slice_m], pixel_m)
+    rim = xy[cluster.heights > height_m - slice_m]
+    top = rectangle_of(rim, pixel_m)
     return Shape(
         height_m=height_m,
         across_m=_across(xy, camera_position) + pixel_m,
         footprint=rectangle_of(xy, pixel_m),
         top=top,
         hole_m=_hole(cluster, top, height_m, pixel_m),
+        rim_share=_share_around(rim, top),
         sphere=_sphere(cluster.points[cluster.heights > SPHERE_MIN_HEIGHT_M], sigma_m),
     )
 
@@ -121,6 +126,13 @@ def _hole(cluster: Cluster, rim: Rectangle, height_m: float, pixel_m: float) -> 
         # A lid would fill the middle with points: one looks down onto the support.
         return height_m
     return max(0.0, height_m - float(np.median(middle)))
+
+
+def _share_around(rim: Floats, rectangle: Rectangle) -> float:
+    """Return the share of directions, seen from a rectangle's middle, in which there is a point."""
+    x, y = (rim - rectangle.centre).T
+    sectors = ((np.arctan2(y, x) + np.pi) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
+    return len(np.unique(sectors)) / SECTORS
 
 
 def _sphere(points: Floats, sigma_m: float) -> Sphere | None:

@@ -12,6 +12,8 @@ LAYER_M = 0.015
 MIN_AREA_M2 = 0.04
 MAX_SUPPORTS = 6
 CELL_M = 0.02
+# What stands on a table hides a part of it, but does not cut it in two.
+BRIDGED_CELLS = 15
 FLOOR_M = 0.04
 STRIDE = 2
 FIT_POINTS = 2000
@@ -116,7 +118,9 @@ def _pieces(
     cells = ((xy - low) / CELL_M).astype(np.intp)
     grid = np.zeros(cells.max(axis=0) + 1, dtype=np.uint8)
     grid[cells[:, 0], cells[:, 1]] = 1
-    grid = cv2.morphologyEx(grid, cv2.MORPH_CLOSE, np.ones((5, 5), dtype=np.uint8))
+    grid = cv2.morphologyEx(
+        grid, cv2.MORPH_CLOSE, np.ones((BRIDGED_CELLS, BRIDGED_CELLS), dtype=np.uint8)
+    )
     _, labels = cv2.connectedComponents(grid, connectivity=8)
     label = labels[cells[:, 0], cells[:, 1]]
     areas = np.bincount(label, weights=area[on_plane])

@@ -51,6 +51,11 @@ class Track:
         return self.classes.most_common(1)[0][0] if self.classes else OTHER
 
     @property
+    def certainty(self) -> float:
+        """Return the share of sights that agree on the class."""
+        return self.classes[self.class_name] / max(1, self.classes.total())
+
+    @property
     def colour(self) -> str:
         """Return the colour most often seen."""
         return self.colours.most_common(1)[0][0] if self.colours else "grey"
@@ -66,7 +71,7 @@ class Track:
             "yaw_rad": round(self.yaw_rad, 4),
             "last_seen_ns": self.last_seen_ns,
             "seen_count": self.seen_count,
-            "confidence": round(self.confidence, 3),
+            "confidence": round(self.confidence * self.certainty, 3),
         }
 
 
@@ -100,7 +105,7 @@ class Tracker:
         for track, detection in pairs:
             _absorb(track, detection, stamp_ns)
         for detection in detections:
-            if id(detection) not in taken and _is_sure(detection):
+            if id(detection) not in taken and _is_sure(detection) and not self._is_part(detection):
                 self._tracks.append(_new_track(detection, stamp_ns))
         self._forget()
         for track in self._tracks:
@@ -135,6 +140,14 @@ class Tracker:
                 used_detections.add(j)
                 pairs.append((self._tracks[i], detections[j]))
         return pairs
+
+    def _is_part(self, detection: Detection) -> bool:
+        """Tell whether this is a half-hidden part of a known thing, seen a second time."""
+        return detection.occluded and any(
+            (track.class_name, track.colour) == (detection.class_name, detection.colour)
+            and math.dist(track.position_m, detection.position_m) < 0.5 * max(track.size_m)
+            for track in self._tracks
+        )
 
     def _forget(self) -> None:
         gone = [

@@ -14,6 +14,7 @@ from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.motion import follow_joints, move_joints, pause, settle
 
 AT_POSE_RAD = 0.05
+LOADED_SPEED_RATIO = 0.6
 TUCK = "tuck"
 # Where a loaded hand travels, in the base frame: pointing down, close in front of the chest.
 CARRY_POINT_M = (0.27, 0.16, 0.72)
@@ -120,16 +121,22 @@ def move_arm(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 def carry(context: SkillContext) -> Skill:
     """Bring both arms to where they may travel: tucked when empty, close in front when loaded."""
-    for hand, described in context.robot.hands.items():
-        joints = context.robot.group(described.arm).joints
-        if context.hands.get(hand) is None:
-            pose = context.robot.poses[TUCK]
-            targets = {name: pose[name] for name in joints}
-        else:
-            targets = _carry_targets(context, hand)
-        if not _is_at(context, targets):
-            yield from move_joints(context, targets, speed_ratio=0.6)
-            yield from settle(context, joints)
+    targets: dict[str, float] = {}
+    for hand in context.robot.hands:
+        wanted = _travel_targets(context, hand)
+        if not _is_at(context, wanted):
+            targets |= wanted
+    if targets:
+        loaded = any(held is not None for held in context.hands.values())
+        yield from move_joints(context, targets, LOADED_SPEED_RATIO if loaded else 1.0)
+        yield from settle(context, list(targets))
+
+
+def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:
+    if context.hands.get(hand) is not None:
+        return _carry_targets(context, hand)
+    pose = context.robot.poses[TUCK]
+    return {name: pose[name] for name in _arm_joints(context, hand)}
 
 
 def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Drive the base: along planned paths, straight, or on the spot; stop for what is in the way."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,16 +17,18 @@ from vla_deploy.navigation.follower import (
     Twist,
     wrap_angle,
 )
+from vla_deploy.navigation.obstacles import is_blocked, scan_points
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.frames import on_floor, to_map
 
 # Cruise below what the drives can do, so that tracking errors can be made up.
 CRUISE_RATIO = 0.9
-SIDE_MARGIN_M = 0.04
 STOP_DISTANCE_M = 0.12
 BLOCKED_TIMEOUT_S = 5.0
 STRAIGHT_TOLERANCE_M = 0.01
+LOOK_AHEAD_M = 0.06
 
 
 def limits_of(context: SkillContext) -> DriveLimits:
@@ -40,8 +42,13 @@ def limits_of(context: SkillContext) -> DriveLimits:
     )
 
 
-def drive_to(context: SkillContext, goal: FloorPose, turn: bool = True) -> Skill:
-    """Drive to a pose of the map along a planned path.
+def drive_to(
+    context: SkillContext,
+    goal: FloorPose,
+    turn: bool = True,
+    until: Callable[[], bool] = lambda: False,
+) -> Skill:
+    """Drive to a pose of the map along a planned path; halt on the way when `until()` holds.
 
     Raises:
         NotPossible: no path leads there.
@@ -52,11 +59,14 @@ def drive_to(context: SkillContext, goal: FloorPose, turn: bool = True) -> Skill
         points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
     except NavigationError as error:
         raise NotPossible(str(error)) from error
-    yield from follow(context, points, goal.yaw_rad if turn else None)
+    yield from follow(context, points, goal.yaw_rad if turn else None, until)
 
 
 def follow(
-    context: SkillContext, points: NDArray[np.float64], final_yaw_rad: float | None
+    context: SkillContext,
+    points: NDArray[np.float64],
+    final_yaw_rad: float | None,
+    until: Callable[[], bool] = lambda: False,
 ) -> Skill:
     """Follow points of the map frame; wait for what stands in the way, and give up on it.
 
@@ -65,7 +75,7 @@ def follow(
     """
     follower = PathFollower(points, limits_of(context), final_yaw_rad)
     clear_ns = context.link.clock.now_ns()
-    while follower.phase is not Phase.ARRIVED:
+    while follower.phase is not Phase.ARRIVED and not until():
         pose = context.link.pose
         twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
         if _blocked(context, twist, _distance(pose, points[-1])):
@@ -85,6 +95,7 @@ def move(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     """Drive straight for a distance, backward when negative.
 
     Raises:
+        NotPossible: the map shows a wall or furniture on the way.
         TryAgain: the way stayed blocked.
     """
     yield from straight(context, float(parameters["distance_m"]))
@@ -94,6 +105,7 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
     """Drive straight, holding the heading; positive is forward.
 
     Raises:
+        NotPossible: the map shows a wall or furniture on the way.
         TryAgain: the way stayed blocked.
     """
     start = context.link.pose
@@ -111,7 +123,10 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
             break
         speed = min(limits.speed_m_s / 2, math.sqrt(1.2 * limits.acceleration_m_s2 * left_m))
         twist = Twist(sign * max(speed, 0.03), 1.5 * wrap_angle(start.yaw_rad - pose.yaw_rad))
-        if _blocked(context, twist, left_m):
+        if _leaves_free_floor(context, sign):
+            context.link.drive(AT_REST)
+            raise NotPossible(f"the map shows no room for the last {left_m:.2f} m")
+        if _blocked(context, twist, left_m, planned=False):
             twist = AT_REST
             if context.link.clock.now_ns() - clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
                 raise TryAgain("something stands in the way")
@@ -147,18 +162,30 @@ def stand_still(context: SkillContext, duration_s: float = 0.4) -> Skill:
         yield
 
 
-def _blocked(context: SkillContext, twist: Twist, remaining_m: float) -> bool:
-    """Tell whether the lidar sees something in the strip that the body is about to sweep."""
+def _blocked(context: SkillContext, twist: Twist, remaining_m: float, planned: bool = True) -> bool:
+    """Tell whether the lidar sees something in the strip that the body is about to sweep.
+
+    A `planned` way keeps clear of what the map shows by itself.
+    """
     ranges_m = context.link.ranges_m
     if abs(twist.v_m_s) < 1e-3 or ranges_m is None:
         return False
-    angles = np.deg2rad(np.arange(len(ranges_m)))
-    seen = ranges_m > 0.0
-    x = np.sign(twist.v_m_s) * ranges_m[seen] * np.cos(angles[seen])
-    y = ranges_m[seen] * np.sin(angles[seen])
-    radius_m = context.robot.base.footprint_radius_m
-    reach_m = radius_m + min(STOP_DISTANCE_M + abs(twist.v_m_s) * 0.5, remaining_m)
-    return bool(((x > 0) & (x < reach_m) & (np.abs(y) < radius_m + SIDE_MARGIN_M)).any())
+    points = scan_points(ranges_m)
+    mapped = context.planner.is_mapped(on_floor(context.link.pose, points))
+    return is_blocked(
+        points * math.copysign(1.0, twist.v_m_s),
+        mapped & planned,
+        reach_m=min(STOP_DISTANCE_M + abs(twist.v_m_s) * 0.5, remaining_m),
+        radius_m=context.robot.base.footprint_radius_m,
+    )
+
+
+def _leaves_free_floor(context: SkillContext, sign: float) -> bool:
+    """Tell whether a little further on the map leaves too little room, and less than here."""
+    pose = context.link.pose
+    ahead, here = to_map(pose, sign * LOOK_AHEAD_M, 0.0), (pose.x_m, pose.y_m)
+    planner = context.planner
+    return not planner.is_free(*ahead) and planner.room_m(*ahead) < planner.room_m(*here)
 
 
 def _distance(pose: FloorPose, point: NDArray[np.float64]) -> float:

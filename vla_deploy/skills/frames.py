@@ -3,6 +3,9 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vla_deploy.robots.description import FloorPose
 
 
@@ -17,3 +20,11 @@ def to_map(pose: FloorPose, x_m: float, y_m: float) -> tuple[float, float]:
     """Return a base-frame point of the floor in the map frame."""
     cosine, sine = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     return pose.x_m + cosine * x_m - sine * y_m, pose.y_m + sine * x_m + cosine * y_m
+
+
+def on_floor(pose: FloorPose, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n, 2) base-frame points of the floor in the map frame."""
+    cosine, sine = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    turn = np.array([[cosine, sine], [-sine, cosine]])
+    moved: NDArray[np.float64] = points @ turn + np.array((pose.x_m, pose.y_m))
+    return moved

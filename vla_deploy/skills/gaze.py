@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from drivers.clock import NS_PER_S
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.context import Skill, SkillContext
@@ -23,14 +21,14 @@ DIRECTIONS: Mapping[str, tuple[float, float]] = {
     "up": (0.0, -0.4),
     "down": (0.0, 0.9),
 }
-# Where the eyes sweep, as (pan, tilt), to cover the tables in front of the robot.
-SWEEP = ((0.0, 0.55), (0.7, 0.5), (-0.7, 0.5), (0.0, 0.95))
+DRIVING_GAZE = (0.0, 0.3)
 FRESH_TIMEOUT_S = 4.0
 SIGHTINGS = 2
-SWEEP_TIMEOUT_S = 2.0
+WATCH_TIMEOUT_S = 2.0
 # Two images at the camera's rate: perception wants to see a thing twice.
 CONFIRMED_S = 0.4
-MEMORY_S = 120.0
+MEMORY_S = 600.0
+SURE_CONFIDENCE = 0.3
 
 
 def look_at(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
@@ -65,8 +63,20 @@ def gaze_at(context: SkillContext, position_m: Any) -> Skill:
 
 
 def remembered(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any] | None:
-    """Return the nearest object meant that was seen within MEMORY_S, or None."""
-    return _nearest(context, query, round(MEMORY_S * NS_PER_S))
+    """Return the nearest object meant that was seen surely and within MEMORY_S, or None."""
+    oldest_ns = context.link.clock.now_ns() - round(MEMORY_S * NS_PER_S)
+    meant = [
+        candidate
+        for candidate in context.link.objects
+        if query.matches(candidate)
+        and int(candidate["last_seen_ns"]) >= oldest_ns
+        and float(candidate["confidence"]) >= SURE_CONFIDENCE
+    ]
+    if not meant:
+        return None
+    pose = context.link.pose
+    here = (pose.x_m, pose.y_m)
+    return min(meant, key=lambda one: math.dist(one["position_m"][:2], here))
 
 
 def see(context: SkillContext, query: ObjectQuery) -> Skill:
@@ -95,32 +105,14 @@ def see(context: SkillContext, query: ObjectQuery) -> Skill:
         raise TryAgain(f"the {query} is no longer where I saw it")
 
 
-def sweep(context: SkillContext, query: ObjectQuery) -> Skill:
-    """Let the eyes sweep until the object is seen or the sweep is over."""
-    started_ns = context.link.clock.now_ns()
-    for pan_rad, tilt_rad in SWEEP:
-        yield from turn_head(context, pan_rad, tilt_rad)
-        looked = partial(_looked, context, context.link.clock.now_ns())
-        yield from wait_until(context, looked, SWEEP_TIMEOUT_S)
-        age_ns = context.link.clock.now_ns() - started_ns
-        if _nearest(context, query, age_ns) is not None:
-            return
+def watch_for(context: SkillContext, query: ObjectQuery) -> Skill:
+    """Wait until an object is seen, or until enough images show that it is not in view."""
+    looked = partial(_looked, context, context.link.clock.now_ns())
+    yield from wait_until(
+        context, lambda: looked() or remembered(context, query) is not None, WATCH_TIMEOUT_S
+    )
 
 
 def _looked(context: SkillContext, since_ns: int) -> bool:
     """Tell whether perception has judged enough images taken after a moment to confirm things."""
     return context.link.scene_stamp_ns > since_ns + round(CONFIRMED_S * NS_PER_S)
-
-
-def _nearest(context: SkillContext, query: ObjectQuery, age_ns: int) -> Mapping[str, Any] | None:
-    now_ns = context.link.clock.now_ns()
-    meant = [
-        candidate
-        for candidate in context.link.objects
-        if query.matches(candidate) and now_ns - int(candidate["last_seen_ns"]) <= age_ns
-    ]
-    if not meant:
-        return None
-    pose = context.link.pose
-    here = np.array((pose.x_m, pose.y_m))
-    return min(meant, key=lambda one: float(np.linalg.norm(np.array(one["position_m"][:2]) - here)))

@@ -10,10 +10,8 @@ from vla_deploy.skills.arms import carry
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.drive import drive_to
 from vla_deploy.skills.errors import NotPossible, TryAgain
-from vla_deploy.skills.gaze import remembered, turn_head
+from vla_deploy.skills.gaze import DRIVING_GAZE, remembered, turn_head
 from vla_deploy.skills.stand import standing_poses
-
-DRIVING_GAZE = (0.0, 0.3)
 
 
 def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
