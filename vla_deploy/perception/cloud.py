@@ -49,25 +49,35 @@ def make_cloud(
 
     `body` marks pixels that show the robot itself.
     """
-    height, width = depth_m.shape
-    u, v = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-    rays = np.dstack(
-        ((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u))
-    ).astype(np.float32)
-    rotation = base_from_camera[:3, :3].astype(np.float32)
-    origin = base_from_camera[:3, 3].astype(np.float32)
-    points = (rays * depth_m[..., None]).reshape(-1, 3) @ rotation.T + origin
     valid = (depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)
     own_body = np.zeros_like(valid) if body is None else body
     return Cloud(
         rgb=rgb,
         depth_m=depth_m,
-        points=points.reshape(height, width, 3).astype(np.float32, copy=False),
+        points=_back_project(depth_m, camera, base_from_camera),
         valid=valid & ~own_body,
         own_body=own_body,
         camera_position=base_from_camera[:3, 3].copy(),
         focal_px=camera.fx,
     )
+
+
+def _back_project(
+    depth_m: Floats, camera: Intrinsics, base_from_camera: NDArray[np.float64]
+) -> Floats:
+    """Return each pixel's point; a ray is the sum of what its column and its row give to it."""
+    height, width = depth_m.shape
+    across = (np.arange(width) - camera.cx) / camera.fx
+    down = (np.arange(height) - camera.cy) / camera.fy
+    points: Floats = np.empty((height, width, 3), np.float32)
+    for axis in range(3):
+        right, below, ahead, origin = base_from_camera[axis]
+        by_column = (right * across).astype(np.float32)
+        by_row = (below * down + ahead).astype(np.float32)
+        ray = by_row[:, None] + by_column
+        ray *= depth_m
+        np.add(ray, np.float32(origin), out=points[..., axis])
+    return points
 
 
 def upward_area(cloud: Cloud) -> Floats:
