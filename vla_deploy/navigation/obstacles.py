@@ -26,7 +26,8 @@ def is_blocked(
     `points` are (n, 2) with x along the motion; `mapped` marks those that the map shows too.
     """
     ahead, aside = points[:, 0], np.abs(points[:, 1])
-    mapped_reach_m = min(reach_m, MAPPED_REACH_M)
-    reach = radius_m + np.where(mapped, mapped_reach_m, reach_m)
+    reach = np.where(mapped, min(reach_m, MAPPED_REACH_M), reach_m)
     half_width = radius_m + np.where(mapped, 0.0, SIDE_MARGIN_M)
-    return bool(((ahead > 0.0) & (ahead < reach) & (aside < half_width)).any())
+    # The body is round: beside its middle its front lies further back.
+    front = np.sqrt(np.maximum(0.0, half_width**2 - aside**2))
+    return bool(((ahead > 0.0) & (aside < half_width) & (ahead < front + reach)).any())

@@ -41,16 +41,38 @@ UNNAMED = "grey"
 NAMES: tuple[str, ...] = tuple(dict.fromkeys(row.name for row in COLOURS))
 
 
+Rows = NDArray[np.uint16]
+
+
+def _rows_by_level(bounds: list[tuple[int, int]]) -> Rows:
+    """Return for each level of a channel the set, one bit each, of the rows that allow it."""
+    levels = np.arange(256)
+    sets = np.zeros(256, np.uint16)
+    for row, (low, high) in enumerate(bounds):
+        sets[(levels >= low) & (levels <= high)] |= 1 << row
+    return sets
+
+
+def _name_by_rows() -> NDArray[np.intp]:
+    """Return for each set of rows the name of the first one in it."""
+    sets = np.arange(1 << len(COLOURS))
+    names = np.full(len(sets), NAMES.index(UNNAMED), dtype=np.intp)
+    for row in reversed(range(len(COLOURS))):
+        names[sets & 1 << row > 0] = NAMES.index(COLOURS[row].name)
+    return names
+
+
+_HUE_ROWS = _rows_by_level([row.hue for row in COLOURS])
+_SATURATION_ROWS = _rows_by_level([row.saturation for row in COLOURS])
+_VALUE_ROWS = _rows_by_level([row.value for row in COLOURS])
+_NAME_OF_ROWS = _name_by_rows()
+
+
 def colour_names(rgb: NDArray[np.uint8]) -> NDArray[np.intp]:
     """Return for each of (n, 3) pixels the index of its colour's name in `NAMES`."""
     hsv = cv2.cvtColor(np.ascontiguousarray(rgb).reshape(-1, 1, 3), cv2.COLOR_RGB2HSV)
-    hue, saturation, value = hsv.reshape(-1, 3).T
-    names = np.full(len(rgb), NAMES.index(UNNAMED), dtype=np.intp)
-    for row in reversed(COLOURS):
-        holds = (
-            _within(hue, row.hue) & _within(saturation, row.saturation) & _within(value, row.value)
-        )
-        names[holds] = NAMES.index(row.name)
+    rows = _HUE_ROWS[hsv[:, 0, 0]] & _SATURATION_ROWS[hsv[:, 0, 1]] & _VALUE_ROWS[hsv[:, 0, 2]]
+    names: NDArray[np.intp] = _NAME_OF_ROWS[rows]
     return names
 
 
@@ -59,8 +81,3 @@ def dominant_colour(rgb: NDArray[np.uint8]) -> tuple[str, float]:
     counts = np.bincount(colour_names(rgb), minlength=len(NAMES))
     best = int(np.argmax(counts))
     return NAMES[best], float(counts[best] / max(1, len(rgb)))
-
-
-def _within(channel: NDArray[np.uint8], bounds: tuple[int, int]) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = (channel >= bounds[0]) & (channel <= bounds[1])
-    return inside

@@ -68,11 +68,12 @@ def find_supports(cloud: Cloud) -> list[Support]:
 def inside(outline: Floats, points: Floats, margin_m: float) -> Mask:
     """Tell which of (n, 2 or 3) points lie within a convex outline widened by `margin_m`."""
     edges = np.roll(outline, -1, axis=0) - outline
-    x, y = points[:, 0], points[:, 1]
+    x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
     within = np.ones(len(points), dtype=np.bool_)
     for (corner_x, corner_y), (edge_x, edge_y) in zip(outline, edges, strict=True):
-        outwards = edge_y * (x - corner_x) - edge_x * (y - corner_y)
-        within &= outwards < margin_m * np.hypot(edge_x, edge_y)
+        outwards = edge_y * x - edge_x * y
+        corner = edge_y * corner_x - edge_x * corner_y
+        within &= outwards < corner + margin_m * np.hypot(edge_x, edge_y)
     return within
 
 

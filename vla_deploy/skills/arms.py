@@ -10,11 +10,14 @@ import numpy as np
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.skills.context import Held, Skill, SkillContext
-from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.motion import follow_joints, move_joints, pause, settle
 
 AT_POSE_RAD = 0.05
 LOADED_SPEED_RATIO = 0.6
+# In the base frame: the hand is over furniture, and above what stands on it.
+OUT_IN_FRONT_M = 0.3
+CLEAR_HEIGHT_M = 0.6
 TUCK = "tuck"
 # Where a loaded hand travels, in the base frame: pointing down, close in front of the chest.
 CARRY_POINT_M = (0.27, 0.16, 0.72)
@@ -120,7 +123,12 @@ def move_arm(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 
 def carry(context: SkillContext) -> Skill:
-    """Bring both arms to where they may travel: tucked when empty, close in front when loaded."""
+    """Bring both arms to where they may travel: tucked when empty, close in front when loaded.
+
+    A hand that is low over furniture is raised first: the way to its chest is no straight line.
+    """
+    for hand in context.robot.hands:
+        yield from _raise_clear(context, hand)
     targets: dict[str, float] = {}
     for hand in context.robot.hands:
         wanted = _travel_targets(context, hand)
@@ -130,6 +138,20 @@ def carry(context: SkillContext) -> Skill:
         loaded = any(held is not None for held in context.hands.values())
         yield from move_joints(context, targets, LOADED_SPEED_RATIO if loaded else 1.0)
         yield from settle(context, list(targets))
+
+
+def _raise_clear(context: SkillContext, hand: str) -> Skill:
+    """Raise a hand that is out in front to a height from which it may swing."""
+    point_m = context.arms[hand].forward(context.link.setpoints)[:3, 3]
+    missing_m = CLEAR_HEIGHT_M - float(point_m[2])
+    if point_m[0] < OUT_IN_FRONT_M or missing_m <= 0.0:
+        return
+    for share in (1.0, 0.5, 0.25):
+        try:
+            yield from lift(context, hand, share * missing_m)
+        except OutOfReach:
+            continue  # the arm may be near its limits: less is better than nothing
+        return
 
 
 def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:
@@ -162,7 +184,7 @@ def lift(context: SkillContext, hand: str, height_m: float, speed_ratio: float =
     """Raise a hand straight up.
 
     Raises:
-        NotPossible: the arm cannot follow the line.
+        OutOfReach: the arm cannot follow the line.
     """
     target = context.arms[hand].forward(context.link.setpoints)
     target[2, 3] += height_m
@@ -173,16 +195,25 @@ def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: fl
     """Move a hand along a straight line to a grip pose in the base frame.
 
     Raises:
-        NotPossible: the arm cannot follow the line.
+        OutOfReach: the arm cannot follow the line.
     """
     try:
         waypoints = context.arms[hand].straight_line(context.link.setpoints, target)
     except ManipulationError as error:
-        raise NotPossible(str(error)) from error
+        raise OutOfReach(str(error)) from error
     joints = _arm_joints(context, hand)
     columns = [context.robot.joint_index[name] for name in joints]
     yield from follow_joints(context, joints, waypoints[:, columns], speed_ratio)
     yield from settle(context, joints)
+
+
+def or_carry(context: SkillContext, skill: Skill) -> Skill:
+    """Run a skill; where it fails, bring the arms to where they may travel before saying so."""
+    try:
+        yield from skill
+    except (TryAgain, NotPossible):
+        yield from carry(context)
+        raise
 
 
 def _arm_joints(context: SkillContext, hand: str) -> tuple[str, ...]:

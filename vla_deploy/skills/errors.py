@@ -3,6 +3,7 @@
 SkillFailed
 ├── TryAgain         the world may be kinder a second time: not found, grasp lost, way blocked
 ├── NotPossible      the same try would fail the same way: out of reach, hands full
+│   └── OutOfReach   standing elsewhere may help
 └── RobotNotReady    control refuses motion: a person must reset and arm
 """
 
@@ -17,6 +18,10 @@ class TryAgain(SkillFailed):
 
 class NotPossible(SkillFailed):
     """Say that a second try would fail the same way."""
+
+
+class OutOfReach(NotPossible):
+    """Say that no hand gets there from where the robot stands."""
 
 
 class RobotNotReady(SkillFailed):

@@ -105,6 +105,13 @@ def see(context: SkillContext, query: ObjectQuery) -> Skill:
         raise TryAgain(f"the {query} is no longer where I saw it")
 
 
+def watch(context: SkillContext) -> Skill:
+    """Wait until enough images have been judged to confirm what is in view."""
+    yield from wait_until(
+        context, partial(_looked, context, context.link.clock.now_ns()), WATCH_TIMEOUT_S
+    )
+
+
 def watch_for(context: SkillContext, query: ObjectQuery) -> Skill:
     """Wait until an object is seen, or until enough images show that it is not in view."""
     looked = partial(_looked, context, context.link.clock.now_ns())

@@ -1,7 +1,7 @@
 """Go to a place, a point, or to where an object can be reached."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Generator, Mapping
+from typing import Any, TypeVar
 
 from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
 from vla_deploy.planning.validator import spoken_places
@@ -9,9 +9,12 @@ from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.arms import carry
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.drive import drive_to
-from vla_deploy.skills.errors import NotPossible, TryAgain
-from vla_deploy.skills.gaze import DRIVING_GAZE, remembered, turn_head
+from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
+from vla_deploy.skills.gaze import DRIVING_GAZE, remembered, see, turn_head
 from vla_deploy.skills.stand import standing_poses
+
+T = TypeVar("T")
+Solving = Generator[None, None, T]
 
 
 def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
@@ -38,8 +41,10 @@ def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     yield from drive_to(context, goal, turn=yaw_rad is not None)
 
 
-def reach(context: SkillContext, query: ObjectQuery) -> Skill:
+def reach(context: SkillContext, query: ObjectQuery, anew: bool = False) -> Skill:
     """Drive to the best standing pose from which an object is within the arms' reach.
+
+    `anew` leaves a pose that would do: it has just proved not to.
 
     Raises:
         TryAgain: the object has not been seen.
@@ -49,7 +54,7 @@ def reach(context: SkillContext, query: ObjectQuery) -> Skill:
     if known is None:
         raise TryAgain(f"I have not seen a {query}; look for it first")
     reasons = []
-    for goal in standing_poses(context, known["position_m"]):
+    for goal in standing_poses(context, known["position_m"], anew=anew):
         try:
             yield from drive_to(context, goal)
         except NotPossible as error:
@@ -58,6 +63,22 @@ def reach(context: SkillContext, query: ObjectQuery) -> Skill:
         return
     why = reasons[0] if reasons else "walls or furniture stand around it"
     raise NotPossible(f"I cannot get within reach of the {query}: {why}")
+
+
+def solve_near(context: SkillContext, query: ObjectQuery, solve: Callable[[], T]) -> Solving[T]:
+    """See an object and solve for it; where it is out of reach, stand elsewhere and try again.
+
+    Raises:
+        TryAgain: the object is not where it was.
+        OutOfReach: it is, from both poses.
+    """
+    yield from see(context, query)
+    try:
+        return solve()
+    except OutOfReach:
+        yield from reach(context, query, anew=True)
+    yield from see(context, query)
+    return solve()
 
 
 def _place(context: SkillContext, name: str) -> FloorPose:

@@ -16,13 +16,15 @@ from vla_deploy.skills.arms import (
     feel,
     lift,
     move_straight,
+    or_carry,
     set_opening,
 )
 from vla_deploy.skills.context import Held, Skill, SkillContext
-from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base
-from vla_deploy.skills.gaze import remembered, see
+from vla_deploy.skills.gaze import remembered
 from vla_deploy.skills.motion import move_joints, pause, settle
+from vla_deploy.skills.navigate import solve_near
 
 PREGRASP_M = 0.12
 LIFT_M = 0.12
@@ -34,11 +36,12 @@ SQUEEZE_M = 0.012
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """Hold the hand, the grasp and the joint positions above and at it."""
+    """Hold the hand, the grasp, the joint positions above it and what will then be held."""
 
     hand: str
     grasp: Grasp
     above: NDArray[np.float64]
+    held: Held
 
 
 def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
@@ -53,20 +56,14 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         return
     hands = _free_hands(context, parameters.get("arm"))
     yield from carry(context)
-    yield from see(context, query)
-    seen = remembered(context, query)
-    if seen is None:
-        raise TryAgain(f"I lost sight of the {query}")
-    choice = _choose(context, seen, hands)
-    held = Held(
-        kind=str(seen["class"]),
-        colour=str(seen["colour"]),
-        width_m=choice.grasp.width_m,
-        below_grip_m=choice.grasp.below_grip_m,
-    )
-    yield from _approach(context, choice)
-    yield from _take(context, choice, query, held)
+    choice = yield from solve_near(context, query, lambda: _choose(context, query, hands))
+    yield from or_carry(context, _grasp(context, choice, query))
     yield from carry(context)
+
+
+def _grasp(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
+    yield from _approach(context, choice)
+    yield from _take(context, choice, query)
 
 
 def _approach(context: SkillContext, choice: Choice) -> Skill:
@@ -80,14 +77,14 @@ def _approach(context: SkillContext, choice: Choice) -> Skill:
     yield from move_straight(context, choice.hand, target, STRAIGHT_SPEED_RATIO)
 
 
-def _take(context: SkillContext, choice: Choice, query: ObjectQuery, held: Held) -> Skill:
-    """Close, feel, lift, feel again; open and back off when nothing is held."""
+def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
+    """Close, feel, lift, feel again; open when nothing is held."""
     grasp, hand = choice.grasp, choice.hand
     goal_m = max(grasp.width_m - 2 * SQUEEZE_M, 0.004)
     yield from set_opening(context, hand, goal_m, grasp.effort_ratio)
     touch = feel(context, hand, goal_m)
     if touch.holds(grasp.effort_ratio):
-        context.hands[hand] = held
+        context.hands[hand] = choice.held
         yield from lift(context, hand, LIFT_M)
         yield from pause(context, 0.3)
         touch = feel(context, hand, goal_m)
@@ -95,8 +92,6 @@ def _take(context: SkillContext, choice: Choice, query: ObjectQuery, held: Held)
             return
     context.hands[hand] = None
     yield from set_opening(context, hand, grasp.opening_m)
-    yield from lift(context, hand, LIFT_M)
-    yield from carry(context)
     raise TryAgain(
         f"the {hand} hand does not hold the {query}: fingers {touch.opening_m * 1000:.0f} mm apart "
         f"(expected {grasp.width_m * 1000:.0f}), effort {touch.effort_ratio:.2f}"
@@ -121,8 +116,16 @@ def _free_hands(context: SkillContext, wanted: str | None) -> list[str]:
     return free
 
 
-def _choose(context: SkillContext, seen: Mapping[str, Any], hands: list[str]) -> Choice:
-    """Return the reachable grasp that moves the arm least, of the hand on the object's side."""
+def _choose(context: SkillContext, query: ObjectQuery, hands: list[str]) -> Choice:
+    """Return the reachable grasp that moves the arm least, of the hand on the object's side.
+
+    Raises:
+        TryAgain: the object is out of sight.
+        OutOfReach: no hand gets there.
+    """
+    seen = remembered(context, query)
+    if seen is None:
+        raise TryAgain(f"I lost sight of the {query}")
     pose = context.link.pose
     centre = to_base(pose, seen["position_m"])
     yaw_rad = float(seen["yaw_rad"]) - pose.yaw_rad
@@ -138,17 +141,21 @@ def _choose(context: SkillContext, seen: Mapping[str, Any], hands: list[str]) ->
             )
         except ManipulationError as error:
             raise NotPossible(str(error)) from error
-        choices = [choice for grasp in grasps if (choice := _solve(context, hand, grasp, reasons))]
+        choices = [
+            choice for grasp in grasps if (choice := _solve(context, hand, grasp, seen, reasons))
+        ]
         if choices:
             now = context.link.setpoints
             return min(choices, key=lambda one: float(np.abs(one.above - now).max()))
-    raise NotPossible(
+    raise OutOfReach(
         f"neither grasp of the {seen['class']} at {centre[0]:.2f}, {centre[1]:.2f}, "
         f"{centre[2]:.2f} m is within reach: {reasons[0] if reasons else 'no grasp fits'}"
     )
 
 
-def _solve(context: SkillContext, hand: str, grasp: Grasp, reasons: list[str]) -> Choice | None:
+def _solve(
+    context: SkillContext, hand: str, grasp: Grasp, seen: Mapping[str, Any], reasons: list[str]
+) -> Choice | None:
     arm = context.arms[hand]
     x_m, y_m, z_m = grasp.point_m
     try:
@@ -158,4 +165,10 @@ def _solve(context: SkillContext, hand: str, grasp: Grasp, reasons: list[str]) -
     except ManipulationError as error:
         reasons.append(str(error))
         return None
-    return Choice(hand=hand, grasp=grasp, above=above)
+    held = Held(
+        kind=str(seen["class"]),
+        colour=str(seen["colour"]),
+        width_m=grasp.width_m,
+        below_grip_m=grasp.below_grip_m,
+    )
+    return Choice(hand=hand, grasp=grasp, above=above, held=held)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Generator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,16 @@ from vla_deploy.skills.arms import (
     lift,
     move_straight,
     opening_of,
+    or_carry,
     set_opening,
 )
 from vla_deploy.skills.context import Held, Skill, SkillContext
-from vla_deploy.skills.errors import NotPossible, TryAgain
+from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base
-from vla_deploy.skills.gaze import remembered, see, turn_head
+from vla_deploy.skills.gaze import remembered, turn_head, watch
 from vla_deploy.skills.motion import move_joints, pause, settle
-from vla_deploy.skills.surfaces import free_spot
+from vla_deploy.skills.navigate import solve_near
+from vla_deploy.skills.surfaces import free_spots
 
 ABOVE_M = 0.10
 # A thing put into a container is let go this far below the rim; one put on something, just above.
@@ -33,6 +36,16 @@ ABOVE_SURFACE_M = 0.008
 YAWS_RAD = tuple(2 * math.pi * step / 16 for step in range(16))
 LOST_OPENING_M = 0.012
 LOOK_AT_TABLE = (0.0, 0.85)
+LET_GO_M = 0.03
+ABOVE_SPEED_RATIO, DOWN_SPEED_RATIO = 0.5, 0.35
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Release:
+    """Hold where the grip lets go, in the base frame, and the joint positions above it."""
+
+    point_m: tuple[float, float, float]
+    above: NDArray[np.float64]
 
 
 def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
@@ -49,56 +62,86 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     if opening_of(context, hand) < held.width_m - LOST_OPENING_M:
         context.hands[hand] = None
         raise TryAgain(f"the {hand} hand has lost the {held.kind} on the way")
-    release_m = yield from _release_point(context, parameters, held)
-    above = _solve_above(context, hand, release_m)
-    joints = context.robot.group(context.robot.hands[hand].arm).joints
-    index = context.robot.joint_index
-    yield from move_joints(context, {name: float(above[index[name]]) for name in joints}, 0.5)
-    yield from settle(context, joints)
-    down = context.arms[hand].forward(context.link.setpoints)
-    down[:3, 3] = release_m
-    yield from move_straight(context, hand, down, 0.35)
-    yield from set_opening(context, hand, held.width_m + 0.03)
-    context.hands[hand] = None
-    yield from pause(context, 0.3)
-    yield from lift(context, hand, ABOVE_M)
+    release = yield from _release(context, parameters, hand, held)
+    yield from or_carry(context, _put_down(context, hand, held, release))
     yield from carry(context)
 
 
-def _release_point(
-    context: SkillContext, parameters: Mapping[str, Any], held: Held
-) -> Generator[None, None, tuple[float, float, float]]:
-    """Return where the grip must be when the fingers open, in the base frame."""
+def _put_down(context: SkillContext, hand: str, held: Held, release: Release) -> Skill:
+    joints = context.robot.group(context.robot.hands[hand].arm).joints
+    index = context.robot.joint_index
+    targets = {name: float(release.above[index[name]]) for name in joints}
+    yield from move_joints(context, targets, ABOVE_SPEED_RATIO)
+    yield from settle(context, joints)
+    down = context.arms[hand].forward(context.link.setpoints)
+    down[:3, 3] = release.point_m
+    yield from move_straight(context, hand, down, DOWN_SPEED_RATIO)
+    yield from set_opening(context, hand, held.width_m + LET_GO_M)
+    context.hands[hand] = None
+    yield from pause(context, 0.3)
+    yield from lift(context, hand, ABOVE_M)
+
+
+def _release(
+    context: SkillContext, parameters: Mapping[str, Any], hand: str, held: Held
+) -> Generator[None, None, Release]:
+    """Return where the grip must be when the fingers open, and the posture above it."""
     try:
         query = parse_object(parameters["destination"])
     except UnknownObject:
-        yield from turn_head(context, *LOOK_AT_TABLE)
-        yield from pause(context, 1.5)
-        x_m, y_m, z_m = free_spot(context)
-        return x_m, y_m, z_m + held.below_grip_m + ABOVE_SURFACE_M
-    return (yield from _over_object(context, query, str(parameters["relation"]), held))
+        return (yield from _on_surface(context, hand, held))
+    relation = str(parameters["relation"])
+    return (
+        yield from solve_near(
+            context, query, lambda: _over_object(context, query, relation, hand, held)
+        )
+    )
+
+
+def _on_surface(context: SkillContext, hand: str, held: Held) -> Generator[None, None, Release]:
+    """Look at the furniture ahead and choose the first free spot that the hand reaches.
+
+    Raises:
+        OutOfReach: there are free spots, all out of reach.
+        TryAgain: there is none in sight.
+    """
+    yield from turn_head(context, *LOOK_AT_TABLE)
+    yield from watch(context)
+    spots = free_spots(context, hand)
+    if not spots:
+        raise TryAgain("I see no free spot within reach to put it down")
+    for x_m, y_m, z_m in spots:
+        point_m = (x_m, y_m, z_m + held.below_grip_m + ABOVE_SURFACE_M)
+        try:
+            return Release(point_m=point_m, above=_solve_above(context, hand, point_m))
+        except OutOfReach as error:
+            reason = error
+    raise reason
 
 
 def _over_object(
-    context: SkillContext, query: ObjectQuery, relation: str, held: Held
-) -> Generator[None, None, tuple[float, float, float]]:
-    yield from see(context, query)
+    context: SkillContext, query: ObjectQuery, relation: str, hand: str, held: Held
+) -> Release:
     seen = remembered(context, query)
     if seen is None:
         raise TryAgain(f"I lost sight of the {query}")
     x_m, y_m, z_m = to_base(context.link.pose, seen["position_m"])
     top_m = z_m + float(seen["size_m"][2]) / 2
-    if relation == "in":
-        if seen["class"] != "box":
-            raise NotPossible(f"a {seen['class']} is no container; put things in a box")
-        return x_m, y_m, top_m - BELOW_RIM_M + held.below_grip_m
-    return x_m, y_m, top_m + ABOVE_SURFACE_M + held.below_grip_m
+    if relation == "in" and seen["class"] != "box":
+        raise NotPossible(f"a {seen['class']} is no container; put things in a box")
+    lower_m = BELOW_RIM_M if relation == "in" else -ABOVE_SURFACE_M
+    point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
+    return Release(point_m=point_m, above=_solve_above(context, hand, point_m))
 
 
 def _solve_above(
     context: SkillContext, hand: str, release_m: tuple[float, float, float]
 ) -> NDArray[np.float64]:
-    """Return the posture above the release point that moves the arm least and can descend."""
+    """Return the posture above the release point that moves the arm least and can descend.
+
+    Raises:
+        OutOfReach: no yaw of the hand gets there.
+    """
     now, arm = context.link.setpoints, context.arms[hand]
     x_m, y_m, z_m = release_m
     found, reason = [], ""
@@ -112,7 +155,7 @@ def _solve_above(
             continue  # another yaw may be within reach
         found.append(above)
     if not found:
-        raise NotPossible(
+        raise OutOfReach(
             f"the {hand} hand cannot reach {x_m:.2f}, {y_m:.2f}, {z_m:.2f} m: {reason}"
         )
     return min(found, key=lambda positions: float(np.abs(positions - now).max()))

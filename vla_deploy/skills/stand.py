@@ -15,11 +15,21 @@ DIRECTIONS = 36
 SIDE_M = 0.12
 
 
-def standing_poses(context: SkillContext, position_m: Sequence[float]) -> list[FloorPose]:
-    """Return free poses facing an object, the one quickest to reach first."""
+def standing_poses(
+    context: SkillContext, position_m: Sequence[float], anew: bool = False
+) -> list[FloorPose]:
+    """Return free poses facing an object, the one quickest to reach first.
+
+    The present pose alone, where it will do, unless they are wanted `anew`.
+    """
     pose = context.link.pose
     here = to_base(pose, position_m)
-    if math.hypot(here[0], here[1]) <= REACH_M[-1] and abs(here[1]) <= 0.2 and here[0] > 0.3:
+    if (
+        not anew
+        and math.hypot(here[0], here[1]) <= REACH_M[-1]
+        and abs(here[1]) <= 0.2
+        and here[0] > 0.3
+    ):
         return [pose]
     candidates = []
     for step in range(DIRECTIONS):

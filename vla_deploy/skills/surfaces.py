@@ -1,4 +1,4 @@
-"""Find a free spot on a surface in front of the robot."""
+"""Find free spots on the surfaces in front of the robot."""
 
 import math
 from collections.abc import Mapping
@@ -8,31 +8,27 @@ import cv2
 import numpy as np
 
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.errors import TryAgain
 from vla_deploy.skills.frames import to_map
 
 REACH_X_M = (0.38, 0.42, 0.46, 0.50)
-REACH_Y_M = (0.0, 0.08, -0.08, 0.16, -0.16)
+# On the hand's own side first.
+REACH_Y_M = (0.12, 0.04, 0.20, -0.04, -0.12)
 KEEP_APART_M = 0.14
 EDGE_M = 0.06
 SURFACE_HEIGHT_M = (0.25, 0.75)
 
 
-def free_spot(context: SkillContext) -> tuple[float, float, float]:
-    """Return a point of a seen surface, in the base frame, with room for the hand around it.
-
-    Raises:
-        TryAgain: no surface with a free spot is within reach.
-    """
-    for surface in context.link.surfaces:
-        height_m = float(surface["height_m"])
-        if not SURFACE_HEIGHT_M[0] <= height_m <= SURFACE_HEIGHT_M[1]:
-            continue
-        for x_m in REACH_X_M:
-            for y_m in REACH_Y_M:
-                if _fits(context, surface, x_m, y_m):
-                    return x_m, y_m, height_m
-    raise TryAgain("I see no free spot within reach to put it down")
+def free_spots(context: SkillContext, hand: str) -> list[tuple[float, float, float]]:
+    """Return points of seen surfaces, in the base frame, with room for a hand; the best first."""
+    side = 1.0 if hand == "left" else -1.0
+    return [
+        (x_m, side * y_m, height_m)
+        for surface in context.link.surfaces
+        if SURFACE_HEIGHT_M[0] <= (height_m := float(surface["height_m"])) <= SURFACE_HEIGHT_M[1]
+        for x_m in REACH_X_M
+        for y_m in REACH_Y_M
+        if _fits(context, surface, x_m, side * y_m)
+    ]
 
 
 def _fits(context: SkillContext, surface: Mapping[str, Any], x_m: float, y_m: float) -> bool:
