@@ -53,17 +53,16 @@ class MotionProbe:
     """Read attitude and specific force at the IMU's site."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, site: str = "imu") -> None:
-        self._data = data
-        self._site = model.site(site).id
-        self._address = int(model.sensor(ACCELEROMETER).adr[0])
+        address = int(model.sensor(ACCELEROMETER).adr[0])
+        self._matrix = data.site_xmat[model.site(site).id]
+        self._force = data.sensordata[address : address + 3]
 
     def read(self) -> ImuTruth:
         """Return yaw, pitch, roll and acceleration with gravity, in the site's frame."""
-        matrix = self._data.site_xmat[self._site]
-        force = self._data.sensordata[self._address : self._address + 3]
+        matrix, force = self._matrix.tolist(), self._force.tolist()
         return ImuTruth(
             yaw_rad=math.atan2(matrix[3], matrix[0]),
-            pitch_rad=math.asin(max(-1.0, min(1.0, -float(matrix[6])))),
+            pitch_rad=math.asin(max(-1.0, min(1.0, -matrix[6]))),
             roll_rad=math.atan2(matrix[7], matrix[8]),
-            acceleration_m_s2=(float(force[0]), float(force[1]), float(force[2])),
+            acceleration_m_s2=(force[0], force[1], force[2]),
         )

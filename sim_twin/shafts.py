@@ -26,7 +26,9 @@ class Shafts:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, shafts: Sequence[Shaft]) -> None:
         joints = [_find(model.joint, "joint", shaft.joint) for shaft in shafts]
-        self._data = data
+        # Views of the state's memory: asking MjData for them anew costs more than reading them.
+        self._all_qpos, self._all_qvel = data.qpos, data.qvel
+        self._all_force, self._all_ctrl = data.actuator_force, data.ctrl
         self._actuator = np.array([_find(model.actuator, "actuator", s.joint) for s in shafts])
         self._qpos = model.jnt_qposadr[joints]
         self._qvel = model.jnt_dofadr[joints]
@@ -36,22 +38,22 @@ class Shafts:
 
     def position_rad(self) -> Floats:
         """Return shaft angles."""
-        angle: Floats = (self._data.qpos[self._qpos] - self._offset) / self._ratio
+        angle: Floats = (self._all_qpos.take(self._qpos) - self._offset) / self._ratio
         return angle
 
     def velocity_rad_s(self) -> Floats:
         """Return shaft speeds."""
-        speed: Floats = self._data.qvel[self._qvel] / self._ratio
+        speed: Floats = self._all_qvel.take(self._qvel) / self._ratio
         return speed
 
     def effort(self) -> Floats:
         """Return what the motors gave in the last step, in the shaft's direction."""
-        effort: Floats = self._data.actuator_force[self._actuator] * self._sign
+        effort: Floats = self._all_force.take(self._actuator) * self._sign
         return effort
 
     def command(self, value: Floats) -> None:
         """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
-        self._data.ctrl[self._actuator] = value * self._sign
+        self._all_ctrl[self._actuator] = value * self._sign
 
 
 def _find(lookup: object, kind: str, name: str) -> int:

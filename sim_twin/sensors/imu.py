@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from drivers.imu.bno085_rvc import HEADER, STANDARD_GRAVITY_M_S2
@@ -68,15 +67,23 @@ class ImuDevice:
 
     def _frame(self, truth: ImuTruth, elapsed_s: float) -> bytes:
         yaw_rad = truth.yaw_rad - self._start_yaw_rad + self._drift_rad_s * elapsed_s
-        angles = np.array([yaw_rad, truth.pitch_rad, truth.roll_rad])
-        angles += ANGLE_SIGMA_RAD * self._random.standard_normal(3)
-        force = np.array(truth.acceleration_m_s2)
-        force += ACCELERATION_SIGMA_M_S2 * self._random.standard_normal(3)
-        centidegrees = np.rint(np.degrees(_wrapped(angles)) * 100.0).astype(int)
-        milli_g = np.rint(force / STANDARD_GRAVITY_M_S2 * 1000.0).clip(-32_768, 32_767).astype(int)
-        body = _BODY.pack(self._sent % 256, *centidegrees.tolist(), *milli_g.tolist())
+        noise = self._random.standard_normal(6).tolist()
+        angles = (yaw_rad, truth.pitch_rad, truth.roll_rad)
+        centidegrees = [
+            round(math.degrees(_wrapped(angle + ANGLE_SIGMA_RAD * wild)) * 100.0)
+            for angle, wild in zip(angles, noise[:3], strict=True)
+        ]
+        milli_g = [
+            _milli_g(force + ACCELERATION_SIGMA_M_S2 * wild)
+            for force, wild in zip(truth.acceleration_m_s2, noise[3:], strict=True)
+        ]
+        body = _BODY.pack(self._sent % 256, *centidegrees, *milli_g)
         return HEADER + body + bytes([sum(body) & 0xFF])
 
 
-def _wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    return (angles + math.pi) % (2.0 * math.pi) - math.pi
+def _wrapped(angle_rad: float) -> float:
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def _milli_g(acceleration_m_s2: float) -> int:
+    return min(max(round(acceleration_m_s2 / STANDARD_GRAVITY_M_S2 * 1000.0), -32_768), 32_767)
