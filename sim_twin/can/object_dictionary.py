@@ -56,7 +56,8 @@ class ObjectDictionary:
         """Return a numeric object."""
         key = (index, subindex)
         live = self.live.get(key)
-        return live() if live is not None else int(self._values[key])
+        value: int = self._values[key] if live is None else live()
+        return value
 
     def set(self, index: int, subindex: int, value: int) -> None:
         """Store a value from inside the drive, unchecked."""

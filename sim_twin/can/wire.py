@@ -64,7 +64,7 @@ class CanWire:
 
     def _carry(self, frame: can.Message, sender: object) -> None:
         self.frames_carried += 1
-        from_node = any(sender is node for node in self._nodes)
+        from_node = sender in self._nodes
         if from_node or not self.cut:
             for node in self._nodes:
                 if node is not sender:

@@ -39,8 +39,14 @@ class GravityOffset:
         self._compliance = 1.0 / stiffness(robot)
         travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
         self._limit = _MAX_OFFSET_RAD * travel
+        self._pose = b""
+        self._offset: Floats = np.zeros_like(self._limit)
 
     def at(self, position: Floats) -> Floats:
-        """Return the offsets for the setpoints `position`."""
-        offset = self._gravity(position) * self._compliance
-        return np.minimum(np.maximum(offset, -self._limit), self._limit)
+        """Return the offsets for the setpoints `position`, which often are the last tick's."""
+        pose = position.tobytes()
+        if pose != self._pose:
+            offset = self._gravity(position) * self._compliance
+            self._offset = np.minimum(np.maximum(offset, -self._limit), self._limit)
+            self._pose = pose
+        return self._offset
