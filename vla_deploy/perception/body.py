@@ -38,11 +38,11 @@ class BodyMask:
         camera = self._model.getFrameId(robot.camera.site)
         self._camera_frame = camera
         head = self._model.frames[camera].parentJoint
-        self._balls = [
-            _fill(shape) for shape in _shapes(self._model, path) if shape.parentJoint != head
-        ]
         mimics = read_mjcf_names(robot.mjcf_path).mimics
         leaders = {**{name: name for name in robot.joint_names}, **mimics}
+        joints = {self._model.getJointId(name) for name in leaders}
+        shapes = _shapes(self._model, path, joints)
+        self._balls = [_fill(shape) for shape in shapes if shape.parentJoint != head]
         index = robot.joint_index
         self._places = [
             (self._model.idx_qs[self._model.getJointId(name)], index[leader])
@@ -65,11 +65,18 @@ class BodyMask:
         return image.astype(np.bool_)
 
 
-def _shapes(model: pinocchio.Model, path: str) -> list[pinocchio.GeometryObject]:
-    """Return what is seen of the robot; a description may have no more than collision shapes."""
-    kinds = (pinocchio.GeometryType.VISUAL, pinocchio.GeometryType.COLLISION)
-    found = (pinocchio.buildGeomFromMJCF(model, path, kind).geometryObjects for kind in kinds)
-    return next((list(shapes) for shapes in found if len(shapes)), [])
+def _shapes(
+    model: pinocchio.Model, path: str, moved_by: set[int]
+) -> list[pinocchio.GeometryObject]:
+    """Return every collision shape, and the looks of what moves: shells may reach beyond.
+
+    The trunk's shells are left out: so near the camera, balls cover far more than they should.
+    """
+    collision, visual = (
+        pinocchio.buildGeomFromMJCF(model, path, kind).geometryObjects
+        for kind in (pinocchio.GeometryType.COLLISION, pinocchio.GeometryType.VISUAL)
+    )
+    return [*collision, *(shape for shape in visual if shape.parentJoint in moved_by)]
 
 
 def _fill(shape: pinocchio.GeometryObject) -> _Balls:
