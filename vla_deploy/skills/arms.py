@@ -14,7 +14,7 @@ from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.motion import follow_joints, move_joints, pause, settle
 
 AT_POSE_RAD = 0.05
-LOADED_SPEED_RATIO = 0.6
+LOADED_SPEED_RATIO, EMPTY_SPEED_RATIO = 0.6, 0.85
 # In the base frame: the hand is over furniture, and above what stands on it.
 OUT_IN_FRONT_M = 0.3
 CLEAR_HEIGHT_M = 0.6
@@ -136,7 +136,9 @@ def carry(context: SkillContext) -> Skill:
             targets |= wanted
     if targets:
         loaded = any(held is not None for held in context.hands.values())
-        yield from move_joints(context, targets, LOADED_SPEED_RATIO if loaded else 1.0)
+        yield from move_joints(
+            context, targets, LOADED_SPEED_RATIO if loaded else EMPTY_SPEED_RATIO
+        )
         yield from settle(context, list(targets))
 
 

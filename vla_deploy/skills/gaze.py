@@ -22,6 +22,7 @@ DIRECTIONS: Mapping[str, tuple[float, float]] = {
     "down": (0.0, 0.9),
 }
 DRIVING_GAZE = (0.0, 0.3)
+HEAD_SPEED_RATIO = 0.9
 FRESH_TIMEOUT_S = 4.0
 SIGHTINGS = 2
 WATCH_TIMEOUT_S = 2.0
@@ -50,7 +51,7 @@ def turn_head(context: SkillContext, pan_rad: float, tilt_rad: float) -> Skill:
         name: min(max(angle, limits[name].min), limits[name].max)
         for name, angle in ((PAN, pan_rad), (TILT, tilt_rad))
     }
-    yield from move_joints(context, targets)
+    yield from move_joints(context, targets, HEAD_SPEED_RATIO)
     yield from settle(context, HEAD_JOINTS)
 
 

@@ -1,0 +1,102 @@
+"""What happens in the middle of picking and placing: a stop, a thing taken away, a restart."""
+
+import numpy as np
+import pytest
+
+from platforms import load_profile
+from sim_twin.stack import LockstepStack
+from vla_deploy.skills.node import ExecutorNode
+
+pytestmark = [pytest.mark.gl, pytest.mark.timeout(240)]
+
+COMMAND = "pick up the red cup and put it in the box"
+STANDSTILL_RAD_S = 0.02
+REST_WITHIN_S = 1.0
+AWAY_M = (6.3, 4.4, 0.5475)
+
+
+def fastest(stack: LockstepStack) -> float:
+    joints = stack.lockstep.truth()["joints"]
+    return max(abs(joint["velocity"]) for joint in joints.values())
+
+
+def run_into(stack: LockstepStack, skill: str, seconds: float) -> str:
+    """Give the main command and return its id some time into the skill of that name."""
+    before = len(stack.events)
+    command_id = stack.give(text=COMMAND)
+
+    def began() -> bool:
+        assert stack.outcome(command_id) is None, stack.outcome(command_id)
+        return any(
+            event["event"] == "action" and event["skill"] == skill and event["status"] == "active"
+            for event in stack.events[before:]
+        )
+
+    assert stack.lockstep.run_until(began, 120.0)
+    stack.lockstep.run_until(lambda: stack.outcome(command_id) is not None, seconds)
+    return command_id
+
+
+def stop_and_check(stack: LockstepStack) -> None:
+    """Stop; the robot must rest within a second and do the next command."""
+    stack.say("stop")
+    assert stack.lockstep.run_until(lambda: fastest(stack) < STANDSTILL_RAD_S, REST_WITHIN_S)
+    stack.lockstep.run_for(0.2)
+    assert fastest(stack) < STANDSTILL_RAD_S
+    assert stack.say("turn left 15 degrees")["success"]
+
+
+def holding(stack: LockstepStack) -> dict[str, str | None]:
+    sample = stack.space.cell_reader("executor_status").latest()
+    assert sample is not None
+    held: dict[str, str | None] = sample.document()["holding"]
+    return held
+
+
+def test_a_stop_while_grasping_leaves_the_robot_ready(stack: LockstepStack) -> None:
+    run_into(stack, "pick_up", 4.5)
+    stop_and_check(stack)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_stops_at_random_moments_of_pick_and_place_leave_the_robot_ready(
+    stack: LockstepStack,
+) -> None:
+    random = np.random.default_rng(2)
+    for skill, longest_s in (("pick_up", 7.5), ("place", 6.0)):
+        for _ in range(3):
+            run_into(stack, skill, float(random.uniform(0.2, longest_s)))
+            stop_and_check(stack)
+    outcome = stack.say(COMMAND)
+    cup = stack.lockstep.inside("red_cup", "box")
+    assert cup["inside"] or not outcome["success"]
+
+
+def test_fingers_that_close_on_nothing_are_reported(stack: LockstepStack) -> None:
+    command_id = run_into(stack, "pick_up", 4.0)
+    stack.lockstep.twin.engine.place("red_cup", *AWAY_M, 0.0)
+    assert stack.lockstep.run_until(lambda: stack.outcome(command_id) is not None, 60.0)
+    outcome = stack.outcome(command_id)
+    assert outcome is not None
+    assert not outcome["success"]
+    assert "no longer where I saw it" in outcome["error"]
+    told = [str(event.get("error")) for event in stack.events if event["event"] == "action"]
+    assert any("does not hold the red cup: fingers" in error for error in told)
+    assert set(holding(stack).values()) == {None}
+    tuck = stack.robot.poses["tuck"]
+    joints = stack.lockstep.truth()["joints"]
+    assert all(joints[name]["position"] == pytest.approx(tuck[name], abs=0.1) for name in tuck)
+
+
+def test_a_restarted_executor_feels_what_the_hand_holds(stack: LockstepStack) -> None:
+    assert stack.say("pick up the red cup")["success"]
+    stack.lockstep.kill(stack.executor)
+    rate_hz = load_profile("desktop").executor_rate_hz
+    stack.lockstep.add(ExecutorNode(stack.lockstep.context, stack.robot, rate_hz))
+    stack.lockstep.run_for(1.0)
+    assert holding(stack) == {"left": "object", "right": None}
+    assert stack.lockstep.truth()["held"] == ["red_cup"]
+    assert stack.say("put it on the coffee table")["success"]
+    assert stack.lockstep.truth()["held"] == []
+    assert stack.lockstep.truth()["objects"]["red_cup"]["position_m"][2] > 0.45

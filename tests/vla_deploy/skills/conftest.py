@@ -1,0 +1,62 @@
+"""A skill context with a robot that stands where a test says, on an empty floor with one table."""
+
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from vla_deploy.navigation.grid_map import GridMap
+from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.description import FloorPose
+from vla_deploy.skills.context import SkillContext
+from vla_deploy.skills.link import RobotLink
+
+BODY_RADIUS_M = 0.27
+
+
+class StoppedClock:
+    """Stand still at 1000 s."""
+
+    def now_ns(self) -> int:
+        """Return the time."""
+        return 1_000_000_000_000
+
+
+@dataclass
+class StandingLink:
+    """Say where the robot stands and what it has seen; the part of `RobotLink` that is state."""
+
+    pose: FloorPose
+    objects: list[dict[str, Any]] = field(default_factory=list)
+    surfaces: list[dict[str, Any]] = field(default_factory=list)
+    clock: StoppedClock = field(default_factory=StoppedClock)
+
+
+def at(x_m: float, y_m: float, yaw_rad: float = 0.0) -> FloorPose:
+    """Return a pose of the floor."""
+    return FloorPose(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+
+
+@pytest.fixture
+def standing() -> StandingLink:
+    """The robot's state; a test changes it."""
+    return StandingLink(pose=at(1.0, 2.0))
+
+
+@pytest.fixture
+def context(standing: StandingLink) -> SkillContext:
+    """A 6 x 4 m room with a table of 1.0 x 0.4 m around (3.0, 1.0)."""
+    blocked = np.zeros((80, 120), dtype=bool)
+    blocked[[0, -1], :] = blocked[:, [0, -1]] = True
+    blocked[16:24, 50:70] = True
+    grid = GridMap(resolution_m=0.05, origin_m=(0.0, 0.0), blocked=blocked)
+    return SkillContext(
+        robot=load_robot("butler"),
+        link=cast("RobotLink", standing),
+        planner=PathPlanner(grid, BODY_RADIUS_M),
+        arms={},
+        say=lambda _: None,
+        hands={"left": None, "right": None},
+    )

@@ -1,0 +1,46 @@
+import math
+from typing import TYPE_CHECKING
+
+from vla_deploy.skills.context import Held, SkillContext
+from vla_deploy.skills.frames import to_base
+from vla_deploy.skills.stand import REACH_M, SIDE_M, standing_poses
+
+if TYPE_CHECKING:
+    from conftest import StandingLink
+
+ON_TABLE_M = (3.0, 1.12, 0.5)
+BEYOND_THE_WALL_M = (-0.3, -0.3, 0.5)
+
+
+def test_every_pose_is_free_and_has_the_object_within_reach(context: SkillContext) -> None:
+    poses = standing_poses(context, ON_TABLE_M)
+    assert poses
+    for pose in poses:
+        assert context.planner.is_free(pose.x_m, pose.y_m)
+        distance_m = math.dist((pose.x_m, pose.y_m), ON_TABLE_M[:2])
+        assert REACH_M[0] - 1e-9 <= distance_m <= REACH_M[-1] + 1e-9
+
+
+def test_the_object_is_put_before_the_left_shoulder(context: SkillContext) -> None:
+    for pose in standing_poses(context, ON_TABLE_M):
+        x_m, y_m, _ = to_base(pose, ON_TABLE_M)
+        assert x_m > 0.3
+        assert abs(y_m - SIDE_M) < 0.01
+
+
+def test_a_full_right_hand_has_it_before_the_right_shoulder(context: SkillContext) -> None:
+    context.hands["right"] = Held(kind="cup", colour="red", width_m=0.07, below_grip_m=0.05)
+    for pose in standing_poses(context, ON_TABLE_M):
+        assert to_base(pose, ON_TABLE_M)[1] < 0.0
+
+
+def test_the_robot_stays_where_it_already_reaches(
+    context: SkillContext, standing: "StandingLink"
+) -> None:
+    standing.pose = standing_poses(context, ON_TABLE_M)[0]
+    assert standing_poses(context, ON_TABLE_M) == [standing.pose]
+    assert len(standing_poses(context, ON_TABLE_M, anew=True)) > 1
+
+
+def test_an_object_beyond_the_walls_has_no_pose(context: SkillContext) -> None:
+    assert standing_poses(context, BEYOND_THE_WALL_M) == []

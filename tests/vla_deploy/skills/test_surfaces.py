@@ -1,0 +1,45 @@
+import math
+from typing import TYPE_CHECKING
+
+from vla_deploy.skills.context import SkillContext
+from vla_deploy.skills.frames import to_map
+from vla_deploy.skills.surfaces import EDGE_M, KEEP_APART_M, free_spots
+
+if TYPE_CHECKING:
+    from conftest import StandingLink
+
+TABLE_M = [[1.35, 1.5], [1.95, 1.5], [1.95, 2.5], [1.35, 2.5]]
+
+
+def test_spots_lie_on_the_surface_away_from_its_edge(
+    context: SkillContext, standing: "StandingLink"
+) -> None:
+    standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
+    spots = free_spots(context, "left")
+    assert spots
+    for x_m, y_m, height_m in spots:
+        assert height_m == 0.45
+        assert to_map(standing.pose, x_m, y_m)[0] >= 1.35 + EDGE_M
+
+
+def test_a_hand_begins_on_its_own_side(context: SkillContext, standing: "StandingLink") -> None:
+    standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
+    assert free_spots(context, "left")[0][1] > 0.0
+    assert free_spots(context, "right")[0][1] < 0.0
+
+
+def test_spots_keep_apart_from_things(context: SkillContext, standing: "StandingLink") -> None:
+    standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
+    standing.objects = [{"position_m": [1.44, 2.10, 0.5]}]
+    for x_m, y_m, _ in free_spots(context, "left"):
+        spot = to_map(standing.pose, x_m, y_m)
+        assert math.dist(spot, (1.44, 2.10)) > KEEP_APART_M
+
+
+def test_the_floor_and_high_shelves_are_no_place_to_put_things(
+    context: SkillContext, standing: "StandingLink"
+) -> None:
+    standing.surfaces = [
+        {"height_m": height_m, "polygon_m": TABLE_M} for height_m in (0.0, 0.15, 0.9)
+    ]
+    assert free_spots(context, "left") == []
