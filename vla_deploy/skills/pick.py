@@ -25,9 +25,10 @@ from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered
 from vla_deploy.skills.motion import move_joints, pause, settle
 from vla_deploy.skills.navigate import solve_near
+from vla_deploy.skills.swing import heights_above
 
 PREGRASP_M = 0.12
-LIFT_M = 0.12
+FINGER_TIPS_M = 0.03
 APPROACH_SPEED_RATIO = 0.5
 STRAIGHT_SPEED_RATIO = 0.35
 # The fingers are sent this much past the surface they should meet.
@@ -41,6 +42,7 @@ class Choice:
     hand: str
     grasp: Grasp
     above: NDArray[np.float64]
+    above_m: float
     held: Held
 
 
@@ -85,7 +87,7 @@ def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
     touch = feel(context, hand, goal_m)
     if touch.holds(grasp.effort_ratio):
         context.hands[hand] = choice.held
-        yield from lift(context, hand, LIFT_M)
+        yield from lift(context, hand, choice.above_m)
         yield from pause(context, 0.3)
         touch = feel(context, hand, goal_m)
         if touch.holds(grasp.effort_ratio):
@@ -156,19 +158,31 @@ def _choose(context: SkillContext, query: ObjectQuery, hands: list[str]) -> Choi
 def _solve(
     context: SkillContext, hand: str, grasp: Grasp, seen: Mapping[str, Any], reasons: list[str]
 ) -> Choice | None:
-    arm = context.arms[hand]
-    x_m, y_m, z_m = grasp.point_m
-    try:
-        high = hand_down((x_m, y_m, z_m + PREGRASP_M), grasp.yaw_rad)
-        above = arm.solve(high, context.link.setpoints, restarts=RESTARTS).positions
-        arm.straight_line(above, hand_down(grasp.point_m, grasp.yaw_rad))
-    except ManipulationError as error:
-        reasons.append(str(error))
+    solved = _above(context, hand, grasp, reasons)
+    if solved is None:
         return None
+    above, above_m = solved
     held = Held(
         kind=str(seen["class"]),
         colour=str(seen["colour"]),
         width_m=grasp.width_m,
         below_grip_m=grasp.below_grip_m,
     )
-    return Choice(hand=hand, grasp=grasp, above=above, held=held)
+    return Choice(hand=hand, grasp=grasp, above=above, above_m=above_m, held=held)
+
+
+def _above(
+    context: SkillContext, hand: str, grasp: Grasp, reasons: list[str]
+) -> tuple[NDArray[np.float64], float] | None:
+    """Return a posture above a grasp from which the hand can go straight down, and how high."""
+    arm, (x_m, y_m, z_m) = context.arms[hand], grasp.point_m
+    for above_m in heights_above(context, grasp.point_m, FINGER_TIPS_M, PREGRASP_M):
+        try:
+            high = hand_down((x_m, y_m, z_m + above_m), grasp.yaw_rad)
+            above = arm.solve(high, context.link.setpoints, restarts=RESTARTS).positions
+            arm.straight_line(above, hand_down(grasp.point_m, grasp.yaw_rad))
+        except ManipulationError as error:
+            reasons.append(str(error))
+            continue  # lower, the arm may get there
+        return above, above_m
+    return None

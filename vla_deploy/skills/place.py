@@ -28,6 +28,7 @@ from vla_deploy.skills.gaze import remembered, turn_head, watch
 from vla_deploy.skills.motion import move_joints, pause, settle
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.surfaces import free_spots
+from vla_deploy.skills.swing import heights_above
 
 ABOVE_M = 0.10
 # A thing put into a container is let go this far below the rim; one put on something, just above.
@@ -46,6 +47,7 @@ class Release:
 
     point_m: tuple[float, float, float]
     above: NDArray[np.float64]
+    above_m: float
 
 
 def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
@@ -79,7 +81,7 @@ def _put_down(context: SkillContext, hand: str, held: Held, release: Release) ->
     yield from set_opening(context, hand, held.width_m + LET_GO_M)
     context.hands[hand] = None
     yield from pause(context, 0.3)
-    yield from lift(context, hand, ABOVE_M)
+    yield from lift(context, hand, release.above_m)
 
 
 def _release(
@@ -113,7 +115,7 @@ def _on_surface(context: SkillContext, hand: str, held: Held) -> Generator[None,
     for x_m, y_m, z_m in spots:
         point_m = (x_m, y_m, z_m + held.below_grip_m + ABOVE_SURFACE_M)
         try:
-            return Release(point_m=point_m, above=_solve_above(context, hand, point_m))
+            return _solve_above(context, hand, point_m, held)
         except OutOfReach as error:
             reason = error
     raise reason
@@ -131,31 +133,47 @@ def _over_object(
         raise NotPossible(f"a {seen['class']} is no container; put things in a box")
     lower_m = BELOW_RIM_M if relation == "in" else -ABOVE_SURFACE_M
     point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
-    return Release(point_m=point_m, above=_solve_above(context, hand, point_m))
+    return _solve_above(context, hand, point_m, held)
 
 
 def _solve_above(
-    context: SkillContext, hand: str, release_m: tuple[float, float, float]
-) -> NDArray[np.float64]:
-    """Return the posture above the release point that moves the arm least and can descend.
+    context: SkillContext, hand: str, release_m: tuple[float, float, float], held: Held
+) -> Release:
+    """Return the posture above a release point that moves the arm least and can descend.
 
     Raises:
         OutOfReach: no yaw of the hand gets there.
     """
-    now, arm = context.link.setpoints, context.arms[hand]
+    now, reasons = context.link.setpoints, [""]
+    for above_m in heights_above(context, release_m, held.below_grip_m, ABOVE_M):
+        found = [
+            above
+            for yaw_rad in YAWS_RAD
+            if (above := _descent(context, hand, release_m, above_m, yaw_rad, reasons)) is not None
+        ]
+        if found:
+            least = min(found, key=lambda positions: float(np.abs(positions - now).max()))
+            return Release(point_m=release_m, above=least, above_m=above_m)
     x_m, y_m, z_m = release_m
-    found, reason = [], ""
-    for yaw_rad in YAWS_RAD:
-        try:
-            high = hand_down((x_m, y_m, z_m + ABOVE_M), yaw_rad)
-            above = arm.solve(high, now, restarts=RESTARTS).positions
-            arm.straight_line(above, hand_down(release_m, yaw_rad))
-        except ManipulationError as error:
-            reason = str(error)
-            continue  # another yaw may be within reach
-        found.append(above)
-    if not found:
-        raise OutOfReach(
-            f"the {hand} hand cannot reach {x_m:.2f}, {y_m:.2f}, {z_m:.2f} m: {reason}"
-        )
-    return min(found, key=lambda positions: float(np.abs(positions - now).max()))
+    raise OutOfReach(
+        f"the {hand} hand cannot reach {x_m:.2f}, {y_m:.2f}, {z_m:.2f} m: {reasons[-1]}"
+    )
+
+
+def _descent(
+    context: SkillContext,
+    hand: str,
+    release_m: tuple[float, float, float],
+    above_m: float,
+    yaw_rad: float,
+    reasons: list[str],
+) -> NDArray[np.float64] | None:
+    arm, (x_m, y_m, z_m) = context.arms[hand], release_m
+    try:
+        high = hand_down((x_m, y_m, z_m + above_m), yaw_rad)
+        above = arm.solve(high, context.link.setpoints, restarts=RESTARTS).positions
+        arm.straight_line(above, hand_down(release_m, yaw_rad))
+    except ManipulationError as error:
+        reasons.append(str(error))
+        return None
+    return above
