@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import CellReader, RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc import CellReader, Event, RingReader, RingWriter, SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.errors import NotReady, PlanningError
@@ -16,6 +16,7 @@ from vla_deploy.planning.validator import World, check_plan, spoken_places
 from vla_deploy.robots import RobotDescription
 
 STATUS_AGE_S = 2.0
+UTTERANCE_AGE_S = 5.0
 
 
 class PlannerNode:
@@ -46,19 +47,21 @@ class PlannerNode:
     def step(self) -> None:
         """Answer every command that has come in."""
         for event in self._utterances.drain():
-            self._answer(event.payload)
+            self._answer(event)
 
     def stop(self) -> None:
         """Close the topics."""
         self._space.close()
 
-    def _answer(self, utterance: Mapping[str, Any]) -> None:
+    def _answer(self, event: Event) -> None:
+        utterance = event.payload
         command_id = str(utterance.get("command_id", ""))
         text = str(utterance.get("text", ""))
         if utterance.get("cancel") or is_stop(text):
             self._plans.publish({"command_id": command_id, "cancel": True})
             return
         try:
+            self._check_age(event)
             plan = self._plan(utterance, text)
             self._check_ready()
         except PlanningError as error:
@@ -79,6 +82,12 @@ class PlannerNode:
             plan = plan_command(text, world, here=self._here())
         check_plan(plan, world)
         return plan
+
+    def _check_age(self, event: Event) -> None:
+        """Refuse what whoever gave it has given up by now: the robot must not move by surprise."""
+        age_s = (self._clock.now_ns() - event.stamp_ns) / NS_PER_S
+        if age_s > UTTERANCE_AGE_S:
+            raise NotReady(f"the command is {age_s:.0f} s old, the planner was away; give it again")
 
     def _check_ready(self) -> None:
         sample = self._control.latest()

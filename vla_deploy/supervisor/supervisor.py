@@ -178,7 +178,7 @@ class _Run:
         self._handlers = {
             number: signal.signal(number, lambda *_: on_stop_signal())
             for number in _STOP_SIGNALS
-            if signal.getsignal(number) is not signal.SIG_IGN  # such as nohup asks for
+            if not _is_ignored_hangup(number)
         }
 
     def close(self) -> None:
@@ -188,6 +188,11 @@ class _Run:
         self.runtime.close()
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
+
+
+def _is_ignored_hangup(number: int) -> bool:
+    """Tell whether whoever started this wants it to outlive the terminal, as nohup does."""
+    return number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN
 
 
 def _without_sender(name: str, line: str) -> str:
