@@ -38,6 +38,12 @@ class PathPlanner:
         self._clearance_m = clearance_of(grid)
         near = np.clip((body_radius_m + COMFORT_M - self._clearance_m) / COMFORT_M, 0.0, 1.0)
         self._cost = 1.0 + (WALL_COST - 1.0) * near
+        # The search runs on one list of cells with a border around the map, so that it need not
+        # look for the edge: the cost per cell of way, infinite where the body does not fit.
+        fits = self._clearance_m >= body_radius_m
+        tolls = np.pad(np.where(fits, self._cost, np.inf), 1, constant_values=np.inf)
+        self._stride = int(tolls.shape[1])
+        self._tolls: list[float] = tolls.ravel().tolist()
 
     def is_free(self, x_m: float, y_m: float) -> bool:
         """Tell whether the body fits at a point of the map frame."""
@@ -95,28 +101,38 @@ class PathPlanner:
         return int(rows[nearest]), int(columns[nearest])
 
     def _search(self, start: Cell, goal: Cell) -> list[Cell] | None:
-        came_from: dict[Cell, Cell] = {}
-        cost_so_far = {start: 0.0}
-        frontier: list[tuple[float, Cell]] = [(0.0, start)]
+        stride, tolls = self._stride, self._tolls
+        neighbours = [(dr * stride + dc, length) for dr, dc, length in _NEIGHBOURS]
+        first, last = self._number(start), self._number(goal)
+        end = divmod(last, stride)
+        came_from: dict[int, int] = {}
+        cost_so_far = {first: 0.0}
+        done: set[int] = set()
+        frontier: list[tuple[float, int]] = [(0.0, first)]
         while frontier:
-            _, cell = heapq.heappop(frontier)
-            if cell == goal:
-                return _unwind(came_from, cell)
-            for following, step in self._steps(cell):
-                cost = cost_so_far[cell] + step
+            cell = heapq.heappop(frontier)[1]
+            if cell == last:
+                return [self._cell(number) for number in _unwind(came_from, cell)]
+            if cell in done:
+                continue
+            done.add(cell)
+            cost_here = cost_so_far[cell]
+            for offset, length in neighbours:
+                following = cell + offset
+                cost = cost_here + length * tolls[following]
                 if cost < cost_so_far.get(following, math.inf):
                     cost_so_far[following] = cost
                     came_from[following] = cell
-                    heapq.heappush(frontier, (cost + math.dist(following, goal), following))
+                    ahead = math.dist(divmod(following, stride), end)
+                    heapq.heappush(frontier, (cost + ahead, following))
         return None
 
-    def _steps(self, cell: Cell) -> list[tuple[Cell, float]]:
-        steps = []
-        for d_row, d_column, length in _NEIGHBOURS:
-            following = (cell[0] + d_row, cell[1] + d_column)
-            if self._inside(following) and self._clearance_m[following] >= self._radius_m:
-                steps.append((following, length * float(self._cost[following])))
-        return steps
+    def _number(self, cell: Cell) -> int:
+        return (cell[0] + 1) * self._stride + cell[1] + 1
+
+    def _cell(self, number: int) -> Cell:
+        row, column = divmod(number, self._stride)
+        return row - 1, column - 1
 
     def _shortcut(self, cells: list[Cell]) -> list[Cell]:
         """Drop cells while the straight line costs no more than the way along them."""
@@ -140,7 +156,7 @@ class PathPlanner:
         return length * float(self._cost[rows, columns].mean())
 
 
-def _unwind(came_from: dict[Cell, Cell], cell: Cell) -> list[Cell]:
+def _unwind(came_from: dict[int, int], cell: int) -> list[int]:
     cells = [cell]
     while cell in came_from:
         cell = came_from[cell]
