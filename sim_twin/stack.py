@@ -35,6 +35,7 @@ class LockstepStack:
         self._status = self.space.cell_reader("control_status")
         self._numbers = itertools.count(1)
         self.events: list[dict[str, Any]] = []
+        self._outcomes: dict[str, dict[str, Any]] = {}
         context, devices = self.lockstep.context, self.lockstep.devices
         self.control: Node = ControlNode(context, self.robot, self._profile, devices)
         self.perception: Node = PerceptionNode(context, self.robot, self._profile, devices)
@@ -80,12 +81,11 @@ class LockstepStack:
 
     def outcome(self, command_id: str) -> dict[str, Any] | None:
         """Return a command's last event, once it has one."""
-        self.events += [event.payload for event in self._events.drain()]
-        for event in self.events:
-            ended = event["event"] in ("finished", "rejected")
-            if ended and event["command_id"] == command_id:
-                return event
-        return None
+        for event in self._events.drain():
+            self.events.append(event.payload)
+            if event.payload["event"] in ("finished", "rejected"):
+                self._outcomes.setdefault(event.payload["command_id"], event.payload)
+        return self._outcomes.get(command_id)
 
     def say(self, text: str, timeout_s: float = COMMAND_TIMEOUT_S) -> dict[str, Any]:
         """Give a command and run until it has ended.

@@ -36,6 +36,7 @@ from sim_twin.can.velocity_loop import VelocityLoop
 HEARTBEAT_LOST: Final = 0x8130
 COMMUNICATION_ERROR: Final = 0x11
 ERROR_FIELD_LENGTH: Final = 4
+MAX_NODE_ID: Final = 127
 
 
 class WheelDrive:
@@ -67,6 +68,16 @@ class WheelDrive:
         self._consumer = HeartbeatConsumer(self._objects)
         self._objects.on_write[CONTROLWORD, 0] = self._on_controlword
         self._objects.on_write[ERROR_FIELD, 0] = self._clear_history
+        # Like a CAN controller's acceptance filter: nothing is done for the frames of others.
+        self._heeded = frozenset(
+            {
+                NMT_COB,
+                SYNC_COB,
+                RPDO1.cob_base + node_id,
+                SDO_REQUEST_COB + node_id,
+                *range(HEARTBEAT_COB, HEARTBEAT_COB + MAX_NODE_ID + 1),
+            }
+        )
         self._nmt_state = NmtState.BOOT_UP
         self._send_frame: Callable[[can.Message], None] = lambda frame: None
         self._now_ns: int | None = None
@@ -118,6 +129,8 @@ class WheelDrive:
 
     def receive(self, frame: can.Message) -> None:
         """Take one frame from the wire."""
+        if frame.arbitration_id not in self._heeded:
+            return
         ordinary = not (frame.is_extended_id or frame.is_remote_frame or frame.is_error_frame)
         if not (self._supplied and ordinary):
             return

@@ -64,6 +64,8 @@ class RingReader:
     def drain(self) -> list[Event]:
         """Return every event since the last call, oldest first."""
         newest = self._segment.newest
+        if newest == self._position:
+            return []
         oldest = max(self._position, newest - self._segment.layout.slots) + 1
         self.lost += oldest - 1 - self._position
         self._position = newest
