@@ -17,6 +17,7 @@ from sim_twin.mirror import MirrorState, mirror_pair, send_state
 START_TIMEOUT_S = 30.0
 STOP_TIMEOUT_S = 2.5
 PERIOD_NS = 20_000_000
+_MESSAGE_BYTES = 4096
 
 
 class CameraLink:
@@ -47,15 +48,17 @@ class CameraLink:
         """Wait until the camera is served.
 
         Raises:
-            CameraFailed: the process ended, or takes too long; its own message is on stderr.
+            CameraFailed: the process refused to start, ended, or takes too long.
         """
         select.select([self._sender], [], [], START_TIMEOUT_S)
         try:
-            ready = self._sender.recv(len(READY)) == READY
+            told = self._sender.recv(_MESSAGE_BYTES)
         except BlockingIOError:
-            ready = False
-        if not ready:
-            raise CameraFailed(f"the rendering process did not start (see above, {self._state()})")
+            raise CameraFailed(
+                f"the rendering process was not ready within {START_TIMEOUT_S:g} s"
+            ) from None
+        if told != READY:
+            raise CameraFailed(told.decode() or "the rendering process ended, see its words above")
 
     def show(self, now_ns: int, wall_ns: int, qpos: NDArray[np.float64]) -> None:
         """Pass the state on every 20 ms of simulated time."""

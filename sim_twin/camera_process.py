@@ -102,7 +102,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         studio = Studio(options.robot, options.world, options.seed, options.devices_dir)
     except TwinError as error:
-        sys.stderr.write(f"twin camera: {error}\n")
+        mirror.send(str(error).encode())
         return 2
     mirror.send(READY)
     try:

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import logging
 import os
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.narrate import action_words, line_of
+from vla_deploy.cli.referee import SteppingClock, ask_referee
 from vla_deploy.cli.run import add_robot_arguments
 from vla_deploy.cli.session import Session
 from vla_deploy.planning.references import parse_object
@@ -25,7 +27,6 @@ EXAMPLES = """  vla-deploy demo
 """
 SETTLE_S = 1.0
 ARM_TIMEOUT_S = 20.0
-STEP_NS = NS_PER_S // 20
 
 
 def register(commands: Any) -> None:
@@ -58,6 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
         arm=True,
     )
     _make_folder(arguments.out)
+    log = logging.NullHandler() if arguments.json else logging.StreamHandler(sys.stdout)
+    logging.basicConfig(handlers=[log], level=logging.WARNING, format="%(message)s")
     outcome = Demo(arguments, options).run()
     path = arguments.out / "outcome.json"
     path.write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
@@ -91,7 +94,7 @@ class Demo:
         self._tell(f"starting the twin of {self._options.robot} (seed {self._options.seed})")
         with Supervisor(self._options) as supervisor:
             supervisor.start()
-            session = Session(supervisor.run_dir, _SteppingClock(self._clock, supervisor))
+            session = Session(supervisor.run_dir, SteppingClock(self._clock, supervisor))
             self._wait_armed(session)
             film = self._start_film(session)
             started_ns = self._clock.now_ns()
@@ -130,7 +133,7 @@ class Demo:
         pair = _object_and_container(self._plan)
         if pair is None:
             return {"judged_by": "actions", "inside": None, "placement_error_m": None}
-        answer = _referee(session, "inside", object=pair[0], container=pair[1])
+        answer = ask_referee(session, "inside", object=pair[0], container=pair[1])
         return {"judged_by": "mujoco", **answer}
 
     def _start_film(self, session: Session) -> bool:
@@ -150,7 +153,7 @@ class Demo:
         if self._arguments.headless:
             return None
         try:
-            return _referee(session, op, **details)
+            return ask_referee(session, op, **details)
         except CommandFailed as error:
             self._tell(f"no film: {error}")
             return None
@@ -188,55 +191,6 @@ class Demo:
     def _tell(self, line: str) -> None:
         if not self._arguments.json:
             print(line, flush=True)
-
-
-class _SteppingClock:
-    """Let the supervisor do its work whenever the demo waits."""
-
-    def __init__(self, clock: MonotonicClock, supervisor: Supervisor) -> None:
-        self._clock = clock
-        self._supervisor = supervisor
-
-    def now_ns(self) -> int:
-        return self._clock.now_ns()
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        while True:
-            self._supervisor.step()
-            if self._supervisor.stop_requested:
-                raise KeyboardInterrupt
-            now_ns = self._clock.now_ns()
-            if now_ns >= deadline_ns:
-                return
-            self._clock.sleep_until(min(deadline_ns, now_ns + STEP_NS))
-
-
-def _referee(session: Session, op: str, **details: str) -> dict[str, Any]:
-    """Ask the twin's referee, which is started by name: the robot's code never imports the twin.
-
-    It may take seconds, in which the robot must not lose its supervisor.
-
-    Raises:
-        CommandFailed: it gives no answer.
-    """
-    command = [sys.executable, "-m", "sim_twin.referee", "--run-dir", str(session.run_dir), op]
-    for name, value in details.items():
-        command += [f"--{name}", value]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(
-        command, stdout=pipe, stderr=pipe, text=True, start_new_session=True
-    ) as asked:
-        try:
-            while asked.poll() is None:
-                session.pause()
-        except BaseException:
-            asked.kill()
-            raise
-        answer_text, complaint = asked.communicate()
-    if asked.returncode != 0:
-        raise CommandFailed(complaint.strip() or f"the referee failed at {op}")
-    answer: dict[str, Any] = json.loads(answer_text)
-    return answer
 
 
 def _object_and_container(plan: dict[str, Any]) -> tuple[str, str] | None:

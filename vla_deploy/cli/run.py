@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import sys
 from typing import Any
 
 from vla_deploy.cli.example import add_command
@@ -43,7 +44,7 @@ def _seed(text: str) -> int:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run until SIGINT or SIGTERM."""
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
     arm = arguments.twin if arguments.arm is None else arguments.arm
     options = RunOptions(
         robot=arguments.robot,

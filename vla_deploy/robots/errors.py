@@ -14,6 +14,8 @@ class RobotFileError(ValueError):
     def __init__(self, file: Path, faults: tuple[Fault, ...]) -> None:
         self.file = file
         self.faults = faults
+        if len(faults) == 1:
+            super().__init__(f"{file}: {faults[0]}")
+            return
         lines = "\n".join(f"  {fault}" for fault in faults)
-        count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
-        super().__init__(f"{file}: {count}\n{lines}")
+        super().__init__(f"{file}: {len(faults)} faults\n{lines}")

@@ -57,7 +57,6 @@ class Seen:
 Step = tuple[Record, Act | None]
 Action = tuple[Act, str]
 _ALIVE = frozenset({State.STARTING, State.READY, State.STOPPING})
-_NOT_IN_THE_WAY = frozenset({State.READY, State.GIVEN_UP})
 
 
 def reconcile(
@@ -80,8 +79,13 @@ def reconcile(
         after[spec.name] = record
         if act is not None:
             actions.append((act, spec.name))
-        may_go &= record.state in ({State.STOPPED} if stopping else _NOT_IN_THE_WAY)
+        may_go &= record.state is State.STOPPED if stopping else _lets_others_go(record)
     return after, tuple(actions)
+
+
+def _lets_others_go(record: Record) -> bool:
+    """Tell whether those after it may start: not when it never worked at all."""
+    return record.state is State.READY or (record.state is State.GIVEN_UP and record.was_ready)
 
 
 def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, now_ns: int) -> Step:

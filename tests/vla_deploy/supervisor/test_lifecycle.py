@@ -130,7 +130,7 @@ def test_a_restart_waits_for_those_before_it():
 
 def test_one_that_was_given_up_does_not_hold_back_the_restart_of_others():
     play = Play().all_ready()
-    play.records["a"] = Record(state=State.GIVEN_UP)
+    play.records["a"] = Record(state=State.GIVEN_UP, was_ready=True)
     play.step(b=Seen(exit_code=1), c=READY)
     play.now_s = 1.0
     assert play.step(c=READY) == [(Act.SPAWN, "b")]
@@ -191,3 +191,10 @@ def test_a_process_that_ends_by_itself_after_a_restart_is_not_called_silent():
     play.step(a=READY, c=READY)
     play.step(a=READY, b=Seen(exit_code=1), c=READY)
     assert play.records["b"].reason == "exit code 1"
+
+
+def test_nothing_is_started_after_one_that_was_given_up_before_it_ever_worked():
+    play = Play()
+    play.step()
+    assert play.step(a=Seen(exit_code=2)) == []
+    assert (play.state("a"), play.state("b")) == (State.GIVEN_UP, State.WAITING)

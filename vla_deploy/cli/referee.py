@@ -1,0 +1,68 @@
+"""Ask the twin's referee what really happened, while the supervisor goes on with its work."""
+
+import json
+import subprocess
+import sys
+from typing import Any
+
+from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.cli.session import Session
+from vla_deploy.supervisor import Supervisor
+
+STEP_NS = NS_PER_S // 20
+
+
+class SteppingClock:
+    """Let the supervisor do its work whenever its own process waits."""
+
+    def __init__(self, clock: MonotonicClock, supervisor: Supervisor) -> None:
+        self._clock = clock
+        self._supervisor = supervisor
+
+    def now_ns(self) -> int:
+        """Return the monotonic time."""
+        return self._clock.now_ns()
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        """Step the supervisor until the deadline.
+
+        Raises:
+            KeyboardInterrupt: someone asked the supervisor to stop.
+        """
+        while True:
+            self._supervisor.step()
+            if self._supervisor.stop_requested:
+                raise KeyboardInterrupt
+            now_ns = self._clock.now_ns()
+            if now_ns >= deadline_ns:
+                return
+            self._clock.sleep_until(min(deadline_ns, now_ns + STEP_NS))
+
+
+def ask_referee(session: Session, op: str, **details: str) -> dict[str, Any]:
+    """Return the referee's answer; it is started by name: the robot never imports the twin.
+
+    It may take seconds, in which the robot must not lose its supervisor.
+
+    Raises:
+        CommandFailed: it gives no answer.
+    """
+    command = [sys.executable, "-m", "sim_twin.referee", "--run-dir", str(session.run_dir), op]
+    for name, value in details.items():
+        command += [f"--{name}", value]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+    ) as asked:
+        try:
+            while asked.poll() is None:
+                session.pause()
+        except BaseException:
+            asked.kill()
+            raise
+        answer_text, complaint = asked.communicate()
+    if asked.returncode != 0:
+        raise CommandFailed(complaint.strip() or f"the referee failed at {op}")
+    answer: dict[str, Any] = json.loads(answer_text)
+    return answer
