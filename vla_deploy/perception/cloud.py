@@ -80,20 +80,26 @@ def _back_project(
     return points
 
 
-def upward_area(cloud: Cloud) -> Floats:
-    """Return for each pixel the area in m^2 of level, upward surface that it shows, else 0."""
+def upward_area(cloud: Cloud, stride: int = 1) -> Floats:
+    """Return the area in m^2 of level, upward surface that a pixel shows, else 0.
+
+    With a `stride`, only every so many pixels of every so many rows are looked at.
+    """
     smooth = cv2.blur(cloud.points, (SMOOTHING_PX, SMOOTHING_PX))
-    along_u = smooth[1:-1, 2:] - smooth[1:-1, :-2]
-    along_v = smooth[2:, 1:-1] - smooth[:-2, 1:-1]
+    at = slice(stride, -1, stride)
+    before, behind = slice(stride - 1, -2, stride), slice(stride + 1, None, stride)
+    along_u = smooth[at, behind] - smooth[at, before]
+    along_v = smooth[behind, at] - smooth[before, at]
     # Rows run towards the robot: v x u looks up from a surface that faces the camera.
     normal_x = along_v[..., 1] * along_u[..., 2] - along_v[..., 2] * along_u[..., 1]
     normal_y = along_v[..., 2] * along_u[..., 0] - along_v[..., 0] * along_u[..., 2]
     normal_z = along_v[..., 0] * along_u[..., 1] - along_v[..., 1] * along_u[..., 0]
     length = np.sqrt(normal_x**2 + normal_y**2 + normal_z**2)
-    upright = (normal_z > UPRIGHT * length) & _on_one_surface(cloud)[1:-1, 1:-1]
-    area = np.zeros_like(cloud.depth_m)
+    upright = (normal_z > UPRIGHT * length) & _on_one_surface(cloud)[at, at]
+    area = np.zeros_like(cloud.depth_m[::stride, ::stride])
+    rows, columns = length.shape
     # The two differences span two pixels each way: a quarter of their parallelogram is the pixel.
-    area[1:-1, 1:-1] = np.where(upright, length * 0.25, 0.0)
+    area[1 : rows + 1, 1 : columns + 1] = np.where(upright, length * 0.25, 0.0)
     return area
 
 

@@ -51,10 +51,11 @@ def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
     """Return the things on each support; furniture and walls are none."""
     clusters: list[Cluster] = []
     flat_points = cloud.points.reshape(-1, 3)
+    noise_m = NOISE_SIGMAS * cloud.sigma_m()
     for index, support in enumerate(supports):
         heights = cv2.medianBlur(support.heights_above(cloud), 3)
         lowest_m = MIN_HEIGHT_ON_FLOOR_M if support.is_floor else MIN_HEIGHT_M
-        least = np.maximum(lowest_m, NOISE_SIGMAS * cloud.sigma_m())
+        least = np.maximum(lowest_m, noise_m)
         standing = np.flatnonzero(cloud.valid & (heights > least))
         standing = standing[inside(support.outline, flat_points[standing], OUTLINE_MARGIN_M)]
         for higher in supports[:index]:

@@ -36,7 +36,9 @@ class Support:
 
     def heights_above(self, cloud: Cloud) -> Floats:
         """Return each pixel's height above the surface's plane."""
-        return _above(cloud.points, self.plane)
+        a, b, c = self.plane
+        above: Floats = cv2.transform(cloud.points, np.array([[-a, -b, 1.0, -c]], np.float32))
+        return above
 
     @property
     def is_floor(self) -> bool:
@@ -48,8 +50,8 @@ class Support:
 def find_supports(cloud: Cloud) -> list[Support]:
     """Return the surfaces in view, the highest first."""
     # Surfaces are large: every other pixel of every other row is plenty.
-    area = upward_area(cloud)[::STRIDE, ::STRIDE] * np.float32(STRIDE**2)
-    points = cloud.points[::STRIDE, ::STRIDE]
+    area = upward_area(cloud, STRIDE) * np.float32(STRIDE**2)
+    points = np.ascontiguousarray(cloud.points[::STRIDE, ::STRIDE])
     z = points[..., 2]
     supports: list[Support] = []
     left = area > 0.0
