@@ -66,6 +66,10 @@ class Session:
             pause=self.pause,
         )
 
+    def close(self) -> None:
+        """Let go of the run's shared memory."""
+        self._space.close()
+
     def cancel(self) -> None:
         """Ask the executor to stop what it does; the robot stays ready.
 

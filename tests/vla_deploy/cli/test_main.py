@@ -1,0 +1,132 @@
+"""Give the command line what nobody should, and read what it says; nothing is started here."""
+
+import argparse
+import json
+from pathlib import Path
+
+import pytest
+
+from vla_deploy.cli import demo
+from vla_deploy.cli.main import main, parser
+
+BUTLER = Path(demo.__file__).parents[1] / "robots" / "butler"
+CYCLE = {
+    "goal": "wait for ever",
+    "actions": [
+        {"id": "a", "skill": "wait", "parameters": {"duration_s": 1}, "depends_on": ["b"]},
+        {"id": "b", "skill": "wait", "parameters": {"duration_s": 1}, "depends_on": ["a"]},
+    ],
+}
+TEN_FAULTS = {
+    "baud = 3000000": "baud = -1",
+    "protocol = 2": "protocol = 1",
+    'joint = "left_elbow", sign = 1': 'joint = "left_elbow", sign = 3',
+    'id = 2, model = "XM540-W270"': 'id = 1, model = "XM540-W270"',
+    'id = 4, model = "XM430-W350"': 'id = 4, model = "XM999"',
+    'joint = "left_wrist_roll"': 'joint = "left_wing"',
+    "wheel_radius_m = 0.08": "wheel_radius_m = 0.0",
+    "track_m = 0.34": 'track_m = "wide"',
+    "node_id = 2": "node_id = 200",
+    "bitrate = 1000000": "bitrate = 0",
+}
+
+
+def commands() -> dict[str, argparse.ArgumentParser]:
+    (sub,) = (one for one in parser()._actions if isinstance(one, argparse._SubParsersAction))
+    return sub.choices
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_the_help_of_every_command_ends_with_an_example(name):
+    assert f"  vla-deploy {name}" in commands()[name].format_help().split("examples:")[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ([], "vla-deploy: the following arguments are required: COMMAND"),
+        (["frobnicate"], "vla-deploy: argument COMMAND: invalid choice"),
+        (["say"], "vla-deploy say: one of the arguments text --plan is required"),
+        (
+            ["run", "--seed", "-1"],
+            "vla-deploy run: argument --seed: expected a whole number from 0",
+        ),
+        (["bench", "nothing"], "vla-deploy bench: argument benchmark: invalid choice"),
+    ],
+)
+def test_bad_arguments_are_one_line_and_exit_code_2(words, complaint, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    error = capsys.readouterr().err
+    assert error.startswith(complaint)
+    assert error.count("\n") == 1
+
+
+def plan_file(tmp_path: Path, content: str) -> str:
+    path = tmp_path / "plan.json"
+    path.write_text(content)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (json.dumps(CYCLE), "the dependencies form a cycle: a -> b -> a"),
+        ("not json", "is no JSON"),
+        ('{"goal": "x", "actions": [{"id": "a", "skill": "fly"}]}', 'unknown skill "fly"'),
+        ('{"goal": "x", "actions": []}', "no actions"),
+    ],
+)
+def test_a_bad_plan_is_one_line_and_exit_code_2(content, complaint, tmp_path, capsys):
+    assert main(["check", "--plan", plan_file(tmp_path, content)]) == 2
+    error = capsys.readouterr().err
+    assert complaint in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["check", "--robot", "nosuch"], "expected a robot file, its folder, or one of butler"),
+        (["check", "--profile", "nosuch"], "no profile 'nosuch': choose "),
+        (["check", "--plan", "/nowhere/plan.json"], "cannot read the plan /nowhere/plan.json"),
+        (["demo", "--out", "/dev/null/out"], "--out /dev/null/out: Not a directory"),
+        (["status"], "no robot runs in "),
+        (["say", "stop"], "no robot runs in "),
+        (["shutdown"], "no robot runs in "),
+        (["run", "--twin", "--robot", "nosuch"], "expected a robot file"),
+        (["run", "--twin", "--profile", "nosuch"], "no profile 'nosuch'"),
+    ],
+)
+def test_what_cannot_be_found_is_one_line_and_exit_code_2(words, complaint, tmp_path, capsys):
+    assert main(["--runtime-base", str(tmp_path), *words]) == 2
+    error = capsys.readouterr().err
+    assert complaint in error
+    assert error.count("\n") == 1
+
+
+def test_all_ten_faults_of_a_robot_file_are_told_at_once(tmp_path, capsys):
+    text = (BUTLER / "robot.toml").read_text()
+    for right, wrong in TEN_FAULTS.items():
+        assert right in text
+        text = text.replace(right, wrong, 1)
+    text = text.replace('mjcf = "', f'mjcf = "{BUTLER}/')
+    (tmp_path / "robot.toml").write_text(text)
+    assert main(["run", "--twin", "--robot", str(tmp_path)]) == 2
+    first, *faults = capsys.readouterr().err.splitlines()
+    assert first.startswith("vla-deploy: ")
+    told = "\n".join(faults)
+    for word in ("baud", "protocol", "sign", "XM999", "left_wing", "wheel_radius_m", "track_m"):
+        assert word in told
+    for word in ("node_id", "bitrate", "id"):
+        assert word in told
+    assert len(faults) >= len(TEN_FAULTS)
+
+
+def test_a_runtime_directory_that_cannot_be_made_is_one_line_and_exit_code_2(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["--runtime-base", str(tmp_path / "file" / "base"), "run", "--twin"]) == 2
+    error = capsys.readouterr().err
+    assert "choose another with --runtime-base" in error
+    assert error.count("\n") == 1
