@@ -128,6 +128,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             resources=("base", "head", "arm"),
             timeout_s=MANIPULATION_TIMEOUT_S,
             estimated_duration_s=12.0,
+            retryable=True,
         ),
         "open_gripper": SkillSpec(
             summary="open a gripper, letting go of what it holds",

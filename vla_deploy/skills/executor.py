@@ -111,6 +111,9 @@ class PlanExecution:
         timeout_s = SKILLS[record.action.skill].timeout_s
         if record.execution_time_s > timeout_s:
             raise TryAgain(f"{record.action.skill} took longer than {timeout_s:g} s")
+        if self._context.link.is_blind:
+            self._context.link.rest_base()
+            return
         if self._skill is None:
             function = SKILL_FUNCTIONS[record.action.skill]
             self._skill = function(self._context, record.action.parameters)

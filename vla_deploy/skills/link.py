@@ -16,6 +16,8 @@ from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.errors import TryAgain
 
 POSE_AGE_S = 0.5
+# A loaded machine may hold perception up for a moment.
+PATIENCE_S = 3.0
 JOINT_AGE_S = 0.25
 
 
@@ -117,6 +119,15 @@ class RobotLink:
         )
 
     @property
+    def is_blind(self) -> bool:
+        """Tell whether perception has just fallen silent: worth a wait before giving up."""
+        sample = self._pose.latest()
+        return (
+            sample is not None
+            and POSE_AGE_S < sample.age_s(self.clock.now_ns()) < POSE_AGE_S + PATIENCE_S
+        )
+
+    @property
     def ranges_m(self) -> NDArray[np.float64] | None:
         """Return the newest lidar scan, beam i at i degrees, or None while there is none."""
         sample = self._scan.latest()
@@ -199,5 +210,9 @@ class RobotLink:
         for motion_id in sorted(self._active):
             self._commands.publish({"kind": "cancel", "motion_id": motion_id})
         self._active.clear()
+        self.rest_base()
+
+    def rest_base(self) -> None:
+        """Bring the base to rest if this executor moves it."""
         if self._driving:
             self.drive(AT_REST)

@@ -54,8 +54,8 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     """Put what is held `in` or `on` a destination within reach.
 
     Raises:
-        NotPossible: nothing is held, or the spot is out of reach.
-        TryAgain: the destination was not seen, or the object was lost on the way.
+        NotPossible: nothing is held any more, or the spot is out of reach.
+        TryAgain: the destination was not seen.
     """
     hand = context.holding_hand(parameters.get("arm"))
     held = context.hands[hand]
@@ -63,7 +63,7 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         raise NotPossible(f"the {hand} hand holds nothing")
     if opening_of(context, hand) < held.width_m - LOST_OPENING_M:
         context.hands[hand] = None
-        raise TryAgain(f"the {hand} hand has lost the {held.kind} on the way")
+        raise NotPossible(f"the {hand} hand has lost the {held.kind} on the way")
     release = yield from _release(context, parameters, hand, held)
     yield from or_carry(context, _put_down(context, hand, held, release))
     yield from carry(context)
