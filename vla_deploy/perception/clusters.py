@@ -26,6 +26,7 @@ OCCLUDER_M = 0.05
 OCCLUDED_SHARE = 0.2
 TOP_HIDDEN_SHARE = 0.5
 PART_SHARE = 0.15
+OUTLINE_PX = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,7 +132,7 @@ def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np
     rows, columns = np.unravel_index(pixels, heights.shape)
     box = (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1)
     at_border = box[0] <= 1 or box[1] <= 1 or box[2] >= width - 1 or box[3] >= height - 1
-    around, over_top = _hidden_shares(cloud, pixels)
+    around, over_top = _hidden_shares(cloud, rows, columns)
     return Cluster(
         support=support,
         points=cloud.points[rows, columns],
@@ -145,15 +146,21 @@ def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np
     )
 
 
-def _hidden_shares(cloud: Cloud, pixels: NDArray[np.intp]) -> tuple[float, float]:
+def _hidden_shares(
+    cloud: Cloud, rows: NDArray[np.intp], columns: NDArray[np.intp]
+) -> tuple[float, float]:
     """Return how much of the outline, and of its upper edge, borders on something nearer."""
-    depth_m = cloud.depth_m
+    top, left = max(0, int(rows.min()) - OUTLINE_PX), max(0, int(columns.min()) - OUTLINE_PX)
+    around = np.s_[
+        top : int(rows.max()) + OUTLINE_PX + 1, left : int(columns.max()) + OUTLINE_PX + 1
+    ]
+    depth_m = cloud.depth_m[around]
     member = np.zeros(depth_m.shape, dtype=np.uint8)
-    member.flat[pixels] = 1
+    member[rows - top, columns - left] = 1
     kernel = np.ones((5, 5), dtype=np.uint8)
     ring = (cv2.dilate(member, kernel) - member).astype(np.bool_)
     beside = cv2.dilate(np.where(member > 0, depth_m, 0.0).astype(np.float32), kernel)
-    nearer = cloud.own_body | ((depth_m > 0.0) & (depth_m < beside - OCCLUDER_M))
+    nearer = cloud.own_body[around] | ((depth_m > 0.0) & (depth_m < beside - OCCLUDER_M))
     above = np.zeros_like(ring)
     above[:-2] = member[2:] > 0
     above &= ring
