@@ -13,7 +13,7 @@ from vla_deploy.robots.mjcf import read_mjcf_names
 
 Array = NDArray[np.float64]
 
-MARGIN_M = 0.015
+MARGIN_M = 0.01
 SPACING_M = 0.03
 NEAR_M = 0.05
 
