@@ -27,9 +27,11 @@ class Owner:
     run_dir: str
 
     def is_alive(self) -> bool:
-        """Tell whether that very process still runs."""
+        """Tell whether that very process still runs; one that nobody has reaped does not."""
         try:
-            return psutil.Process(self.pid).create_time() == self.started
+            process = psutil.Process(self.pid)
+            is_the_same = process.create_time() == self.started
+            return is_the_same and process.status() != psutil.STATUS_ZOMBIE
         except psutil.NoSuchProcess:
             return False
 

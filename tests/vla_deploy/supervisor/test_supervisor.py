@@ -167,6 +167,7 @@ def test_kill_9_of_the_supervisor_ends_its_children_and_the_next_start_sweeps_th
     supervisor = start_supervisor(stage, python)
     (a,), (b,), (grandchild,) = (stage.pids(name) for name in ("a", "b", "grandchild"))
     supervisor.kill()
+    assert eventually(lambda: running(stage.base) is None, 3.0)  # also while nobody has reaped it
     supervisor.wait(timeout=10)
     assert eventually(lambda: not is_running(a) and not is_running(b), 3.0)
     assert is_running(grandchild)
