@@ -17,6 +17,7 @@ OTHER_GATE_M = 0.05
 CARRY_GATE_M = 0.2
 LEAST_GAIN = 0.2
 DOUBTFUL_GAIN = 0.05
+UNKNOWN_WEIGHT = 0.25
 MISSES_TO_FORGET = 5
 UNCONFIRMED_MISSES = 2
 MAX_OBJECTS = 64
@@ -30,7 +31,7 @@ class View(Enum):
     HIDDEN = "out of the image, too far, or something is in front"
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Track:
     """Hold what is known of one thing; `object_id` is empty until it is confirmed."""
 
@@ -47,13 +48,21 @@ class Track:
 
     @property
     def class_name(self) -> str:
-        """Return the class most often seen."""
-        return self.classes.most_common(1)[0][0] if self.classes else OTHER
+        """Return the class most often seen; not to recognise a thing says little against one."""
+        votes = self._votes()
+        return max(votes, key=lambda name: votes[name]) if votes else OTHER
 
     @property
     def certainty(self) -> float:
         """Return the share of sights that agree on the class."""
-        return self.classes[self.class_name] / max(1, self.classes.total())
+        votes = self._votes()
+        return votes[self.class_name] / sum(votes.values()) if votes else 0.0
+
+    def _votes(self) -> dict[str, float]:
+        return {
+            name: count * (UNKNOWN_WEIGHT if name == OTHER else 1.0)
+            for name, count in self.classes.items()
+        }
 
     @property
     def colour(self) -> str:
@@ -108,6 +117,7 @@ class Tracker:
             if id(detection) not in taken and _is_sure(detection) and not self._is_part(detection):
                 self._tracks.append(_new_track(detection, stamp_ns))
         self._forget()
+        self._drop_doubles([track for track, _ in pairs])
         for track in self._tracks:
             if not track.object_id and track.seen_count >= CONFIRM_HITS:
                 track.object_id = self._name(track)
@@ -159,6 +169,16 @@ class Tracker:
             self._tracks.remove(track)
         self._vanished += [track for track in gone if track.object_id]
         del self._vanished[:-VANISHED_KEPT]
+
+    def _drop_doubles(self, seen: list[Track]) -> None:
+        """Let what is seen now take over the id of an unseen thing like it in the same place."""
+        for track in seen:
+            for other in [one for one in self._tracks if one not in seen]:
+                width_m = min(*track.size_m[:2], *other.size_m[:2])
+                alike = other.class_name == track.class_name
+                if alike and math.dist(other.position_m, track.position_m) < 0.5 * width_m:
+                    self._tracks.remove(other)
+                    track.object_id = other.object_id or track.object_id
 
     def _name(self, track: Track) -> str:
         """Return the id of the same kind of thing that has left its place, or a new id."""
@@ -218,7 +238,8 @@ def _absorb(track: Track, detection: Detection, stamp_ns: int) -> None:
     track.position_m = _blend(track.position_m, detection.position_m, gain)
     track.size_m = _blend(track.size_m, detection.size_m, gain)
     track.yaw_rad = half_turn(track.yaw_rad + gain * half_turn(detection.yaw_rad - track.yaw_rad))
-    track.confidence += gain * (detection.confidence - track.confidence)
+    if detection.class_name == track.class_name:
+        track.confidence += gain * (detection.confidence - track.confidence)
 
 
 def _vote(track: Track, detection: Detection) -> None:

@@ -174,3 +174,41 @@ def test_a_vague_sight_begins_no_track() -> None:
     for _ in range(4):
         objects = watcher.image(seen("object", "brown", occluded=True))
     assert objects == []
+
+
+def test_a_thing_too_far_to_be_recognised_keeps_its_class() -> None:
+    watcher = Watcher()
+    for _ in range(3):
+        watcher.image(seen("ball", "blue"))
+    for _ in range(6):
+        (ball,) = watcher.image(seen("object", "blue", confidence=0.4))
+    assert (ball["class"], ball["seen_count"]) == ("ball", 9)
+    assert ball["confidence"] > 0.5
+
+
+def test_a_thing_never_surely_recognised_is_no_known_thing() -> None:
+    watcher = Watcher()
+    watcher.image(seen("bottle", "blue"))
+    for _ in range(8):
+        (thing,) = watcher.image(seen("object", "blue"))
+    assert thing["class"] == "object"
+
+
+def test_a_box_seen_better_from_near_replaces_its_far_sight() -> None:
+    watcher = Watcher()
+    far = seen("box", "brown", at=(4.15, 0.51, 0.48), size_m=(0.31, 0.18, 0.12))
+    near = seen("box", "orange", at=(4.21, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
+    for _ in range(3):
+        watcher.image(far)
+    for _ in range(3):
+        boxes = watcher.image(near, view=HIDDEN)
+    assert [(box["id"], box["colour"]) for box in boxes] == [("box_1", "orange")]
+
+
+def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
+    watcher = Watcher()
+    box = seen("box", "orange", at=(4.2, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
+    part = seen("box", "orange", at=(4.14, 0.46, 0.49), size_m=(0.24, 0.14, 0.13), occluded=True)
+    for _ in range(4):
+        boxes = watcher.image(box, part)
+    assert [one["id"] for one in boxes] == ["box_1"]
