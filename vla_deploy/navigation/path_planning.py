@@ -16,7 +16,7 @@ Cell = tuple[int, int]
 COMFORT_M = 0.25
 WALL_COST = 4.0
 # What a scan shows this near to a blocked cell is that cell: scans and poses are a little off.
-MAPPED_M = 0.10
+MAPPED_M = 0.11
 _NEIGHBOURS = tuple(
     (dr, dc, math.hypot(dr, dc)) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if dr or dc
 )

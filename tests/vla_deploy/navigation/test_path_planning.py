@@ -83,3 +83,16 @@ def test_a_start_beside_a_wall_is_left_by_the_way_out() -> None:
     path = PathPlanner(room(), RADIUS_M).plan((0.15, 3.0), (4.0, 3.0))
     assert path[0] == pytest.approx((0.15, 3.0))
     assert length_m(path) < 4.2
+
+
+def test_points_near_blocked_cells_and_off_the_map_count_as_mapped() -> None:
+    planner = PathPlanner(room((np.s_[20:30], np.s_[20:30])), RADIUS_M)
+    points = np.array([[2.5, 2.5], [3.05, 2.5], [3.5, 2.5], [-1.0, 2.5], [2.5, 99.0]])
+    assert planner.is_mapped(points).tolist() == [True, True, False, True, True]
+
+
+def test_room_is_the_distance_to_what_blocks_and_none_off_the_map() -> None:
+    planner = PathPlanner(room((np.s_[20:30], np.s_[20:30])), RADIUS_M)
+    assert planner.room_m(4.05, 2.45) == pytest.approx(1.1, abs=0.06)
+    assert planner.room_m(2.45, 2.45) == 0.0
+    assert planner.room_m(-1.0, 2.0) == 0.0
