@@ -216,12 +216,19 @@ class PerceptionNode:
             self._writers["scene"].put_document(self._scene.document())
 
     def _make_localiser(self) -> Localiser:
-        start = self._robot.start_pose
         return Localiser(
-            Pose2D(start.x_m, start.y_m, start.yaw_rad),
+            self._last_pose(),
             load_map(self._robot.home.map_path),
             self._place(self._robot.lidar),
         )
+
+    def _last_pose(self) -> Pose2D:
+        """Return where an earlier instance in this run left off, else the robot file's start."""
+        told = self._space.cell_reader("pose").latest()
+        if told is not None:
+            return Pose2D(*(float(told.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
+        start = self._robot.start_pose
+        return Pose2D(start.x_m, start.y_m, start.yaw_rad)
 
     def _place(self, sensor: SerialSensor) -> Pose2D:
         """Return where a sensor sits on the base; beams already count from the robot's front."""

@@ -216,6 +216,15 @@ def test_driving_is_followed_better_than_by_wheels_alone(make_rig: Callable[...,
     assert yaw_rad < 0.03
 
 
+def test_a_restarted_process_knows_where_the_robot_is(make_rig: Callable[..., Rig]) -> None:
+    make_rig().run_for(0.5)
+    restarted = make_rig(believed=Pose2D(VIEW.x_m + 1.5, VIEW.y_m, VIEW.yaw_rad + 1.0))
+    restarted.run_for(1.0)
+    position_m, yaw_rad = restarted.pose_error()
+    assert position_m < 0.05
+    assert yaw_rad < 0.03
+
+
 def test_images_taken_while_the_head_turns_are_shown_but_not_believed(
     make_rig: Callable[..., Rig],
 ) -> None:
