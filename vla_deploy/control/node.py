@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from drivers.clock import NS_PER_S
+from drivers.errors import DriverError
 from drivers.opener import DeviceOpener
 from platforms import Profile
 from vla_deploy.control.arming import Arming
@@ -102,7 +103,11 @@ class ControlNode:
         """
         self._servos.open()
         self._release()
-        self._wheels.open()
+        try:
+            self._wheels.open()
+        except DriverError:
+            self._servos.close()  # before `stop` could let arms fall that hold themselves
+            raise
         self._place(np.ones(len(self._plan.every_joint), dtype=np.bool_))
 
     def step(self) -> None:

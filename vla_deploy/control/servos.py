@@ -139,8 +139,9 @@ class ServoLine:
 
     def close(self) -> None:
         """Release the line; the servos keep what they do until their watchdog stops them."""
-        if self._bus is not None:
-            self._bus.close()
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            bus.close()
 
     def _energise(self, bus: DynamixelBus, servo_id: int) -> None:
         for register, gain in GAINS.items():

@@ -335,6 +335,23 @@ def test_an_orderly_stop_ramps_and_then_takes_all_power(armed: Rig) -> None:
     assert [bank.register(servo_id, "torque_enable") for servo_id in ids] == [0] * len(ids)
 
 
+def test_a_control_that_finds_no_wheels_drops_no_arm_that_holds(
+    armed: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(name: str) -> None:
+        raise DeviceMissing(f"{name}: not there")
+
+    bank = armed.lockstep.twin.serial_devices["servos"]
+    elbow_id = armed.robot.servo_bus.servos[armed.robot.joint_index[ELBOW]].id
+    armed.lockstep.kill(armed.control)
+    monkeypatch.setattr(armed.lockstep.devices, "can", missing)
+    later = armed.new_control()
+    with pytest.raises(DeviceMissing, match="can: not there"):
+        later.start()
+    later.stop()
+    assert bank.register(elbow_id, "torque_enable") == 1
+
+
 def test_a_missing_servo_line_is_told_at_the_start(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
