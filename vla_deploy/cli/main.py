@@ -1,6 +1,7 @@
 """Read the command line and run one command."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
 from vla_deploy.cli.example import OneLineParser
 
 COMMANDS = (run, demo, say, status, operate, check, bench)
+EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin
   vla-deploy run --twin                           keep a twin running
@@ -41,7 +43,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return 0 on success, 1 when the robot failed, 2 for a bad request."""
     arguments = parser().parse_args(argv)
     try:
-        return int(arguments.run(arguments))
+        code = int(arguments.run(arguments))
+        sys.stdout.flush()
+        return code
     except CommandFailed as error:
         print(f"vla-deploy: {error}", file=sys.stderr)
         return 1
@@ -50,6 +54,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+    except BrokenPipeError:  # whoever reads, such as head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_BROKEN_PIPE
 
 
 if __name__ == "__main__":

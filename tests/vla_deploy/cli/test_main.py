@@ -1,7 +1,10 @@
 """Give the command line what nobody should, and read what it says; nothing is started here."""
 
 import argparse
+import errno
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -129,4 +132,26 @@ def test_a_runtime_directory_that_cannot_be_made_is_one_line_and_exit_code_2(tmp
     assert main(["--runtime-base", str(tmp_path / "file" / "base"), "run", "--twin"]) == 2
     error = capsys.readouterr().err
     assert "choose another with --runtime-base" in error
+    assert error.count("\n") == 1
+
+
+def test_a_reader_that_has_seen_enough_gets_no_traceback():
+    pipe = subprocess.PIPE
+    words = [sys.executable, "-m", "vla_deploy.cli.main", "schema"]
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 141
+
+
+def test_a_runtime_directory_of_someone_else_is_one_line_and_exit_code_2(
+    tmp_path, capsys, monkeypatch
+):
+    def forbid(*_: object, **__: object) -> str:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_text", forbid)
+    assert main(["--runtime-base", str(tmp_path), "status"]) == 2
+    error = capsys.readouterr().err
+    assert f"runtime directory {tmp_path}: Permission denied; choose another" in error
     assert error.count("\n") == 1
