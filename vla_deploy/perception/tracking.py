@@ -174,9 +174,9 @@ class Tracker:
         """Let what is seen now take over the id of an unseen thing like it in the same place."""
         for track in seen:
             for other in [one for one in self._tracks if one not in seen]:
-                width_m = min(*track.size_m[:2], *other.size_m[:2])
+                gap_m = math.dist(other.position_m[:2], track.position_m[:2])
                 alike = other.class_name == track.class_name
-                if alike and math.dist(other.position_m, track.position_m) < 0.5 * width_m:
+                if alike and gap_m < 0.5 * min(track.size_m[:2]):
                     self._tracks.remove(other)
                     track.object_id = other.object_id or track.object_id
 

@@ -196,7 +196,7 @@ def test_a_thing_never_surely_recognised_is_no_known_thing() -> None:
 
 def test_a_box_seen_better_from_near_replaces_its_far_sight() -> None:
     watcher = Watcher()
-    far = seen("box", "brown", at=(4.15, 0.51, 0.48), size_m=(0.31, 0.18, 0.12))
+    far = seen("box", "brown", at=(4.14, 0.52, 0.475), size_m=(0.28, 0.145, 0.11))
     near = seen("box", "orange", at=(4.21, 0.46, 0.49), size_m=(0.24, 0.24, 0.13))
     for _ in range(3):
         watcher.image(far)
