@@ -134,12 +134,8 @@ class Wheels:
             return
         self.state = state
         self.lost = any(state.lost)
-        left, right = state.position_rad
-        self.odometry.update(float(left), float(right))
-        left_speed, right_speed = state.velocity_rad_s
-        self.v_m_s, self.w_rad_s = self._geometry.base_velocity(
-            float(left_speed), float(right_speed)
-        )
+        self.odometry.update(*state.position_rad.tolist())
+        self.v_m_s, self.w_rad_s = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
 
     def enable(self) -> None:
         """Begin to power the drives; `enabled` tells when they follow."""

@@ -78,10 +78,10 @@ class DistanceField:
         v = np.clip(at[:, 1], 0.0, rows - 1.001)
         i, j = v.astype(np.intp), u.astype(np.intp)
         fu, fv = u - j, v - i
-        f = self._field_m
-        low, high = f[i, j], f[i, np.minimum(j + 1, columns - 1)]
-        low_next = f[np.minimum(i + 1, rows - 1), j]
-        high_next = f[np.minimum(i + 1, rows - 1), np.minimum(j + 1, columns - 1)]
+        # Clipped as they are, both have a neighbour: in one flat list it lies a cell or a row on.
+        field_m, cell = self._field_m.ravel(), i * columns + j
+        low, high = field_m.take(cell), field_m.take(cell + 1)
+        low_next, high_next = field_m.take(cell + columns), field_m.take(cell + columns + 1)
         along_low, along_high = low + fu * (high - low), low_next + fu * (high_next - low_next)
         gradient_x = (1.0 - fv) * (high - low) + fv * (high_next - low_next)
         gradient = np.column_stack((gradient_x, along_high - along_low))
