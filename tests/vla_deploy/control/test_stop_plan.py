@@ -1,5 +1,7 @@
 """Hold power to the stop categories of the robot file, and gravity to the servos' stiffness."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,13 +22,29 @@ def names(robot: RobotDescription, joints: np.ndarray[tuple[int], np.dtype[np.in
     return {robot.joint_names[joint] for joint in joints}
 
 
+def with_head(robot: RobotDescription, category: StopCategory) -> RobotDescription:
+    head = replace(robot.groups["head"], stop_category=category)
+    return replace(robot, groups={**robot.groups, "head": head})
+
+
 def test_an_estop_takes_power_from_category_1_at_rest_only(robot: RobotDescription) -> None:
-    plan = StopPlan(robot)
+    plan = StopPlan(with_head(robot, StopCategory.STOP_THEN_REMOVE_POWER))
     assert len(plan.unpowered_at_once(Reaction.GROUP_STOP)) == 0
     head = {"head_pan", "head_tilt"}
     assert names(robot, plan.unpowered_at_rest(Reaction.GROUP_STOP)) == head
     assert names(robot, plan.released) == head
     assert plan.base_category(Reaction.GROUP_STOP) is StopCategory.STOP_THEN_REMOVE_POWER
+
+
+def test_an_estop_takes_power_from_category_0_at_once(robot: RobotDescription) -> None:
+    plan = StopPlan(with_head(robot, StopCategory.POWER_REMOVED))
+    head = {"head_pan", "head_tilt"}
+    assert names(robot, plan.unpowered_at_once(Reaction.GROUP_STOP)) == head
+
+
+def test_butler_holds_every_joint_through_an_estop(robot: RobotDescription) -> None:
+    plan = StopPlan(robot)
+    assert len(plan.unpowered_at_rest(Reaction.GROUP_STOP)) == 0
 
 
 def test_a_protective_stop_keeps_all_power(robot: RobotDescription) -> None:
