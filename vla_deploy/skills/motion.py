@@ -92,8 +92,8 @@ def minimum_jerk(
     u = np.linspace(0.0, 1.0, max(4, math.ceil(duration_s / POINT_PERIOD_S)) + 1)
     s = (10 * u**3 - 15 * u**4 + 6 * u**5) * along[-1]
     positions = _smooth_through(along, waypoints[kept], s)
-    rates = np.gradient(positions, u, axis=0)
-    bends = np.gradient(rates, u, axis=0)
+    rates = np.diff(positions, axis=0) / u[1]
+    bends = np.diff(rates, axis=0) / u[1]
     slowest_s = (np.abs(rates) / velocity_limits).max()
     hardest_s = math.sqrt((np.abs(bends) / acceleration_limits).max())
     return u * max(duration_s, slowest_s, hardest_s), positions
