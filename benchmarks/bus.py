@@ -195,8 +195,8 @@ def _report(results: dict[str, list[Round]]) -> dict[str, Any]:
         for name, rounds in results.items()
     }
     return {
-        "cpu_ratio_vs_dynamixel_sdk": cpu_us["dynamixel_sdk"] / cpu_us["ours"],
-        "cpu_ratio_vs_dynamixel_sdk_fast": cpu_us["dynamixel_sdk_fast"] / cpu_us["ours_fast"],
+        "cpu_ratio_vs_dynamixel_sdk": cpu_us["ours"] / cpu_us["dynamixel_sdk"],
+        "cpu_ratio_vs_dynamixel_sdk_fast": cpu_us["ours_fast"] / cpu_us["dynamixel_sdk_fast"],
         "cycles_per_s": rate["ours"],
         "servos": _SERVOS,
         "clients": {
@@ -222,8 +222,8 @@ def _text(report: dict[str, Any]) -> str:
         for name, values in report["clients"].items()
     ]
     lines.append(
-        f"dynamixel-sdk takes {report['cpu_ratio_vs_dynamixel_sdk']:.1f} x our CPU, "
-        f"with fast sync read {report['cpu_ratio_vs_dynamixel_sdk_fast']:.1f} x"
+        f"our CPU is {report['cpu_ratio_vs_dynamixel_sdk']:.2f} of dynamixel-sdk's, "
+        f"with fast sync read {report['cpu_ratio_vs_dynamixel_sdk_fast']:.2f}"
     )
     return "\n".join(lines)
 

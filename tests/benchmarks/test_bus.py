@@ -12,7 +12,7 @@ pytestmark = pytest.mark.stack
 def test_the_report_holds_the_ratio_and_every_client(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--rounds", "1", "--seconds", "0.1", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
-    assert report["cpu_ratio_vs_dynamixel_sdk"] > 1.0
+    assert 0.0 < report["cpu_ratio_vs_dynamixel_sdk"] < 1.0
     assert report["cycles_per_s"] > 0
     assert set(report["clients"]) == {
         "ours",
