@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
+from drivers.framing import align
 
 HEADER = b"\xaa\xaa"
 FRAME_BYTES = 19
@@ -104,13 +105,9 @@ class Imu:
 
     def _seek_header(self) -> bool:
         """Drop bytes up to the next header; false when there is none yet."""
-        at = self._buffer.find(HEADER)
-        if at < 0:
-            keep = 1 if self._buffer.endswith(HEADER[:1]) else 0
-            self._discard(len(self._buffer) - keep)
-            return False
-        self._discard(at)
-        return True
+        found, dropped = align(self._buffer, HEADER)
+        self.counters.discarded_bytes += dropped
+        return found
 
     def _discard(self, count: int) -> None:
         self.counters.discarded_bytes += count

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from drivers.base import ByteTransport
 from drivers.clock import Clock
 from drivers.device_clock import DeviceClock
+from drivers.framing import align
 
 HEADER = b"\x54\x2c"
 PACKET_BYTES = 47
@@ -156,13 +157,9 @@ class Lidar:
 
     def _seek_header(self) -> bool:
         """Drop bytes up to the next header; false when there is none yet."""
-        at = self._buffer.find(HEADER)
-        if at < 0:
-            keep = 1 if self._buffer.endswith(HEADER[:1]) else 0
-            self._discard(len(self._buffer) - keep)
-            return False
-        self._discard(at)
-        return True
+        found, dropped = align(self._buffer, HEADER)
+        self.counters.discarded_bytes += dropped
+        return found
 
     def _discard(self, count: int) -> None:
         self.counters.discarded_bytes += count
