@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
@@ -115,7 +116,7 @@ def move_arm(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     """Bring the arms, or one arm, to a named pose of the robot file."""
     targets = dict(context.robot.poses[parameters["pose"]])
     if "arm" in parameters:
-        joints = context.robot.group(context.robot.hands[parameters["arm"]].arm).joints
+        joints = _arm_joints(context, parameters["arm"])
         targets = {name: value for name, value in targets.items() if name in joints}
     if not targets:
         raise NotPossible(f"the pose {parameters['pose']} names no joint of that arm")
@@ -178,8 +179,7 @@ def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
     if not found:
         raise NotPossible(f"the {hand} hand cannot reach its carry pose {point}")
     best = min(found, key=lambda positions: float(np.abs(positions - now).max()))
-    index = context.robot.joint_index
-    return {name: float(best[index[name]]) for name in _arm_joints(context, hand)}
+    return _arm_targets(context, hand, best)
 
 
 def lift(context: SkillContext, hand: str, height_m: float, speed_ratio: float = 0.4) -> Skill:
@@ -209,6 +209,14 @@ def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: fl
     yield from settle(context, joints)
 
 
+def move_to_posture(
+    context: SkillContext, hand: str, positions: NDArray[np.float64], speed_ratio: float
+) -> Skill:
+    """Bring a hand's arm to its part of a posture of the whole robot, and let it settle."""
+    yield from move_joints(context, _arm_targets(context, hand, positions), speed_ratio)
+    yield from settle(context, _arm_joints(context, hand))
+
+
 def or_carry(context: SkillContext, skill: Skill) -> Skill:
     """Run a skill; where it fails, bring the arms to where they may travel before saying so."""
     try:
@@ -216,6 +224,13 @@ def or_carry(context: SkillContext, skill: Skill) -> Skill:
     except (TryAgain, NotPossible):
         yield from carry(context)
         raise
+
+
+def _arm_targets(
+    context: SkillContext, hand: str, positions: NDArray[np.float64]
+) -> dict[str, float]:
+    index = context.robot.joint_index
+    return {name: float(positions[index[name]]) for name in _arm_joints(context, hand)}
 
 
 def _arm_joints(context: SkillContext, hand: str) -> tuple[str, ...]:

@@ -74,18 +74,12 @@ def follow(
         TryAgain: the way stayed blocked.
     """
     follower = PathFollower(points, limits_of(context), final_yaw_rad)
-    clear_ns = context.link.clock.now_ns()
+    patience = _Patience(context)
     while follower.phase is not Phase.ARRIVED and not until():
         pose = context.link.pose
         twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
-        if _blocked(context, twist, _distance(pose, points[-1])):
-            twist = Twist(0.0, 0.0)
-            if context.link.clock.now_ns() - clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
-                context.link.drive(AT_REST)
-                raise TryAgain("something stands in the way")
-        else:
-            clear_ns = context.link.clock.now_ns()
-        context.link.drive(twist)
+        blocked = _blocked(context, twist, _distance(pose, points[-1]))
+        context.link.drive(patience.pass_on(twist, blocked))
         yield
     context.link.drive(AT_REST)
     yield from stand_still(context)
@@ -111,7 +105,7 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
     start = context.link.pose
     limits = limits_of(context)
     sign = math.copysign(1.0, distance_m)
-    clear_ns = context.link.clock.now_ns()
+    patience = _Patience(context)
     while True:
         pose = context.link.pose
         travelled_m = sign * (
@@ -126,13 +120,8 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
         if _leaves_free_floor(context, sign):
             context.link.drive(AT_REST)
             raise NotPossible(f"the map shows no room for the last {left_m:.2f} m")
-        if _blocked(context, twist, left_m, planned=False):
-            twist = AT_REST
-            if context.link.clock.now_ns() - clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
-                raise TryAgain("something stands in the way")
-        else:
-            clear_ns = context.link.clock.now_ns()
-        context.link.drive(twist)
+        blocked = _blocked(context, twist, left_m, planned=False)
+        context.link.drive(patience.pass_on(twist, blocked))
         yield
     context.link.drive(AT_REST)
     yield from stand_still(context)
@@ -160,6 +149,29 @@ def stand_still(context: SkillContext, duration_s: float = 0.4) -> Skill:
     while context.link.clock.now_ns() < end_ns:
         context.link.drive(AT_REST)
         yield
+
+
+class _Patience:
+    """Hold the base while something stands in the way, and give up when it stays."""
+
+    def __init__(self, context: SkillContext) -> None:
+        self._link = context.link
+        self._clear_ns = context.link.clock.now_ns()
+
+    def pass_on(self, twist: Twist, blocked: bool) -> Twist:
+        """Return what to drive now.
+
+        Raises:
+            TryAgain: the way stayed blocked; the base is at rest.
+        """
+        now_ns = self._link.clock.now_ns()
+        if not blocked:
+            self._clear_ns = now_ns
+            return twist
+        if now_ns - self._clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
+            self._link.drive(AT_REST)
+            raise TryAgain("something stands in the way")
+        return AT_REST
 
 
 def _blocked(context: SkillContext, twist: Twist, remaining_m: float, planned: bool = True) -> bool:

@@ -202,8 +202,8 @@ class RobotLink:
         return motion_id
 
     def ended(self, motion_id: int) -> MotionResult | None:
-        """Return how a motion ended, or None while it runs."""
-        return self._ended.get(motion_id)
+        """Return how a motion ended, once, or None while it runs."""
+        return self._ended.pop(motion_id, None)
 
     def halt(self) -> None:
         """Cancel every motion that this executor started and bring the base to rest."""

@@ -20,9 +20,7 @@ MIN_PACE_S = 1e-4
 
 def pause(context: SkillContext, duration_s: float) -> Skill:
     """Wait for a while."""
-    end_ns = context.link.clock.now_ns() + round(duration_s * NS_PER_S)
-    while context.link.clock.now_ns() < end_ns:
-        yield
+    yield from wait_until(context, lambda: False, duration_s)
 
 
 def wait_until(context: SkillContext, done: Callable[[], bool], timeout_s: float) -> Skill:

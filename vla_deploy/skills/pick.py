@@ -16,6 +16,7 @@ from vla_deploy.skills.arms import (
     feel,
     lift,
     move_straight,
+    move_to_posture,
     or_carry,
     set_opening,
 )
@@ -23,7 +24,7 @@ from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered
-from vla_deploy.skills.motion import move_joints, pause, settle
+from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.swing import heights_above
 
@@ -70,11 +71,7 @@ def _grasp(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
 
 def _approach(context: SkillContext, choice: Choice) -> Skill:
     yield from set_opening(context, choice.hand, choice.grasp.opening_m)
-    joints = context.robot.group(context.robot.hands[choice.hand].arm).joints
-    index = context.robot.joint_index
-    targets = {name: float(choice.above[index[name]]) for name in joints}
-    yield from move_joints(context, targets, APPROACH_SPEED_RATIO)
-    yield from settle(context, joints)
+    yield from move_to_posture(context, choice.hand, choice.above, APPROACH_SPEED_RATIO)
     target = hand_down(choice.grasp.point_m, choice.grasp.yaw_rad)
     yield from move_straight(context, choice.hand, target, STRAIGHT_SPEED_RATIO)
 

@@ -17,6 +17,7 @@ from vla_deploy.skills.arms import (
     carry,
     lift,
     move_straight,
+    move_to_posture,
     opening_of,
     or_carry,
     set_opening,
@@ -25,7 +26,7 @@ from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered, turn_head, watch
-from vla_deploy.skills.motion import move_joints, pause, settle
+from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.surfaces import free_spots
 from vla_deploy.skills.swing import heights_above
@@ -70,11 +71,7 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 
 def _put_down(context: SkillContext, hand: str, held: Held, release: Release) -> Skill:
-    joints = context.robot.group(context.robot.hands[hand].arm).joints
-    index = context.robot.joint_index
-    targets = {name: float(release.above[index[name]]) for name in joints}
-    yield from move_joints(context, targets, ABOVE_SPEED_RATIO)
-    yield from settle(context, joints)
+    yield from move_to_posture(context, hand, release.above, ABOVE_SPEED_RATIO)
     down = context.arms[hand].forward(context.link.setpoints)
     down[:3, 3] = release.point_m
     yield from move_straight(context, hand, down, DOWN_SPEED_RATIO)
