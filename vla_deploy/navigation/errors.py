@@ -2,8 +2,7 @@
 
 NavigationError
 ├── NoPath       another goal, or clear the way
-├── MapInvalid   mend the map's files
-└── Blocked      something stands in the way: wait, or plan around it
+└── MapInvalid   mend the map's files
 """
 
 
@@ -17,7 +16,3 @@ class NoPath(NavigationError):
 
 class MapInvalid(NavigationError):
     """Say what is wrong with a map file."""
-
-
-class Blocked(NavigationError):
-    """Say that something not on the map stands in the way."""

@@ -27,7 +27,6 @@ class Support:
 
     plane: tuple[float, float, float]
     outline: Floats
-    area_m2: float
 
     def height_m(self, x_m: float, y_m: float) -> float:
         """Return the surface's height above the floor at a point."""
@@ -128,7 +127,7 @@ def _pieces(
     label = labels[cells[:, 0], cells[:, 1]]
     areas = np.bincount(label, weights=area[on_plane])
     return [
-        Support(plane=plane, outline=_outline(xy[label == index]), area_m2=float(areas[index]))
+        Support(plane=plane, outline=_outline(xy[label == index]))
         for index in np.flatnonzero(areas >= MIN_AREA_M2)
     ]
 
