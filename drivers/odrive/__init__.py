@@ -1,0 +1,1 @@
+"""Drive ODrive axes over their CANSimple protocol."""
