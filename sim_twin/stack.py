@@ -24,8 +24,16 @@ class NotReady(Exception):
 class LockstepStack:
     """Own a twin and every node of the robot; give commands and read what became of them."""
 
-    def __init__(self, tmp_path: Path, seed: int = 0, profile: str = "desktop") -> None:
-        self.lockstep = Lockstep(seed=seed, profile=profile, tmp_path=tmp_path)
+    def __init__(
+        self,
+        tmp_path: Path,
+        seed: int = 0,
+        profile: str = "desktop",
+        *,
+        robot: str = "butler",
+        world: str = "flat",
+    ) -> None:
+        self.lockstep = Lockstep(robot, world, seed, profile, tmp_path=tmp_path)
         self.robot = self.lockstep.robot
         self._profile = load_profile(profile)
         self.space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)

@@ -1,7 +1,5 @@
 from hypothesis import HealthCheck, settings
 
-pytest_plugins = ["sim_twin.pytest_plugin"]
-
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]

@@ -5,15 +5,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 
 from platforms import load_profile
-from sim_twin.referee import ask
+from sim_twin.process_stack import ProcessStack
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
@@ -23,80 +21,11 @@ MOVING_RAD_S = 1.0
 DRIVE = "go to the kitchen"
 
 
-def eventually(condition: Callable[[], object], timeout_s: float = 30.0) -> bool:
-    until_ns = time.monotonic_ns() + round(timeout_s * 1e9)
-    while not condition():
-        if time.monotonic_ns() > until_ns:
-            return False
-        time.sleep(0.02)
-    return True
-
-
-class Run:
-    """Hold one `vla-deploy run --twin` and talk to it as a user does."""
-
-    def __init__(self, base: Path) -> None:
-        self.base = base
-        self.process = subprocess.Popen(
-            self._words("run", "--twin"), stdout=subprocess.PIPE, text=True, start_new_session=True
-        )
-
-    def wait_until_armed(self) -> None:
-        told = iter(self.process.stdout.readline, "")
-        assert any(line.startswith("ready;") for line in told), "the run ended before it was ready"
-        self.run_dir = (self.base / "current").resolve()
-        self.shared_memory = (self.run_dir / "ipc").resolve()
-        assert eventually(lambda: self.state() == "armed")
-
-    def _words(self, *words: str) -> list[str]:
-        return [*VLA_DEPLOY, "--runtime-base", str(self.base), *words]
-
-    def ask(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            self._words(*words), capture_output=True, text=True, timeout=90, check=False
-        )
-
-    def begin(self, *words: str) -> "subprocess.Popen[str]":
-        pipe = subprocess.PIPE
-        return subprocess.Popen(self._words(*words), stdout=pipe, stderr=pipe, text=True)
-
-    def status(self) -> dict:
-        return json.loads(self.ask("status", "--json").stdout)
-
-    def state(self) -> str:
-        return (self.status()["control"] or {"state": "silent"})["state"]
-
-    def row(self, name: str) -> dict:
-        return next(
-            row for row in self.status()["process_table"]["processes"] if row["name"] == name
-        )
-
-    def fastest_rad_s(self) -> float:
-        joints = ask(self.run_dir, "truth")["joints"]
-        return max(abs(joint["velocity"]) for joint in joints.values())
-
+class Run(ProcessStack):
     def drive(self) -> "subprocess.Popen[str]":
         saying = self.begin("say", DRIVE)
-        assert eventually(lambda: self.fastest_rad_s() > MOVING_RAD_S)
+        assert self.wait_until(lambda: self.fastest_rad_s() > MOVING_RAD_S)
         return saying
-
-    def members(self) -> list[psutil.Process]:
-        """Return every process that carries the run's id, the supervisor's descendants or not."""
-        return [one for one in psutil.process_iter() if _belongs(one, self.run_dir.name)]
-
-    def end(self) -> None:
-        if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGTERM)
-        self.process.wait(60)
-        self.process.stdout.close()
-
-
-def _belongs(process: psutil.Process, run_id: str) -> bool:
-    try:
-        alive = process.status() != psutil.STATUS_ZOMBIE
-        return alive and process.environ().get("VLA_DEPLOY_RUN_ID") == run_id
-    except (psutil.NoSuchProcess, psutil.AccessDenied):
-        return False
 
 
 @pytest.fixture
@@ -110,7 +39,7 @@ def start(tmp_path: Path) -> Iterator[Callable[[], Run]]:
 
     yield begin
     for run in runs:
-        run.end()
+        run.close()
 
 
 @pytest.fixture
@@ -125,6 +54,7 @@ def one_line(done: "subprocess.CompletedProcess[str]") -> str:
 
 
 def test_a_session_from_the_first_command_to_ctrl_c(run: Run) -> None:
+    shared_memory = (run.run_dir / "ipc").resolve()
     said = run.ask("say", "turn left 20 degrees")
     assert said.returncode == 0, said
     assert said.stdout.startswith("plan: turn")
@@ -132,7 +62,7 @@ def test_a_session_from_the_first_command_to_ctrl_c(run: Run) -> None:
 
     saying = run.drive()
     assert run.ask("estop").returncode == 0
-    assert eventually(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
+    assert run.wait_until(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
     _, complaint = saying.communicate(timeout=30)
     assert saying.returncode == 1
     assert "estop" in complaint
@@ -144,14 +74,14 @@ def test_a_session_from_the_first_command_to_ctrl_c(run: Run) -> None:
 
     saying = run.drive()
     assert run.ask("stop").stdout == "stopped; the robot is ready\n"
-    assert eventually(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
+    assert run.wait_until(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
     saying.communicate(timeout=30)
     assert saying.returncode == 1
 
     os.killpg(run.process.pid, signal.SIGINT)
     assert run.process.wait(30) == 0
     assert run.members() == []
-    assert not run.shared_memory.exists()
+    assert not shared_memory.exists()
     assert [path.name for path in run.base.iterdir()] == ["lock"]
 
 
@@ -176,14 +106,14 @@ def test_bad_requests_are_one_line_each_and_lose_nothing(run: Run, tmp_path: Pat
 def test_kill_9_of_control_stops_the_robot_and_leaves_it_disarmed(run: Run) -> None:
     profile = load_profile("desktop")
     saying = run.drive()
-    os.kill(run.row("control")["pid"], signal.SIGKILL)
+    run.kill("control")
     # Physics runs on the wall clock here: allow a busy machine some time to ask.
     limit_s = max(profile.bus_watchdog_s, profile.can_heartbeat_s) + 1.5
-    assert eventually(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, limit_s)
+    assert run.wait_until(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, limit_s)
     _, complaint = saying.communicate(timeout=60)
     assert saying.returncode == 1, complaint
-    assert eventually(lambda: run.row("control")["restarts"] == 1)
-    assert eventually(lambda: run.state() == "disarmed")
+    assert run.wait_until(lambda: run.row("control")["restarts"] == 1)
+    assert run.wait_until(lambda: run.state() == "disarmed")
     assert run.fastest_rad_s() < STANDSTILL_RAD_S
     assert "vla-deploy arm" in one_line(run.ask("say", "turn left"))
     assert run.ask("arm").returncode == 0
@@ -192,14 +122,14 @@ def test_kill_9_of_control_stops_the_robot_and_leaves_it_disarmed(run: Run) -> N
 
 def test_kill_9_of_the_executor_tells_the_command_as_lost(run: Run) -> None:
     saying = run.begin("say", "--json", DRIVE)
-    assert eventually(lambda: run.fastest_rad_s() > MOVING_RAD_S)
-    os.kill(run.row("executor")["pid"], signal.SIGKILL)
-    assert eventually(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
+    assert run.wait_until(lambda: run.fastest_rad_s() > MOVING_RAD_S)
+    run.kill("executor")
+    assert run.wait_until(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
     told, complaint = saying.communicate(timeout=30)
     assert saying.returncode == 1
     assert complaint.startswith("vla-deploy: lost: the executor ")
     assert [action["status"] for action in json.loads(told)["actions"]] == ["lost"]
-    assert eventually(lambda: run.row("executor")["state"] == "ready")
+    assert run.wait_until(lambda: run.row("executor")["state"] == "ready")
     assert run.ask("say", "turn left 20 degrees").returncode == 0
 
 
@@ -207,15 +137,16 @@ def test_kill_9_of_the_supervisor_ends_everything_and_a_new_run_starts(
     start: Callable[[], Run],
 ) -> None:
     run = start()
+    shared_memory = (run.run_dir / "ipc").resolve()
     saying = run.drive()
     run.process.kill()
-    assert eventually(lambda: not run.members(), 5.0)
+    assert run.wait_until(lambda: not run.members(), 5.0)
     saying.communicate(timeout=30)
     assert saying.returncode == 1
     assert "no robot runs in" in one_line(run.ask("status"))
     assert start().ask("say", "turn left 20 degrees").returncode == 0
     assert not run.run_dir.exists()
-    assert not run.shared_memory.exists()
+    assert not shared_memory.exists()
 
 
 def test_without_opengl_the_run_says_what_to_install_and_stops_again(tmp_path: Path) -> None:

@@ -1,0 +1,168 @@
+"""Run the real processes on a twin as a user does, and talk to them by the command line."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import psutil
+
+from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.referee import ask
+
+_COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
+_POLL_NS: Final = NS_PER_S // 50
+_ANSWER_S: Final = 90.0
+_END_S: Final = 60.0
+
+
+class StackFailed(Exception):
+    """Say that the processes did not come up, or that a command line was refused."""
+
+
+class ProcessStack:
+    """Hold one `vla-deploy run --twin` in a runtime directory of its own.
+
+    Physics keeps pace with the wall clock here: allow a busy machine some time.
+    """
+
+    def __init__(self, base: Path, *options: str) -> None:
+        """Start the processes; `options` are further words for `vla-deploy run`."""
+        self.base = base
+        self.run_dir = base
+        self._clock = MonotonicClock()
+        self.process = subprocess.Popen(
+            self._words("run", "--twin", *options),
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def wait_until_armed(self) -> None:
+        """Return once the robot takes commands.
+
+        Raises:
+            StackFailed: the run ended, or control does not arm.
+        """
+        assert self.process.stdout is not None
+        if not any(line.startswith("ready;") for line in iter(self.process.stdout.readline, "")):
+            raise StackFailed("the run ended before it was ready; its last words are on stderr")
+        self.run_dir = (self.base / "current").resolve()
+        if not self.wait_until(lambda: self.state() == "armed"):
+            raise StackFailed(f"control does not arm: {self.status()['control']}")
+
+    # --- as a user ----------------------------------------------------------------------------
+
+    def ask(self, *words: str) -> "subprocess.CompletedProcess[str]":
+        """Run `vla-deploy WORDS` to its end."""
+        return subprocess.run(
+            self._words(*words), capture_output=True, text=True, timeout=_ANSWER_S, check=False
+        )
+
+    def begin(self, *words: str) -> "subprocess.Popen[str]":
+        """Start `vla-deploy WORDS` and do not wait for it."""
+        pipe = subprocess.PIPE
+        return subprocess.Popen(self._words(*words), stdout=pipe, stderr=pipe, text=True)
+
+    def say(self, text: str) -> dict[str, Any]:
+        """Give a command, wait for its end and return its last event.
+
+        Raises:
+            StackFailed: there is no outcome, as when nobody answers.
+        """
+        done = self.ask("say", "--json", text)
+        if not done.stdout:
+            raise StackFailed(done.stderr.strip())
+        outcome: dict[str, Any] = json.loads(done.stdout)
+        return outcome
+
+    def operate(self, act: str) -> None:
+        """Do an operator's act: estop, reset, arm, disarm or stop.
+
+        Raises:
+            StackFailed: it was refused.
+        """
+        done = self.ask(act)
+        if done.returncode:
+            raise StackFailed(done.stderr.strip())
+
+    def status(self) -> dict[str, Any]:
+        """Return what `vla-deploy status --json` tells."""
+        document: dict[str, Any] = json.loads(self.ask("status", "--json").stdout)
+        return document
+
+    def state(self) -> str:
+        """Return control's state, "silent" where control tells none."""
+        control = self.status()["control"]
+        return str(control["state"]) if control else "silent"
+
+    # --- as an adversary ----------------------------------------------------------------------
+
+    def row(self, name: str) -> dict[str, Any]:
+        """Return a process' row of the supervisor's table.
+
+        Raises:
+            KeyError: there is no such process.
+        """
+        rows = {row["name"]: row for row in self.status()["process_table"]["processes"]}
+        row: dict[str, Any] = rows[name]
+        return row
+
+    def kill(self, name: str) -> None:
+        """End a process as `kill -9` does.
+
+        Raises:
+            KeyError: there is no such process.
+        """
+        os.kill(self.row(name)["pid"], signal.SIGKILL)
+
+    # --- as the judge -------------------------------------------------------------------------
+
+    def truth(self) -> dict[str, Any]:
+        """Return what the physics knows."""
+        return ask(self.run_dir, "truth")
+
+    def inside(self, name: str, container: str) -> dict[str, Any]:
+        """Return whether an object rests in a container."""
+        return ask(self.run_dir, "inside", object=name, container=container)
+
+    def fastest_rad_s(self) -> float:
+        """Return the speed of the fastest joint."""
+        joints = self.truth()["joints"]
+        return max(abs(float(joint["velocity"])) for joint in joints.values())
+
+    def wait_until(self, condition: Callable[[], object], timeout_s: float = 30.0) -> bool:
+        """Return whether `condition()` came true in time."""
+        deadline_ns = self._clock.now_ns() + round(timeout_s * NS_PER_S)
+        while not condition():
+            if self._clock.now_ns() > deadline_ns:
+                return False
+            self._clock.sleep_until(self._clock.now_ns() + _POLL_NS)
+        return True
+
+    def members(self) -> list[psutil.Process]:
+        """Return every process that carries the run's id, the supervisor's descendants or not."""
+        return [one for one in psutil.process_iter() if _belongs(one, self.run_dir.name)]
+
+    def close(self) -> None:
+        """End the run in order; ending twice is allowed."""
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGTERM)
+        self.process.wait(_END_S)
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+
+    def _words(self, *words: str) -> list[str]:
+        return [*_COMMAND, "--runtime-base", str(self.base), *words]
+
+
+def _belongs(process: psutil.Process, run_id: str) -> bool:
+    try:
+        alive = process.status() != psutil.STATUS_ZOMBIE
+        return alive and process.environ().get("VLA_DEPLOY_RUN_ID") == run_id
+    except (psutil.NoSuchProcess, psutil.AccessDenied):
+        return False
