@@ -95,15 +95,21 @@ def _identity_faults(servo: ServoSpec, number: int, firmware: int, *, fast_sync:
             f"{servo}: expected model {servo.model.number}, got {number} "
             f"({got.name if got else 'unknown'}); correct the robot file or swap the servo"
         ]
-    needs = {"the Bus Watchdog": servo.model.min_firmware_watchdog}
-    if fast_sync:
-        needs["fast sync read"] = servo.model.min_firmware_fast_sync
-    return [
-        f"{servo}: {what} needs firmware {least}, got {firmware}; update it with DYNAMIXEL Wizard"
-        + (" or set fast_sync = false" if what == "fast sync read" else "")
-        for what, least in needs.items()
-        if firmware < least
-    ]
+    least, fast = servo.model.min_firmware_watchdog, servo.model.min_firmware_fast_sync
+    faults = []
+    if firmware < least:
+        faults.append(
+            f"{servo}: the Bus Watchdog needs firmware {least}, got {firmware}; "
+            "update it with DYNAMIXEL Wizard"
+        )
+    if fast_sync and fast is None:
+        faults.append(f"{servo}: the model has no fast sync read; set fast_sync = false")
+    if fast_sync and fast is not None and firmware < fast:
+        faults.append(
+            f"{servo}: fast sync read needs firmware {fast}, got {firmware}; "
+            "update it with DYNAMIXEL Wizard or set fast_sync = false"
+        )
+    return faults
 
 
 def _wanted(servo: ServoSpec) -> dict[str, int]:

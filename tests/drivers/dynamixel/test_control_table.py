@@ -49,12 +49,66 @@ def test_initial_values_are_in_range_and_limits_fit_the_bytes(model: Model) -> N
 
 def test_models_are_told_apart_by_their_numbers() -> None:
     numbers = {model.number: model.name for model in MODELS_BY_NUMBER.values()}
+    assert len(numbers) == len(MODELS)
     assert numbers == {
+        1010: "XH430-W210",
         1020: "XM430-W350",
-        1120: "XM540-W270",
+        1030: "XM430-W210",
         1060: "XL430-W250",
         1070: "XC430-W150",
+        1090: "2XL430-W250",
+        1100: "XH540-W270",
+        1110: "XH540-W150",
+        1120: "XM540-W270",
+        1160: "2XC430-W250",
+        1190: "XL330-M077",
+        1200: "XL330-M288",
+        1210: "XC330-T181",
+        1220: "XC330-T288",
+        1230: "XC330-M181",
+        1240: "XC330-M288",
     }
+
+
+def test_a_smaller_series_differs_where_its_pages_say() -> None:
+    registers = MODELS["XL330-M288"].registers
+    assert registers["baud_rate"].maximum == 6
+    assert registers["current_limit"].initial == 1750
+    assert registers["min_voltage_limit"].initial == 35
+    assert registers["pwm_slope"].address == 62
+    assert registers["shutdown"].initial == 53
+    assert MODELS["XL330-M288"].current_unit_a == pytest.approx(1e-3)
+    assert "pwm_slope" not in MODELS["XM430-W350"].registers
+    assert "startup_configuration" not in MODELS["2XL430-W250"].registers
+
+
+@pytest.mark.parametrize(
+    ("name", "firmware", "banks"),
+    [
+        ("XM430-W350", 45, [(168, 224, 28), (578, 634, 28)]),
+        ("XL330-M288", 52, [(168, 208, 20)]),
+        ("XL330-M288", 53, [(168, 224, 28)]),
+    ],
+)
+def test_indirect_slots_are_where_model_and_firmware_put_them(
+    name: str, firmware: int, banks: list[tuple[int, int, int]]
+) -> None:
+    found = MODELS[name].indirect_banks(firmware)
+    assert [(bank.addresses, bank.data, bank.slots) for bank in found] == banks
+
+
+@pytest.mark.parametrize(
+    ("name", "firmware", "has"),
+    [
+        ("XM430-W350", 44, False),
+        ("XM430-W350", 45, True),
+        ("XL330-M077", 45, False),
+        ("XL330-M077", 46, True),
+        ("2XL430-W250", 99, False),
+    ],
+)
+def test_fast_sync_read_needs_a_model_and_a_firmware(name: str, firmware: int, has: bool) -> None:
+    assert MODELS[name].has_fast_sync(firmware) is has
 
 
 def test_models_without_current_sensing_have_no_current_modes() -> None:
