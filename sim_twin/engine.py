@@ -27,12 +27,12 @@ class Engine:
         self.data = mujoco.MjData(model)
         self.servos = Shafts(model, self.data, servos)
         self.drives = Shafts(model, self.data, drives)
-        self.lidar = RangeProbe(model, self.data)
         self.imu = MotionProbe(model, self.data)
         self.referee = Referee(model, self.data)
         self._steps = 0
         self._move_joints_into_range()
         mujoco.mj_forward(model, self.data)
+        self.lidar = RangeProbe(model, self.data)
 
     @property
     def now_ns(self) -> int:

@@ -1,5 +1,6 @@
 """Read what the robot's range and motion sensors would feel, straight from the physics."""
 
+import copy
 import math
 
 import mujoco
@@ -13,29 +14,41 @@ BEAMS = 360
 RANGE_CUTOFF_M = 25.0
 ACCELEROMETER = "imu_accelerometer"
 _WORLD_GROUPS = np.array([1, 1, 0, 0, 0, 0], np.uint8)
+_HIDDEN_GROUP = 5
+_ENDLESS_M = 1e6
+_PLANE = mujoco.mjtGeom.mjGEOM_PLANE.value
 
 
 class RangeProbe:
-    """Cast rays in the base's plane from the lidar; they pass the robot itself by."""
+    """Cast rays in the base's plane from the lidar; they pass the robot itself by.
+
+    Rays stay in one plane, so geoms that the plane misses are hidden from them: they cannot be hit,
+    and MuJoCo would look at each of them for each ray. `data` must be up to date.
+    """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, site: str = "lidar") -> None:
-        self._model = model
         self._data = data
-        self._site = model.site(site).id
-        self._base = model.body(ROBOT_ROOT).id
+        site_id = model.site(site).id
+        self._origin = data.site_xpos[site_id]
+        self._rotation = data.xmat[model.body(ROBOT_ROOT).id].reshape(3, 3)
+        self._centres = data.geom_xpos
+        self._view = copy.copy(model)
+        self._groups = model.geom_group.copy()
+        self._radius_m = np.where(model.geom_type == _PLANE, _ENDLESS_M, model.geom_rbound)
+        self._reach_m = _reach_from_level_plane(model, data, self._radius_m)
         angles = np.radians(np.arange(BEAMS))
         self._directions = np.stack([np.cos(angles), np.sin(angles), np.zeros(BEAMS)], axis=1)
 
     def cast(self, beams: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return ranges in metres, beam i at i degrees counter-clockwise; 0 is no return."""
-        rotation = self._data.xmat[self._base].reshape(3, 3)
-        geoms = np.zeros(beams.size, np.int32)
-        ranges_m = np.zeros(beams.size)
+        self._show_what_the_plane_meets()
+        geoms = np.empty(beams.size, np.int32)
+        ranges_m = np.empty(beams.size)
         mujoco.mj_multiRay(
-            self._model,
+            self._view,
             self._data,
-            self._data.site_xpos[self._site],
-            (self._directions[beams] @ rotation.T).ravel(),
+            self._origin,
+            (self._directions[beams] @ self._rotation.T).ravel(),
             _WORLD_GROUPS,
             True,
             -1,
@@ -45,8 +58,25 @@ class RangeProbe:
             beams.size,
             RANGE_CUTOFF_M,
         )
-        hit = (geoms >= 0) & (ranges_m > 0.0)
-        return np.where(hit, ranges_m, 0.0).astype(np.float32)
+        ranges_m[geoms < 0] = 0.0
+        return ranges_m.astype(np.float32)
+
+    def _show_what_the_plane_meets(self) -> None:
+        normal = self._rotation[:, 2]
+        lean = math.hypot(normal[0], normal[1])
+        distance_m = np.abs((self._centres - self._origin) @ normal)
+        meets = distance_m <= self._reach_m + lean * self._radius_m
+        self._view.geom_group[:] = np.where(meets, self._groups, _HIDDEN_GROUP)
+
+
+def _reach_from_level_plane(
+    model: mujoco.MjModel, data: mujoco.MjData, radius_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how far from its centre each geom may meet a level plane; known where it is fixed."""
+    upwards = np.abs(data.geom_xmat.reshape(-1, 3, 3)[:, 2])
+    half_height_m = (upwards * model.geom_aabb[:, 3:]).sum(axis=1)
+    fixed = model.body_weldid[model.geom_bodyid] == 0
+    return np.where(fixed, np.minimum(half_height_m, radius_m), radius_m)
 
 
 class MotionProbe:
