@@ -7,7 +7,8 @@ DriverError
 ├── NoReply          a device on a working link stayed silent (also a TimeoutError)
 ├── ProtocolError    bytes arrived that break the protocol
 ├── DeviceFault      the device reports a fault of its own
-└── WrongDevice      the device is not what the robot file declares
+├── WrongDevice      the device is not what the robot file declares
+└── UnknownModel     no driver here knows the model: correct the name
 """
 
 
@@ -41,3 +42,7 @@ class DeviceFault(DriverError):
 
 class WrongDevice(DriverError):
     """Say that the device found is not the one declared."""
+
+
+class UnknownModel(DriverError):
+    """Say that no driver knows a model."""

@@ -1,19 +1,17 @@
 """Drive an RGB-D camera that speaks the stream protocol of `drivers/camera/protocol.py`."""
 
 import zlib
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.base import ByteTransport
+from drivers.camera.base import CameraCounters, RgbdFrame
 from drivers.camera.protocol import (
     CRC,
     FRAME_MAGIC,
     HEADER_BYTES,
     Command,
     FrameHeader,
-    Intrinsics,
     decode_header,
     encode_request,
 )
@@ -24,34 +22,6 @@ RESTART_NS = 2 * NS_PER_S
 MAX_RATE_HZ = 1000.0
 _READ_BYTES = 1 << 20
 _POLL_BYTES = 1 << 23
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RgbdFrame:
-    """Hold one colour and depth image with its calibration; `stamp_ns` is host time of exposure."""
-
-    stamp_ns: int
-    sequence: int
-    intrinsics: Intrinsics
-    depth_unit_m: float
-    rgb: NDArray[np.uint8]
-    depth: NDArray[np.uint16]
-
-    def depth_m(self) -> NDArray[np.float32]:
-        """Return depth along the optical axis in metres; 0 is no depth."""
-        return self.depth.astype(np.float32) * np.float32(self.depth_unit_m)
-
-
-@dataclass(slots=True)
-class CameraCounters:
-    """Count what the stream delivered and what was thrown away."""
-
-    frames: int = 0
-    superseded_frames: int = 0
-    lost_frames: int = 0
-    crc_errors: int = 0
-    discarded_bytes: int = 0
-    restarts: int = 0
 
 
 class RgbdCamera:

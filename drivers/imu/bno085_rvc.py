@@ -15,11 +15,11 @@ Yaw counts from the reset, not from north, positive counter-clockwise about the 
 
 import math
 import struct
-from dataclasses import dataclass
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
 from drivers.framing import align
+from drivers.imu.base import ImuCounters, ImuSample
 
 HEADER = b"\xaa\xaa"
 FRAME_BYTES = 19
@@ -31,29 +31,7 @@ _READ_BYTES = 4096
 _BODY = struct.Struct("<B6h3x")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ImuSample:
-    """Hold one inertial sample in the sensor's frame."""
-
-    stamp_ns: int
-    index: int
-    yaw_rad: float
-    pitch_rad: float
-    roll_rad: float
-    acceleration_m_s2: tuple[float, float, float]
-
-
-@dataclass(slots=True)
-class ImuCounters:
-    """Count what the line delivered and what was thrown away."""
-
-    frames: int = 0
-    checksum_errors: int = 0
-    discarded_bytes: int = 0
-    lost_frames: int = 0
-
-
-class Imu:
+class Bno085Rvc:
     """Read inertial samples as they arrive."""
 
     def __init__(self, transport: ByteTransport, clock: Clock) -> None:

@@ -29,12 +29,12 @@ from drivers.base import ByteTransport
 from drivers.clock import Clock
 from drivers.device_clock import DeviceClock
 from drivers.framing import align
+from drivers.lidar.base import BEAMS, LidarCounters, Scan
 
 HEADER = b"\x54\x2c"
 PACKET_BYTES = 47
 POINTS_PER_PACKET = 12
 STAMP_WRAP_MS = 30_000
-BEAMS = 360
 MAX_STEP_DEG = 3.0
 MIN_COVERAGE_DEG = 300.0
 _NS_PER_MS = 1_000_000
@@ -66,31 +66,6 @@ def crc8(data: bytes) -> int:
     return crc
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Scan:
-    """Hold one turn of the lidar.
-
-    Beam i lies i degrees counter-clockwise from the robot's front; range 0 is no return.
-    `beam_stamp_ns` tells when each beam was measured, for taking out the robot's own motion.
-    """
-
-    stamp_ns: int
-    range_m: NDArray[np.float32]
-    beam_stamp_ns: NDArray[np.int64]
-    turn_hz: float
-
-
-@dataclass(slots=True)
-class LidarCounters:
-    """Count what the line delivered and what was thrown away."""
-
-    packets: int = 0
-    crc_errors: int = 0
-    discarded_bytes: int = 0
-    scans: int = 0
-    incomplete_scans: int = 0
-
-
 @dataclass(frozen=True, slots=True)
 class _Packet:
     speed_deg_s: int
@@ -107,7 +82,7 @@ class _Piece:
     stamp_ns: int
 
 
-class Lidar:
+class Ld19:
     """Assemble LD19 packets into whole scans; `mounting_yaw_rad` is where sensor zero points."""
 
     def __init__(

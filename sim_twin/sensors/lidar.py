@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from drivers.lidar.ld19 import BEAMS, HEADER, POINTS_PER_PACKET, STAMP_WRAP_MS, crc8
+from drivers.lidar.base import BEAMS
+from drivers.lidar.ld19 import HEADER, POINTS_PER_PACKET, STAMP_WRAP_MS, crc8
 
 POINTS_PER_S = 4500
 MIN_RANGE_M = 0.02

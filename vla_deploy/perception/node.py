@@ -6,11 +6,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.rgbd_stream import RgbdCamera, RgbdFrame
+from drivers import registry
+from drivers.camera.base import Camera, RgbdFrame
 from drivers.clock import NS_PER_S
-from drivers.imu.bno085_rvc import Imu, ImuSample
-from drivers.lidar.ld19 import Lidar
+from drivers.imu.base import Imu, ImuSample
+from drivers.lidar.base import Lidar
 from drivers.opener import DeviceOpener
+from drivers.reopening import Reopening
 from platforms import Profile
 from vla_deploy.ipc import CellReader, CellWriter, FrameWriter, SharedSpace
 from vla_deploy.navigation.grid_map import load_map
@@ -19,7 +21,6 @@ from vla_deploy.node import NodeContext
 from vla_deploy.perception.body import BodyMask
 from vla_deploy.perception.history import JointHistory
 from vla_deploy.perception.scene import Scene
-from vla_deploy.perception.sensor_slot import SensorSlot
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import SerialSensor
 from vla_deploy.robots.model import RobotModel, full_positions
@@ -83,9 +84,9 @@ class PerceptionNode:
             name: space.cell_writer(name) for name in ("imu", "scan", "pose", "scene")
         }
         self._images: FrameWriter = space.frame_writer("rgbd")
-        self._lidar = SensorSlot("lidar", self._open_lidar, self._clock)
-        self._imu = SensorSlot("imu", self._open_imu, self._clock)
-        self._camera = SensorSlot("camera", self._open_camera, self._clock)
+        self._lidar = Reopening("lidar", self._open_lidar, self._clock)
+        self._imu = Reopening("imu", self._open_imu, self._clock)
+        self._camera = Reopening("camera", self._open_camera, self._clock)
         for slot in (self._lidar, self._imu, self._camera):
             slot.open()
 
@@ -100,7 +101,7 @@ class PerceptionNode:
         self._publish_scene()
 
     def stop(self) -> None:
-        """Stop the camera's stream and release every sensor."""
+        """Release every sensor."""
         for slot in (self._lidar, self._imu, self._camera):
             slot.close()
         self._space.close()
@@ -243,12 +244,17 @@ class PerceptionNode:
         pose = self._site(robot_lidar.site)
         yaw_rad = math.atan2(pose[1, 0], pose[0, 0])
         line = self._devices.serial(robot_lidar.device)
-        return Lidar(line, self._clock, mounting_yaw_rad=yaw_rad)
+        return registry.open_lidar(robot_lidar.model, line, self._clock, mounting_yaw_rad=yaw_rad)
 
     def _open_imu(self) -> Imu:
-        return Imu(self._devices.serial(self._robot.imu.device), self._clock)
+        imu = self._robot.imu
+        return registry.open_imu(imu.model, self._devices.serial(imu.device), self._clock)
 
-    def _open_camera(self) -> RgbdCamera:
-        camera = RgbdCamera(self._devices.stream(self._robot.camera.device), self._clock)
-        camera.start(self._profile.camera_rate_hz)
-        return camera
+    def _open_camera(self) -> Camera[RgbdFrame]:
+        camera = self._robot.camera
+        return registry.open_camera(
+            camera.model,
+            self._devices.stream(camera.device),
+            self._clock,
+            rate_hz=self._profile.camera_rate_hz,
+        )

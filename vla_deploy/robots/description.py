@@ -103,6 +103,7 @@ class Camera:
 
     device: str
     path: str
+    model: str
     site: str
     width: int
     height: int

@@ -1,13 +1,10 @@
 """Tell where a robot's devices are reached: as its file says, or all of them in one folder."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 
 from drivers.opener import DeviceLink
+from drivers.registry import Kind, sensor_model
 from vla_deploy.robots.description import RobotDescription
-
-SENSOR_BAUD: Mapping[str, int] = MappingProxyType({"LD19": 230_400, "BNO085-RVC": 115_200})
 
 
 def device_links(robot: RobotDescription, devices_dir: Path | None = None) -> dict[str, DeviceLink]:
@@ -15,8 +12,8 @@ def device_links(robot: RobotDescription, devices_dir: Path | None = None) -> di
     bauds = {
         robot.servo_bus.device: robot.servo_bus.baud,
         robot.can_bus.device: robot.can_bus.bitrate,
-        robot.lidar.device: SENSOR_BAUD[robot.lidar.model],
-        robot.imu.device: SENSOR_BAUD[robot.imu.model],
+        robot.lidar.device: sensor_model(Kind.LIDAR, robot.lidar.model).baud,
+        robot.imu.device: sensor_model(Kind.IMU, robot.imu.model).baud,
         robot.camera.device: 0,
     }
     return {

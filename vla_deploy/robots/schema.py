@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, TypeGuard
 
+from drivers.registry import Kind, model_names
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
@@ -126,11 +128,17 @@ BASE: Shape = {
     "max_turn_acceleration_rad_s2": POSITIVE,
     "footprint_radius_m": POSITIVE,
 }
-LIDAR: Shape = {"device": TEXT, "path": TEXT, "model": one_of("LD19"), "site": TEXT}
-IMU: Shape = {"device": TEXT, "path": TEXT, "model": one_of("BNO085-RVC"), "site": TEXT}
+LIDAR: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "model": one_of(*model_names(Kind.LIDAR)),
+    "site": TEXT,
+}
+IMU: Shape = {"device": TEXT, "path": TEXT, "model": one_of(*model_names(Kind.IMU)), "site": TEXT}
 CAMERA: Shape = {
     "device": TEXT,
     "path": TEXT,
+    "model": one_of(*model_names(Kind.CAMERA)),
     "site": TEXT,
     "width": _integer(16, 1920),
     "height": _integer(16, 1080),

@@ -1,7 +1,6 @@
 import struct
 import time
 import zlib
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -9,39 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.camera.rgbd_stream import RgbdCamera
+from sim_twin.contracts.scripted import ManualClock, ScriptedLine
 
 MS = 1_000_000
-
-
-@dataclass
-class FakeClock:
-    ns: int = 0
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
-
-
-@dataclass
-class Line:
-    pending: bytearray = field(default_factory=bytearray)
-    sent: bytearray = field(default_factory=bytearray)
-
-    def write(self, data: bytes) -> None:
-        self.sent += data
-
-    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
-        data = bytes(self.pending[:max_bytes])
-        del self.pending[:max_bytes]
-        return data
-
-    def discard_input(self) -> None:
-        self.pending.clear()
-
-    def close(self) -> None:
-        pass
 
 
 def frame(
@@ -62,8 +31,8 @@ def frame(
     )
 
 
-def make(now_ns: int = 10**9) -> tuple[RgbdCamera, Line, FakeClock]:
-    line, clock = Line(), FakeClock(now_ns)
+def make(now_ns: int = 10**9) -> tuple[RgbdCamera, ScriptedLine, ManualClock]:
+    line, clock = ScriptedLine(), ManualClock(now_ns)
     return RgbdCamera(line, clock), line, clock
 
 

@@ -1,44 +1,14 @@
 import struct
-from dataclasses import dataclass, field
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.imu.bno085_rvc import FRAME_BYTES, Imu
+from drivers.imu.bno085_rvc import FRAME_BYTES, Bno085Rvc
+from sim_twin.contracts.scripted import ManualClock, ScriptedLine
 
 # BNO08X Data Sheet, section 1.3.5.2: the example frame and its meaning.
 GOLDEN = bytes.fromhex("aaaade010092ff25088dfeecffd103000000e7")
-
-
-@dataclass
-class FakeClock:
-    ns: int = 0
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
-
-
-@dataclass
-class Line:
-    pending: bytearray = field(default_factory=bytearray)
-
-    def write(self, data: bytes) -> None:
-        raise AssertionError("the sensor takes no data")
-
-    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
-        data = bytes(self.pending[:max_bytes])
-        del self.pending[:max_bytes]
-        return data
-
-    def discard_input(self) -> None:
-        self.pending.clear()
-
-    def close(self) -> None:
-        pass
 
 
 def frame(index: int, yaw_cdeg: int = 0) -> bytes:
@@ -46,9 +16,9 @@ def frame(index: int, yaw_cdeg: int = 0) -> bytes:
     return b"\xaa\xaa" + body + bytes([sum(body) % 256])
 
 
-def make(now_ns: int = 10**9) -> tuple[Imu, Line]:
-    line = Line()
-    return Imu(line, FakeClock(now_ns)), line
+def make(now_ns: int = 10**9) -> tuple[Bno085Rvc, ScriptedLine]:
+    line = ScriptedLine()
+    return Bno085Rvc(line, ManualClock(now_ns)), line
 
 
 def test_the_data_sheets_example_is_read_as_the_data_sheet_says() -> None:

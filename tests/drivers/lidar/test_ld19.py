@@ -1,49 +1,19 @@
 import math
 import struct
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.lidar.ld19 import PACKET_BYTES, Lidar, crc8
+from drivers.lidar.ld19 import PACKET_BYTES, Ld19, crc8
+from sim_twin.contracts.scripted import ManualClock, ScriptedLine
 
 # LD19 Development Manual, section 4: the example packet.
 GOLDEN = bytes.fromhex(
     "542c6808ab7ee000e4dc00e2d900e5d500e3d300e4d000e9cd00e4ca00e2c700e9c500e5c200e5c000e5be823a1a50"
 )
 GOLDEN_MM = [224, 220, 217, 213, 211, 208, 205, 202, 199, 197, 194, 192]
-
-
-@dataclass
-class FakeClock:
-    ns: int = 0
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = max(self.ns, deadline_ns)
-
-
-@dataclass
-class Line:
-    pending: bytearray = field(default_factory=bytearray)
-
-    def write(self, data: bytes) -> None:
-        raise AssertionError("the LD19 takes no data")
-
-    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
-        data = bytes(self.pending[:max_bytes])
-        del self.pending[:max_bytes]
-        return data
-
-    def discard_input(self) -> None:
-        self.pending.clear()
-
-    def close(self) -> None:
-        pass
 
 
 def packet(
@@ -77,12 +47,12 @@ def turn_and_next(distance_mm: int) -> list[bytes]:
     return [*turn(distance_mm), turn(distance_mm, 100)[0]]
 
 
-def make() -> tuple[Lidar, Line, FakeClock]:
-    line, clock = Line(), FakeClock(10**9)
-    return Lidar(line, clock), line, clock
+def make() -> tuple[Ld19, ScriptedLine, ManualClock]:
+    line, clock = ScriptedLine(), ManualClock(10**9)
+    return Ld19(line, clock), line, clock
 
 
-def feed_turns(line: Line, packets: list[bytes]) -> None:
+def feed_turns(line: ScriptedLine, packets: list[bytes]) -> None:
     for data in packets:
         line.pending += data
 
@@ -118,8 +88,8 @@ def test_a_whole_turn_becomes_one_scan() -> None:
 
 
 def test_the_mounting_yaw_turns_the_scan_to_the_robots_front() -> None:
-    line = Line()
-    lidar = Lidar(line, FakeClock(10**9), mounting_yaw_rad=math.pi / 2)
+    line = ScriptedLine()
+    lidar = Ld19(line, ManualClock(10**9), mounting_yaw_rad=math.pi / 2)
     packets = turn_and_next(3000)
     packets[0] = packet(0.0, [500] * 12, 0, 1.0)
     feed_turns(line, packets)

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from drivers.camera.base import RgbdFrame
 from drivers.camera.protocol import Intrinsics
-from drivers.camera.rgbd_stream import RgbdCamera, RgbdFrame
-from drivers.imu.bno085_rvc import Imu, ImuSample
-from drivers.lidar.ld19 import Lidar, Scan
+from drivers.camera.rgbd_stream import RgbdCamera
+from drivers.imu.base import ImuSample
+from drivers.imu.bno085_rvc import Bno085Rvc
+from drivers.lidar.base import Scan
+from drivers.lidar.ld19 import Ld19
 from sim_twin.device import WireDevice
 from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
@@ -53,7 +56,7 @@ class Line:
 
 def scans_of(device: LidarDevice, seconds: float, mounting_yaw_rad: float = 0.0) -> list[Scan]:
     line = Line(device)
-    lidar = Lidar(line, line, mounting_yaw_rad=mounting_yaw_rad)
+    lidar = Ld19(line, line, mounting_yaw_rad=mounting_yaw_rad)
     scans = []
     for _ in range(round(seconds / 0.02)):
         line.sleep_until(line.now + 20_000_000)
@@ -99,7 +102,7 @@ def test_beams_carry_the_time_at_which_they_were_measured() -> None:
 
     device = LidarDevice(cast, sigma_m=0.0)
     line = Line(device)
-    lidar = Lidar(line, line)
+    lidar = Ld19(line, line)
     scan = None
     for _ in range(30):
         line.sleep_until(line.now + 20_000_000)
@@ -113,7 +116,7 @@ def test_beams_carry_the_time_at_which_they_were_measured() -> None:
 
 def imu_samples(device: ImuDevice, seconds: float) -> list[ImuSample]:
     line = Line(device)
-    imu = Imu(line, line)
+    imu = Bno085Rvc(line, line)
     samples: list[ImuSample] = []
     for _ in range(round(seconds / 0.02)):
         line.sleep_until(line.now + 20_000_000)

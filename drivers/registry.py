@@ -1,0 +1,104 @@
+"""List the sensor models there are: (kind, model) -> driver class and line speed.
+
+A driver loads when it is asked for, so that a process pays only for what its robot carries.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, Final, cast
+
+from drivers.base import ByteTransport
+from drivers.camera.base import Camera, RgbdFrame
+from drivers.clock import Clock
+from drivers.errors import UnknownModel
+from drivers.imu.base import Imu
+from drivers.lidar.base import Lidar
+
+
+class Kind(Enum):
+    """Name the kinds of sensor that a robot file may declare by model."""
+
+    LIDAR = "lidar"
+    IMU = "imu"
+    CAMERA = "camera"
+
+
+@dataclass(frozen=True, slots=True)
+class SensorModel:
+    """Say which class drives a model ("module:Class"); `baud` is 0 where no serial line is used."""
+
+    driver: str
+    baud: int = 0
+
+
+MODELS: Final[Mapping[tuple[Kind, str], SensorModel]] = MappingProxyType(
+    {
+        (Kind.LIDAR, "LD19"): SensorModel("drivers.lidar.ld19:Ld19", 230_400),
+        (Kind.IMU, "BNO085-RVC"): SensorModel("drivers.imu.bno085_rvc:Bno085Rvc", 115_200),
+        (Kind.CAMERA, "RGBD-STREAM"): SensorModel("drivers.camera.rgbd_stream:RgbdCamera"),
+    }
+)
+
+
+def model_names(kind: Kind) -> tuple[str, ...]:
+    """Return the models of a kind that have a driver."""
+    return tuple(name for known, name in MODELS if known is kind)
+
+
+def sensor_model(kind: Kind, model: str) -> SensorModel:
+    """Return a model's row.
+
+    Raises:
+        UnknownModel: no driver knows the model; the message lists those there are.
+    """
+    row = MODELS.get((kind, model))
+    if row is None:
+        known = ", ".join(model_names(kind))
+        raise UnknownModel(
+            f"no driver for the {kind.value} {model!r}; there are drivers for {known}"
+        )
+    return row
+
+
+def open_lidar(
+    model: str, line: ByteTransport, clock: Clock, *, mounting_yaw_rad: float = 0.0
+) -> Lidar:
+    """Return the driver of a lidar on its line; `mounting_yaw_rad` is where sensor zero points.
+
+    Raises:
+        UnknownModel: no driver knows the model.
+    """
+    driver = _driver(Kind.LIDAR, model)
+    return cast("Lidar", driver(line, clock, mounting_yaw_rad=mounting_yaw_rad))
+
+
+def open_imu(model: str, line: ByteTransport, clock: Clock) -> Imu:
+    """Return the driver of an inertial sensor on its line.
+
+    Raises:
+        UnknownModel: no driver knows the model.
+    """
+    return cast("Imu", _driver(Kind.IMU, model)(line, clock))
+
+
+def open_camera(
+    model: str, stream: ByteTransport, clock: Clock, *, rate_hz: float
+) -> Camera[RgbdFrame]:
+    """Return the driver of an RGB-D camera, streaming at `rate_hz`.
+
+    Raises:
+        UnknownModel: no driver knows the model.
+        ValueError: the camera cannot have that rate.
+        LinkLost: the stream has gone.
+    """
+    camera = _driver(Kind.CAMERA, model)(stream, clock)
+    camera.start(rate_hz)
+    return cast("Camera[RgbdFrame]", camera)
+
+
+def _driver(kind: Kind, model: str) -> Any:
+    module, name = sensor_model(kind, model).driver.split(":")
+    return getattr(import_module(module), name)
