@@ -41,6 +41,7 @@ class ImuDevice:
         self._random = np.random.default_rng(seed)
         self._drift_rad_s = float(self._random.uniform(-YAW_DRIFT_RAD_S, YAW_DRIFT_RAD_S))
         self._start_ns: int | None = None
+        self._next_ns = 0
         self._start_yaw_rad = 0.0
         self._sent = 0
         self._out = bytearray()
@@ -56,14 +57,15 @@ class ImuDevice:
 
     def step(self, now_ns: int) -> None:
         """Send a frame when one is due."""
+        if now_ns < self._next_ns:
+            return
         if self._start_ns is None:
             self._start_ns = now_ns
             self._start_yaw_rad = self._read().yaw_rad
         elapsed_s = (now_ns - self._start_ns) / NS_PER_S
-        if elapsed_s * self._rate_hz < self._sent:
-            return
         self._out += self._frame(self._read(), elapsed_s)
         self._sent = math.floor(elapsed_s * self._rate_hz) + 1
+        self._next_ns = self._start_ns + math.ceil(self._sent * NS_PER_S / self._rate_hz)
 
     def _frame(self, truth: ImuTruth, elapsed_s: float) -> bytes:
         yaw_rad = truth.yaw_rad - self._start_yaw_rad + self._drift_rad_s * elapsed_s

@@ -1,7 +1,6 @@
 """Emulate the LDROBOT LD19 at its serial line: 12-point packets while the head turns clockwise."""
 
 import math
-import struct
 from collections import deque
 from collections.abc import Callable
 
@@ -17,10 +16,34 @@ MIN_RANGE_M = 0.02
 MAX_RANGE_M = 12.0
 INTENSITY = 200
 _NS_PER_MS = 1_000_000
-_HEAD = struct.Struct("<2sHH")
-_END = struct.Struct("<H")
-_STAMP = struct.Struct("<H")
+_PACKETS_PER_S = POINTS_PER_S // POINTS_PER_PACKET
 _POINT = np.dtype([("distance_mm", "<u2"), ("intensity", "u1")])
+_PACKET = np.dtype(
+    [
+        ("header", "S2"),
+        ("speed_deg_s", "<u2"),
+        ("start", "<u2"),
+        ("points", _POINT, (POINTS_PER_PACKET,)),
+        ("end", "<u2"),
+        ("stamp_ms", "<u2"),
+        ("crc", "u1"),
+    ]
+)
+_CHECKED_BYTES = _PACKET.itemsize - 1
+_PLACES = np.arange(_CHECKED_BYTES)
+_NUMBERS = np.arange(POINTS_PER_PACKET)
+
+
+def _crc_parts() -> NDArray[np.uint8]:
+    """Return what each value at each place adds to the CRC of a packet: the CRC is linear."""
+    step = [crc8(bytes((value,))) for value in range(256)]
+    parts = [step]
+    for _ in range(_CHECKED_BYTES - 1):
+        parts.insert(0, [step[value] for value in parts[0]])
+    return np.array(parts, np.uint8)
+
+
+_CRC_PARTS = _crc_parts()
 
 
 class LidarDevice:
@@ -50,9 +73,11 @@ class LidarDevice:
         self._mounting_deg = math.degrees(mounting_yaw_rad)
         self._cast_every_ns = round(NS_PER_S / rate_hz / casts_per_turn)
         self._next_cast_ns = 0
-        self._start_ns: int | None = None
+        self._start_ns = 0
+        self._started = False
         self._sent_packets = 0
-        self._bodies: deque[bytes] = deque()
+        self._due_ns: deque[int] = deque()
+        self._packets = b""
         self._out = bytearray()
 
     def receive(self, data: bytes) -> None:
@@ -66,37 +91,46 @@ class LidarDevice:
 
     def step(self, now_ns: int) -> None:
         """Send every packet whose last point is due by `now_ns`."""
-        if self._start_ns is None:
+        if not self._started:
+            self._started = True
             self._start_ns = self._next_cast_ns = now_ns
         if now_ns >= self._next_cast_ns:
             self._next_cast_ns += self._cast_every_ns
             self._measure(max(self._packets_due(self._next_cast_ns), self._packets_due(now_ns)))
-        for _ in range(self._sent_packets, self._packets_due(now_ns)):
-            stamp_ms = now_ns // _NS_PER_MS % STAMP_WRAP_MS
-            packet = self._bodies.popleft() + _STAMP.pack(stamp_ms)
-            self._out += packet + bytes((crc8(packet),))
-            self._sent_packets += 1
+        while self._due_ns and self._due_ns[0] <= now_ns:
+            self._send()
+
+    def _send(self) -> None:
+        self._due_ns.popleft()
+        self._sent_packets += 1
+        self._out += self._packets[: _PACKET.itemsize]
+        self._packets = self._packets[_PACKET.itemsize :]
 
     def _packets_due(self, now_ns: int) -> int:
         """Return how many packets have been measured to their last point by `now_ns`."""
-        assert self._start_ns is not None
-        return (now_ns - self._start_ns) * POINTS_PER_S // (NS_PER_S * POINTS_PER_PACKET)
+        return (now_ns - self._start_ns) * _PACKETS_PER_S // NS_PER_S
 
     def _measure(self, end: int) -> None:
-        """Look at the world once for all packets not sent yet, up to the one before `end`."""
-        packets = np.arange(self._sent_packets, end)[:, None]
-        points = packets * POINTS_PER_PACKET + np.arange(POINTS_PER_PACKET)
-        angles_deg = np.multiply(points, self._step_deg, dtype=np.float64)
-        readings = np.empty(points.shape, _POINT)
-        readings["distance_mm"] = self._distances_mm(angles_deg)
-        readings["intensity"] = np.where(readings["distance_mm"] > 0, INTENSITY, 0)
-        hundredths = np.rint(angles_deg * 100.0).astype(np.int64) % 36_000
-        edges = hundredths[:, [0, -1]].tolist()
-        speed = round(self._speed_deg_s)
-        self._bodies = deque(
-            _HEAD.pack(HEADER, speed, first) + row.tobytes() + _END.pack(last)
-            for (first, last), row in zip(edges, readings, strict=True)
-        )
+        """Look at the world once for all packets not sent yet, up to the one before `end`.
+
+        A packet's stamp is when its last point was measured, whenever the host reads it.
+        """
+        numbers = np.arange(self._sent_packets, end)
+        points = numbers[:, None] * POINTS_PER_PACKET + _NUMBERS
+        angles_deg = points * self._step_deg
+        hundredths = np.rint(angles_deg[:, (0, -1)] * 100.0).astype(np.int64) % 36_000
+        due_ns = self._start_ns - (numbers + 1) * -NS_PER_S // _PACKETS_PER_S
+        packets = np.empty(numbers.size, _PACKET)
+        packets["header"] = HEADER
+        packets["speed_deg_s"] = round(self._speed_deg_s)
+        packets["start"], packets["end"] = hundredths.T
+        packets["points"]["distance_mm"] = distances_mm = self._distances_mm(angles_deg)
+        packets["points"]["intensity"] = INTENSITY * (distances_mm > 0)
+        packets["stamp_ms"] = due_ns // _NS_PER_MS % STAMP_WRAP_MS
+        checked = packets.view(np.uint8).reshape(-1, _PACKET.itemsize)[:, :_CHECKED_BYTES]
+        packets["crc"] = np.bitwise_xor.reduce(_CRC_PARTS[_PLACES, checked], axis=1)
+        self._due_ns = deque(due_ns.tolist())
+        self._packets = packets.tobytes()
 
     def _distances_mm(self, angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64) % BEAMS
