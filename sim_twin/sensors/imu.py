@@ -37,7 +37,7 @@ class ImuDevice:
         self, read: Callable[[], ImuTruth], rate_hz: float = 100.0, *, seed: int = 0
     ) -> None:
         self._read = read
-        self._rate_hz = rate_hz
+        self._period_ns = round(NS_PER_S / rate_hz)
         self._random = np.random.default_rng(seed)
         self._drift_rad_s = float(self._random.uniform(-YAW_DRIFT_RAD_S, YAW_DRIFT_RAD_S))
         self._start_ns: int | None = None
@@ -62,10 +62,10 @@ class ImuDevice:
         if self._start_ns is None:
             self._start_ns = now_ns
             self._start_yaw_rad = self._read().yaw_rad
-        elapsed_s = (now_ns - self._start_ns) / NS_PER_S
-        self._out += self._frame(self._read(), elapsed_s)
-        self._sent = math.floor(elapsed_s * self._rate_hz) + 1
-        self._next_ns = self._start_ns + math.ceil(self._sent * NS_PER_S / self._rate_hz)
+        elapsed_ns = now_ns - self._start_ns
+        self._out += self._frame(self._read(), elapsed_ns / NS_PER_S)
+        self._sent = elapsed_ns // self._period_ns + 1
+        self._next_ns = self._start_ns + self._sent * self._period_ns
 
     def _frame(self, truth: ImuTruth, elapsed_s: float) -> bytes:
         yaw_rad = truth.yaw_rad - self._start_yaw_rad + self._drift_rad_s * elapsed_s

@@ -117,7 +117,7 @@ class LidarDevice:
         """
         numbers = np.arange(self._sent_packets, end)
         points = numbers[:, None] * POINTS_PER_PACKET + _NUMBERS
-        angles_deg = points * self._step_deg
+        angles_deg = np.multiply(points, self._step_deg, dtype=np.float64)
         hundredths = np.rint(angles_deg[:, (0, -1)] * 100.0).astype(np.int64) % 36_000
         due_ns = self._start_ns - (numbers + 1) * -NS_PER_S // _PACKETS_PER_S
         packets = np.empty(numbers.size, _PACKET)
