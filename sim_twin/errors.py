@@ -5,6 +5,7 @@ TwinError
 ├── ModelMismatch    robot file and world do not fit together: fix the named file
 ├── RefereeRefusal   the referee does not know the object, container or operation
 ├── FilmFault        a film cannot be written: choose another path or ending
+├── FaultRefused     the fault is unknown, not supported there, or out of range: see what is
 ├── CameraFailed     the rendering process did not start: its own message says why
 └── Unreachable      no twin answers under the run directory: start one
 """
@@ -28,6 +29,10 @@ class RefereeRefusal(TwinError):
 
 class Unreachable(TwinError):
     """Say that no twin answers."""
+
+
+class FaultRefused(TwinError):
+    """Say why a fault cannot be injected."""
 
 
 class FilmFault(TwinError):

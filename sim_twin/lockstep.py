@@ -10,6 +10,8 @@ from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing
 from sim_twin.can import MemoryBus
 from sim_twin.clock import SimClock
+from sim_twin.device import WireDevice
+from sim_twin.faults import FaultInjector
 from sim_twin.lines import MemoryLine
 from sim_twin.schedule import Closable, Schedule
 from sim_twin.twin import Twin
@@ -29,21 +31,21 @@ class MemoryOpener:
         """Open a serial line.
 
         Raises:
-            DeviceMissing: the robot file does not name it.
+            DeviceMissing: the robot file does not name it, or it is unplugged.
         """
-        devices = self._twin.serial_devices
-        if name not in devices:
-            raise DeviceMissing(f"the twin has no serial device {name!r}; it has {list(devices)}")
-        return self._line(MemoryLine(devices[name], self._clock))
+        lines = self._twin.lines
+        if name not in lines:
+            raise DeviceMissing(f"the twin has no serial device {name!r}; it has {list(lines)}")
+        return self._plugged(name, lines[name])
 
     def stream(self, name: str) -> MemoryLine:
         """Open the camera's stream.
 
         Raises:
-            DeviceMissing: the robot file does not name it.
+            DeviceMissing: the robot file does not name it, or it is unplugged.
         """
         self._expect(name, self._twin.robot.camera.device)
-        return self._line(MemoryLine(self._twin.camera.device, self._clock))
+        return self._plugged(name, self._twin.camera_line)
 
     def can(self, name: str) -> can.BusABC:
         """Open the CAN bus.
@@ -56,7 +58,12 @@ class MemoryOpener:
         self.opened.append(_Leaver(bus))
         return bus
 
-    def _line(self, line: MemoryLine) -> MemoryLine:
+    def _plugged(self, name: str, device: WireDevice) -> MemoryLine:
+        plug = self._twin.plugs[name]
+        if not plug.is_in:
+            raise DeviceMissing(f"{name}: unplugged; plug it in")
+        line = MemoryLine(device, self._clock)
+        plug.add_connection(line)
         self.opened.append(line)
         return line
 
@@ -110,6 +117,11 @@ class Lockstep:
     def now_s(self) -> float:
         """Return simulated time in seconds."""
         return self.twin.now_ns / NS_PER_S
+
+    @property
+    def faults(self) -> FaultInjector:
+        """Return what makes the twin's devices fail."""
+        return self.twin.faults
 
     @property
     def nodes(self) -> tuple[Node, ...]:

@@ -2,9 +2,16 @@
 
 import numpy as np
 
+from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES
 from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.imu import bno085_rvc
+from drivers.lidar import ld19
 from sim_twin.can import CanWire, WheelDrive
 from sim_twin.device import WireDevice
+from sim_twin.faults.injector import FaultInjector
+from sim_twin.faults.line_tamper import LineTamper
+from sim_twin.faults.plug import Plug
+from sim_twin.faults.supply import Supply
 from sim_twin.head_camera import HeadCamera
 from sim_twin.load import load_engine
 from sim_twin.sensors.imu import ImuDevice
@@ -12,11 +19,13 @@ from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.servos import EmulatedServoSpec, ServoBank
 from vla_deploy.robots import RobotDescription
 
-SUPPLY_V = 12.0
-
 
 class Twin:
-    """Be the robot's machine: physics, servos, drives, lidar and IMU, stepped as one."""
+    """Be the robot's machine: physics, servos, drives, lidar and IMU, stepped as one.
+
+    A host reaches a device through `lines`, as long as the `plugs` are in; `faults` may disturb
+    both, and the devices behind them.
+    """
 
     def __init__(self, robot: RobotDescription, world: str = "flat", seed: int = 0) -> None:
         """Build the robot in its world.
@@ -38,7 +47,20 @@ class Twin:
             robot.lidar.device: self.lidar,
             robot.imu.device: self.imu,
         }
+        frame_bytes = {
+            robot.lidar.device: ld19.PACKET_BYTES,
+            robot.imu.device: bno085_rvc.FRAME_BYTES,
+        }
+        self.lines = {
+            name: LineTamper(device, self._now_ns, frame_bytes.get(name))
+            for name, device in self.serial_devices.items()
+        }
+        self.plugs = {name: Plug() for name in (*self.lines, robot.camera.device)}
+        self.servo_supply = Supply()
+        self.faults = FaultInjector(self)
+        self._encoder_slip_rad = np.zeros(len(robot.servo_bus.servos))
         self._camera: HeadCamera | None = None
+        self._camera_line: LineTamper | None = None
         self._seed = seed
 
     @property
@@ -54,8 +76,23 @@ class Twin:
             self._camera = HeadCamera(engine.model, engine.data, self.robot.camera, self._seed)
         return self._camera
 
+    @property
+    def camera_line(self) -> LineTamper:
+        """Return the head camera's line."""
+        if self._camera_line is None:
+            camera = self.robot.camera
+            frame_bytes = HEADER_BYTES + camera.width * camera.height * BYTES_PER_PIXEL + CRC.size
+            self._camera_line = LineTamper(self.camera.device, self._now_ns, frame_bytes)
+        return self._camera_line
+
+    def slip_encoder(self, servo_id: int, offset_rad: float) -> None:
+        """Let a servo measure its shaft further off than it does, as after a blow."""
+        ids = [servo.id for servo in self.robot.servo_bus.servos]
+        self._encoder_slip_rad[ids.index(servo_id)] += offset_rad
+
     def step(self) -> None:
         """Let the firmware act, the physics follow and the sensors look."""
+        self.faults.step()
         self._drive_motors()
         self.engine.step()
         now_ns = self.engine.now_ns
@@ -70,11 +107,18 @@ class Twin:
         if self._camera is not None:
             self._camera.close()
 
+    def _now_ns(self) -> int:
+        return self.engine.now_ns
+
     def _drive_motors(self) -> None:
         engine, now_ns = self.engine, self.engine.now_ns
         shafts = engine.servos
         duty = self.servos.advance(
-            now_ns, shafts.position_rad(), shafts.velocity_rad_s(), shafts.effort(), SUPPLY_V
+            now_ns,
+            shafts.position_rad() + self._encoder_slip_rad,
+            shafts.velocity_rad_s(),
+            shafts.effort(),
+            self.servo_supply.volts(now_ns),
         )
         shafts.command(duty)
         wheels = zip(

@@ -30,7 +30,8 @@ class CameraDevice:
     """Serve frames of `render` (RGB uint8 and depth in metres along the optical axis).
 
     Depth noise has sigma = `depth_sigma_per_m` * z^2, as stereo cameras have; 0 switches it off.
-    `latency_s` is the time from exposure to the first byte on the line.
+    `latency_s` is the time from exposure to the first byte on the line. `depth_ratio` (told over
+    true depth) and `rate_ratio` (given over asked-for rate) may be changed at any time.
     """
 
     def __init__(
@@ -42,6 +43,8 @@ class CameraDevice:
         latency_s: float = 0.0,
         seed: int = 0,
     ) -> None:
+        self.depth_ratio = 1.0
+        self.rate_ratio = 1.0
         self._render = render
         self._intrinsics = intrinsics
         self._sigma_per_m = depth_sigma_per_m
@@ -78,7 +81,8 @@ class CameraDevice:
     def step(self, now_ns: int) -> None:
         """Expose a frame when one is due; hand over those whose latency has passed."""
         if self._period_ns and (self._due_ns is None or now_ns >= self._due_ns):
-            self._due_ns = max((self._due_ns or now_ns) + self._period_ns, now_ns)
+            period_ns = round(self._period_ns / self.rate_ratio)
+            self._due_ns = max((self._due_ns or now_ns) + period_ns, now_ns)
             self._in_flight.append((now_ns + self._latency_ns, self._frame(now_ns)))
         while self._in_flight and self._in_flight[0][0] <= now_ns:
             self._out += self._in_flight.pop(0)[1]
@@ -112,5 +116,5 @@ class CameraDevice:
         if self._sigma_per_m:
             noise = self._random.standard_normal(depth_m.shape, dtype=np.float32)
             noisy_m = depth_m + np.float32(self._sigma_per_m) * depth_m**2 * noise
-        units = np.rint(noisy_m / DEPTH_UNIT_M).clip(1, 65_535)
+        units = np.rint(noisy_m * np.float32(self.depth_ratio / DEPTH_UNIT_M)).clip(1, 65_535)
         return np.where(seen, units, 0).astype("<u2")

@@ -30,20 +30,22 @@ class ImuDevice:
     """Turn the true motion into the BNO085's frames.
 
     Yaw starts at 0 as on the real sensor and drifts at a rate drawn from the seed, at most
-    half a degree a minute.
+    half a degree a minute; `runaway_rad_s` makes that worse. `rate_hz` may be changed at any time.
     """
 
     def __init__(
         self, read: Callable[[], ImuTruth], rate_hz: float = 100.0, *, seed: int = 0
     ) -> None:
         self._read = read
-        self._period_ns = round(NS_PER_S / rate_hz)
+        self.rate_hz = rate_hz
+        self.runaway_rad_s = 0.0
         self._random = np.random.default_rng(seed)
         self._drift_rad_s = float(self._random.uniform(-YAW_DRIFT_RAD_S, YAW_DRIFT_RAD_S))
-        self._start_ns: int | None = None
-        self._next_ns = 0
+        self._due_ns: int | None = None
         self._start_yaw_rad = 0.0
-        self._sent = 0
+        self._drift_rad = 0.0
+        self._drifted_ns = 0
+        self._index = 0
         self._out = bytearray()
 
     def receive(self, data: bytes) -> None:
@@ -57,18 +59,23 @@ class ImuDevice:
 
     def step(self, now_ns: int) -> None:
         """Send a frame when one is due."""
-        if now_ns < self._next_ns:
-            return
-        if self._start_ns is None:
-            self._start_ns = now_ns
+        if self._due_ns is None:
+            self._due_ns = self._drifted_ns = now_ns
             self._start_yaw_rad = self._read().yaw_rad
-        elapsed_ns = now_ns - self._start_ns
-        self._out += self._frame(self._read(), elapsed_ns / NS_PER_S)
-        self._sent = elapsed_ns // self._period_ns + 1
-        self._next_ns = self._start_ns + self._sent * self._period_ns
+        if now_ns < self._due_ns:
+            return
+        self._due_ns = max(self._due_ns + round(NS_PER_S / self.rate_hz), now_ns)
+        self._drift(now_ns)
+        self._out += self._frame(self._read())
+        self._index = (self._index + 1) % 256
 
-    def _frame(self, truth: ImuTruth, elapsed_s: float) -> bytes:
-        yaw_rad = truth.yaw_rad - self._start_yaw_rad + self._drift_rad_s * elapsed_s
+    def _drift(self, now_ns: int) -> None:
+        elapsed_s = (now_ns - self._drifted_ns) / NS_PER_S
+        self._drift_rad += (self._drift_rad_s + self.runaway_rad_s) * elapsed_s
+        self._drifted_ns = now_ns
+
+    def _frame(self, truth: ImuTruth) -> bytes:
+        yaw_rad = truth.yaw_rad - self._start_yaw_rad + self._drift_rad
         noise = self._random.standard_normal(6).tolist()
         angles = (yaw_rad, truth.pitch_rad, truth.roll_rad)
         centidegrees = [
@@ -79,7 +86,7 @@ class ImuDevice:
             _milli_g(force + ACCELERATION_SIGMA_M_S2 * wild)
             for force, wild in zip(truth.acceleration_m_s2, noise[3:], strict=True)
         ]
-        body = _BODY.pack(self._sent % 256, *centidegrees, *milli_g)
+        body = _BODY.pack(self._index, *centidegrees, *milli_g)
         return HEADER + body + bytes([sum(body) & 0xFF])
 
 

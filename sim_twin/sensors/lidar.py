@@ -52,7 +52,7 @@ class LidarDevice:
     `cast` returns the ranges in metres of the beams it is given, beam i at i degrees
     counter-clockwise from the robot's front, 0 for no return. It is called `casts_per_turn` times a
     turn for the points up to the next cast, so that a moving robot distorts the scan as it does in
-    life.
+    life. `rate_hz` and `range_ratio` (told over true range) may be changed at any time.
     """
 
     def __init__(
@@ -65,9 +65,11 @@ class LidarDevice:
         mounting_yaw_rad: float = 0.0,
         casts_per_turn: int = 5,
     ) -> None:
+        self.rate_hz = rate_hz
+        self.range_ratio = 1.0
         self._cast = cast
-        self._speed_deg_s = rate_hz * 360.0
-        self._step_deg = self._speed_deg_s / POINTS_PER_S
+        self._step_deg = rate_hz * 360.0 / POINTS_PER_S
+        self._phase_deg = 0.0
         self._sigma_m = sigma_m
         self._random = np.random.default_rng(seed)
         self._mounting_deg = math.degrees(mounting_yaw_rad)
@@ -115,14 +117,15 @@ class LidarDevice:
 
         A packet's stamp is when its last point was measured, whenever the host reads it.
         """
+        self._follow_rate()
         numbers = np.arange(self._sent_packets, end)
         points = numbers[:, None] * POINTS_PER_PACKET + _NUMBERS
-        angles_deg = np.multiply(points, self._step_deg, dtype=np.float64)
+        angles_deg = np.multiply(points, self._step_deg, dtype=np.float64) + self._phase_deg
         hundredths = np.rint(angles_deg[:, (0, -1)] * 100.0).astype(np.int64) % 36_000
         due_ns = self._start_ns - (numbers + 1) * -NS_PER_S // _PACKETS_PER_S
         packets = np.empty(numbers.size, _PACKET)
         packets["header"] = HEADER
-        packets["speed_deg_s"] = round(self._speed_deg_s)
+        packets["speed_deg_s"] = round(self.rate_hz * 360.0)
         packets["start"], packets["end"] = hundredths.T
         packets["points"]["distance_mm"] = distances_mm = self._distances_mm(angles_deg)
         packets["points"]["intensity"] = INTENSITY * (distances_mm > 0)
@@ -132,9 +135,17 @@ class LidarDevice:
         self._due_ns = deque(due_ns.tolist())
         self._packets = packets.tobytes()
 
+    def _follow_rate(self) -> None:
+        """Turn on from where the head is at another speed."""
+        step_deg = self.rate_hz * 360.0 / POINTS_PER_S
+        first = self._sent_packets * POINTS_PER_PACKET
+        self._phase_deg += first * (self._step_deg - step_deg)
+        self._step_deg = step_deg
+
     def _distances_mm(self, angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64) % BEAMS
         true_m = self._cast(beams.ravel()).reshape(beams.shape)
-        noisy_m = true_m + self._sigma_m * self._random.standard_normal(true_m.shape)
+        noise_m = self._sigma_m * self._random.standard_normal(true_m.shape)
+        noisy_m = self.range_ratio * true_m + noise_m
         seen = (true_m >= MIN_RANGE_M) & (true_m <= MAX_RANGE_M)
         return np.where(seen, np.rint(noisy_m * 1000.0).clip(1.0, 65_535.0), 0.0)

@@ -1,0 +1,36 @@
+"""Name what can fail and how: the one vocabulary of fault injection."""
+
+from enum import Enum
+
+
+class Fault(Enum):
+    """Name how something fails."""
+
+    OFF = "off"
+    STUCK = "stuck"
+    GARBAGE = "garbage"
+    WRONG = "wrong"
+    SLOW = "slow"
+    DELAYED = "delayed"
+    INTERMITTENT = "intermittent"
+    UNPLUG = "unplug"
+    BROWN_OUT = "brown_out"
+    OVERHEAT = "overheat"
+    OVERLOAD = "overload"
+    ID_CLASH = "id_clash"
+    WRONG_BAUD = "wrong_baud"
+    ECHO = "echo"
+    BUS_OFF = "bus_off"
+    ARBITRATION_LOSS = "arbitration_loss"
+
+
+class Component(Enum):
+    """Name what fails; a servo or a drive needs an instance: its joint, or its id on the bus."""
+
+    SERVO_BUS = "servo_bus"
+    SERVO = "servo"
+    CAN_BUS = "can_bus"
+    DRIVE = "drive"
+    LIDAR = "lidar"
+    IMU = "imu"
+    CAMERA = "camera"
