@@ -1,8 +1,10 @@
 """Run the perception process: `python -m vla_deploy.perception --run-dir D --robot butler`."""
 
+import os
 import sys
 
 from drivers.opener import PathOpener
+from drivers.recording_opener import RECORD_VARIABLE, recorded_if_asked
 from platforms import load_profile
 from vla_deploy.node import NodeContext
 from vla_deploy.perception.node import PerceptionNode
@@ -15,7 +17,9 @@ def build(context: NodeContext) -> PerceptionNode:
     """Build the node from what the process was started with."""
     robot = load_robot(context.robot)
     links = device_links(robot, context.devices_dir)
-    opener = PathOpener(links, context.clock)
+    opener = recorded_if_asked(
+        PathOpener(links, context.clock), context.clock, os.environ.get(RECORD_VARIABLE)
+    )
     return PerceptionNode(context, robot, load_profile(context.profile), opener)
 
 

@@ -1,0 +1,185 @@
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.clock import NS_PER_S
+from drivers.dynamixel import DynamixelBus, ServoSpec
+from drivers.errors import LinkLost
+from drivers.wire_recorder import RecordingTransport, WireRecorder
+from drivers.wire_recording import RecordKind, WireRecord, read_recording
+from drivers.wire_replay import ReplayDiverged, WireReplay
+from sim_twin.lines import MemoryLine
+from sim_twin.servos import EmulatedServoSpec
+from sim_twin.servos.server import FreeServos
+
+US = NS_PER_S // 1_000_000
+WRITE, READ, LOST = RecordKind.WRITE, RecordKind.READ, RecordKind.LOST
+SESSION = [
+    WireRecord(RecordKind.NOTE, 0, b"note"),
+    WireRecord(WRITE, 1_000 * US, b"ping"),
+    WireRecord(READ, 1_400 * US, b"po"),
+    WireRecord(READ, 1_500 * US, b"ng"),
+    WireRecord(WRITE, 9_000 * US, b"more"),
+    WireRecord(READ, 9_100 * US, b"done"),
+]
+
+
+class SteppedClock:
+    def __init__(self, time_ns: int = 50 * NS_PER_S) -> None:
+        self.time_ns = time_ns
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+
+
+def test_replies_come_as_late_after_their_request_as_they_did() -> None:
+    clock = SteppedClock()
+    wire = WireReplay(SESSION, clock)
+    wire.write(b"ping")
+    start_ns = clock.time_ns
+    assert wire.read(10, start_ns + 300 * US) == b""
+    assert clock.time_ns == start_ns + 300 * US
+    assert wire.read(10, start_ns + NS_PER_S) == b"po"
+    assert clock.time_ns == start_ns + 400 * US
+    assert wire.read(10, start_ns + NS_PER_S) == b"ng"
+    assert clock.time_ns == start_ns + 500 * US
+    wire.write(b"more")
+    assert not wire.finished
+    assert wire.read(10, clock.time_ns + NS_PER_S) == b"done"
+    assert wire.finished
+
+
+def test_a_poll_takes_only_what_is_due_and_a_small_read_leaves_the_rest() -> None:
+    clock = SteppedClock()
+    wire = WireReplay(SESSION, clock)
+    wire.write(b"ping")
+    assert wire.read(10, 0) == b""
+    clock.time_ns += 450 * US
+    assert [wire.read(1, 0) for _ in range(3)] == [b"p", b"o", b""]
+
+
+def test_a_reply_that_nobody_read_is_still_there_at_the_next_request() -> None:
+    clock = SteppedClock()
+    wire = WireReplay(SESSION, clock)
+    wire.write(b"ping")
+    wire.write(b"more")
+    clock.time_ns += NS_PER_S
+    assert [wire.read(10, 0) for _ in range(4)] == [b"po", b"ng", b"done", b""]
+
+
+def test_discarded_input_is_gone() -> None:
+    clock = SteppedClock()
+    wire = WireReplay(SESSION, clock)
+    wire.write(b"ping")
+    clock.time_ns += 450 * US
+    wire.discard_input()
+    assert wire.read(10, clock.time_ns + NS_PER_S) == b"ng"
+
+
+def test_what_came_before_any_request_comes_by_itself() -> None:
+    clock = SteppedClock()
+    stream = [WireRecord(READ, n * 100_000 * US, bytes([n])) for n in range(5)]
+    wire = WireReplay(stream, clock)
+    start_ns = clock.time_ns
+    got = [wire.read(100, start_ns + NS_PER_S) for _ in range(5)]
+    assert got == [bytes([n]) for n in range(5)]
+    assert clock.time_ns == start_ns + 400_000 * US
+
+
+def test_another_request_is_an_error_that_shows_both() -> None:
+    wire = WireReplay(SESSION, SteppedClock())
+    wire.write(b"ping")
+    with pytest.raises(ReplayDiverged) as caught:
+        wire.write(b"pink")
+    assert str(caught.value) == (
+        "record 3: expected the request 0.009000 s write: 6d 6f 72 65; got 70 69 6e 6b; "
+        "replay with the settings of the recording"
+    )
+
+
+def test_a_request_beyond_the_end_is_an_error() -> None:
+    wire = WireReplay(SESSION, SteppedClock())
+    wire.write(b"ping")
+    wire.write(b"more")
+    with pytest.raises(ReplayDiverged, match="the recording ended before the request 78"):
+        wire.write(b"x")
+
+
+def test_a_lost_link_is_lost_again_at_its_place() -> None:
+    records = [*SESSION[:3], WireRecord(LOST, 1_500 * US, b"adapter gone")]
+    clock = SteppedClock()
+    wire = WireReplay(records, clock)
+    wire.write(b"ping")
+    assert wire.read(10, clock.time_ns + NS_PER_S) == b"po"
+    for act in (lambda: wire.read(10, 0), lambda: wire.write(b"more")):
+        with pytest.raises(LinkLost, match="adapter gone"):
+            act()
+
+
+def test_a_recording_without_traffic_is_refused() -> None:
+    with pytest.raises(ValueError, match="no byte traffic"):
+        WireReplay(SESSION[:1], SteppedClock())
+
+
+class TurningServos(SteppedClock):
+    """Servos whose time is this clock."""
+
+    def __init__(self, specs: Sequence[ServoSpec]) -> None:
+        super().__init__(10 * NS_PER_S)
+        emulated = [EmulatedServoSpec(id=one.id, model_name=one.model_name) for one in specs]
+        self.servos = FreeServos(emulated)
+        self.sleep_until(self.time_ns + NS_PER_S // 100)
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        super().sleep_until(deadline_ns)
+        self.servos.advance_to(self.time_ns)
+
+
+def drive(clock: SteppedClock, bus: DynamixelBus) -> np.ndarray:
+    """Connect, hold, and follow a sine; return every value that was read."""
+    bus.connect()
+    positions = [bus.read_state().position_rad.copy()]
+    bus.enable_torque()
+    for tick in range(60):
+        clock.sleep_until(clock.now_ns() + NS_PER_S // 250)
+        positions.append(bus.read_state().position_rad.copy())
+        bus.write_goals(positions[0] + 0.3 * np.sin(tick / 20))
+    return np.array(positions)
+
+
+def test_a_servo_session_replays_to_the_same_values_without_any_servo(tmp_path: Path) -> None:
+    specs = [ServoSpec(id=n, model_name="XM430-W350", joint=f"joint_{n}") for n in (1, 2, 3)]
+    bench = TurningServos(specs)
+    line = MemoryLine(bench.servos.bank, bench)
+    recorder = WireRecorder(tmp_path / "servos.wire", bench)
+
+    def new_bus(
+        line: MemoryLine | RecordingTransport | WireReplay, clock: SteppedClock
+    ) -> DynamixelBus:
+        return DynamixelBus(line, clock, specs, baud=1_000_000)
+
+    recorded = drive(bench, new_bus(RecordingTransport(line, recorder), bench))
+    assert np.ptp(recorded, axis=0).min() > 0.1, "the servos moved"
+    clock = SteppedClock(20 * NS_PER_S)
+    replay = WireReplay(read_recording(tmp_path / "servos.wire"), clock)
+    replayed = drive(clock, new_bus(replay, clock))
+    assert np.array_equal(recorded, replayed)
+    assert replay.finished
+
+
+def test_a_driver_with_other_goals_diverges(tmp_path: Path) -> None:
+    specs = [ServoSpec(id=1, model_name="XM430-W350", joint="joint_1")]
+    bench = TurningServos(specs)
+    line = MemoryLine(bench.servos.bank, bench)
+    wire = RecordingTransport(line, WireRecorder(tmp_path / "servos.wire", bench))
+    drive(bench, DynamixelBus(wire, bench, specs, baud=1_000_000))
+    clock = SteppedClock()
+    mirrored = [ServoSpec(id=1, model_name="XM430-W350", joint="joint_1", sign=-1)]
+    replay = WireReplay(read_recording(tmp_path / "servos.wire"), clock)
+    with pytest.raises(ReplayDiverged, match="expected the request"):
+        drive(clock, DynamixelBus(replay, clock, mirrored, baud=1_000_000))
