@@ -54,6 +54,8 @@ class Columns:
         self.position_d_gain = self.named("position_d_gain")
         self.position_i_gain = self.named("position_i_gain")
         self.position_p_gain = self.named("position_p_gain")
+        self.feedforward_1st_gain = self.named("feedforward_1st_gain")
+        self.feedforward_2nd_gain = self.named("feedforward_2nd_gain")
         self.bus_watchdog = self.named("bus_watchdog")
         self.goal_pwm = self.named("goal_pwm")
         self.goal_current = self.named("goal_current")

@@ -1,9 +1,10 @@
 """Turn goals into motor duty as the servo's control loops do, for all servos of a bus at once.
 
 Positions are pulses, velocities register units, outputs PWM units (885 = full). Gains as in the
-e-manual: position P/128, I/65536, D/16; velocity P/128, I/65536; integrals and derivatives count in
-milliseconds. The current loop is taken as ideal: it asks for the duty at which the motor, at its
-present speed, draws the goal current. Feed-forward gains are stored but have no effect.
+e-manual: position P/128, I/65536, D/16, feed-forward of the setpoint's velocity and acceleration /4;
+velocity P/128, I/65536; integrals and derivatives count in milliseconds, which the manual leaves
+open. The current loop is taken as ideal: it asks for the duty at which the motor, at its present
+speed, draws the goal current.
 """
 
 from dataclasses import dataclass
@@ -63,10 +64,12 @@ class Motion:
         self._motors = Motors.of(registers)
         self.profile = Profile(columns)
         self.pulses = np.full(count, float(CENTRE_PULSES))
-        self.velocity_rad_s = np.zeros(count)
-        self.pwm = np.zeros(count)
+        self._shaft_rad_s: Floats = np.zeros(count)
+        self._pwm = np.zeros(count)
+        self._scratch = np.zeros(count)
         self._turn_pulses = np.zeros(count)
         self._last_setpoint = np.zeros(count)
+        self._last_change = np.zeros(count)
         self._position_sum = np.zeros(count)
         self._velocity_sum = np.zeros(count)
         self.ramped_velocity = np.zeros(count)
@@ -79,12 +82,19 @@ class Motion:
         self.direction = np.where(columns.drive_mode & _REVERSE, -1.0, 1.0)
         self._pulses_per_rad = self.direction / PULSE_RAD
         self._offset_pulses = CENTRE_PULSES + self._turn_pulses + columns.homing_offset
-        self._enabled = columns.torque_enable.astype(np.float64)
-        self._any_enabled = bool(columns.torque_enable.any())
+        enabled = columns.torque_enable != 0
+        self._enabled = enabled.astype(np.float64)
+        self._any_enabled = bool(enabled.any())
+        self._duty_per_pwm = self._enabled * self.direction / PWM_FULL
         self._p = columns.position_p_gain / 128.0
         self._i = columns.position_i_gain / 65536.0
         self._d = columns.position_d_gain / 16.0
-        self._has_i, self._has_d = bool(self._i.any()), bool(self._d.any())
+        self._damping = self._d * self.direction / (PULSE_RAD * _MS_PER_S)
+        self._forward = self._d + columns.feedforward_1st_gain / 4.0
+        self._forward_2nd = columns.feedforward_2nd_gain / 4.0
+        self._has_i = bool(self._i.any())
+        self._has_2nd = bool(self._forward_2nd.any())
+        self._has_rates = self._has_2nd or bool(self._forward.any())
         self._reload_modes()
 
     def _reload_modes(self) -> None:
@@ -92,18 +102,29 @@ class Motion:
         in_pwm = mode == OperatingMode.PWM
         limit = np.minimum(columns.pwm_limit, np.abs(columns.goal_pwm))
         self._pwm_limit = np.where(in_pwm, columns.pwm_limit, limit).astype(np.float64)
+        self._least_pwm = -self._pwm_limit
         self._velocity_rows = np.flatnonzero(mode == OperatingMode.VELOCITY)
         self._pwm_rows = np.flatnonzero(in_pwm)
         self._torque_rows = np.flatnonzero(mode == OperatingMode.CURRENT)
         self._limited_rows = np.flatnonzero(mode == OperatingMode.CURRENT_BASED_POSITION)
         self.in_position_mode = np.isin(mode, _POSITION_MODES)
 
+    @property
+    def velocity_rad_s(self) -> Floats:
+        """Return the measured velocities."""
+        return self._shaft_rad_s * self.direction
+
+    @property
+    def pwm(self) -> Floats:
+        """Return what is put on the motors."""
+        return self._pwm * self._enabled
+
     def sense(self, position_rad: Floats, velocity_rad_s: Floats) -> None:
         """Read the encoders."""
         np.multiply(position_rad, self._pulses_per_rad, out=self.pulses)
         self.pulses += self._offset_pulses
         np.rint(self.pulses, out=self.pulses)
-        np.multiply(velocity_rad_s, self.direction, out=self.velocity_rad_s)
+        self._shaft_rad_s = velocity_rad_s
 
     def home(self, row: int) -> None:
         """Forget the turns counted, as at power-on: the position comes back to 0..4095."""
@@ -118,16 +139,18 @@ class Motion:
         """Begin anew from the present position and velocity, with empty integrals."""
         self.profile.restart(row, self.pulses[row])
         self._last_setpoint[row] = self.pulses[row]
+        self._last_change[row] = 0.0
         self._position_sum[row] = 0.0
         self._velocity_sum[row] = 0.0
         self.ramped_velocity[row] = 0.0
 
     def advance(self, dt_s: float) -> Floats:
         """Return the duty, -1..1 in shaft coordinates, for the next `dt_s`."""
+        pwm = self._pwm
         if not self._any_enabled:
-            self.pwm = np.zeros_like(self.pwm)
-            return self.pwm.copy()
-        pwm = self._position_pwm(dt_s)
+            pwm[:] = 0.0
+            return np.zeros_like(pwm)
+        self._control_position(dt_s)
         if self._velocity_rows.size:
             pwm[self._velocity_rows] = self._velocity_pwm(self._velocity_rows, dt_s)
         if self._pwm_rows.size:
@@ -135,31 +158,36 @@ class Motion:
         if self._torque_rows.size or self._limited_rows.size:
             self._limit_current(pwm)
         np.minimum(pwm, self._pwm_limit, out=pwm)
-        np.maximum(pwm, -self._pwm_limit, out=pwm)
-        pwm *= self._enabled
-        self.pwm = pwm
-        duty = pwm * self.direction
-        duty /= PWM_FULL
-        return duty
+        np.maximum(pwm, self._least_pwm, out=pwm)
+        return pwm * self._duty_per_pwm
 
-    def _position_pwm(self, dt_s: float) -> Floats:
+    def _control_position(self, dt_s: float) -> None:
+        """Set `pwm` to what the position loops ask for; work in place, for every step comes here."""
         self.profile.advance(dt_s)
-        error = self.profile.position - self.pulses
-        pwm: Floats = error * self._p
+        pwm, scratch = self._pwm, self._scratch
+        np.subtract(self.profile.position, self.pulses, out=scratch)
+        np.multiply(scratch, self._p, out=pwm)
         if self._has_i:
-            self._position_sum += error * (dt_s * _MS_PER_S)
-            bound = PWM_FULL / np.maximum(self._i, 1e-9)
-            self._position_sum = np.clip(self._position_sum, -bound, bound)
-            pwm += self._position_sum * self._i
-        if self._has_d:
-            pwm += self._d * self._error_rate(dt_s)
-        return pwm
+            self._integrate_position(scratch, dt_s)
+        if self._has_rates:
+            np.multiply(self._shaft_rad_s, self._damping, out=scratch)
+            pwm -= scratch
+            self._feed_forward(dt_s * _MS_PER_S)
 
-    def _error_rate(self, dt_s: float) -> Floats:
-        """Return the change of the position error in pulses per millisecond."""
-        asked = (self.profile.position - self._last_setpoint) / (dt_s * _MS_PER_S)
+    def _integrate_position(self, error: Floats, dt_s: float) -> None:
+        self._position_sum += error * (dt_s * _MS_PER_S)
+        bound = PWM_FULL / np.maximum(self._i, 1e-9)
+        self._position_sum = np.clip(self._position_sum, -bound, bound)
+        self._pwm += self._position_sum * self._i
+
+    def _feed_forward(self, dt_ms: float) -> None:
+        """Add what the setpoint's rates of change call for: of D, and of the feed-forward gains."""
+        change = self.profile.position - self._last_setpoint
         np.copyto(self._last_setpoint, self.profile.position)
-        return asked - self.velocity_rad_s / (PULSE_RAD * _MS_PER_S)
+        self._pwm += change * (self._forward / dt_ms)
+        if self._has_2nd:
+            self._pwm += (change - self._last_change) * (self._forward_2nd / dt_ms**2)
+            self._last_change = change
 
     def _velocity_pwm(self, rows: Rows, dt_s: float) -> Floats:
         columns = self._columns
