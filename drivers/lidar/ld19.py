@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base import ByteTransport
-from drivers.clock import Clock
+from drivers.clock import NS_PER_S, Clock
 from drivers.device_clock import DeviceClock
 from drivers.framing import align
 from drivers.lidar.base import BEAMS, LidarCounters, Scan
@@ -37,6 +37,7 @@ POINTS_PER_PACKET = 12
 STAMP_WRAP_MS = 30_000
 MAX_STEP_DEG = 3.0
 MIN_COVERAGE_DEG = 300.0
+MAX_GAP_DEG = 180.0
 _NS_PER_MS = 1_000_000
 _READ_BYTES = 16_384
 _MAX_PIECES = 1024
@@ -95,6 +96,7 @@ class Ld19:
         self._buffer = bytearray()
         self._device_clock = DeviceClock(wrap_ns=STAMP_WRAP_MS * _NS_PER_MS)
         self._last_deg: float | None = None
+        self._last_stamp_ns = 0
         self._synced = False
         self._begin_scan()
 
@@ -145,6 +147,7 @@ class Ld19:
         stamp_ns = self._device_clock.to_host_ns(packet.stamp_ms * _NS_PER_MS, self._clock.now_ns())
         wrapped: NDArray[np.float64] = (packet.start_deg + packet.step_deg * _POINT_NUMBERS) % 360.0
         first_deg, last_deg = float(wrapped[0]), float(wrapped[-1])
+        self._forget_before_gap(stamp_ns, packet.speed_deg_s)
         goes_on = first_deg - (self._last_deg or 0.0) >= -180.0 and last_deg >= first_deg
         before_deg, self._last_deg = self._last_deg, last_deg
         if goes_on:
@@ -155,6 +158,13 @@ class Ld19:
         scan = self._finish(packet.speed_deg_s)
         self._add(packet, wrapped, slice(start, None), stamp_ns)
         return scan
+
+    def _forget_before_gap(self, stamp_ns: int, speed_deg_s: int) -> None:
+        """Begin anew where half a turn or more is missing: its two sides are of different turns."""
+        gap_ns, self._last_stamp_ns = stamp_ns - self._last_stamp_ns, stamp_ns
+        if self._pieces and gap_ns * speed_deg_s > MAX_GAP_DEG * NS_PER_S:
+            self.counters.incomplete_scans += 1
+            self._begin_scan()
 
     def _add(
         self, packet: _Packet, angles_deg: NDArray[np.float64], part: slice, stamp_ns: int

@@ -214,7 +214,12 @@ class PerceptionNode:
     def _publish_scene(self) -> None:
         if self._clock.now_ns() >= self._next_scene_ns:
             self._next_scene_ns = self._clock.now_ns() + SCENE_PERIOD_NS
-            self._writers["scene"].put_document(self._scene.document())
+            self._writers["scene"].put_document({**self._scene.document(), "away": self._away()})
+
+    def _away(self) -> dict[str, str]:
+        """Return which sensors are away at present, and why: what they told is stale."""
+        slots = {"lidar": self._lidar, "imu": self._imu, "camera": self._camera}
+        return {name: slot.failure for name, slot in slots.items() if slot.failure}
 
     def _make_localiser(self) -> Localiser:
         return Localiser(

@@ -141,6 +141,19 @@ def test_a_turn_with_too_many_holes_is_no_scan() -> None:
     assert lidar.counters.incomplete_scans == 1
 
 
+def test_the_sides_of_a_gap_in_time_are_not_glued_into_one_scan() -> None:
+    lidar, line, clock = make()
+    feed_turns(line, turn(1000) + turn(1000, 100)[:15])
+    lidar.poll()
+    clock.ns += 3 * 10**9
+    feed_turns(line, turn(2000, 3100)[15:] + turn_and_next(3000))
+    scan = lidar.poll()
+    assert scan is not None
+    assert np.all(scan.range_m == np.float32(3.0))
+    assert lidar.counters.scans == 2
+    assert lidar.counters.incomplete_scans == 2
+
+
 def test_stamps_tell_the_time_of_measurement_and_survive_the_wrap() -> None:
     lidar, line, clock = make()
     scans = []

@@ -250,6 +250,8 @@ def test_a_lost_camera_is_reopened_and_the_rest_goes_on(make_rig: Callable[..., 
     scans = rig.space.cell_reader("scan").latest()
     rig.run_for(0.5)
     during = rig.space.cell_reader("scan").latest()
+    assert list(rig.scene()["away"]) == ["camera"]
+    assert "unplugged" in rig.scene()["away"]["camera"]
     assert scans is not None
     assert during is not None
     assert during.sequence > scans.sequence
@@ -257,6 +259,30 @@ def test_a_lost_camera_is_reopened_and_the_rest_goes_on(make_rig: Callable[..., 
     rig.lines["camera"].replug()
     rig.run_for(1.5)
     assert rig.scene()["stamp_ns"] > unplugged_ns + 1_000_000_000
+    assert rig.scene()["away"] == {}
+
+
+@pytest.mark.parametrize(("sensor", "topic"), [("lidar", "scan"), ("imu", "imu")])
+def test_a_lost_lidar_or_imu_leaves_its_topic_stale_until_it_is_back(
+    make_rig: Callable[..., Rig], sensor: str, topic: str
+) -> None:
+    rig = make_rig()
+    rig.run_for(0.5)
+    rig.lines[sensor].unplug()
+    rig.run_for(0.1)
+    lost = rig.space.cell_reader(topic).latest()
+    rig.run_for(0.8)
+    still = rig.space.cell_reader(topic).latest()
+    assert lost is not None
+    assert still is not None
+    assert still.sequence == lost.sequence
+    assert list(rig.scene()["away"]) == [sensor]
+    rig.lines[sensor].replug()
+    rig.run_for(1.5)
+    back = rig.space.cell_reader(topic).latest()
+    assert back is not None
+    assert back.sequence > lost.sequence
+    assert rig.scene()["away"] == {}
 
 
 def test_a_cup_that_is_carried_off_is_forgotten_and_keeps_its_id_elsewhere(
