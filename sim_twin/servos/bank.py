@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from typing import Final
 
-from drivers.dynamixel.codec import PacketParser
 from sim_twin.servos.firmware import Firmware
+from sim_twin.servos.instructions import InstructionParser
 from sim_twin.servos.profile import Floats
 from sim_twin.servos.protocol import BusProtocol
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
+from sim_twin.servos.timing import ReplyQueue, WireTiming
+from sim_twin.servos.wire_faults import Spoiler
 
 _PACKET_GAP_NS: Final = 1_500_000
 """A pause within an instruction packet after which a servo looks for a new header."""
@@ -17,14 +19,18 @@ class ServoBank:
     """Be the servos of one bus: bytes on the line on one side, shafts on the other.
 
     `advance` is called once per physics step. `step` only takes over the time, for a bus whose
-    shafts nobody moves; a bus that is advanced does not need it.
+    shafts nobody moves and for times between two physics steps. With `timing` bytes take their time
+    on the wire; without it a reply is there at once.
 
     Raises:
         ValueError: there are no servos, or two of them share an id.
     """
 
     def __init__(
-        self, servos: Sequence[EmulatedServoSpec], options: FirmwareOptions | None = None
+        self,
+        servos: Sequence[EmulatedServoSpec],
+        options: FirmwareOptions | None = None,
+        timing: WireTiming | None = None,
     ) -> None:
         ids = [servo.id for servo in servos]
         if not ids or len(set(ids)) < len(ids):
@@ -32,28 +38,52 @@ class ServoBank:
         options = options or FirmwareOptions()
         self._firmware = Firmware(servos, options)
         self._protocol = BusProtocol(self._firmware, options)
-        self._parser = PacketParser()
+        self._audience = self._protocol.audience
+        self._faults = self._protocol.speaker.faults
+        self._parser = InstructionParser()
+        self._queue = ReplyQueue(timing)
+        self._echo = False
+        self._now_ns = 0
         self._received_ns = 0
-        self._replies: list[bytes] = []
+
+    @property
+    def paced(self) -> bool:
+        """Tell whether bytes take time on this bus."""
+        return self._queue.paced
 
     def receive(self, data: bytes) -> None:
         """Take bytes that the host has put on the bus."""
-        now_ns = self._firmware.now_ns
+        now_ns = self._now_ns
         if self._parser.pending_bytes and now_ns - self._received_ns > _PACKET_GAP_NS:
             self._parser.reset()
         self._received_ns = now_ns
-        self._parser.feed(data)
-        self._replies += [self._protocol.execute(packet) for packet in self._parser.packets()]
+        self._queue.hear(data, now_ns, echo=self._echo)
+        for packet in self._parser.feed(data):
+            self._queue.say(self._protocol.execute(packet), now_ns)
 
     def transmit(self) -> bytes:
-        """Return and forget the replies."""
-        replies = b"".join(self._replies)
-        self._replies.clear()
-        return replies
+        """Return and forget the replies that have arrived at the host."""
+        return self._queue.ready(self._now_ns)
+
+    def next_due_ns(self) -> int | None:
+        """Return when the next bytes arrive at the host; None when nothing is under way."""
+        return self._queue.next_due_ns()
 
     def step(self, now_ns: int) -> None:
         """Take over the time; a bus watchdog that has run out trips."""
-        self._firmware.set_time(now_ns)
+        if now_ns > self._now_ns:
+            self._now_ns = now_ns
+            self._firmware.set_time(now_ns)
+
+    def set_host_baud(self, baud: int | None) -> None:
+        """Take over the rate at which the host talks; a servo set to another one hears nothing.
+
+        With None, which is so at first, every servo understands the host.
+        """
+        self._audience.host_baud = baud
+        self._audience.tune()
+        if baud is not None:
+            self._queue.set_baud(baud)
 
     def advance(
         self,
@@ -68,24 +98,89 @@ class ServoBank:
         Arrays are in the order of the servos and in shaft coordinates; 0 rad is 2048 pulses. Duty
         is zero without torque. A supply below `FirmwareOptions.brownout_v` switches the servos off.
         """
+        self._now_ns = max(self._now_ns, now_ns)
         return self._firmware.advance(now_ns, position_rad, velocity_rad_s, torque_nm, supply_v)
 
     def register(self, servo_id: int, name: str) -> int:
         """Return a register's present value without using the bus."""
-        table = self._firmware.registers.tables[self._protocol.rows[servo_id]]
+        table = self._firmware.registers.tables[self._row(servo_id)]
         item = table.model.registers[name]
         self._firmware.refresh(item.address, item.size)
         return table.get(name)
 
+    # Faults. Each lasts until it is taken back, but for `corrupt_next` and `set_alert`. A fast read
+    # ends where a servo says nothing.
+
     def silence(self, servo_id: int, *, silent: bool = True) -> None:
         """Cut a servo off the bus, as a broken cable does; its motor goes on."""
-        change = self._protocol.silenced.add if silent else self._protocol.silenced.discard
-        change(self._protocol.rows[servo_id])
+        self._mark(self._audience.cut_off, servo_id, on=silent)
+
+    def set_wrong_baud(self, servo_id: int, on: bool = True) -> None:
+        """Let a servo talk at another rate than the host: it neither understands nor answers."""
+        self._mark(self._audience.mistuned, servo_id, on=on)
 
     def corrupt_next(self, servo_id: int) -> None:
         """Spoil the CRC of this servo's next reply."""
-        self._protocol.corrupted.add(self._protocol.rows[servo_id])
+        self._faults.corrupted.add(self._row(servo_id))
 
     def set_alert(self, servo_id: int, bits: int) -> None:
         """Raise hardware error bits, with what Shutdown makes of them."""
-        self._firmware.raise_errors(self._protocol.rows[servo_id], bits)
+        self._firmware.raise_errors(self._row(servo_id), bits)
+
+    def garble(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
+        """Damage one byte of every reply of this servo."""
+        self._spoil(servo_id, Spoiler.GARBLE, on=on, seed=seed)
+
+    def truncate(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
+        """Lose the end of every reply of this servo."""
+        self._spoil(servo_id, Spoiler.TRUNCATE, on=on, seed=seed)
+
+    def duplicate(self, servo_id: int, on: bool = True) -> None:
+        """Let this servo say everything twice."""
+        self._spoil(servo_id, Spoiler.DUPLICATE, on=on)
+
+    def set_clash(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
+        """Let a second servo answer to this id at the same time: all of it becomes garbage."""
+        self._spoil(servo_id, Spoiler.CLASH, on=on, seed=seed)
+
+    def stick(self, servo_id: int, on: bool = True) -> None:
+        """Let this servo show for ever what it senses now, realtime tick included."""
+        if on:
+            self._protocol.speaker.freeze(self._row(servo_id))
+        else:
+            self._faults.frozen.pop(self._row(servo_id), None)
+
+    def answer_as(self, servo_id: int, other_id: int | None) -> None:
+        """Let this servo put another id into its replies; None ends it."""
+        self._faults.aliases.pop(self._row(servo_id), None)
+        if other_id is not None:
+            self._faults.aliases[self._row(servo_id)] = other_id
+
+    def delay(self, servo_id: int, seconds: float) -> None:
+        """Let every reply of this servo come later by this time; 0 ends it."""
+        self._faults.set_delay(self._row(servo_id), seconds)
+
+    def drop_ratio(self, servo_id: int, ratio: float, seed: int = 0) -> None:
+        """Lose this share of the servo's replies; 0 ends it."""
+        self._faults.set_loss(self._row(servo_id), ratio, seed)
+
+    def set_echo(self, on: bool = True) -> None:
+        """Let the adapter hear its own bytes, as a half-duplex one without a switch does."""
+        self._echo = on
+
+    def noise(self, on: bool = True, seed: int = 0) -> None:
+        """Put a few random bytes before every reply."""
+        self._faults.set_noise(on=on, seed=seed)
+
+    def _spoil(self, servo_id: int, spoiler: Spoiler, *, on: bool, seed: int = 0) -> None:
+        self._faults.set_spoiler(self._row(servo_id), spoiler, on=on, seed=seed)
+
+    def _mark(self, rows: set[int], servo_id: int, *, on: bool) -> None:
+        (rows.add if on else rows.discard)(self._row(servo_id))
+        self._audience.tune()
+
+    def _row(self, servo_id: int) -> int:
+        rows = self._audience.rows
+        if servo_id not in rows:
+            raise KeyError(f"no servo has the id {servo_id}; there are {sorted(rows)}")
+        return rows[servo_id]

@@ -6,11 +6,12 @@ between them.
 
 Source: ROBOTIS e-manual, "DYNAMIXEL Protocol 2.0" (status packet, error) and "XM430-W350". A read
 of addresses that hold no register gives zeros, as long as it ends within the table. A write is
-refused as a whole when any part of it is. Indirect addresses are not in the table.
+refused as a whole when any part of it is; through indirect data it is judged as if it went straight
+to the registers behind it, so a part of a register is too short there too.
 """
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -19,6 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from drivers.dynamixel.codec import StatusError
 from drivers.dynamixel.control_table import MODELS, Model, OperatingMode, Register
+from sim_twin.servos.indirect import ADDRESS_PREFIX, Scattered, indirect_registers, scatter
 from sim_twin.servos.spec import EmulatedServoSpec
 
 TABLE_BYTES: Final = 704
@@ -48,6 +50,26 @@ _LIMITS: Final = {
 }
 """The register that bounds each goal's magnitude."""
 
+SENSED: Final = range(120, 147)
+"""Addresses of what a servo senses, realtime tick to temperature."""
+
+_BACKED_UP_RAM: Final = (
+    "velocity_i_gain",
+    "velocity_p_gain",
+    "position_d_gain",
+    "position_i_gain",
+    "position_p_gain",
+    "feedforward_2nd_gain",
+    "feedforward_1st_gain",
+    "profile_acceleration",
+    "profile_velocity",
+)
+"""RAM that a control table backup holds, beside the EEPROM and the indirect addresses."""
+
+_RESTORE_AT_START: Final = 0x02
+_LOWEST_SLOT: Final = 208
+_SCATTERED_KEPT: Final = 64
+
 _FORMATS: Final = {1: "b", 2: "h", 4: "i"}
 """The struct code of a signed register by its bytes; an unsigned one has the capital."""
 
@@ -64,15 +86,25 @@ class Refused(Exception):
 
 
 class ControlTable:
-    """Be the memory of one servo."""
+    """Be the memory of one servo; `on_remap` is called when its indirect addresses change."""
 
-    def __init__(self, spec: EmulatedServoSpec, memory: memoryview) -> None:
+    def __init__(
+        self, spec: EmulatedServoSpec, memory: memoryview, on_remap: Callable[[], None]
+    ) -> None:
         self.model: Model = MODELS[spec.model_name]
         self._spec = spec
         self._memory = memory
-        self.end = max(r.address + r.size for r in self.model.registers.values())
+        self._on_remap = on_remap
+        self._banks = self.model.indirect_banks(spec.firmware_version)
+        self._registers = dict(self.model.registers) | {
+            register.name: register for register in indirect_registers(self._banks)
+        }
+        self._by_address = {each.address: each for each in self._registers.values()}
+        self._backup: dict[str, int] = {}
+        self._targets: dict[tuple[int, int], tuple[int, ...]] = {}
+        self.end = max(r.address + r.size for r in self._registers.values())
         self._unpackers = {
-            register.name: _unpacker(register, memory) for register in self.model.registers.values()
+            register.name: _unpacker(register, memory) for register in self._registers.values()
         }
         self._load_defaults(eeprom=True)
         self._load_defaults(eeprom=False)
@@ -88,12 +120,29 @@ class ControlTable:
 
     def put(self, name: str, value: int) -> None:
         """Set a register from inside the firmware, unchecked."""
-        register = self.model.registers[name]
+        register = self._registers[name]
         end = register.address + register.size
         self._memory[register.address : end] = register.to_bytes(value)
+        if name.startswith(ADDRESS_PREFIX):
+            self._targets.clear()
+            self._on_remap()
 
-    def read(self, address: int, length: int) -> bytes:
-        """Return `length` bytes as the host asks for them.
+    def sensed(self) -> bytes:
+        """Return what is at the addresses `SENSED`."""
+        return bytes(self._memory[SENSED.start : SENSED.stop])
+
+    def targets(self, address: int, length: int) -> tuple[int, ...]:
+        """Return where the bytes of a range are, each on its own; () for a range without slots."""
+        end = address + length
+        if not any(bank.data < end and address < bank.data + bank.slots for bank in self._banks):
+            return ()
+        if (address, length) not in self._targets:
+            targets = tuple(self._target(each) for each in range(address, end))
+            self._targets[address, length] = targets
+        return self._targets[address, length]
+
+    def read(self, address: int, length: int, sensed: bytes | None = None) -> bytes:
+        """Return `length` bytes as the host asks for them; `sensed` replaces what is sensed now.
 
         Raises:
             Refused: the range is empty or ends beyond the table.
@@ -102,7 +151,14 @@ class ControlTable:
             raise Refused(StatusError.DATA_LENGTH)
         if address + length > self.end:
             raise Refused(StatusError.ACCESS)
-        return bytes(self._memory[address : address + length])
+        memory: memoryview | bytearray = self._memory
+        if sensed is not None:
+            memory = bytearray(memory)
+            memory[SENSED.start : SENSED.stop] = sensed
+        targets = self.targets(address, length)
+        if targets:
+            return bytes(memory[target] for target in targets)
+        return bytes(memory[address : address + length])
 
     def check_write(self, address: int, data: bytes) -> list[tuple[Register, int]]:
         """Return the registers that a host's write would set, and their values.
@@ -112,18 +168,45 @@ class ControlTable:
         """
         if not data:
             raise Refused(StatusError.DATA_LENGTH)
-        writes = []
-        while data:
-            register = self._writable_register(address, len(data))
-            value = register.from_bytes(data[: register.size])
-            self._check_value(register, value)
-            writes.append((register, value))
-            address, data = address + register.size, data[register.size :]
+        writes: list[tuple[Register, int]] = []
+        for start, run in self._runs(address, data):
+            writes += self._check_run(start, run)
         return writes
 
     def power_on(self) -> None:
-        """Give the RAM its defaults, as after power-on or reboot."""
+        """Give the RAM its defaults, or its backup where the startup configuration asks for it."""
         self._load_defaults(eeprom=False)
+        if not self._backup:
+            return
+        self.put("backup_ready", 1)
+        if self.get("startup_configuration") & _RESTORE_AT_START:
+            self._restore(eeprom=False)
+
+    def back_up(self) -> None:
+        """Keep the EEPROM, gains, profile and indirect addresses."""
+        self._backup = {
+            name: self.get(name)
+            for name, register in self._registers.items()
+            if (register.eeprom and register.writable)
+            or name in _BACKED_UP_RAM
+            or name.startswith(ADDRESS_PREFIX)
+        }
+        self.put("backup_ready", 1)
+
+    def restore(self) -> None:
+        """Give the EEPROM the values of the backup.
+
+        Raises:
+            Refused: there is no backup.
+        """
+        if not self._backup:
+            raise Refused(StatusError.RESULT_FAIL)
+        self._restore(eeprom=True)
+
+    def _restore(self, *, eeprom: bool) -> None:
+        for name, value in self._backup.items():
+            if self._registers[name].eeprom == eeprom:
+                self.put(name, value)
 
     def reset_motion_settings(self) -> None:
         """Reset what a new operating mode resets."""
@@ -147,12 +230,39 @@ class ControlTable:
             self.put(name, value)
 
     def _load_defaults(self, *, eeprom: bool) -> None:
-        for register in self.model.registers.values():
+        for register in self._registers.values():
             if register.eeprom == eeprom:
                 self.put(register.name, register.initial or 0)
 
+    def _target(self, address: int) -> int:
+        for bank in self._banks:
+            slot = address - bank.data
+            if 0 <= slot < bank.slots:
+                return self.get(self._by_address[bank.addresses + 2 * slot].name)
+        return address
+
+    def _runs(self, address: int, data: bytes) -> Iterator[tuple[int, bytes]]:
+        """Cut a write where the addresses behind it do not go on one by one."""
+        targets = self.targets(address, len(data))
+        if not targets:
+            yield address, data
+            return
+        start = 0
+        for count in range(1, len(data) + 1):
+            if count == len(data) or targets[count] != targets[count - 1] + 1:
+                yield targets[start], data[start:count]
+                start = count
+
+    def _check_run(self, address: int, data: bytes) -> Iterator[tuple[Register, int]]:
+        while data:
+            register = self._writable_register(address, len(data))
+            value = register.from_bytes(data[: register.size])
+            self._check_value(register, value)
+            yield register, value
+            address, data = address + register.size, data[register.size :]
+
     def _writable_register(self, address: int, available: int) -> Register:
-        register = self.model.registers_by_address.get(address)
+        register = self._by_address.get(address)
         if register is None or not register.writable:
             raise Refused(StatusError.ACCESS)
         if available < register.size:
@@ -193,10 +303,13 @@ class RegisterFile:
 
     def __init__(self, specs: Sequence[EmulatedServoSpec]) -> None:
         self._bytes = bytearray(len(specs) * TABLE_BYTES)
+        self._scattered: dict[tuple[int, int, bytes], Scattered] = {}
         view = memoryview(self._bytes)
         self._grid = np.frombuffer(self._bytes, np.uint8).reshape(len(specs), TABLE_BYTES)
         self.tables = tuple(
-            ControlTable(spec, view[row * TABLE_BYTES : (row + 1) * TABLE_BYTES])
+            ControlTable(
+                spec, view[row * TABLE_BYTES : (row + 1) * TABLE_BYTES], self._scattered.clear
+            )
             for row, spec in enumerate(specs)
         )
         self._shortest = min(table.end for table in self.tables)
@@ -208,8 +321,32 @@ class RegisterFile:
         """Return the same bytes of several tables; none where one of them would refuse the read."""
         if length == 0 or address + length > self._shortest:
             return []
-        block = self._grid[rows, address : address + length].tobytes()
+        scattered = self._scatter(rows, address, length)
+        if scattered is None:
+            block = self._grid[rows, address : address + length].tobytes()
+        else:
+            block = self._grid[scattered.index].tobytes()
         return [block[start : start + length] for start in range(0, len(block), length)]
+
+    def sources(
+        self, rows: Iterable[int], address: int, length: int
+    ) -> tuple[tuple[int, int], ...]:
+        """Return the ranges, start and length, where a read of these tables finds its bytes."""
+        scattered = self._scatter(list(rows), address, length)
+        return ((address, length),) if scattered is None else scattered.sources
+
+    def _scatter(self, rows: Sequence[int], address: int, length: int) -> Scattered | None:
+        """Return where the bytes of a read are; None where all of them are where it says."""
+        if address + length <= _LOWEST_SLOT or address + length > TABLE_BYTES:
+            return None
+        key = address, length, bytes(rows)
+        if key not in self._scattered:
+            if len(self._scattered) >= _SCATTERED_KEPT:
+                self._scattered.clear()
+            straight = range(address, address + length)
+            targets = [self.tables[row].targets(address, length) or straight for row in rows]
+            self._scattered[key] = scatter(rows, targets)
+        return self._scattered[key]
 
     def column(self, address: int, dtype: DTypeLike) -> NDArray[np.int32]:
         """Return the register at `address` of all servos as one writable array."""

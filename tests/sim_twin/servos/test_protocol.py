@@ -103,7 +103,7 @@ def test_a_fast_sync_read_longer_than_any_packet_stays_unanswered(trio: Any) -> 
 
 
 def test_a_fast_sync_read_past_the_table_tells_the_error_of_every_servo(trio: Any) -> None:
-    params = struct.pack("<HH", 600, 2) + b"\1\2"
+    params = struct.pack("<HH", 662, 2) + b"\1\2"
     trio.bank.receive(encode_instruction(BROADCAST_ID, Instruction.FAST_SYNC_READ, params))
     entries = decode_fast_entries(trio.bank.transmit(), 2)
     assert entries == [(StatusError.ACCESS, n, b"\0\0") for n in (1, 2)]
@@ -209,7 +209,7 @@ def test_a_status_packet_on_the_bus_is_nobodys_instruction(trio: Any) -> None:
     assert trio.send(BROADCAST_ID, Instruction.STATUS, b"\x00") == []
 
 
-@pytest.mark.parametrize("instruction", [Instruction.CONTROL_TABLE_BACKUP, 0x30, 0xFF])
+@pytest.mark.parametrize("instruction", [0x21, 0x30, 0xFF])
 def test_an_unknown_instruction_is_refused(bench: Any, instruction: int) -> None:
     assert bench.send(1, instruction)[0].error == StatusError.INSTRUCTION
 

@@ -8,7 +8,7 @@ from drivers.dynamixel.codec import BROADCAST_ID, Instruction, StatusError
 from drivers.dynamixel.control_table import MODELS
 from sim_twin.servos import EmulatedServoSpec
 
-ADDRESS_PAST_THE_END = 600
+ADDRESS_PAST_THE_END = 662
 
 
 @pytest.mark.parametrize(
