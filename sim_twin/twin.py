@@ -99,6 +99,7 @@ class Twin:
         self.servos.step(now_ns)
         self.lidar.step(now_ns)
         self.imu.step(now_ns)
+        self.can_wire.poll(now_ns)
         if self._camera is not None:
             self._camera.device.step(now_ns)
 

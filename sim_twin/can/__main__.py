@@ -16,7 +16,7 @@ from sim_twin.can.hub import CanHub
 from sim_twin.can.wire import CanWire
 
 
-def serve(hub: CanHub, wheels: Sequence[FreeWheel], clock: Clock) -> None:
+def serve(hub: CanHub, wire: CanWire, wheels: Sequence[FreeWheel], clock: Clock) -> None:
     """Carry frames as they come and turn the wheels every 2 ms, until interrupted."""
     step_at_ns = clock.now_ns()
     while True:
@@ -26,6 +26,7 @@ def serve(hub: CanHub, wheels: Sequence[FreeWheel], clock: Clock) -> None:
         if clock.now_ns() >= step_at_ns:
             for wheel in wheels:
                 wheel.step(clock.now_ns(), STEP_NS / NS_PER_S)
+            wire.poll(clock.now_ns())
             step_at_ns = max(step_at_ns + STEP_NS, clock.now_ns())
 
 
@@ -36,9 +37,10 @@ def main() -> None:
     parser.add_argument("--nodes", type=int, nargs="+", default=[1, 2], help="node ids")
     arguments = parser.parse_args()
     wheels = [FreeWheel(WheelDrive(node_id)) for node_id in arguments.nodes]
-    hub = CanHub(CanWire([wheel.drive for wheel in wheels]), arguments.socket)
+    wire = CanWire([wheel.drive for wheel in wheels])
+    hub = CanHub(wire, arguments.socket)
     try:
-        serve(hub, wheels, MonotonicClock())
+        serve(hub, wire, wheels, MonotonicClock())
     except KeyboardInterrupt:
         return
     finally:

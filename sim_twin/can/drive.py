@@ -93,6 +93,11 @@ class WheelDrive:
         """Return the communication state, for tests."""
         return self._nmt_state
 
+    @property
+    def supplied(self) -> bool:
+        """Tell whether the drive has power."""
+        return self._supplied
+
     def connect(self, send: Callable[[can.Message], None]) -> None:
         """Remember how to put a frame on the wire, and boot."""
         self._send_frame = send

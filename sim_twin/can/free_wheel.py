@@ -47,3 +47,4 @@ class FreeWheelWorld:
             self._now_ns += STEP_NS
             for wheel in self.wheels:
                 wheel.step(self._now_ns, STEP_NS / NS_PER_S)
+            self.wire.poll(self._now_ns)

@@ -66,7 +66,7 @@ class CanHub:
 
     @property
     def frames_dropped(self) -> int:
-        """Return how many frames were lost because a client did not read."""
+        """Return how many frames were lost for want of room, towards a client or from one."""
         return self._frames_dropped + sum(client.frames_dropped for client in self._clients)
 
     def filenos(self) -> list[int]:
@@ -106,7 +106,7 @@ class CanHub:
             self.packets_malformed += 1
             _LOG.warning("dropped: %s", error)
             return
-        self._wire.send(frame, client.port)
+        client.frames_dropped += not self._wire.send(frame, client.port)
 
     def _dismiss(self, client: _Client) -> None:
         self._wire.detach(client.port)

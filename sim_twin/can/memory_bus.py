@@ -1,5 +1,7 @@
 """Reach the emulated nodes from within one process: a python-can bus without sockets or waiting."""
 
+import errno
+import os
 from collections import deque
 
 import can
@@ -19,8 +21,18 @@ class MemoryBus(can.BusABC):  # type: ignore[misc]
         super().__init__(channel="memory")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Carry one frame; the answers wait in the queue when this returns."""
-        self._wire.send(msg, self._port)
+        """Carry one frame; the answers wait in the queue when this returns.
+
+        Raises:
+            can.CanOperationError: the controller's queue is full or it is bus-off, as on SocketCAN;
+                or the bus was shut down.
+        """
+        if self._is_shutdown:
+            raise can.CanOperationError(f"{self.channel_info}: was shut down", errno.EBADF)
+        if not self._wire.send(msg, self._port):
+            raise can.CanOperationError(
+                f"{self.channel_info}: {os.strerror(errno.ENOBUFS)}", errno.ENOBUFS
+            )
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """Return the next frame or None; never wait, for here only the caller moves time."""

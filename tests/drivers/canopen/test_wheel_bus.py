@@ -8,9 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.canopen import DriveSpec, DriveState, PowerState, WheelDriveBus
+from drivers.canopen import DriveSpec, PowerState, WheelDriveBus
 from drivers.canopen.objects import HEARTBEAT_PRODUCER, RPDO1
 from drivers.canopen.wheel_bus import HOST_NODE_ID
+from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
 from sim_twin.can import MemoryBus, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
@@ -54,7 +55,8 @@ class Bench(FreeWheelWorld):
         return state
 
     def inject(self, can_id: int, data: bytes) -> None:
-        self.wire.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=data), self)
+        with MemoryBus(self.wire) as outsider:
+            outsider.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
 
 
 @pytest.fixture
@@ -162,8 +164,8 @@ def test_when_the_host_falls_silent_the_drives_stop_and_stay_in_fault(enabled: B
     state = enabled.run(0.5, FORWARD)
     assert both(state, PowerState.FAULT)
     assert np.abs(enabled.velocities).max() < 0.02
-    assert state.emergency[0] is not None
-    assert "heartbeat" in state.emergency[0].text
+    assert state.fault[0] is not None
+    assert "heartbeat" in state.fault[0].text
 
 
 def test_a_fault_needs_reset_and_a_new_enable(enabled: Bench) -> None:
@@ -174,7 +176,7 @@ def test_a_fault_needs_reset_and_a_new_enable(enabled: Bench) -> None:
     enabled.bus.reset_fault()
     state = enabled.run(0.1, FORWARD)
     assert both(state, PowerState.SWITCH_ON_DISABLED)
-    assert state.emergency == (None, None)
+    assert state.fault == (None, None)
     assert not state.enabled
     enabled.bus.enable()
     assert enabled.run(0.5, FORWARD).enabled
@@ -253,8 +255,8 @@ def test_a_faulted_drive_takes_the_other_one_with_it(enabled: Bench) -> None:
     state = enabled.run(0.3, FORWARD)
     assert state.power_state == (PowerState.SWITCH_ON_DISABLED, PowerState.FAULT)
     assert state.faulted == (False, True)
-    assert state.emergency[1] is not None
-    assert state.emergency[1].text == "0x4310 drive over-temperature"
+    assert state.fault[1] is not None
+    assert state.fault[1].text == "0x4310 drive over-temperature"
     assert np.abs(enabled.velocities).max() < 0.02
 
 

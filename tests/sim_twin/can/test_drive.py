@@ -21,14 +21,17 @@ class Host:
     def __init__(self, node_id: int = 1) -> None:
         self.drive = WheelDrive(node_id)
         self.wheel = FreeWheel(self.drive)
-        self.bus = MemoryBus(CanWire([self.drive]))
+        self.wire = CanWire([self.drive])
+        self.bus = MemoryBus(self.wire)
         self.now_ns = 0
         self.pass_time(0.002)
+        assert self.received() == [(0x700 + node_id, b"\x00")]
 
     def pass_time(self, duration_s: float) -> None:
         for _ in range(round(duration_s * 1e9 / STEP_NS)):
             self.now_ns += STEP_NS
             self.wheel.step(self.now_ns, STEP_NS / 1e9)
+            self.wire.poll(self.now_ns)
 
     def send(self, can_id: int, data: bytes = b"", **flags: bool) -> list[tuple[int, bytes]]:
         self.bus.send(
