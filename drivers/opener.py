@@ -8,15 +8,18 @@ from typing import Protocol
 import can
 
 from drivers.base import ByteTransport
-from drivers.canopen.open_bus import open_can_bus
+from drivers.can_interface import open_can_bus
 from drivers.clock import Clock
 from drivers.errors import DeviceMissing
+from drivers.estop.gpio_button import Contact
+from drivers.estop.gpio_contact import GpioContact
+from drivers.estop.input_device import InputDevice
 from drivers.serial_port import SerialPort
 from drivers.socket_stream import SocketStream
 
 
 class DeviceOpener(Protocol):
-    """Hand out the transport of each named device: "servos", "lidar", "imu", "camera", "can"."""
+    """Hand out the transport of each named device: "servos", "lidar", "camera", "can", "estop"."""
 
     def serial(self, name: str) -> ByteTransport:
         """Open a serial line.
@@ -40,6 +43,24 @@ class DeviceOpener(Protocol):
 
         Raises:
             DeviceMissing: the interface is not there.
+        """
+        ...
+
+    def input_events(self, name: str) -> ByteTransport:
+        """Open a source of Linux input events; it begins with the present state of its keys.
+
+        Raises:
+            DeviceMissing: the device is not there.
+            DeviceBusy: another process has grabbed it.
+        """
+        ...
+
+    def gpio_contact(self, name: str, offset: int) -> Contact:
+        """Open a normally closed contact on a GPIO line.
+
+        Raises:
+            DeviceMissing: there is no such chip or line.
+            DeviceBusy: another process holds the line.
         """
         ...
 
@@ -85,6 +106,27 @@ class PathOpener:
         """
         link = self._link(name)
         return open_can_bus(link.path, link.baud)
+
+    def input_events(self, name: str) -> ByteTransport:
+        """Open an input device, or a socket that carries the same events.
+
+        Raises:
+            DeviceMissing: the device is not there, or the robot file does not name it.
+            DeviceBusy: another process has grabbed it.
+        """
+        path = Path(self._link(name).path)
+        if path.is_socket():
+            return SocketStream(path, self._clock)
+        return InputDevice(path, self._clock, grab=True)
+
+    def gpio_contact(self, name: str, offset: int) -> GpioContact:
+        """Open a normally closed contact on a line of the chip that the robot file gives.
+
+        Raises:
+            DeviceMissing: there is no such chip or line, or the robot file does not name it.
+            DeviceBusy: another process holds the line.
+        """
+        return GpioContact(self._link(name).path, offset)
 
     def _link(self, name: str) -> DeviceLink:
         if name not in self._links:

@@ -3,31 +3,11 @@
 The patterns and commands are those of CiA 402-2 (IEC 61800-7-201), state control and statusword.
 """
 
-from enum import Enum, IntEnum
+from enum import IntEnum
 from typing import Final
 
-
-class PowerState(Enum):
-    """Name the states of the CiA 402 power drive system."""
-
-    UNKNOWN = "unknown"
-    NOT_READY = "not ready to switch on"
-    SWITCH_ON_DISABLED = "switch on disabled"
-    READY_TO_SWITCH_ON = "ready to switch on"
-    SWITCHED_ON = "switched on"
-    OPERATION_ENABLED = "operation enabled"
-    QUICK_STOP_ACTIVE = "quick stop active"
-    FAULT_REACTION_ACTIVE = "fault reaction active"
-    FAULT = "fault"
-
-
-class Goal(Enum):
-    """Name what the host wants of all its drives."""
-
-    DISABLED = "disabled"
-    ENABLED = "enabled"
-    QUICK_STOP = "quick stop"
-    FAULT_RESET = "fault reset"
+from drivers.drive_bus import Goal as Goal
+from drivers.drive_bus import PowerState as PowerState
 
 
 class ControlCommand(IntEnum):

@@ -1,142 +1,138 @@
-"""Check that a drive is the one declared and write its parameters over SDO."""
+"""Check that a drive is the one declared and write its parameters over SDO, step by step."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Final
 
-import canopen
-from canopen.sdo.exceptions import SdoError
-
-from drivers.canopen.network import PumpedSdoClient
+from drivers.canopen.cia402 import FAULT_STATES, decode_statusword
+from drivers.canopen.error_codes import code_text, reset_rule
 from drivers.canopen.objects import (
     ABORT_CONNECTION_OPTION,
     CIA402_PROFILE,
     DEVICE_TYPE,
     ENCODER_RESOLUTION,
+    ERROR_CODE,
     FAULT_REACTION_OPTION,
     GEAR_RATIO,
     HEARTBEAT_CONSUMER,
     HEARTBEAT_PRODUCER,
     IDENTITY,
+    INTERPOLATION_PERIOD,
+    MODE_DISPLAY,
     MODE_OF_OPERATION,
-    PDOS,
     PROFILE_ACCELERATION,
     PROFILE_DECELERATION,
     QUICK_STOP_DECELERATION,
     QUICK_STOP_OPTION,
     RATED_TORQUE,
     RATED_TORQUE_PER_NM,
+    STATUSWORD,
+    SUPPORTED_MODES,
     AbortConnection,
     OperatingMode,
 )
+from drivers.canopen.parameters import DriveParameters, Expected
+from drivers.canopen.sdo import Writing
 from drivers.canopen.spec import DriveSpec
-from drivers.errors import NoReply, ProtocolError, WrongDevice
+from drivers.clock import Clock
+from drivers.drive_bus import ResetRule
+from drivers.errors import DeviceFault, NoReply, ProtocolError, WrongDevice
 
 SLOW_DOWN_THEN_DISABLE: Final = 2
 HEARTBEATS_PER_LIMIT: Final = 4
+MODE_TIMEOUT_NS: Final = 300_000_000
+MILLISECONDS: Final = -3
+
+Step = tuple[int, int, int]
 
 
-class DriveParameters:
-    """Read and write the objects of one drive."""
+def refuse_unrepaired(parameters: DriveParameters) -> Writing:
+    """Look, before a reset would wipe it, whether a drive has a fault that only repair may end.
 
-    def __init__(self, client: PumpedSdoClient, spec: DriveSpec) -> None:
-        self._client = client
-        self._spec = spec
-        self._name = f"drive {spec.joint} (node {spec.node_id})"
+    A drive that does not answer yet is left to the boot that follows.
 
-    def read(self, index: int, subindex: int = 0) -> int:
-        """Return an unsigned object.
-
-        Raises:
-            NoReply: the drive is silent.
-            WrongDevice: the drive has no such object.
-            ProtocolError: the reply does not fit the request.
-        """
-        try:
-            return int.from_bytes(self._client.upload(index, subindex), "little")
-        except SdoError as error:
-            raise self._translated(error, f"reading 0x{index:04X}:{subindex:X}") from error
-
-    def write(self, index: int, subindex: int, value: int) -> None:
-        """Write an object with the size that the EDS declares.
-
-        Raises:
-            NoReply: the drive is silent.
-            WrongDevice: the drive refuses the value.
-            ProtocolError: the reply does not fit the request.
-        """
-        data = self._client.od.get_variable(index, subindex).encode_raw(value)
-        try:
-            self._client.download(index, subindex, data)
-        except SdoError as error:
-            raise self._translated(
-                error, f"writing {value} to 0x{index:04X}:{subindex:X}"
-            ) from error
-
-    def _translated(self, error: SdoError, doing: str) -> Exception:
-        what = f"{self._name}: {doing}: {error}"
-        if isinstance(error, canopen.SdoAbortedError):
-            return WrongDevice(f"{what}; check that the EDS file fits the drive")
-        if "No SDO response" in str(error):
-            return NoReply(f"{what}; check its power, node id, bit rate and the bus termination")
-        return ProtocolError(what)
-
-    def check(self, expected: Iterator[tuple[str, int, int, int]]) -> None:
-        """Compare objects with what is expected of them.
-
-        Raises:
-            WrongDevice: one differs.
-        """
-        for what, index, subindex, value in expected:
-            got = self.read(index, subindex)
-            if got != value:
-                raise WrongDevice(
-                    f"{self._name}: {what} 0x{index:04X}:{subindex:X} is 0x{got:X}, expected "
-                    f"0x{value:X}; correct the robot file or the drive's configuration"
-                )
+    Raises:
+        DeviceFault: it has one.
+    """
+    try:
+        status = yield from parameters.read(STATUSWORD)
+        if decode_statusword(status) not in FAULT_STATES:
+            return
+        code = yield from parameters.read(ERROR_CODE)
+    except (NoReply, WrongDevice, ProtocolError):
+        return
+    if reset_rule(code) is ResetRule.NEVER:
+        raise DeviceFault(
+            f"{parameters.name}: {code_text(code)}; it is reset {ResetRule.NEVER.value}"
+        )
 
 
-def verify_drive(client: PumpedSdoClient, spec: DriveSpec) -> float:
-    """Check profile, identity, encoder and PDO layout of a drive; return its rated torque in N·m.
+def verify_drive(parameters: DriveParameters, spec: DriveSpec) -> Writing:
+    """Check profile, identity, encoder and modes of a drive.
 
     Raises:
         WrongDevice: it is not the drive that EDS and robot file declare.
         NoReply: the drive is silent.
     """
-    parameters = DriveParameters(client, spec)
-    profile = parameters.read(DEVICE_TYPE) & 0xFFFF
+    profile = (yield from parameters.read(DEVICE_TYPE)) & 0xFFFF
     if profile != CIA402_PROFILE:
-        raise WrongDevice(f"drive {spec.joint} (node {spec.node_id}): profile {profile}, not 402")
-    parameters.check(_identity(client.od))
-    parameters.check(_encoder(spec))
-    parameters.check(_pdo_layout(spec.node_id))
-    return parameters.read(RATED_TORQUE) / RATED_TORQUE_PER_NM
+        raise WrongDevice(f"{spec.name}: device profile is {profile}, expected {CIA402_PROFILE}")
+    yield from parameters.check(_identity(parameters))
+    yield from parameters.check(_encoder(spec))
+    if parameters.dictionary.has(SUPPORTED_MODES):
+        modes = yield from parameters.read(SUPPORTED_MODES)
+        if not modes >> (spec.mode - 1) & 1:
+            raise WrongDevice(
+                f"{spec.name}: supports modes 0x{modes:X} (0x6502), not {spec.mode.words}; "
+                "correct `mode` in the robot file"
+            )
 
 
-def _identity(od: canopen.ObjectDictionary) -> Iterator[tuple[str, int, int, int]]:
-    yield "vendor", IDENTITY, 1, od[IDENTITY][1].default
-    yield "product", IDENTITY, 2, od[IDENTITY][2].default
+def _identity(parameters: DriveParameters) -> Expected:
+    for what, subindex in (("vendor", 1), ("product", 2)):
+        declared = parameters.dictionary.default(IDENTITY, subindex)
+        if declared:
+            yield what, IDENTITY, subindex, declared
 
 
-def _encoder(spec: DriveSpec) -> Iterator[tuple[str, int, int, int]]:
+def _encoder(spec: DriveSpec) -> Expected:
     yield "encoder increments", ENCODER_RESOLUTION, 1, spec.counts_per_rev
     yield "encoder revolutions", ENCODER_RESOLUTION, 2, 1
     yield "gear, motor side", GEAR_RATIO, 1, 1
     yield "gear, shaft side", GEAR_RATIO, 2, 1
 
 
-def _pdo_layout(node_id: int) -> Iterator[tuple[str, int, int, int]]:
-    for pdo in PDOS:
-        yield "PDO identifier", pdo.communication, 1, pdo.cob_base + node_id
-        yield "PDO transmission type", pdo.communication, 2, pdo.transmission
-        yield "PDO mapped objects", pdo.mapping, 0, len(pdo.entries)
-        for subindex, entry in enumerate(pdo.entries, start=1):
-            yield "PDO mapping", pdo.mapping, subindex, entry
+def read_rated_torque(parameters: DriveParameters) -> Generator[None, None, float]:
+    """Return the rated torque in N·m."""
+    steps = yield from parameters.read(RATED_TORQUE)
+    return steps / RATED_TORQUE_PER_NM
+
+
+def set_mode(parameters: DriveParameters, mode: OperatingMode, clock: Clock) -> Writing:
+    """Choose the mode of operation and wait until the drive displays it.
+
+    Raises:
+        WrongDevice: it displays another one.
+    """
+    yield from parameters.write(MODE_OF_OPERATION, 0, int(mode))
+    deadline_ns = clock.now_ns() + MODE_TIMEOUT_NS
+    while (shown := (yield from parameters.read(MODE_DISPLAY))) != mode:
+        if clock.now_ns() > deadline_ns:
+            raise WrongDevice(
+                f"{parameters.name}: mode of operation display 0x6061 is {shown}, expected "
+                f"{int(mode)} ({mode.words}); check that the drive is set up for this mode"
+            )
+        yield
 
 
 def configure_drive(
-    client: PumpedSdoClient, spec: DriveSpec, *, host_node_id: int, heartbeat_ms: int
-) -> None:
-    """Write mode, ramps, stop reactions and both heartbeats.
+    parameters: DriveParameters,
+    spec: DriveSpec,
+    *,
+    host_node_id: int,
+    heartbeat_ms: int,
+    cycle_ms: int,
+) -> Writing:
+    """Write ramps, stop reactions and both heartbeats; pass over what the drive does not have.
 
     A lost host puts the drive into FAULT: it brakes on its quick stop ramp, then power is off
     until an explicit fault reset.
@@ -145,19 +141,22 @@ def configure_drive(
         WrongDevice: the drive refuses a value.
         NoReply: the drive is silent.
     """
-    parameters = DriveParameters(client, spec)
-    counts_per_rad = abs(spec.counts_per_rad)
-    ramp = round(spec.acceleration_rad_s2 * counts_per_rad)
-    table = (
-        (MODE_OF_OPERATION, 0, OperatingMode.PROFILE_VELOCITY),
-        (PROFILE_ACCELERATION, 0, ramp),
-        (PROFILE_DECELERATION, 0, ramp),
-        (QUICK_STOP_DECELERATION, 0, round(spec.quick_stop_rad_s2 * counts_per_rad)),
+    steps = (
+        *_ramps(spec, cycle_ms),
+        (QUICK_STOP_DECELERATION, 0, round(spec.quick_stop_rad_s2 * abs(spec.counts_per_rad))),
         (QUICK_STOP_OPTION, 0, SLOW_DOWN_THEN_DISABLE),
         (FAULT_REACTION_OPTION, 0, SLOW_DOWN_THEN_DISABLE),
-        (ABORT_CONNECTION_OPTION, 0, AbortConnection.FAULT),
+        (ABORT_CONNECTION_OPTION, 0, int(AbortConnection.FAULT)),
         (HEARTBEAT_PRODUCER, 0, max(1, heartbeat_ms // HEARTBEATS_PER_LIMIT)),
         (HEARTBEAT_CONSUMER, 1, host_node_id << 16 | heartbeat_ms),
     )
-    for index, subindex, value in table:
-        parameters.write(index, subindex, int(value))
+    for index, subindex, value in steps:
+        if parameters.dictionary.has(index, subindex):
+            yield from parameters.write(index, subindex, value)
+
+
+def _ramps(spec: DriveSpec, cycle_ms: int) -> tuple[Step, ...]:
+    if spec.mode is OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY:
+        return (INTERPOLATION_PERIOD, 1, cycle_ms), (INTERPOLATION_PERIOD, 2, MILLISECONDS)
+    ramp = round(spec.acceleration_rad_s2 * abs(spec.counts_per_rad))
+    return (PROFILE_ACCELERATION, 0, ramp), (PROFILE_DECELERATION, 0, ramp)

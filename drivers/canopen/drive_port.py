@@ -4,11 +4,17 @@ import math
 import struct
 from typing import Final
 
-from drivers.canopen.cia402 import FAULT_STATES, PowerState, decode_statusword
+from drivers.canopen.cia402 import FAULT_STATES, decode_statusword
 from drivers.canopen.emergency import Emergency, decode_emergency
-from drivers.canopen.objects import TORQUE_STEPS_PER_RATED, TPDO1, TPDO2, NmtState
+from drivers.canopen.objects import (
+    TORQUE_STEPS_PER_RATED,
+    TPDO1,
+    TPDO2,
+    NmtState,
+)
 from drivers.canopen.spec import DriveSpec
 from drivers.clock import NS_PER_S
+from drivers.drive_bus import PowerState, ResetRule
 from drivers.errors import ProtocolError
 
 _STATUS: Final = 0b01
@@ -26,7 +32,8 @@ class DrivePort:
 
     def __init__(self, spec: DriveSpec, heartbeat_limit_ns: int) -> None:
         self.spec = spec
-        self.rated_torque_nm = 0.0
+        self.rated_torque_nm = math.nan
+        self.position_wire = TPDO2.wire
         self._limit_ns = heartbeat_limit_ns
         self.forget()
 
@@ -34,7 +41,7 @@ class DrivePort:
         """Start over, as before the drive's first message."""
         self.power_state = PowerState.UNKNOWN
         self.velocity_rad_s = 0.0
-        self.torque_nm = 0.0
+        self.torque_nm = math.nan
         self.emergency: Emergency | None = None
         self.booted = False
         self.rebooted = False
@@ -61,6 +68,11 @@ class DrivePort:
     def faulted(self) -> bool:
         """Tell whether the drive is in one of its fault states."""
         return self.power_state in FAULT_STATES
+
+    @property
+    def reset_rule(self) -> ResetRule:
+        """Return who may reset the drive's fault; a fault without a code is the operator's."""
+        return ResetRule.OPERATOR if self.emergency is None else self.emergency.rule
 
     def age_s(self, now_ns: int) -> float:
         """Return the time since the older of both samples was taken; infinite before the first."""
@@ -90,14 +102,15 @@ class DrivePort:
 
     def on_position(self, data: bytes, now_ns: int) -> None:
         """Take TPDO2."""
-        counts, torque_steps = _unpacked(TPDO2.wire, data)
+        counts, *torque_steps = _unpacked(self.position_wire, data)
+        if torque_steps:
+            torque_ratio = torque_steps[0] / TORQUE_STEPS_PER_RATED
+            self.torque_nm = self.spec.sign * torque_ratio * self.rated_torque_nm
         if self._counts is None:
             self._travel_counts = counts
         else:
             self._travel_counts += counts_moved(self._counts, counts)
         self._counts = counts
-        torque_ratio = torque_steps / TORQUE_STEPS_PER_RATED
-        self.torque_nm = self.spec.sign * torque_ratio * self.rated_torque_nm
         self._answered(_POSITION, now_ns)
 
     def _answered(self, which: int, now_ns: int) -> None:
@@ -122,8 +135,7 @@ class DrivePort:
         self._heard_ns = now_ns
 
 
-def _unpacked(wire: struct.Struct, data: bytes) -> tuple[int, int]:
+def _unpacked(wire: struct.Struct, data: bytes) -> tuple[int, ...]:
     if len(data) != wire.size:
         raise ProtocolError(f"PDO has {len(data)} bytes, expected {wire.size}")
-    first, second = wire.unpack(data)
-    return first, second
+    return wire.unpack(data)

@@ -1,38 +1,11 @@
 """Decode emergency messages (EMCY, CiA 301) into words."""
 
 from dataclasses import dataclass
-from typing import Final
 
+from drivers.canopen.error_codes import code_text, reset_rule
 from drivers.canopen.objects import EMERGENCY_WIRE
+from drivers.drive_bus import ResetRule
 from drivers.errors import ProtocolError
-
-# CiA 301 (80xx and classes) and CiA 402-2, error codes
-CODE_TEXTS: Final[dict[int, str]] = {
-    0x0000: "error reset",
-    0x2310: "continuous over-current",
-    0x3210: "DC link over-voltage",
-    0x3220: "DC link under-voltage",
-    0x4210: "device over-temperature",
-    0x4310: "drive over-temperature",
-    0x7305: "encoder fault",
-    0x8110: "CAN overrun",
-    0x8130: "heartbeat of the master lost",
-    0x8140: "recovered from bus off",
-    0x8400: "velocity controller",
-}
-CLASS_TEXTS: Final[dict[int, str]] = {
-    0x0: "error reset",
-    0x1: "generic error",
-    0x2: "current",
-    0x3: "voltage",
-    0x4: "temperature",
-    0x5: "device hardware",
-    0x6: "device software",
-    0x7: "additional modules",
-    0x8: "monitoring",
-    0x9: "external error",
-    0xF: "device specific",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,8 +25,12 @@ class Emergency:
     @property
     def text(self) -> str:
         """Return the meaning of the code in words."""
-        fallback = CLASS_TEXTS.get(self.code >> 12, "reserved code")
-        return f"0x{self.code:04X} {CODE_TEXTS.get(self.code, fallback)}"
+        return code_text(self.code)
+
+    @property
+    def rule(self) -> ResetRule:
+        """Return who may take the fault back."""
+        return reset_rule(self.code)
 
 
 def decode_emergency(data: bytes, received_ns: int) -> Emergency:

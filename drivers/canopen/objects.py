@@ -4,7 +4,7 @@ Shared by the driver and by the twin's emulated drive. The EDS file holds the fu
 """
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from pathlib import Path
 from typing import Final
@@ -49,7 +49,9 @@ PROFILE_DECELERATION: Final = 0x6084
 QUICK_STOP_DECELERATION: Final = 0x6085
 ENCODER_RESOLUTION: Final = 0x608F
 GEAR_RATIO: Final = 0x6091
+INTERPOLATION_PERIOD: Final = 0x60C2
 TARGET_VELOCITY: Final = 0x60FF
+SUPPORTED_MODES: Final = 0x6502
 
 CIA402_PROFILE: Final = 402
 RATED_TORQUE_PER_NM: Final = 1000
@@ -81,6 +83,11 @@ class OperatingMode(IntEnum):
     PROFILE_VELOCITY = 3
     CYCLIC_SYNCHRONOUS_VELOCITY = 9
 
+    @property
+    def words(self) -> str:
+        """Return the mode's name in words."""
+        return self.name.lower().replace("_", " ")
+
 
 class AbortConnection(IntEnum):
     """Name the reactions to a lost master (6007)."""
@@ -108,6 +115,11 @@ def mapping_entry(index: int, bits: int) -> int:
     return index << 16 | bits
 
 
+def mapped_object(entry: int) -> tuple[int, int, int]:
+    """Return index, sub-index and length in bits of a mapping parameter."""
+    return entry >> 16, entry >> 8 & 0xFF, entry & 0xFF
+
+
 RPDO1: Final = Pdo(
     cob_base=0x200,
     communication=0x1400,
@@ -132,5 +144,6 @@ TPDO2: Final = Pdo(
     entries=(mapping_entry(POSITION_ACTUAL, 32), mapping_entry(TORQUE_ACTUAL, 16)),
     wire=struct.Struct("<ih"),
 )
+TPDO2_WITHOUT_TORQUE: Final = replace(TPDO2, entries=TPDO2.entries[:1], wire=struct.Struct("<i"))
 PDOS: Final = (RPDO1, TPDO1, TPDO2)
 EMERGENCY_WIRE: Final = struct.Struct("<HB5s")

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from drivers.canopen import DriveSpec, DriveState, WheelDriveBus
+from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.clock import NS_PER_S, Clock
+from drivers.drive_bus import DriveState
 from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from platforms import Profile
@@ -167,5 +168,5 @@ class Wheels:
 def _fault_code(state: DriveState, row: int) -> int:
     if not state.faulted[row]:
         return 0
-    emergency = state.emergency[row]
-    return _UNKNOWN_FAULT if emergency is None else emergency.code
+    fault = state.fault[row]
+    return _UNKNOWN_FAULT if fault is None else fault.code

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.canopen import DriveSpec, DriveState, WheelDriveBus, open_can_bus
+from drivers.can_interface import open_can_bus
+from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.clock import MonotonicClock
+from drivers.drive_bus import DriveState
 from drivers.errors import LinkLost
 
 pytestmark = pytest.mark.stack

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from drivers.can_hub import HubBus
-from drivers.canopen import open_can_bus
+from drivers.can_interface import open_can_bus
 from drivers.errors import DeviceMissing
 from sim_twin.can import CanHub, CanWire
 

@@ -1,0 +1,37 @@
+"""Say in words why a node refuses an SDO access (CiA 301, SDO abort codes)."""
+
+from typing import Final
+
+ABORT_TEXTS: Final[dict[int, str]] = {
+    0x0503_0000: "toggle bit not alternated",
+    0x0504_0000: "SDO protocol timed out",
+    0x0504_0001: "command specifier not valid or unknown",
+    0x0504_0002: "invalid block size",
+    0x0504_0003: "invalid sequence number",
+    0x0504_0004: "CRC error",
+    0x0504_0005: "out of memory",
+    0x0601_0000: "unsupported access to an object",
+    0x0601_0001: "attempt to read a write-only object",
+    0x0601_0002: "attempt to write a read-only object",
+    0x0602_0000: "object does not exist in the object dictionary",
+    0x0604_0041: "object cannot be mapped to the PDO",
+    0x0604_0042: "number and length of the mapped objects exceed the PDO",
+    0x0604_0043: "parameters are incompatible",
+    0x0604_0047: "general internal incompatibility in the device",
+    0x0606_0000: "access failed due to a hardware error",
+    0x0607_0010: "data type or length of the parameter does not match",
+    0x0607_0012: "data type does not match, parameter too long",
+    0x0607_0013: "data type does not match, parameter too short",
+    0x0609_0011: "sub-index does not exist",
+    0x0609_0030: "value out of range",
+    0x0609_0031: "value too high",
+    0x0609_0032: "value too low",
+    0x0609_0036: "maximum value is less than minimum value",
+    0x060A_0023: "resource not available: no SDO connection",
+    0x0800_0000: "general error",
+    0x0800_0020: "data cannot be transferred or stored",
+    0x0800_0021: "data cannot be transferred because of local control",
+    0x0800_0022: "data cannot be transferred in the present device state",
+    0x0800_0023: "no object dictionary present, or it cannot be generated",
+    0x0800_0024: "no data available",
+}
