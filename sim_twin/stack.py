@@ -21,8 +21,8 @@ class NotReady(Exception):
     """Say that the stack did not come up."""
 
 
-class LockstepStack:
-    """Own a twin and every node of the robot; give commands and read what became of them."""
+class LockstepControl:
+    """Own a twin and the control node; be the operator and read what control tells."""
 
     def __init__(
         self,
@@ -38,26 +38,18 @@ class LockstepStack:
         self._profile = load_profile(profile)
         self.space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)
         self.operator = self.space.ring_writer("operator")
-        self._utterances = self.space.ring_writer("utterance")
-        self._events = self.space.ring_reader("task_event", from_start=True)
         self._status = self.space.cell_reader("control_status")
-        self._numbers = itertools.count(1)
-        self.events: list[dict[str, Any]] = []
-        self._outcomes: dict[str, dict[str, Any]] = {}
-        context, devices = self.lockstep.context, self.lockstep.devices
-        self.control: Node = ControlNode(context, self.robot, self._profile, devices)
-        self.perception: Node = PerceptionNode(context, self.robot, self._profile, devices)
-        self.planner: Node = PlannerNode(context, self.robot)
-        rate_hz = self._profile.executor_rate_hz
-        self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
-        for node in (self.control, self.perception, self.planner, self.executor):
-            self.lockstep.add(node)
+        self.control: Node = self._new_control()
+        self.lockstep.add(self.control)
 
     def restart_control(self) -> None:
         """Start control anew, as the supervisor does after it died."""
-        context, devices = self.lockstep.context, self.lockstep.devices
-        self.control = ControlNode(context, self.robot, self._profile, devices)
+        self.control = self._new_control()
         self.lockstep.add(self.control)
+
+    def _new_control(self) -> Node:
+        context, devices = self.lockstep.context, self.lockstep.devices
+        return ControlNode(context, self.robot, self._profile, devices)
 
     def status(self) -> dict[str, Any]:
         """Return control's newest status, or an empty document before the first."""
@@ -80,6 +72,38 @@ class LockstepStack:
         self.operate("arm")
         if not clock.run_until(lambda: self.status()["state"] == "armed", READY_TIMEOUT_S):
             raise NotReady(f"control does not arm: {self.status()}")
+
+    def close(self) -> None:
+        """Stop every node and release the twin."""
+        self.lockstep.close()
+        self.space.close()
+
+
+class LockstepStack(LockstepControl):
+    """Own a twin and every node of the robot; give commands and read what became of them."""
+
+    def __init__(
+        self,
+        tmp_path: Path,
+        seed: int = 0,
+        profile: str = "desktop",
+        *,
+        robot: str = "butler",
+        world: str = "flat",
+    ) -> None:
+        super().__init__(tmp_path, seed, profile, robot=robot, world=world)
+        self._utterances = self.space.ring_writer("utterance")
+        self._events = self.space.ring_reader("task_event", from_start=True)
+        self._numbers = itertools.count(1)
+        self.events: list[dict[str, Any]] = []
+        self._outcomes: dict[str, dict[str, Any]] = {}
+        context, devices = self.lockstep.context, self.lockstep.devices
+        self.perception: Node = PerceptionNode(context, self.robot, self._profile, devices)
+        self.planner: Node = PlannerNode(context, self.robot)
+        rate_hz = self._profile.executor_rate_hz
+        self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
+        for node in (self.perception, self.planner, self.executor):
+            self.lockstep.add(node)
 
     def give(self, **utterance: Any) -> str:
         """Give a command without waiting; return its id."""
@@ -107,8 +131,3 @@ class LockstepStack:
         outcome = self.outcome(command_id)
         assert outcome is not None, "run_until saw it"
         return outcome
-
-    def close(self) -> None:
-        """Stop every node and release the twin."""
-        self.lockstep.close()
-        self.space.close()

@@ -1,0 +1,146 @@
+"""Play a scenario in lock-step against the real control, or the whole stack, and judge it."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from sim_twin.faults.scenario import NO_CAUSE, Meanwhile, Scenario
+from sim_twin.faults.verdict import failures
+from sim_twin.faults.witness import STANDSTILL_RAD_S, Witness
+from sim_twin.stack import LockstepControl, LockstepStack
+
+_SAMPLE_S: Final = 0.004
+_COMMAND_EVERY: Final = 5
+_SETTLE_S: Final = 0.3
+_RETURN_S: Final = 1.3  # a lost bus is opened again once a second
+_ACT_S: Final = 3.0
+_ACT_EVERY_S: Final = 0.5
+_TRAVEL_S: Final = 20.0
+_TRAVEL_M: Final = 0.8
+_DRIVE_M_S: Final = 0.3
+_REACH: Final = {"left_elbow": 1.9, "left_shoulder_pitch": 0.7, "right_elbow": 1.9}
+_WHEELS: Final = ("left_wheel", "right_wheel")
+_REACHED: Final = {"reset": "disarmed", "arm": "armed"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """Tell what happened: `failures` is empty when the stack did all that it must do."""
+
+    scenario: str
+    cause: str
+    cause_s: float
+    rest_s: float
+    failures: tuple[str, ...]
+
+    @property
+    def row(self) -> str:
+        """Return one line for a table."""
+        verdict = "ok" if not self.failures else "FAILED: " + "; ".join(self.failures)
+        cause = self.cause if math.isnan(self.cause_s) else f"{self.cause} {self.cause_s:.3f} s"
+        return f"{self.scenario:28} {cause:32} at rest {self.rest_s:6.3f} s  {verdict}"
+
+
+class Rehearsal:
+    """Own one robot for one scenario."""
+
+    def __init__(self, scenario: Scenario, tmp_path: Path, seed: int = 0) -> None:
+        self._scenario = scenario
+        travels = scenario.meanwhile is Meanwhile.TRAVEL
+        self._stack = (LockstepStack if travels else LockstepControl)(tmp_path, seed)
+        self._base_command = self._stack.space.cell_writer("base_command")
+        self._start_s = 0.0
+
+    def run(self) -> Outcome:
+        """Play the scenario to its end."""
+        try:
+            return self._play()
+        finally:
+            self._stack.close()
+
+    def _play(self) -> Outcome:
+        scenario, lockstep = self._scenario, self._stack.lockstep
+        self._stack.arm()
+        lockstep.run_for(_SETTLE_S)
+        self._start_s = lockstep.now_s
+        travels = scenario.meanwhile is Meanwhile.TRAVEL
+        parts = _WHEELS if travels else (*self._stack.robot.joint_names, *_WHEELS)
+        seen = Witness(self._stack, self._start_s + scenario.begin_s, parts)
+        before, command = seen.counters(), self._begin_activity()
+        for request in scenario.faults:
+            lockstep.faults.inject_checked(request)
+        for _ in self._samples(scenario.end_s):
+            if seen.since_s >= 0.0:
+                seen.look()
+        wrong = [*failures(scenario.expect, seen, before), *self._return(seen)]
+        wrong += self._judge_travel(command) if command else []
+        return Outcome(
+            scenario=scenario.name,
+            cause=seen.cause,
+            cause_s=seen.cause_s,
+            rest_s=seen.rest_s,
+            failures=tuple(wrong),
+        )
+
+    def _begin_activity(self) -> str:
+        """Set the robot in motion; return the command's id on a travel, else nothing."""
+        match self._scenario.meanwhile:
+            case Meanwhile.REACH:
+                goal = {"kind": "goal", "motion_id": 1, "targets": _REACH, "speed_ratio": 0.7}
+                self._stack.space.ring_writer("motion_command").publish(goal)
+            case Meanwhile.TRAVEL:
+                assert isinstance(self._stack, LockstepStack)
+                step = {"id": "a1", "skill": "move", "parameters": {"distance_m": _TRAVEL_M}}
+                return self._stack.give(plan={"goal": "go", "actions": [step]})
+        return ""
+
+    def _samples(self, until_s: float) -> Iterator[None]:
+        """Run on to a moment of the scenario, and stop every few milliseconds to look."""
+        drives, count = self._scenario.meanwhile is Meanwhile.DRIVE, 0
+        while self._stack.lockstep.now_s - self._start_s < until_s:
+            if drives and count % _COMMAND_EVERY == 0:
+                self._base_command.put(v_m_s=_DRIVE_M_S, w_rad_s=0.0)
+            self._stack.lockstep.run_for(_SAMPLE_S)
+            count += 1
+            yield
+
+    def _return(self, seen: Witness) -> list[str]:
+        """See what happens once the fault has gone: nothing moves without an operator's act."""
+        expect, wrong = self._scenario.expect, []
+        stands = expect.cause != NO_CAUSE and expect.recovery and not math.isnan(seen.rest_s)
+        fastest = 0.0
+        for _ in self._samples(self._scenario.end_s + _RETURN_S):
+            seen.look_at_pose()
+            fastest = max(fastest, seen.speed_rad_s())
+        if stands and expect.torque != "off" and fastest > STANDSTILL_RAD_S:
+            wrong.append(f"it moved again without an operator's act, at {fastest:.2f} rad/s")
+        if expect.recovery and self._stack.status()["state"] == "armed":
+            wrong.append("it armed again without an operator's act")
+        for act in expect.recovery:
+            self._do(act)
+        if self._stack.status()["state"] != "armed":
+            wrong.append(f"it did not recover: {self._stack.status()}")
+        if expect.pose_error_m is not None and seen.worst_pose_m > expect.pose_error_m:
+            wrong.append(f"pose off by {seen.worst_pose_m:.3f} m, limit {expect.pose_error_m:g} m")
+        return wrong
+
+    def _do(self, act: str) -> None:
+        """Do an operator's act again and again, as a person would, until it has its effect."""
+        for _ in range(round(_ACT_S / _ACT_EVERY_S)):
+            self._stack.operate(act)
+            if self._stack.lockstep.run_until(
+                lambda: self._stack.status()["state"] == _REACHED[act], _ACT_EVERY_S
+            ):
+                return
+
+    def _judge_travel(self, command: str) -> list[str]:
+        stack, wanted = self._stack, self._scenario.expect.travel
+        assert isinstance(stack, LockstepStack)
+        stack.lockstep.run_until(lambda: stack.outcome(command) is not None, _TRAVEL_S)
+        outcome = stack.outcome(command) or {"error": "no end in sight"}
+        ending = "succeeds" if outcome.get("success") else "fails"
+        if wanted is None or ending == wanted:
+            return []
+        return [f"the travel {ending} ({outcome.get('error')}), expected: {wanted}"]
