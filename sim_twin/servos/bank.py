@@ -127,6 +127,14 @@ class ServoBank:
         """Raise hardware error bits, with what Shutdown makes of them."""
         self._firmware.raise_errors(self._row(servo_id), bits)
 
+    def heat(self, servo_id: int, celsius: float) -> None:
+        """Bring a servo to a temperature; it cools from there."""
+        self._firmware.heat(self._row(servo_id), celsius)
+
+    def overload(self, servo_id: int, on: bool = True) -> None:
+        """Let a servo count as overloaded whatever it carries, or no longer."""
+        self._firmware.force_overload(self._row(servo_id), on=on)
+
     def garble(self, servo_id: int, on: bool = True, *, seed: int = 0) -> None:
         """Damage one byte of every reply of this servo."""
         self._spoil(servo_id, Spoiler.GARBLE, on=on, seed=seed)

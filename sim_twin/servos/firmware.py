@@ -33,11 +33,14 @@ from sim_twin.servos.goal_window import GoalWindow
 from sim_twin.servos.motion import Motion
 from sim_twin.servos.profile import Floats
 from sim_twin.servos.protection import CHECK_PERIOD_S, Protection
+from sim_twin.servos.rail import Rail
 from sim_twin.servos.registers import RegisterFile
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
 from sim_twin.servos.watchdog import BusWatchdog
 
 _CHECK_PERIOD_NS: Final = round(CHECK_PERIOD_S * NS_PER_S)
+_BROWNOUT_RATIO: Final = 0.6
+"""No servo runs below this share of its nominal voltage (chosen: 3 V of a 5 V servo)."""
 _TORQUE_ON_BY_GOAL: Final = 0x08
 _TORQUE_ON_AT_START: Final = 0x01
 
@@ -50,11 +53,16 @@ class Firmware:
         self._columns = Columns(self.registers)
         self._options = options
         self._motion = Motion(self.registers, self._columns)
-        self._protection = Protection(self._columns, options)
+        models = [table.model for table in self.registers.tables]
+        self._protection = Protection(models, self._columns, options)
+        self._rail = Rail(models, options.supply_ohm)
+        self._brownout_v = min(
+            min(options.brownout_v, _BROWNOUT_RATIO * model.voltage_v) for model in models
+        )
         self._feedback = Feedback(self._columns, self._motion, self._protection)
         self._watchdog = BusWatchdog(self._columns)
         self._goal_window = GoalWindow(self._columns)
-        self._stall_nm = np.array([t.model.stall_torque_nm for t in self.registers.tables])
+        self._duty: Floats = np.zeros(len(specs))
         self._boot_until_ns = [0] * len(specs)
         self._goal_is_fresh = [False] * len(specs)
         self._powered = True
@@ -89,7 +97,10 @@ class Firmware:
         torque_nm: Floats,
         supply_v: float,
     ) -> Floats:
-        """Sense, run the control loops and return the duty for the next step."""
+        """Sense, run the control loops and return the duty for the next step.
+
+        The duty counts from the models' nominal voltage: what the rail lacks is taken off.
+        """
         if self._stale:
             self._reload()
         self.set_time(now_ns)
@@ -98,15 +109,18 @@ class Firmware:
             self._take_first_pose()
         dt_s = (now_ns - self._advanced_ns) / NS_PER_S
         self._advanced_ns = now_ns
-        if (supply_v >= self._options.brownout_v) != self._powered:
+        volts = self._rail.volts(supply_v, self._duty, velocity_rad_s)
+        if (volts >= self._brownout_v) != self._powered:
             self._switch_power(on=not self._powered)
-        np.divide(torque_nm, self._stall_nm, out=self._feedback.effort_ratio)
-        self._feedback.supply_v = supply_v
+        self._feedback.torque_nm = torque_nm
+        self._feedback.supply_v = volts
         if now_ns - self._checked_ns >= _CHECK_PERIOD_NS:
-            self._protect(supply_v)
+            self._protect(volts)
         if self._stale:
             self._reload()
-        return self._motion.advance(max(dt_s, 1e-6))
+        ratio = self._motion.nominal_ratio = self._rail.nominal_ratio(volts)
+        self._duty = self._motion.advance(max(dt_s, 1e-6))
+        return self._duty * ratio
 
     def answers(self, row: int) -> bool:
         """Tell whether a servo is powered and has finished booting."""
@@ -190,6 +204,14 @@ class Firmware:
         if columns.hardware_error[row] & columns.shutdown[row] and columns.torque_enable[row]:
             self._cut_torque(row)
 
+    def heat(self, row: int, celsius: float) -> None:
+        """Bring a servo to a temperature, as heat from outside does; it cools from there."""
+        self._protection.thermals.heat(row, celsius)
+
+    def force_overload(self, row: int, *, on: bool) -> None:
+        """Let a servo count as overloaded whatever its effort, or no longer."""
+        self._protection.force_overload(row, on=on)
+
     def _boot(self, row: int) -> None:
         table = self.registers.tables[row]
         table.power_on()
@@ -220,7 +242,8 @@ class Firmware:
     def _protect(self, supply_v: float) -> None:
         elapsed_s = (self.now_ns - self._checked_ns) / NS_PER_S
         self._checked_ns = self.now_ns
-        bits = self._protection.check(self._feedback.effort_ratio, supply_v, elapsed_s)
+        effort_ratio = self._motion.effort_ratio(self._feedback.torque_nm)
+        bits = self._protection.check(effort_ratio, supply_v, elapsed_s)
         if self._powered and bits.any():
             for row in np.flatnonzero(bits):
                 self.raise_errors(int(row), int(bits[row]))

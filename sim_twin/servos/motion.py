@@ -1,10 +1,10 @@
 """Turn goals into motor duty as the servo's control loops do, for all servos of a bus at once.
 
 Positions are pulses, velocities register units, outputs PWM units (885 = full). Gains as in the
-e-manual: position P/128, I/65536, D/16, feed-forward of the setpoint's velocity and acceleration /4;
-velocity P/128, I/65536; integrals and derivatives count in milliseconds, which the manual leaves
-open. The current loop is taken as ideal: it asks for the duty at which the motor, at its present
-speed, draws the goal current.
+e-manual: position P/128, I/65536, D/16, feed-forward of the setpoint's velocity and acceleration
+/4; velocity P/128, I/65536; integrals and derivatives count in milliseconds, which the manual
+leaves open. The current loop is taken as ideal: it asks for the duty at which the motor, at its
+present speed and voltage, draws the goal current.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.control_table import (
+from drivers.dynamixel.model import (
     PULSE_RAD,
     PULSES_PER_REV,
     PWM_FULL,
     OperatingMode,
 )
+from drivers.dynamixel.models import X330_CURRENT_UNIT_A
 from sim_twin.servos.columns import Columns
 from sim_twin.servos.profile import PULSES_S2_PER_UNIT, PULSES_S_PER_UNIT, Floats, Profile
 from sim_twin.servos.registers import RegisterFile
@@ -26,6 +27,7 @@ from sim_twin.servos.registers import RegisterFile
 CENTRE_PULSES: Final = PULSES_PER_REV // 2
 _REVERSE: Final = 0x01
 _MS_PER_S: Final = 1e3
+_LEAST_RATIO: Final = 0.1
 _POSITION_MODES: Final = (
     OperatingMode.POSITION,
     OperatingMode.EXTENDED_POSITION,
@@ -40,18 +42,24 @@ Rows = NDArray[np.intp]
 class Motors:
     """Hold what the control loops know of each motor, from its model."""
 
+    stall_nm: Floats
     no_load_rad_s: Floats
     effort_unit_ratio: Floats
     velocity_unit_rad_s: Floats
+    senses_supply_current: NDArray[np.bool_]
 
     @classmethod
     def of(cls, registers: RegisterFile) -> "Motors":
         """Collect the figures of the models on the bus."""
         models = [table.model for table in registers.tables]
         return cls(
+            stall_nm=np.array([m.stall_torque_nm for m in models]),
             no_load_rad_s=np.array([m.no_load_speed_rad_s for m in models]),
             effort_unit_ratio=np.array([m.effort_unit_ratio for m in models]),
             velocity_unit_rad_s=np.array([m.velocity_unit_rad_s for m in models]),
+            senses_supply_current=np.array(
+                [m.current_unit_a == X330_CURRENT_UNIT_A for m in models]
+            ),
         )
 
 
@@ -67,6 +75,8 @@ class Motion:
         self._shaft_rad_s: Floats = np.zeros(count)
         self._pwm = np.zeros(count)
         self._scratch = np.zeros(count)
+        self.nominal_ratio: Floats = np.ones(count)
+        """The supply's voltage as a share of each motor's nominal one."""
         self._turn_pulses = np.zeros(count)
         self._last_setpoint = np.zeros(count)
         self._last_change = np.zeros(count)
@@ -112,12 +122,14 @@ class Motion:
     @property
     def velocity_rad_s(self) -> Floats:
         """Return the measured velocities."""
-        return self._shaft_rad_s * self.direction
+        velocity: Floats = self._shaft_rad_s * self.direction
+        return velocity
 
     @property
     def pwm(self) -> Floats:
         """Return what is put on the motors."""
-        return self._pwm * self._enabled
+        pwm: Floats = self._pwm * self._enabled
+        return pwm
 
     def sense(self, position_rad: Floats, velocity_rad_s: Floats) -> None:
         """Read the encoders."""
@@ -159,10 +171,11 @@ class Motion:
             self._limit_current(pwm)
         np.minimum(pwm, self._pwm_limit, out=pwm)
         np.maximum(pwm, self._least_pwm, out=pwm)
-        return pwm * self._duty_per_pwm
+        duty: Floats = pwm * self._duty_per_pwm
+        return duty
 
     def _control_position(self, dt_s: float) -> None:
-        """Set `pwm` to what the position loops ask for; work in place, for every step comes here."""
+        """Set `pwm` to what the position loops ask for, in place: every step comes here."""
         self.profile.advance(dt_s)
         pwm, scratch = self._pwm, self._scratch
         np.subtract(self.profile.position, self.pulses, out=scratch)
@@ -207,8 +220,9 @@ class Motion:
     def _limit_current(self, pwm: Floats) -> None:
         columns = self._columns
         allowed = np.minimum(np.abs(columns.goal_current), columns.current_limit)
-        allowed_pwm = allowed * self._motors.effort_unit_ratio * PWM_FULL
-        back_emf_pwm = self.velocity_rad_s / self._motors.no_load_rad_s * PWM_FULL
+        full_pwm = PWM_FULL / np.maximum(self.nominal_ratio, _LEAST_RATIO)
+        allowed_pwm = allowed * self._motors.effort_unit_ratio * full_pwm
+        back_emf_pwm = self.velocity_rad_s / self._motors.no_load_rad_s * full_pwm
         rows = self._torque_rows
         asked = np.sign(columns.goal_current[rows]) * allowed_pwm[rows]
         pwm[rows] = back_emf_pwm[rows] + asked
@@ -216,9 +230,20 @@ class Motion:
         low, high = back_emf_pwm[rows] - allowed_pwm[rows], back_emf_pwm[rows] + allowed_pwm[rows]
         pwm[rows] = np.clip(pwm[rows], low, high)
 
-    def present_effort(self, effort_ratio: Floats) -> Floats:
-        """Return what address 126 shows: current, or load where the model senses none."""
-        return effort_ratio * self.direction / self._motors.effort_unit_ratio
+    def effort_ratio(self, torque_nm: Floats) -> Floats:
+        """Return the current behind a torque, as a share of the stall current."""
+        ratio: Floats = torque_nm / self._motors.stall_nm
+        return ratio
+
+    def present_effort(self, torque_nm: Floats) -> Floats:
+        """Return what address 126 shows: current, or load where the model senses none.
+
+        An X330 senses what it draws from the supply: the motor's current by the bridge's duty.
+        """
+        ratio = self.effort_ratio(torque_nm) * self.direction
+        drawn = ratio * (np.abs(self.pwm) / PWM_FULL)
+        sensed = np.where(self._motors.senses_supply_current, drawn, ratio)
+        return sensed / self._motors.effort_unit_ratio
 
     def present_velocity(self) -> Floats:
         """Return the measured velocity in register units."""

@@ -38,7 +38,8 @@ class FirmwareOptions:
     """Choose what the manual leaves open, and the constants of the protection.
 
     A servo counts as overloaded when its effort stays above `overload_ratio` of stall for
-    `overload_time_s`. The winding heats towards `stall_rise_c` above ambient at stall current.
+    `overload_time_s`. What heats and cools it: `sim_twin/servos/thermal.py`. `supply_ohm` is the
+    resistance of supply, cables and connectors together (chosen, not measured).
 
     When the Bus Watchdog trips, the manual says only that the servo stops. By default its path
     stops where it is: it holds the setpoint it had. With `trip_holds_present` it takes its
@@ -54,5 +55,4 @@ class FirmwareOptions:
     overload_ratio: float = 0.8
     overload_time_s: float = 3.0
     ambient_c: float = 25.0
-    stall_rise_c: float = 250.0
-    thermal_time_constant_s: float = 200.0
+    supply_ohm: float = 0.05

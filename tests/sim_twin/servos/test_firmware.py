@@ -7,7 +7,7 @@ import pytest
 
 from drivers.dynamixel.codec import ALERT, Instruction, StatusError
 from drivers.dynamixel.control_table import HardwareError, OperatingMode
-from sim_twin.servos import EmulatedServoSpec, ServoBank
+from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank
 
 CENTRE = 2048
 QUARTER_TURN = 1024
@@ -176,7 +176,8 @@ def test_velocity_mode_reaches_its_goal_and_ramps_with_the_profile(bench: Any) -
     assert bench.read("present_velocity") == pytest.approx(-100, abs=2)
 
 
-def test_pwm_mode_puts_the_goal_on_the_motor(bench: Any) -> None:
+def test_pwm_mode_puts_the_goal_on_the_motor(make_bench: Callable[..., Any]) -> None:
+    bench = make_bench(options=FirmwareOptions(supply_ohm=0.0))
     arm(bench, OperatingMode.PWM)
     bench.write("goal_pwm", -443)
     bench.run(0.004)
@@ -330,20 +331,57 @@ def test_an_error_that_shutdown_does_not_name_only_raises_the_alert(bench: Any) 
     assert bench.write("led", 5) == ALERT | StatusError.DATA_RANGE
 
 
-def test_a_stalled_motor_heats_up_until_overheating_cuts_torque(
+def test_overheating_cuts_torque_which_stays_off_until_a_reboot_of_a_cooler_servo(
+    bench: Any,
+) -> None:
+    arm(bench)
+    bench.bank.heat(1, 81.0)
+    bench.run(0.05)
+    assert bench.read("present_temperature") == 81
+    assert bench.read("hardware_error_status") == HardwareError.OVERHEATING
+    assert bench.read("torque_enable") == 0
+    bench.bank.heat(1, 40.0)
+    bench.run(0.05)
+    assert bench.write("torque_enable", 1) == ALERT
+    assert bench.read("torque_enable") == 0
+    bench.send(1, Instruction.REBOOT)
+    bench.run(0.5)
+    assert bench.write("torque_enable", 1) == StatusError.NONE
+    assert bench.read("torque_enable") == 1
+
+
+def test_a_servo_that_is_still_hot_after_its_reboot_trips_again(bench: Any) -> None:
+    bench.bank.heat(1, 90.0)
+    bench.run(0.05)
+    bench.send(1, Instruction.REBOOT)
+    bench.run(0.5)
+    bench.write("torque_enable", 1)
+    bench.run(0.05)
+    assert bench.read("torque_enable") == 0
+    assert bench.read("hardware_error_status") == HardwareError.OVERHEATING
+
+
+def test_overheating_that_shutdown_does_not_name_leaves_torque_on(
     make_bench: Callable[..., Any],
 ) -> None:
-    bench = make_bench(["XM430-W350"], eeprom={"shutdown": HardwareError.OVERHEATING})
-    stall(bench, 10.0)
-    warm = bench.read("present_temperature")
-    assert 30 < warm < 60
-    bench.run(60.0)
-    assert bench.read("hardware_error_status") & HardwareError.OVERHEATING
+    bench = make_bench(eeprom={"shutdown": HardwareError.OVERLOAD})
+    arm(bench)
+    bench.bank.heat(1, 85.0)
+    bench.run(0.05)
+    assert bench.read("torque_enable") == 1
+    assert bench.write("led", 1) == ALERT
+
+
+def test_an_overload_from_outside_trips_and_holds_until_it_ends(bench: Any) -> None:
+    arm(bench)
+    bench.bank.overload(1)
+    bench.run(0.05)
+    assert bench.read("hardware_error_status") == HardwareError.OVERLOAD
     assert bench.read("torque_enable") == 0
-    hot = bench.read("present_temperature")
-    bench.blocked = False
-    bench.run(20.0)
-    assert bench.read("present_temperature") < hot
+    bench.bank.overload(1, on=False)
+    bench.send(1, Instruction.REBOOT)
+    bench.run(0.5)
+    assert bench.read("hardware_error_status") == 0
 
 
 def test_a_fault_from_outside_is_treated_as_one_from_inside(bench: Any) -> None:
