@@ -1,0 +1,129 @@
+"""Find what answers on a bus at one speed: servos, ids that clash, another protocol, noise.
+
+All servos are asked at once first. Where that gives damaged answers, each id is asked by itself:
+of two servos with one id neither is understood.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from drivers.dynamixel.codec import BROADCAST_ID, MAX_SERVO_ID, Instruction, encode_instruction
+from drivers.dynamixel.errors import CorruptReply, ServoSilent
+from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES
+from drivers.dynamixel.tools.bench_link import (
+    ONE_TRY,
+    PING_ANSWER_BYTES,
+    BenchLink,
+    FoundServo,
+)
+
+ALL_IDS: Final = range(MAX_SERVO_ID + 1)
+_SLOT_S: Final = 0.003
+"""The longest that each servo's turn to answer a broadcast ping takes, its bytes left out."""
+_PROBES: Final = 3
+_PROBED_ADDRESS: Final = 120  # realtime_tick .. present_temperature: two servos never agree on it
+_PROBED_BYTES: Final = 27
+_PROTOCOL_1_PING: Final = b"\xff\xff\xfe\x02\x01\xfe"
+_PROTOCOL_1_STATUS_BYTES: Final = 6
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedReport:
+    """Hold what was found at one speed."""
+
+    baud: int
+    servos: tuple[FoundServo, ...] = ()
+    clashes: tuple[int, ...] = ()
+    """Ids that more than one servo has; the cable may be at fault where it spoils every answer."""
+    protocol_1_ids: tuple[int, ...] = ()
+    """Ids that answer in Protocol 1.0 (AX, MX, and other makes), which is not spoken here."""
+    noise_bytes: int = 0
+    """Received bytes that made no packet, as from servos at another speed."""
+
+
+def scan_speed(
+    link: BenchLink, ids: Sequence[int] | None = None, progress: Progress = lambda text: None
+) -> SpeedReport:
+    """Return what answers at the link's speed: of all ids, or of the given ones.
+
+    Raises:
+        LinkLost: the adapter is gone.
+    """
+    noise_bytes = 0
+    if ids is None:
+        progress(f"{link.baud} baud: all ids at once")
+        servos, noise_bytes = _ask_everyone(link)
+        doubtful = noise_bytes > 0 or len({one.servo_id for one in servos}) < len(servos)
+        ids = ALL_IDS if doubtful else sorted(one.servo_id for one in servos)
+    found, clashes = _ask_each(link, ids, progress)
+    return SpeedReport(
+        baud=link.baud,
+        servos=tuple(found),
+        clashes=tuple(clashes),
+        protocol_1_ids=() if found or clashes else _ask_protocol_1(link),
+        noise_bytes=0 if found or clashes else noise_bytes,
+    )
+
+
+def is_clash(link: BenchLink, servo_id: int) -> bool:
+    """Tell whether more than one servo answers to an id, by what two can never agree on.
+
+    Raises:
+        LinkLost: the adapter is gone.
+    """
+    params = _PROBED_ADDRESS.to_bytes(2, "little") + _PROBED_BYTES.to_bytes(2, "little")
+    damaged = 0
+    for _ in range(_PROBES):
+        packets, junk_bytes = link.listen(servo_id, Instruction.READ, params, _PROBED_BYTES)
+        if len(packets) > 1:
+            return True
+        damaged += junk_bytes > 0
+    return damaged == _PROBES
+
+
+def _ask_everyone(link: BenchLink) -> tuple[list[FoundServo], int]:
+    packets, noise_bytes = link.listen_raw(
+        encode_instruction(BROADCAST_ID, Instruction.PING),
+        len(ALL_IDS) * (PING_ANSWER_BYTES + STATUS_OVERHEAD_BYTES),
+        len(ALL_IDS) * _SLOT_S,
+    )
+    answers = [packet for packet in packets if len(packet.params) == PING_ANSWER_BYTES]
+    return [FoundServo.of(packet) for packet in answers], noise_bytes
+
+
+def _ask_each(
+    link: BenchLink, ids: Iterable[int], progress: Progress
+) -> tuple[list[FoundServo], list[int]]:
+    found, clashes = [], []
+    for servo_id in ids:
+        progress(f"{link.baud} baud: id {servo_id}")
+        if not _answers(link, servo_id):
+            continue
+        if is_clash(link, servo_id):
+            clashes.append(servo_id)
+        else:
+            found.append(link.ping(servo_id))
+    return found, clashes
+
+
+def _answers(link: BenchLink, servo_id: int) -> bool:
+    try:
+        link.ping(servo_id, ONE_TRY)
+    except ServoSilent:
+        return False
+    except CorruptReply:  # something answers; what it is, the caller finds out
+        return True
+    return True
+
+
+def _ask_protocol_1(link: BenchLink) -> tuple[int, ...]:
+    data, _ = link.link.exchange(_PROTOCOL_1_PING, 4 * _PROTOCOL_1_STATUS_BYTES, ONE_TRY.margin_s)
+    frames = [
+        data[at : at + _PROTOCOL_1_STATUS_BYTES]
+        for at in range(len(data) - _PROTOCOL_1_STATUS_BYTES + 1)
+        if data.startswith(b"\xff\xff", at)
+    ]
+    return tuple(frame[2] for frame in frames if frame[3] == 2 and sum(frame[2:]) & 0xFF == 0xFF)
