@@ -8,6 +8,7 @@ import can
 from drivers.base import ByteTransport
 from drivers.clock import Clock
 from drivers.errors import DeviceMissing
+from drivers.estop.gpio_button import Contact
 from drivers.opener import DeviceOpener
 from drivers.wire_recorder import RecordingCanBus, RecordingTransport, WireRecorder
 from drivers.wire_recording import older_part
@@ -64,6 +65,24 @@ class RecordingOpener:
             DeviceMissing: the interface is not there, or the recording cannot be written.
         """
         return RecordingCanBus(self._opener.can(name), self._recorder(name))
+
+    def input_events(self, name: str) -> ByteTransport:
+        """Open a source of input events and record it.
+
+        Raises:
+            DeviceMissing: the device is not there, or the recording cannot be written.
+            DeviceBusy: another process has grabbed it.
+        """
+        return RecordingTransport(self._opener.input_events(name), self._recorder(name))
+
+    def gpio_contact(self, name: str, offset: int) -> Contact:
+        """Open a contact on a GPIO line; it has no bytes to record.
+
+        Raises:
+            DeviceMissing: there is no such chip or line.
+            DeviceBusy: another process holds the line.
+        """
+        return self._opener.gpio_contact(name, offset)
 
     def _recorder(self, name: str) -> WireRecorder:
         earlier = sorted(

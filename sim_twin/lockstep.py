@@ -8,6 +8,7 @@ import can
 
 from drivers.clock import NS_PER_S
 from drivers.errors import DeviceMissing
+from drivers.estop.gpio_button import Contact
 from sim_twin.can import MemoryBus
 from sim_twin.clock import SimClock
 from sim_twin.device import WireDevice
@@ -39,11 +40,13 @@ class MemoryOpener:
         return self._plugged(name, lines[name])
 
     def stream(self, name: str) -> MemoryLine:
-        """Open the camera's stream.
+        """Open the camera's stream, or that of sound.
 
         Raises:
             DeviceMissing: the robot file does not name it, or it is unplugged.
         """
+        if name in self._twin.stream_lines:
+            return self.input_events(name)
         self._expect(name, self._twin.robot.camera.device)
         return self._plugged(name, self._twin.camera_line)
 
@@ -57,6 +60,29 @@ class MemoryOpener:
         bus = MemoryBus(self._twin.can_wire)
         self.opened.append(_Leaver(bus))
         return bus
+
+    def input_events(self, name: str) -> MemoryLine:
+        """Open a device that begins anew for each host, such as the e-stop button.
+
+        Raises:
+            DeviceMissing: the robot file does not name it, or it is unplugged.
+        """
+        lines = self._twin.stream_lines
+        if name not in lines:
+            raise DeviceMissing(f"the twin has no stream {name!r}; it has {list(lines)}")
+        line = self._plugged(name, lines[name])
+        self._twin.streamed_devices[name].announce()
+        return line
+
+    def gpio_contact(self, name: str, offset: int) -> Contact:
+        """Refuse: a GPIO line has no wire that the twin could serve.
+
+        Raises:
+            DeviceMissing: always.
+        """
+        raise DeviceMissing(
+            f"{name}: the twin has no GPIO lines; declare the e-stop as HID to run it in the twin"
+        )
 
     def _plugged(self, name: str, device: WireDevice) -> MemoryLine:
         plug = self._twin.plugs[name]

@@ -19,6 +19,7 @@ from sim_twin.pacer import Pacer, RealTimeFactor
 from sim_twin.priority import claim_priority
 from sim_twin.pty_line import PtyLine
 from sim_twin.referee import REFEREE_SOCKET
+from sim_twin.stream_line import StreamLine
 from sim_twin.twin import Twin
 from vla_deploy.robots import load_robot
 
@@ -63,6 +64,10 @@ class TwinProcess:
         self._lines = [
             PtyLine(device, devices / name) for name, device in self._twin.serial_devices.items()
         ]
+        self._streams = [
+            StreamLine(device, devices / name, device.announce)
+            for name, device in self._twin.streamed_devices.items()
+        ]
         self._referee = JsonLineServer(devices / REFEREE_SOCKET, self.answer)
         self._operations: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "truth": self._truth,
@@ -94,6 +99,8 @@ class TwinProcess:
         self._hub.close()
         for line in self._lines:
             line.close()
+        for stream in self._streams:
+            stream.close()
         if self._camera is not None:
             self._camera.close()
 
@@ -114,6 +121,8 @@ class TwinProcess:
         self._pacer.stepped()
         for line in self._lines:
             line.poll_once()
+        for stream in self._streams:
+            stream.poll_once()
         now_ns = self._twin.now_ns
         self._factor.update(wall_ns, now_ns)
         if self._camera is not None:

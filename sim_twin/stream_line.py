@@ -94,6 +94,6 @@ class StreamLine:
             return
         self._client.close()
         self._client = None
-        self._hang_up()
         self._device.transmit()
+        self._hang_up()
         self._pending = memoryview(b"")

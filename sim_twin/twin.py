@@ -8,15 +8,18 @@ from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
 from sim_twin.can import CanWire, WheelDrive
 from sim_twin.device import WireDevice
+from sim_twin.errors import ModelMismatch
 from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.supply import Supply
 from sim_twin.head_camera import HeadCamera
 from sim_twin.load import load_engine
+from sim_twin.sensors.estop import EstopButtonDevice
 from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.servos import EmulatedServoSpec, ServoBank
+from sim_twin.streams import streamed_devices
 from vla_deploy.robots import RobotDescription
 
 
@@ -55,7 +58,12 @@ class Twin:
             name: LineTamper(device, self._now_ns, frame_bytes.get(name))
             for name, device in self.serial_devices.items()
         }
-        self.plugs = {name: Plug() for name in (*self.lines, robot.camera.device)}
+        self.streamed_devices = streamed_devices(robot)
+        self.stream_lines = {
+            name: LineTamper(device, self._now_ns) for name, device in self.streamed_devices.items()
+        }
+        names = (*self.lines, *self.stream_lines, robot.camera.device)
+        self.plugs = {name: Plug() for name in names}
         self.servo_supply = Supply()
         self.faults = FaultInjector(self)
         self._encoder_slip_rad = np.zeros(len(robot.servo_bus.servos))
@@ -67,6 +75,18 @@ class Twin:
     def now_ns(self) -> int:
         """Return simulated time in nanoseconds."""
         return self.engine.now_ns
+
+    @property
+    def estop_button(self) -> EstopButtonDevice:
+        """Return the emergency-stop button, to be pressed and released.
+
+        Raises:
+            ModelMismatch: the robot file declares none that the twin has.
+        """
+        for device in self.streamed_devices.values():
+            if isinstance(device, EstopButtonDevice):
+                return device
+        raise ModelMismatch(f"{self.robot.name} has no e-stop button of model HID in its file")
 
     @property
     def camera(self) -> HeadCamera:
@@ -100,6 +120,8 @@ class Twin:
         self.lidar.step(now_ns)
         self.imu.step(now_ns)
         self.can_wire.poll(now_ns)
+        for device in self.streamed_devices.values():
+            device.step(now_ns)
         if self._camera is not None:
             self._camera.device.step(now_ns)
 

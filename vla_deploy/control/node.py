@@ -12,6 +12,7 @@ from vla_deploy.control.arming import Arming
 from vla_deploy.control.axes import Flags
 from vla_deploy.control.base_motion import BaseLimits, BaseRamp
 from vla_deploy.control.dispatch import Dispatcher, axis_limits
+from vla_deploy.control.estop_button import EstopButton
 from vla_deploy.control.gravity import GravityOffset
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionSet
@@ -82,7 +83,10 @@ class ControlNode:
         self._status_every = max(1, round(profile.control_rate_hz / _STATUS_HZ))
 
         space = SharedSpace(context.run_dir / "ipc", clock)
-        self._desk = OperatorDesk(space.ring_reader("operator", from_start=False))
+        self._button = EstopButton(robot, devices, clock)
+        self._desk = OperatorDesk(
+            space.ring_reader("operator", from_start=False), self._button.source
+        )
         self._commands = space.ring_reader("motion_command", from_start=False)
         self._watch = Watch(space, self._servos, self._wheels, clock)
         self._telemetry = Telemetry(space, len(robot.joint_names))
@@ -96,7 +100,7 @@ class ControlNode:
         self._notice = ""
 
     def start(self) -> None:
-        """Open both buses; groups of stop category 2 keep the power they have, others lose it.
+        """Open buses and button; groups of stop category 2 keep the power they have.
 
         Raises:
             DriverError: a device is missing, busy, silent or not the one declared.
@@ -105,6 +109,7 @@ class ControlNode:
         self._release()
         try:
             self._wheels.open()
+            self._button.open()
         except DriverError:
             self._servos.close()  # before `stop` could let arms fall that hold themselves
             raise
@@ -136,6 +141,7 @@ class ControlNode:
         self._wheels.cycle(0.0, 0.0)
         self._wheels.close()
         self._servos.close()
+        self._button.close()
         for topic in (self._telemetry, self._watch, self._commands):
             topic.close()
 

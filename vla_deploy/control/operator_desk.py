@@ -1,6 +1,7 @@
 """Take the operator's acts: an emergency stop at once, everything else one per tick, in order."""
 
 from collections import deque
+from collections.abc import Callable
 from enum import Enum
 
 from vla_deploy.ipc import RingReader
@@ -16,10 +17,15 @@ class Act(Enum):
 
 
 class OperatorDesk:
-    """Drain the operator ring."""
+    """Drain the operator ring, and look at the robot's own button.
 
-    def __init__(self, ring: RingReader) -> None:
+    `button` names the button as the source of a stop for as long as it is pressed.
+    """
+
+    def __init__(self, ring: RingReader, button: Callable[[], str | None] = lambda: None) -> None:
         self._ring = ring
+        self._button = button
+        self._was_pressed = False
         self._waiting: deque[Act] = deque()
         self.estop_source: str | None = None
         self.complaint = ""
@@ -36,6 +42,7 @@ class OperatorDesk:
             self._take(event.payload.get("act"), str(event.payload.get("source", "unknown")))
         if self._ring.lost > lost_before:
             self._stop("operator events were lost")
+        self._look_at_button()
 
     def next_act(self) -> Act | None:
         """Return the next act other than an emergency stop."""
@@ -52,6 +59,14 @@ class OperatorDesk:
             self._stop(source)
         else:
             self._waiting.append(act)
+
+    def _look_at_button(self) -> None:
+        """Stop as long as the button is pressed; only the press itself drops the waiting acts."""
+        source = self._button()
+        if source is not None and not self._was_pressed:
+            self._stop(source)
+        self._was_pressed = source is not None
+        self.estop_source = self.estop_source or source
 
     def _stop(self, source: str) -> None:
         self.estop_source = source

@@ -12,7 +12,10 @@ from typing import Any
 from vla_deploy.robots.schema import Fault, is_number
 
 Document = Mapping[str, Any]
-DEVICES = ("servo_bus", "can_bus", "lidar", "imu", "camera")
+DEVICES = (
+    *("servo_bus", "can_bus", "lidar", "imu", "camera"),
+    *("estop", "microphone", "speaker"),
+)
 
 
 def table(document: Document, key: object) -> Document:

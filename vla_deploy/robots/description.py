@@ -116,6 +116,26 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EstopButton:
+    """Describe the emergency-stop input; `number` is a key's code (HID) or a GPIO line's offset."""
+
+    device: str
+    path: str
+    model: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audio:
+    """Describe a microphone or a speaker; `path` is its name at the sound system, or a socket."""
+
+    device: str
+    path: str
+    rate_hz: int
+    channels: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointLimits:
     """Bound one joint's motion in its own unit (rad, or m for a finger)."""
 
@@ -202,6 +222,9 @@ class RobotDescription:
     hands: Mapping[str, Hand]
     poses: Mapping[str, Mapping[str, float]]
     home: Home
+    estop: EstopButton | None = None
+    microphone: Audio | None = None
+    speaker: Audio | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -271,8 +294,9 @@ class RobotDescription:
         Raises:
             KeyError: the robot has no device of that name; the message lists those it has.
         """
-        buses = (self.servo_bus, self.can_bus, self.lidar, self.imu, self.camera)
-        paths = {device.device: device.path for device in buses}
+        fixed = (self.servo_bus, self.can_bus, self.lidar, self.imu, self.camera)
+        optional = (self.estop, self.microphone, self.speaker)
+        paths = {device.device: device.path for device in (*fixed, *optional) if device}
         if name not in paths:
             raise KeyError(f"{self.name} has no device {name!r}; it has {', '.join(paths)}")
         return paths[name] if devices_dir is None else str(devices_dir / name)

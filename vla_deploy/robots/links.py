@@ -16,6 +16,8 @@ def device_links(robot: RobotDescription, devices_dir: Path | None = None) -> di
         robot.imu.device: sensor_model(Kind.IMU, robot.imu.model).baud,
         robot.camera.device: 0,
     }
+    optional = (robot.estop, robot.microphone, robot.speaker)
+    bauds.update({device.device: 0 for device in optional if device})
     return {
         name: DeviceLink(path=robot.device_path(name, devices_dir), baud=baud)
         for name, baud in bauds.items()

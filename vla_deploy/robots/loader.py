@@ -9,10 +9,12 @@ from xml.etree import ElementTree
 from vla_deploy.robots import schema
 from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
 from vla_deploy.robots.description import (
+    Audio,
     BaseGeometry,
     Camera,
     CanBus,
     Drive,
+    EstopButton,
     FloorPose,
     Group,
     Hand,
@@ -42,6 +44,9 @@ SINGLE: Mapping[str, Shape] = {
     "lidar": schema.LIDAR,
     "imu": schema.IMU,
     "camera": schema.CAMERA,
+    "estop": schema.ESTOP,
+    "microphone": schema.AUDIO,
+    "speaker": schema.AUDIO,
     "home": schema.HOME,
 }
 NAMED: Mapping[str, Shape] = {
@@ -150,6 +155,9 @@ def _build(document: Document, directory: Path) -> RobotDescription:
         lidar=SerialSensor(**document["lidar"]),
         imu=SerialSensor(**document["imu"]),
         camera=Camera(**document["camera"]),
+        estop=EstopButton(**document["estop"]) if "estop" in document else None,
+        microphone=Audio(**document["microphone"]) if "microphone" in document else None,
+        speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         limits={name: JointLimits(**row) for name, row in document["limits"].items()},
         groups={name: _group(name, row) for name, row in document["groups"].items()},
         hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, TypeGuard
 
+from drivers.estop.open_estop import MODELS as ESTOP_MODELS
 from drivers.registry import Kind, model_names
 
 
@@ -26,6 +27,7 @@ class Check:
 
     expected: str
     holds: Callable[[Any], bool]
+    is_optional: bool = False
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -50,6 +52,7 @@ NUMBER = Check(expected="a number", holds=is_number)
 POSITIVE = Check(expected="a number above 0", holds=lambda value: is_number(value) and value > 0)
 TEXT = Check(expected="a text", holds=lambda value: isinstance(value, str) and value != "")
 TABLE = Check(expected="a table", holds=lambda value: isinstance(value, dict))
+OPTIONAL_TABLE = Check(expected="a table", holds=TABLE.holds, is_optional=True)
 TABLES = Check(
     expected="a list of tables",
     holds=lambda value: isinstance(value, list) and all(isinstance(row, dict) for row in value),
@@ -80,6 +83,9 @@ ROBOT: Shape = {
     "lidar": TABLE,
     "imu": TABLE,
     "camera": TABLE,
+    "estop": OPTIONAL_TABLE,
+    "microphone": OPTIONAL_TABLE,
+    "speaker": OPTIONAL_TABLE,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE,
@@ -147,6 +153,18 @@ CAMERA: Shape = {
         holds=lambda value: is_number(value) and 0.1 <= value <= 2.8,
     ),
 }
+ESTOP: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "model": one_of(*ESTOP_MODELS),
+    "number": _integer(0, 767),
+}
+AUDIO: Shape = {
+    "device": TEXT,
+    "path": TEXT,
+    "rate_hz": one_of(8000, 16000, 22050, 24000, 32000, 44100, 48000),
+    "channels": _integer(1, 8),
+}
 LIMITS: Shape = {
     "min": NUMBER,
     "max": NUMBER,
@@ -168,7 +186,7 @@ def check_record(record: Mapping[str, Any], key: str, shape: Shape) -> tuple[Fau
     missing = [
         Fault(key=prefix + name, got="nothing", expected=check.expected)
         for name, check in shape.items()
-        if name not in record
+        if name not in record and not check.is_optional
     ]
     unknown = [
         Fault(key=prefix + name, got="an unknown key", expected=f"one of {', '.join(shape)}")

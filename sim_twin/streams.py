@@ -1,0 +1,26 @@
+"""List the emulated devices that a host reaches by a stream: the e-stop button, sound."""
+
+from typing import Protocol
+
+from sim_twin.device import WireDevice
+from sim_twin.sensors.estop import EstopButtonDevice
+from vla_deploy.robots import RobotDescription
+
+
+class StreamedDevice(WireDevice, Protocol):
+    """Emulate a device whose hosts come and go."""
+
+    def announce(self) -> None:
+        """Begin anew for the next host."""
+        ...
+
+
+def streamed_devices(robot: RobotDescription) -> dict[str, StreamedDevice]:
+    """Return what the robot file declares, by device name.
+
+    A button on GPIO is none of these: the twin has no GPIO lines.
+    """
+    devices: dict[str, StreamedDevice] = {}
+    if robot.estop is not None and robot.estop.model == "HID":
+        devices[robot.estop.device] = EstopButtonDevice(robot.estop.number)
+    return devices

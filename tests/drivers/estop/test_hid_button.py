@@ -1,0 +1,80 @@
+"""What is not surely a released button reads as pressed."""
+
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.estop.base import ButtonState
+from drivers.estop.hid_button import HidButton
+from drivers.estop.input_event import EVENT, decode_event, key_report
+from sim_twin.contracts.scripted import ManualClock, ScriptedLine
+
+KEY = 288
+PRESS = struct.pack("@llHHi", 12, 345_678, 1, KEY, 1)
+RELEASE = struct.pack("@llHHi", 13, 0, 1, KEY, 0)
+REPEAT = struct.pack("@llHHi", 13, 0, 1, KEY, 2)
+OTHER_KEY = struct.pack("@llHHi", 13, 0, 1, KEY + 1, 1)
+SYN = struct.pack("@llHHi", 13, 0, 0, 0, 0)
+DROPPED = struct.pack("@llHHi", 13, 0, 0, 3, 0)
+SCAN_CODE = struct.pack("@llHHi", 13, 0, 4, 4, 0x90001)
+
+
+def make(data: bytes = b"") -> tuple[HidButton, ScriptedLine]:
+    line = ScriptedLine(pending=bytearray(data))
+    return HidButton(line, ManualClock(10**9), KEY), line
+
+
+def test_an_event_is_read_as_the_kernel_writes_it() -> None:
+    event = decode_event(PRESS)
+    assert event is not None
+    assert (event.time_us, event.type, event.code, event.value) == (12_345_678, 1, KEY, 1)
+    assert key_report(KEY, down=True, now_ns=12_345_678_000)[: EVENT.size] == PRESS
+
+
+@pytest.mark.parametrize(
+    ("told", "state"),
+    [
+        (b"", ButtonState.UNKNOWN),
+        (SYN + SCAN_CODE + OTHER_KEY, ButtonState.UNKNOWN),
+        (RELEASE, ButtonState.RELEASED),
+        (RELEASE + PRESS, ButtonState.PRESSED),
+        (RELEASE + PRESS + REPEAT + SYN, ButtonState.PRESSED),
+        (RELEASE + PRESS[:-1], ButtonState.RELEASED),
+        (PRESS + RELEASE, ButtonState.RELEASED),
+        (RELEASE + DROPPED, ButtonState.LOST),
+        (RELEASE + b"\xff" * EVENT.size, ButtonState.LOST),
+        (RELEASE + b"\xff" * EVENT.size + RELEASE, ButtonState.LOST),
+    ],
+)
+def test_events_in_order_give_the_state(told: bytes, state: ButtonState) -> None:
+    button, _ = make(told)
+    reading = button.poll()
+    assert reading.state is state
+    assert reading.pressed is (state is not ButtonState.RELEASED)
+
+
+def test_events_in_pieces_are_put_together() -> None:
+    button, line = make()
+    for byte in RELEASE[:-1]:
+        line.pending.append(byte)
+        assert button.poll().state is ButtonState.UNKNOWN
+    line.pending.append(RELEASE[-1])
+    assert button.poll().state is ButtonState.RELEASED
+
+
+def test_a_device_that_sends_without_end_is_lost_and_holds_nobody_up() -> None:
+    button, _ = make(RELEASE * 100_000)
+    reading = button.poll()
+    assert reading.state is ButtonState.LOST
+    assert "without end" in reading.reason
+
+
+@given(st.binary(max_size=400))
+def test_only_a_true_release_event_reads_as_released(noise: bytes) -> None:
+    button, _ = make(noise)
+    whole = range(0, len(noise) - EVENT.size + 1, EVENT.size)
+    events = [decode_event(noise[at : at + EVENT.size]) for at in whole]
+    told = any(e is not None and (e.type, e.code, e.value) == (1, KEY, 0) for e in events)
+    assert told or button.poll().pressed
