@@ -1,6 +1,6 @@
 """Declare what every emulated device has in common: bytes in, bytes out, simulated time."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 class WireDevice(Protocol):
@@ -20,4 +20,21 @@ class WireDevice(Protocol):
 
     def step(self, now_ns: int) -> None:
         """Advance the firmware to simulated time `now_ns`."""
+        ...
+
+
+@runtime_checkable
+class TimedDevice(WireDevice, Protocol):
+    """Have bytes under way, which arrive at the host some time after they were asked for.
+
+    The line calls `step` with the present time before it hands over or fetches bytes.
+    """
+
+    @property
+    def paced(self) -> bool:
+        """Tell whether bytes take time, so that a host which waits for them lets time pass."""
+        ...
+
+    def next_due_ns(self) -> int | None:
+        """Return when the next bytes arrive at the host; None when nothing is under way."""
         ...

@@ -3,26 +3,49 @@
 The line holds its own end of the terminal open, so that a poll on it wakes for bytes alone and not
 because no driver is there yet. Bytes that nobody fetches are lost once the terminal is full, as on
 a UART without a listener; `lost_bytes` counts them.
+
+A pseudo-terminal has no speed of its own, but keeps the one that the host has set: `on_baud` is
+told it before the bytes that came at it.
 """
 
+import fcntl
 import os
+import struct
 import tty
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from drivers.clock import Clock
 from drivers.errors import LinkLost
 from sim_twin.device import WireDevice
 
 _CHUNK_BYTES: Final = 4096
+_TCGETS2: Final = 0x802C542A
+_TERMIOS2: Final = struct.Struct("4I20s2I")
+"""Four words of flags, line discipline and characters, speed in, speed out: any speed, not only
+those with a constant, as <asm-generic/termbits.h> has it."""
 
 
 class PtyLine:
-    """Carry bytes between a pseudo-terminal and a device; belongs to one single-threaded loop."""
+    """Carry bytes between a pseudo-terminal and a device; belongs to one single-threaded loop.
 
-    def __init__(self, device: WireDevice, link_path: Path) -> None:
+    With `clock` the device is told the time whenever bytes pass, for one that runs on wall time.
+    """
+
+    def __init__(
+        self,
+        device: WireDevice,
+        link_path: Path,
+        *,
+        clock: Clock | None = None,
+        on_baud: Callable[[int], None] | None = None,
+    ) -> None:
         self.link_path = link_path
         self.lost_bytes = 0
         self._device = device
+        self._clock = clock
+        self._on_baud = on_baud
         self._ends: tuple[int, int] | None = None
         self.replug()
 
@@ -40,9 +63,13 @@ class PtyLine:
         Raises:
             LinkLost: the line is unplugged.
         """
-        line = self.fileno()
+        line, terminal = self._plugged_ends()
         request = self._read(line)
+        if self._clock is not None:
+            self._device.step(self._clock.now_ns())
         if request:
+            if self._on_baud is not None:
+                self._on_baud(_baud_of(terminal))
             self._device.receive(request)
         reply = self._device.transmit()
         if reply:
@@ -98,3 +125,10 @@ class PtyLine:
         except BlockingIOError:
             sent = 0
         self.lost_bytes += len(reply) - sent
+
+
+def _baud_of(terminal: int) -> int:
+    """Return the speed at which the host sends."""
+    settings = fcntl.ioctl(terminal, _TCGETS2, bytes(_TERMIOS2.size))
+    speed: int = _TERMIOS2.unpack(settings)[-1]
+    return speed

@@ -1,6 +1,11 @@
-"""Run `python -m sim_twin.servos --link PATH`: emulated servos on a pseudo-terminal."""
+"""Run `python -m sim_twin.servos --link PATH`: emulated servos on a pseudo-terminal.
+
+Without --baud replies are there at once, whatever speed the host sets. With it the servos are set
+to that rate, understand no other, and every byte takes its time.
+"""
 
 import argparse
+import gc
 import signal
 import sys
 from collections.abc import Sequence
@@ -8,22 +13,73 @@ from pathlib import Path
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.dynamixel.codec import MAX_SERVO_ID
-from drivers.dynamixel.control_table import MODELS
+from drivers.dynamixel.control_table import BAUD_RATES, MODELS
+from sim_twin.priority import claim_priority
 from sim_twin.servos.server import FreeServos, make_specs, serve
+from sim_twin.servos.timing import WireTiming
+
+_EXAMPLE = (
+    "example: python -m sim_twin.servos --link /tmp/servos --baud 1000000 --return-delay-us 0"
+)
+_MAX_RETURN_DELAY_US = 508
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m sim_twin.servos", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m sim_twin.servos",
+        description=__doc__,
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--link", type=Path, required=True, help="path of the link to the terminal")
     parser.add_argument("--servos", type=int, default=16, help="how many, with ids from 1")
     parser.add_argument(
         "--models", nargs="+", choices=sorted(MODELS), default=["XM430-W350"], help="in turn"
     )
     parser.add_argument("--seconds", type=float, help="stop after this time; else run until killed")
+    parser.add_argument(
+        "--baud", type=int, choices=sorted(BAUD_RATES.values()), help="let bytes take their time"
+    )
+    parser.add_argument("--return-delay-us", type=int, help="of every servo; as delivered: 500")
+    parser.add_argument(
+        "--latency-timer-ms", type=float, default=0.0, help="of the USB adapter; as delivered: 16"
+    )
+    parser.add_argument("--jitter-us", type=float, default=0.0, help="longest additional delay")
+    parser.add_argument("--seed", type=int, default=0, help="of the jitter")
     options = parser.parse_args(arguments)
+    _check(parser, options)
+    return options
+
+
+def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     if not 1 <= options.servos <= MAX_SERVO_ID:
         parser.error(f"--servos: expected 1..{MAX_SERVO_ID}, got {options.servos}")
-    return options
+    if not 0 <= (options.return_delay_us or 0) <= _MAX_RETURN_DELAY_US:
+        parser.error(
+            f"--return-delay-us: expected 0..{_MAX_RETURN_DELAY_US}, got {options.return_delay_us}"
+        )
+    for name in ("latency_timer_ms", "jitter_us"):
+        value, flag = getattr(options, name), "--" + name.replace("_", "-")
+        if value < 0.0:
+            parser.error(f"{flag}: expected 0 or more, got {value}")
+        if value and options.baud is None:
+            parser.error(f"{flag}: only a paced bus has it; give --baud too")
+
+
+def _build(options: argparse.Namespace) -> FreeServos:
+    eeprom = {}
+    if options.return_delay_us is not None:
+        eeprom["return_delay_time"] = options.return_delay_us // 2
+    timing = None
+    if options.baud is not None:
+        eeprom["baud_rate"] = {rate: value for value, rate in BAUD_RATES.items()}[options.baud]
+        timing = WireTiming(
+            baud=options.baud,
+            latency_timer_s=options.latency_timer_ms / 1e3,
+            jitter_s=options.jitter_us / 1e6,
+            seed=options.seed,
+        )
+    return FreeServos(make_specs(options.servos, options.models, eeprom), timing=timing)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -34,7 +90,10 @@ def main(arguments: Sequence[str]) -> int:
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: stopped.append(received))
-    servos = FreeServos(make_specs(options.servos, options.models))
+    servos = _build(options)
+    if options.baud is not None:
+        gc.freeze()  # a full collection takes longer than a reply
+        claim_priority()
     serve(
         servos,
         options.link,

@@ -80,6 +80,8 @@ class ServoBank:
 
         With None, which is so at first, every servo understands the host.
         """
+        if baud == self._audience.host_baud:
+            return
         self._audience.host_baud = baud
         self._audience.tune()
         if baud is not None:

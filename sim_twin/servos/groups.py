@@ -124,6 +124,8 @@ class GroupAccess:
             error, data = self._speaker.read(row, address, length)
             entries.append((error, self._speaker.shown_id(row), data.ljust(length, b"\0")))
             present.append(row)
+        if not present:
+            return []
         absent = [(0, 0, bytes(length)) for _, _, length in requests[len(present) :]]
         return self._chain(present, encode_fast_status(entries + absent), requests)
 

@@ -1,7 +1,12 @@
-"""Serve free-running servos on a pseudo-terminal, for drivers and tools that need no robot."""
+"""Serve free-running servos on a pseudo-terminal, for drivers and tools that need no robot.
+
+On a paced bus a reply leaves at the microsecond at which its last bit would have arrived: the loop
+sleeps until shortly before and then watches the clock, and shafts are turned while nothing is due.
+A paced bus also hears at which speed the host talks; see `ServoBank.set_host_baud`.
+"""
 
 import select
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import cycle, islice
 from pathlib import Path
@@ -13,10 +18,16 @@ from sim_twin.pty_line import PtyLine
 from sim_twin.servos.bank import ServoBank
 from sim_twin.servos.rotor import FreeRotors
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
+from sim_twin.servos.timing import WireTiming
 
 STEP_S: Final = 0.002
 _STEP_NS: Final = round(STEP_S * NS_PER_S)
 _MAX_STEPS_BEHIND: Final = 50
+_MAX_STEPS_WAITING: Final = 5
+_STEP_COST_NS: Final = 300_000
+"""A step does not begin this shortly before a reply is due."""
+_WATCH_NS: Final = 150_000
+"""Sleep may end this late, so the rest of the time before a reply is spent watching the clock."""
 
 
 @dataclass(slots=True)
@@ -26,12 +37,13 @@ class FreeServos:
     specs: Sequence[EmulatedServoSpec]
     options: FirmwareOptions = field(default_factory=FirmwareOptions)
     supply_v: float = 12.0
+    timing: WireTiming | None = None
     bank: ServoBank = field(init=False)
     rotors: FreeRotors = field(init=False)
     now_ns: int = 0
 
     def __post_init__(self) -> None:
-        self.bank = ServoBank(self.specs, self.options)
+        self.bank = ServoBank(self.specs, self.options, self.timing)
         self.rotors = FreeRotors([MODELS[spec.model_name] for spec in self.specs])
 
     def advance_to(self, now_ns: int) -> None:
@@ -54,10 +66,15 @@ class FreeServos:
         rotors.advance(duty, STEP_S)
 
 
-def make_specs(count: int, model_names: Sequence[str]) -> list[EmulatedServoSpec]:
+def make_specs(
+    count: int, model_names: Sequence[str], eeprom: Mapping[str, int] | None = None
+) -> list[EmulatedServoSpec]:
     """Return servos with ids from 1 whose models take turns."""
     names = islice(cycle(model_names), count)
-    return [EmulatedServoSpec(id=row + 1, model_name=name) for row, name in enumerate(names)]
+    return [
+        EmulatedServoSpec(id=row + 1, model_name=name, eeprom=eeprom or {})
+        for row, name in enumerate(names)
+    ]
 
 
 def serve(
@@ -65,14 +82,36 @@ def serve(
 ) -> None:
     """Answer on `link_path` until `should_stop()`, asleep between bytes and steps."""
     servos.advance_to(clock.now_ns())
-    line = PtyLine(servos.bank, link_path)
-    poller = select.poll()
-    poller.register(line.fileno(), select.POLLIN)
+    bank = servos.bank
+    if bank.paced:
+        line = PtyLine(bank, link_path, clock=clock, on_baud=bank.set_host_baud)
+    else:
+        line = PtyLine(bank, link_path)
     try:
         while not should_stop():
-            servos.advance_to(clock.now_ns())
-            remaining_ns = servos.now_ns + _STEP_NS - clock.now_ns()
-            if poller.poll(max(0.0, remaining_ns / 1e6)):
-                line.poll_once()
+            _turn(servos, line, clock)
     finally:
         line.close()
+
+
+def _turn(servos: FreeServos, line: PtyLine, clock: Clock) -> None:
+    """Do what is due, then wait for bytes or for what is due next."""
+    now_ns, due_ns = clock.now_ns(), servos.bank.next_due_ns()
+    behind = now_ns - servos.now_ns > _MAX_STEPS_WAITING * _STEP_NS
+    if due_ns is None or due_ns - now_ns > _STEP_COST_NS or behind:
+        servos.advance_to(now_ns)
+        step_ns = servos.now_ns + _STEP_NS
+        if due_ns is None or due_ns > step_ns + _STEP_COST_NS:
+            if _readable(line, step_ns - clock.now_ns()):
+                line.poll_once()
+            return
+    if not _readable(line, due_ns - _WATCH_NS - clock.now_ns()):
+        while clock.now_ns() < due_ns:
+            pass
+    line.poll_once()
+
+
+def _readable(line: PtyLine, timeout_ns: int) -> bool:
+    """Wait for bytes of the host; select alone among its kind takes less than a millisecond."""
+    ready, _, _ = select.select([line.fileno()], [], [], max(0.0, timeout_ns / NS_PER_S))
+    return bool(ready)
