@@ -1,0 +1,21 @@
+"""`vla-deploy servo ...`: find, look at, set up and calibrate servos."""
+
+from typing import Any
+
+from vla_deploy.cli import servo_change, servo_find, servo_monitor
+from vla_deploy.cli.example import add_command
+
+PARTS = (servo_find, servo_monitor, servo_change)
+
+
+def register(commands: Any) -> None:
+    """Add the group of commands."""
+    servo = add_command(
+        commands,
+        "servo",
+        "find, look at, set up and calibrate servos",
+        "  vla-deploy servo scan --port /dev/ttyUSB0\n  vla-deploy servo monitor --robot butler\n",
+    )
+    group = servo.add_subparsers(dest="servo_command", required=True, metavar="SERVO_COMMAND")
+    for part in PARTS:
+        part.register(group)

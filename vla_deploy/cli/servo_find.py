@@ -1,0 +1,232 @@
+"""`vla-deploy servo scan | ping | info`: see what is on a servo bus; nothing is changed."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from drivers.clock import NS_PER_S
+from drivers.dynamixel.tools import BenchLink, FoundServo, SpeedReport, scan_speed
+from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.cli.example import add_command
+from vla_deploy.cli.servo_wire import (
+    SPEEDS,
+    ProgressLine,
+    ServoWire,
+    add_wire_arguments,
+    servo_id,
+    wire_of,
+)
+
+
+def register(commands: Any) -> None:
+    """Add the commands."""
+    scan = add_command(
+        commands,
+        "scan",
+        "find all servos, at every speed unless --baud names one",
+        "  vla-deploy servo scan --port /dev/ttyUSB0\n"
+        "  vla-deploy servo scan --robot butler --json\n"
+        "  vla-deploy servo scan --port /dev/ttyUSB0 --baud 57600 --ids 1-20\n",
+    )
+    add_wire_arguments(scan)
+    scan.add_argument("--ids", type=_id_range, metavar="A-B", help="ask these ids one by one")
+    scan.set_defaults(run=run_scan)
+    ping = add_command(
+        commands, "ping", "ask servos who they are", "  vla-deploy servo ping 1 2 --robot butler\n"
+    )
+    add_wire_arguments(ping)
+    ping.add_argument("ids", type=servo_id, nargs="+", metavar="ID")
+    ping.set_defaults(run=run_ping)
+    info = add_command(
+        commands, "info", "print every register of a servo", "  vla-deploy servo info 3\n"
+    )
+    add_wire_arguments(info)
+    info.add_argument("id", type=servo_id)
+    info.set_defaults(run=run_info)
+
+
+def _id_range(text: str) -> Sequence[int]:
+    first, dash, last = text.partition("-")
+    low, high = servo_id(first), servo_id(last if dash else first)
+    if low > high:
+        raise argparse.ArgumentTypeError(f"expected the smaller id first, got {text!r}")
+    return range(low, high + 1)
+
+
+def run_scan(arguments: argparse.Namespace) -> int:
+    """Print what answers at each speed.
+
+    Raises:
+        CommandFailed: nothing answers, ids clash, or a declared servo is missing.
+    """
+    wire = wire_of(arguments)
+    progress = ProgressLine(quiet=arguments.json)
+    reports = []
+    for baud in _speeds(wire):
+        with wire.open(baud) as link:
+            reports.append(scan_speed(link, arguments.ids, progress))
+    progress.clear()
+    missing = _missing(wire, reports) if arguments.ids is None else []
+    if arguments.json:
+        print(json.dumps(_scan_document(wire, reports, missing), indent=2))
+    else:
+        print("\n".join(_scan_lines(wire, reports)))
+    _raise_findings(wire, reports, missing)
+    return 0
+
+
+def _speeds(wire: ServoWire) -> Sequence[int]:
+    if wire.baud_given or wire.is_pseudo_terminal:
+        return (wire.baud,)
+    return (wire.baud, *(speed for speed in SPEEDS if speed != wire.baud))
+
+
+def _missing(wire: ServoWire, reports: Sequence[SpeedReport]) -> list[int]:
+    answered = {one.servo_id for one in reports[0].servos} | set(reports[0].clashes)
+    return sorted(set(wire.joints) - answered)
+
+
+def _scan_document(
+    wire: ServoWire, reports: Sequence[SpeedReport], missing: Sequence[int]
+) -> dict[str, Any]:
+    return {
+        "port": str(wire.port),
+        "servos": [
+            {"baud": report.baud, **describe(wire, servo)}
+            for report in reports
+            for servo in report.servos
+        ],
+        "clashes": [
+            {"baud": report.baud, "id": one} for report in reports for one in report.clashes
+        ],
+        "protocol_1": [
+            {"baud": report.baud, "id": one} for report in reports for one in report.protocol_1_ids
+        ],
+        "noise_bytes": {report.baud: report.noise_bytes for report in reports},
+        "missing": list(missing),
+    }
+
+
+def describe(wire: ServoWire, servo: FoundServo) -> dict[str, Any]:
+    """Return a servo's row of a JSON document."""
+    return {
+        "id": servo.servo_id,
+        "joint": wire.joint(servo.servo_id) or None,
+        "model": servo.model_name,
+        "model_number": servo.model_number,
+        "firmware": servo.firmware,
+    }
+
+
+def _scan_lines(wire: ServoWire, reports: Sequence[SpeedReport]) -> list[str]:
+    rows = [
+        f"{one.servo_id:>4}  {report.baud:>8}  {one.model_name:<14} {one.firmware:>8}  "
+        f"{wire.joint(one.servo_id)}".rstrip()
+        for report in reports
+        for one in report.servos
+    ]
+    head = [
+        f"{'id':>4}  {'baud':>8}  {'model':<14} {'firmware':>8}" + "  joint" * bool(wire.joints)
+    ]
+    speeds = [report.baud for report in reports if report.servos]
+    hints = [
+        f"servos at {len(speeds)} speeds ({', '.join(map(str, speeds))}): on one bus all need the "
+        "same; see: vla-deploy servo set-baud --help"
+    ]
+    return [*(head if rows else []), *rows, *(hints if len(speeds) > 1 else [])]
+
+
+def _raise_findings(
+    wire: ServoWire, reports: Sequence[SpeedReport], missing: Sequence[int]
+) -> None:
+    for report in reports:
+        if report.clashes:
+            ids = ", ".join(map(str, report.clashes))
+            raise CommandFailed(
+                f"{wire.port} at {report.baud} baud: the answers of id {ids} are damaged: more "
+                "than one servo has it, or the cable is bad. Connect one of them alone and give it "
+                "a free id: vla-deploy servo set-id"
+            )
+    if not any(report.servos for report in reports):
+        raise CommandFailed(_nothing_found(wire, reports))
+    if missing:
+        names = ", ".join(wire.label(one) for one in missing)
+        raise CommandFailed(
+            f"{wire.port} at {reports[0].baud} baud: no answer from {names}; check power, cable "
+            "and speed (see the table for servos at another speed)"
+        )
+
+
+def _nothing_found(wire: ServoWire, reports: Sequence[SpeedReport]) -> str:
+    old = next((report for report in reports if report.protocol_1_ids), None)
+    noisy = next((report for report in reports if report.noise_bytes), None)
+    if old is not None:
+        ids = ", ".join(map(str, old.protocol_1_ids))
+        return (
+            f"{wire.port} at {old.baud} baud: id {ids} answers in Protocol 1.0, only 2.0 is spoken "
+            "here; set the servo's protocol_type to 2, if it has one"
+        )
+    if noisy is not None:
+        return (
+            f"{wire.port}: bytes came at {noisy.baud} baud, but no packet: another speed, an "
+            "adapter that echoes, or another device; check the adapter's mode"
+        )
+    asked = ", ".join(str(report.baud) for report in reports)
+    return f"{wire.port}: no servo answers at {asked} baud; check power, cable and port"
+
+
+def run_ping(arguments: argparse.Namespace) -> int:
+    """Print who answers.
+
+    Raises:
+        ServoSilent: one of them does not.
+    """
+    wire = wire_of(arguments)
+    with wire.open() as link:
+        rows = [_pinged(link, wire, one) for one in arguments.ids]
+    if arguments.json:
+        print(json.dumps(rows, indent=2))
+        return 0
+    for row in rows:
+        joint = f" ({row['joint']})" if row["joint"] else ""
+        print(
+            f"servo {row['id']}{joint}: {row['model']}, firmware {row['firmware']}, "
+            f"{1e3 * row['round_trip_s']:.2f} ms"
+        )
+    return 0
+
+
+def _pinged(link: BenchLink, wire: ServoWire, one: int) -> dict[str, Any]:
+    start_ns = wire.clock.now_ns()
+    servo = link.ping(one)
+    taken_s = (wire.clock.now_ns() - start_ns) / NS_PER_S
+    return {**describe(wire, servo), "round_trip_s": taken_s}
+
+
+def run_info(arguments: argparse.Namespace) -> int:
+    """Print every register.
+
+    Raises:
+        ServoSilent: the servo does not answer.
+        WrongServo: its registers are not known.
+    """
+    wire = wire_of(arguments)
+    with wire.open() as link:
+        found = link.ping(arguments.id)
+        servo = link.servo(arguments.id)
+        registers = {
+            name: {**asdict(register), "value": link.read(servo, name)}
+            for name, register in servo.model.registers.items()
+        }
+    if arguments.json:
+        print(json.dumps({**describe(wire, found), "registers": registers}, indent=2))
+        return 0
+    print(f"{wire.label(arguments.id)}: {found.model_name}, firmware {found.firmware}")
+    for name, row in registers.items():
+        kind = "EEPROM" if row["eeprom"] else "RAM"
+        default = "" if row["initial"] is None else f"  factory {row['initial']}"
+        changed = " *" if row["initial"] not in (None, row["value"]) and row["eeprom"] else ""
+        print(f"{row['address']:>5}  {name:<24}{row['value']:>10}  {kind:<6}{default}{changed}")
+    return 0

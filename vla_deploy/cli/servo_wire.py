@@ -1,0 +1,164 @@
+"""Reach a servo bus from the command line: by port and speed, or as a robot file says."""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from drivers.base import ByteTransport
+from drivers.clock import Clock, MonotonicClock
+from drivers.dynamixel.codec import MAX_SERVO_ID
+from drivers.dynamixel.control_table import BAUD_RATES
+from drivers.dynamixel.tools import BenchLink
+from drivers.serial_port import SerialPort
+from drivers.wire_recorder import RecordingTransport, WireRecorder
+from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.robots import RobotDescription, load_robot
+
+SPEEDS = tuple(sorted(rate for rate in BAUD_RATES.values() if rate != 4_500_000))
+"""The speeds of servos that a tty offers too."""
+DEFAULT_BAUD = 1_000_000
+FACTORY_BAUD = 57_600
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoWire:
+    """Say which bus to work on; `joints` names the servos that a robot file declares, by id."""
+
+    port: Path
+    baud: int
+    baud_given: bool = True
+    robot: RobotDescription | None = None
+    joints: Mapping[int, str] = field(default_factory=dict)
+    record: Path | None = None
+    clock: Clock = field(default_factory=MonotonicClock)
+
+    @property
+    def is_pseudo_terminal(self) -> bool:
+        """Tell whether the port is a pseudo-terminal, such as the twin's, which has no speed."""
+        return str(self.port.resolve()).startswith("/dev/pts/")
+
+    @contextmanager
+    def open(self, baud: int | None = None) -> Iterator[BenchLink]:
+        """Open the bus for a `with` block.
+
+        Raises:
+            DeviceMissing: the port is not there.
+            DeviceBusy: another process holds it.
+        """
+        baud = baud or self.baud
+        transport: ByteTransport = SerialPort(self.port, baud, self.clock)
+        if self.record is not None:
+            transport = RecordingTransport(transport, self._recorder(self.record, baud))
+        link = BenchLink(transport, self.clock, baud)
+        try:
+            yield link
+        finally:
+            link.close()
+
+    def _recorder(self, file: Path, baud: int) -> WireRecorder:
+        """Return a recorder; each speed other than the bus' own has a file of its own."""
+        if baud != self.baud:
+            file = file.with_name(f"{file.stem}-{baud}{file.suffix}")
+        return WireRecorder(file, self.clock, note=f"{self.port} at {baud} baud")
+
+    def joint(self, servo_id: int) -> str:
+        """Return the joint that a servo drives, "" without a robot file."""
+        return self.joints.get(servo_id, "")
+
+    def label(self, servo_id: int) -> str:
+        """Return how messages name a servo."""
+        joint = self.joint(servo_id)
+        return f"servo {servo_id} ({joint})" if joint else f"servo {servo_id}"
+
+
+def add_wire_arguments(command: argparse.ArgumentParser) -> None:
+    """Add what chooses the bus."""
+    command.add_argument("--robot", help="work on this robot's servo bus (default: butler)")
+    command.add_argument("--port", type=Path, help="work on this port, such as /dev/ttyUSB0")
+    command.add_argument(
+        "--baud",
+        type=int,
+        choices=SPEEDS,
+        metavar="N",
+        help=f"speed in bit/s: {', '.join(map(str, SPEEDS))} "
+        f"(default: the robot's, or {DEFAULT_BAUD} with --port)",
+    )
+    command.add_argument("--record", type=Path, metavar="FILE", help="record the wire to this file")
+    command.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def wire_of(arguments: argparse.Namespace) -> ServoWire:
+    """Return the bus that the arguments name.
+
+    Raises:
+        RobotFileError: the robot file has faults.
+    """
+    given = arguments.baud is not None
+    if arguments.port is not None and arguments.robot is None:
+        return ServoWire(
+            port=arguments.port,
+            baud=arguments.baud or DEFAULT_BAUD,
+            baud_given=given,
+            record=arguments.record,
+        )
+    robot = load_robot(arguments.robot or "butler")
+    return ServoWire(
+        port=arguments.port or Path(robot.servo_bus.path),
+        baud=arguments.baud or robot.servo_bus.baud,
+        baud_given=given,
+        robot=robot,
+        joints={servo.id: servo.joint for servo in robot.servo_bus.servos},
+        record=arguments.record,
+    )
+
+
+def servo_id(text: str) -> int:
+    """Read one id.
+
+    Raises:
+        argparse.ArgumentTypeError: it is no id that a servo can have.
+    """
+    if not text.isdecimal() or int(text) > MAX_SERVO_ID:
+        raise argparse.ArgumentTypeError(f"expected an id in 0..{MAX_SERVO_ID}, got {text!r}")
+    return int(text)
+
+
+def confirm(
+    arguments: argparse.Namespace, question: str, ask: Callable[[str], str] = input
+) -> None:
+    """Ask a person before something that can hurt; `--yes` has answered already.
+
+    Raises:
+        UsageError: nobody can be asked.
+        CommandFailed: the answer is not yes.
+    """
+    if arguments.yes:
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(f"{question} Nobody can be asked here: repeat it with --yes")
+    if ask(f"{question} Type yes to go on: ").strip().lower() != "yes":
+        raise CommandFailed("nothing was changed")
+
+
+def add_yes_argument(command: argparse.ArgumentParser) -> None:
+    """Add the answer to every question."""
+    command.add_argument("--yes", action="store_true", help="do not ask")
+
+
+class ProgressLine:
+    """Tell a person at a terminal what is being done, on one line that goes away again."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._shown = not quiet and sys.stderr.isatty()
+
+    def __call__(self, text: str) -> None:
+        """Replace what is told."""
+        if self._shown:
+            print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        """Take the line away."""
+        self("")
