@@ -190,3 +190,31 @@ def until(done: Callable[[], bool], clock: Clock, timeout_ns: int) -> Iterator[N
     deadline_ns = clock.now_ns() + timeout_ns
     while not done() and clock.now_ns() <= deadline_ns:
         yield
+
+
+FRAMES_BEFORE_YIELD: Final = 16
+
+
+def listening(steps: Iterator[None], take_frames: Callable[[], bool]) -> Iterator[None]:
+    """Hand steps what has arrived between any two of them; yield where nothing has.
+
+    It yields now and then anyway, so that a chattering bus does not hold the caller up.
+    """
+    in_a_row = 0
+    for _ in steps:
+        in_a_row += 1
+        if not take_frames() or in_a_row >= FRAMES_BEFORE_YIELD:
+            in_a_row = 0
+            yield
+            take_frames()
+
+
+def finite(velocity_rad_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the velocities.
+
+    Raises:
+        ValueError: one of them is NaN or infinite.
+    """
+    if not np.isfinite(velocity_rad_s).all():
+        raise ValueError(f"velocities {velocity_rad_s.tolist()} rad/s: NaN or infinite")
+    return velocity_rad_s

@@ -33,6 +33,8 @@ from drivers.drive_bus import (
     Goal,
     PowerState,
     ResetRule,
+    finite,
+    listening,
     side_by_side,
     until,
     wait_for,
@@ -119,12 +121,16 @@ class WheelDriveBus:
         self._was_enabled = False
         for node in self._nodes:
             node.read_dictionary()
-        yield from self._listening(side_by_side([refuse_unrepaired(n.sdo) for n in self._nodes]))
+        yield from listening(
+            side_by_side([refuse_unrepaired(node.sdo) for node in self._nodes]), self._take_frames
+        )
         for port in self._ports:
             port.forget()
             self._link.send(NMT_COB, bytes((NmtCommand.RESET_NODE, port.spec.node_id)))
         yield from self._await("boots", lambda port: port.booted, BOOT_TIMEOUT_NS)
-        yield from self._listening(side_by_side([node.configuring() for node in self._nodes]))
+        yield from listening(
+            side_by_side([node.configuring() for node in self._nodes]), self._take_frames
+        )
         for port in self._ports:
             self._link.send(NMT_COB, bytes((NmtCommand.START, port.spec.node_id)))
         self._sync(self._clock.now_ns())
@@ -133,13 +139,6 @@ class WheelDriveBus:
             port.nmt_state = NmtState.OPERATIONAL
         if any(port.faulted and port.reset_rule is ResetRule.AUTOMATIC for port in self._ports):
             self._begin_reset()
-
-    def _listening(self, steps: Iterator[None]) -> Iterator[None]:
-        """Run steps and hand them, between any two, what has arrived; yield where nothing has."""
-        for _ in steps:
-            if not self._take_frames():
-                yield
-                self._take_frames()
 
     def _await(
         self, what: str, done: Callable[[DrivePort], bool], timeout_ns: int
@@ -223,13 +222,14 @@ class WheelDriveBus:
             LinkLost: the bus has gone.
             ValueError: a velocity is not finite.
         """
+        wanted = None if velocity_rad_s is None else finite(velocity_rad_s)
         now_ns = self._clock.now_ns()
         self._take_frames()
         self._advance_goal(now_ns)
         if now_ns >= self._next_beat_ns:
             self._next_beat_ns = now_ns + self._beat_ns
             self._link.send(HEARTBEAT_COB + HOST_NODE_ID, bytes((NmtState.OPERATIONAL,)))
-        self._send_setpoints(velocity_rad_s)
+        self._send_setpoints(wanted)
         self._sync(now_ns)
         return self._state(now_ns)
 
@@ -263,7 +263,7 @@ class WheelDriveBus:
         return Goal.DISABLED if barred else self._goal
 
     def _send_setpoints(self, velocity_rad_s: NDArray[np.float64] | None) -> None:
-        wanted = velocity_rad_s if velocity_rad_s is not None and self.enabled else None
+        wanted = velocity_rad_s if self.enabled else None
         for row, port in enumerate(self._ports):
             target = 0 if wanted is None else round(float(wanted[row]) * port.spec.counts_per_rad)
             target = min(max(target, -_INT32_MAX), _INT32_MAX)
