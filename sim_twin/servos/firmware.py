@@ -62,7 +62,6 @@ class Firmware:
         self._feedback = Feedback(self._columns, self._motion, self._protection)
         self._watchdog = BusWatchdog(self._columns)
         self._goal_window = GoalWindow(self._columns)
-        self._duty: Floats = np.zeros(len(specs))
         self._boot_until_ns = [0] * len(specs)
         self._goal_is_fresh = [False] * len(specs)
         self._powered = True
@@ -71,6 +70,7 @@ class Firmware:
         self._all_readable = False
         self._advanced_ns = 0
         self._checked_ns = 0
+        self._supply_v = 0.0
         self.now_ns = 0
         self._on_change: dict[str, Callable[[int], None]] = {
             "torque_enable": self._on_torque,
@@ -109,18 +109,13 @@ class Firmware:
             self._take_first_pose()
         dt_s = (now_ns - self._advanced_ns) / NS_PER_S
         self._advanced_ns = now_ns
-        volts = self._rail.volts(supply_v, self._duty, velocity_rad_s)
-        if (volts >= self._brownout_v) != self._powered:
-            self._switch_power(on=not self._powered)
         self._feedback.torque_nm = torque_nm
-        self._feedback.supply_v = volts
-        if now_ns - self._checked_ns >= _CHECK_PERIOD_NS:
-            self._protect(volts)
+        if supply_v != self._supply_v or now_ns - self._checked_ns >= _CHECK_PERIOD_NS:
+            self._supply_v = supply_v
+            self._check()
         if self._stale:
             self._reload()
-        ratio = self._motion.nominal_ratio = self._rail.nominal_ratio(volts)
-        self._duty = self._motion.advance(max(dt_s, 1e-6))
-        return self._duty * ratio
+        return self._motion.advance(max(dt_s, 1e-6))
 
     def answers(self, row: int) -> bool:
         """Tell whether a servo is powered and has finished booting."""
@@ -172,6 +167,7 @@ class Firmware:
         if self._stale or not (self._all_answer() and self._goal_window.admits(rows, goals)):
             return False
         self._columns.goal_position[rows] = goals
+        self._motion.goals_moved = True
         return True
 
     def reboot(self, row: int) -> None:
@@ -239,11 +235,18 @@ class Firmware:
             else:
                 self._cut_torque(row)
 
-    def _protect(self, supply_v: float) -> None:
+    def _check(self) -> None:
+        """Look at voltage, current and temperature, which are slow beside the control loops."""
+        motion = self._motion
+        volts = self._rail.volts(self._supply_v, motion.duty, motion.shaft_rad_s)
+        motion.set_voltage(self._rail.nominal_ratio(volts))
+        self._feedback.supply_v = volts
+        if (volts >= self._brownout_v) != self._powered:
+            self._switch_power(on=not self._powered)
         elapsed_s = (self.now_ns - self._checked_ns) / NS_PER_S
         self._checked_ns = self.now_ns
-        effort_ratio = self._motion.effort_ratio(self._feedback.torque_nm)
-        bits = self._protection.check(effort_ratio, supply_v, elapsed_s)
+        effort_ratio = motion.effort_ratio(self._feedback.torque_nm)
+        bits = self._protection.check(effort_ratio, volts, elapsed_s)
         if self._powered and bits.any():
             for row in np.flatnonzero(bits):
                 self.raise_errors(int(row), int(bits[row]))
@@ -293,6 +296,7 @@ class Firmware:
         self._watchdog.reload(row, self.now_ns)
 
     def _on_goal_position(self, row: int) -> None:
+        self._motion.goals_moved = True
         self._motion.profile.on_goal(row)
         if self._columns.torque_enable[row]:
             return

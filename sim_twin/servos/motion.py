@@ -72,11 +72,12 @@ class Motion:
         self._motors = Motors.of(registers)
         self.profile = Profile(columns)
         self.pulses = np.full(count, float(CENTRE_PULSES))
-        self._shaft_rad_s: Floats = np.zeros(count)
+        self.shaft_rad_s: Floats = np.zeros(count)
         self._pwm = np.zeros(count)
         self._scratch = np.zeros(count)
-        self.nominal_ratio: Floats = np.ones(count)
-        """The supply's voltage as a share of each motor's nominal one."""
+        self.goals_moved = True
+        """Set this when goal positions have changed."""
+        self._nominal_ratio: Floats = np.ones(count)
         self._turn_pulses = np.zeros(count)
         self._last_setpoint = np.zeros(count)
         self._last_change = np.zeros(count)
@@ -95,7 +96,8 @@ class Motion:
         enabled = columns.torque_enable != 0
         self._enabled = enabled.astype(np.float64)
         self._any_enabled = bool(enabled.any())
-        self._duty_per_pwm = self._enabled * self.direction / PWM_FULL
+        self.goals_moved = True
+        self._scale_duty()
         self._p = columns.position_p_gain / 128.0
         self._i = columns.position_i_gain / 65536.0
         self._d = columns.position_d_gain / 16.0
@@ -119,10 +121,25 @@ class Motion:
         self._limited_rows = np.flatnonzero(mode == OperatingMode.CURRENT_BASED_POSITION)
         self.in_position_mode = np.isin(mode, _POSITION_MODES)
 
+    def set_voltage(self, nominal_ratio: Floats) -> None:
+        """Take over the supply's voltage, as a share of each motor's nominal one."""
+        self._nominal_ratio = nominal_ratio
+        self._scale_duty()
+
+    def _scale_duty(self) -> None:
+        """Count duty from the nominal voltage: a lower one does less with the same PWM."""
+        self._duty_per_pwm = self._enabled * self.direction * self._nominal_ratio / PWM_FULL
+
+    @property
+    def duty(self) -> Floats:
+        """Return the share of the supply that is put on the motors, in shaft coordinates."""
+        duty: Floats = self._pwm * self._enabled * self.direction / PWM_FULL
+        return duty
+
     @property
     def velocity_rad_s(self) -> Floats:
         """Return the measured velocities."""
-        velocity: Floats = self._shaft_rad_s * self.direction
+        velocity: Floats = self.shaft_rad_s * self.direction
         return velocity
 
     @property
@@ -136,7 +153,7 @@ class Motion:
         np.multiply(position_rad, self._pulses_per_rad, out=self.pulses)
         self.pulses += self._offset_pulses
         np.rint(self.pulses, out=self.pulses)
-        self._shaft_rad_s = velocity_rad_s
+        self.shaft_rad_s = velocity_rad_s
 
     def home(self, row: int) -> None:
         """Forget the turns counted, as at power-on: the position comes back to 0..4095."""
@@ -157,7 +174,7 @@ class Motion:
         self.ramped_velocity[row] = 0.0
 
     def advance(self, dt_s: float) -> Floats:
-        """Return the duty, -1..1 in shaft coordinates, for the next `dt_s`."""
+        """Return the duty for the next `dt_s`, -1..1 of nominal voltage in shaft coordinates."""
         pwm = self._pwm
         if not self._any_enabled:
             pwm[:] = 0.0
@@ -176,15 +193,19 @@ class Motion:
 
     def _control_position(self, dt_s: float) -> None:
         """Set `pwm` to what the position loops ask for, in place: every step comes here."""
-        self.profile.advance(dt_s)
         pwm, scratch = self._pwm, self._scratch
+        moving = self.goals_moved or self.profile.active or self._has_2nd
+        if moving:
+            self.goals_moved = False
+            self.profile.advance(dt_s)
         np.subtract(self.profile.position, self.pulses, out=scratch)
         np.multiply(scratch, self._p, out=pwm)
         if self._has_i:
             self._integrate_position(scratch, dt_s)
         if self._has_rates:
-            np.multiply(self._shaft_rad_s, self._damping, out=scratch)
+            np.multiply(self.shaft_rad_s, self._damping, out=scratch)
             pwm -= scratch
+        if moving:
             self._feed_forward(dt_s * _MS_PER_S)
 
     def _integrate_position(self, error: Floats, dt_s: float) -> None:
@@ -197,7 +218,8 @@ class Motion:
         """Add what the setpoint's rates of change call for: of D, and of the feed-forward gains."""
         change = self.profile.position - self._last_setpoint
         np.copyto(self._last_setpoint, self.profile.position)
-        self._pwm += change * (self._forward / dt_ms)
+        if self._has_rates:
+            self._pwm += change * (self._forward / dt_ms)
         if self._has_2nd:
             self._pwm += (change - self._last_change) * (self._forward_2nd / dt_ms**2)
             self._last_change = change
@@ -220,7 +242,7 @@ class Motion:
     def _limit_current(self, pwm: Floats) -> None:
         columns = self._columns
         allowed = np.minimum(np.abs(columns.goal_current), columns.current_limit)
-        full_pwm = PWM_FULL / np.maximum(self.nominal_ratio, _LEAST_RATIO)
+        full_pwm = PWM_FULL / np.maximum(self._nominal_ratio, _LEAST_RATIO)
         allowed_pwm = allowed * self._motors.effort_unit_ratio * full_pwm
         back_emf_pwm = self.velocity_rad_s / self._motors.no_load_rad_s * full_pwm
         rows = self._torque_rows

@@ -30,7 +30,7 @@ class Profile:
         self.velocity = np.zeros(count)
         self._speed = np.full(count, _UNBOUNDED)
         self._acceleration = np.full(count, _UNBOUNDED)
-        self._active = False
+        self.active = False
 
     def reload(self) -> None:
         """Take over profile registers that the host or the firmware changed."""
@@ -43,7 +43,7 @@ class Profile:
         acceleration = np.where(stepped, _UNBOUNDED, ramp)
         self._speed = np.where(by_speed, speed, self._speed)
         self._acceleration = np.where(by_speed, acceleration, self._acceleration)
-        self._active = bool((self._speed < _UNBOUNDED).any())
+        self.active = bool((self._speed < _UNBOUNDED).any())
 
     def on_goal(self, row: int) -> None:
         """Turn a time-based profile into speeds for the distance that a new goal asks for."""
@@ -56,7 +56,7 @@ class Profile:
         speed = distance / (span_s - ramp_s) if span_s > 0 else _UNBOUNDED
         self._speed[row] = max(speed, 1.0)
         self._acceleration[row] = max(speed, 1.0) / ramp_s if ramp_s > 0 else _UNBOUNDED
-        self._active = bool((self._speed < _UNBOUNDED).any())
+        self.active = bool((self._speed < _UNBOUNDED).any())
 
     def restart(self, rows: NDArray[np.bool_] | int, position: Floats | float) -> None:
         """Begin anew at rest at `position`."""
@@ -65,7 +65,7 @@ class Profile:
 
     def advance(self, dt_s: float) -> None:
         """Move every setpoint on by one step."""
-        if not self._active:
+        if not self.active:
             np.copyto(self.position, self._columns.goal_position)
             return
         distance = self._columns.goal_position - self.position
