@@ -26,34 +26,49 @@ class Shafts:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, shafts: Sequence[Shaft]) -> None:
         joints = [_find(model.joint, "joint", shaft.joint) for shaft in shafts]
+        actuators = [_find(model.actuator, "actuator", shaft.joint) for shaft in shafts]
+        ratio = np.array([shaft.ratio for shaft in shafts])
         # Views of the state's memory: asking MjData for them anew costs more than reading them.
         self._all_qpos, self._all_qvel = data.qpos, data.qvel
         self._all_force, self._all_ctrl = data.actuator_force, data.ctrl
-        self._actuator = np.array([_find(model.actuator, "actuator", s.joint) for s in shafts])
-        self._qpos = model.jnt_qposadr[joints]
-        self._qvel = model.jnt_dofadr[joints]
-        self._offset = np.array([shaft.offset for shaft in shafts])
-        self._ratio = np.array([shaft.ratio for shaft in shafts])
-        self._sign = np.sign(self._ratio)
+        self._actuator = _span(actuators)
+        self._qpos = _span(model.jnt_qposadr[joints].tolist())
+        self._qvel = _span(model.jnt_dofadr[joints].tolist())
+        self._zero_rad = np.array([shaft.offset for shaft in shafts]) / ratio
+        self._per_joint = 1.0 / ratio
+        self._sign = np.sign(ratio)
 
     def position_rad(self) -> Floats:
         """Return shaft angles."""
-        angle: Floats = (self._all_qpos.take(self._qpos) - self._offset) / self._ratio
+        angle: Floats = self._all_qpos[self._qpos] * self._per_joint
+        angle -= self._zero_rad
         return angle
 
     def velocity_rad_s(self) -> Floats:
         """Return shaft speeds."""
-        speed: Floats = self._all_qvel.take(self._qvel) / self._ratio
+        speed: Floats = self._all_qvel[self._qvel] * self._per_joint
         return speed
 
     def effort(self) -> Floats:
         """Return what the motors gave in the last step, in the shaft's direction."""
-        effort: Floats = self._all_force.take(self._actuator) * self._sign
+        effort: Floats = self._all_force[self._actuator] * self._sign
         return effort
 
     def command(self, value: Floats) -> None:
         """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
         self._all_ctrl[self._actuator] = value * self._sign
+
+    def slip(self, row: int, angle_rad: float) -> None:
+        """Measure a shaft further off than it is, as an encoder does after a blow."""
+        self._zero_rad[row] -= angle_rad
+
+
+def _span(addresses: list[int]) -> slice | NDArray[np.intp]:
+    """Return addresses as a slice where they follow each other: reading that copies nothing."""
+    start = min(addresses, default=0)
+    whole = slice(start, start + len(addresses))
+    in_order = addresses == list(range(whole.start, whole.stop))
+    return whole if in_order else np.array(addresses, np.intp)
 
 
 def _find(lookup: object, kind: str, name: str) -> int:

@@ -66,7 +66,6 @@ class Twin:
         self.plugs = {name: Plug() for name in names}
         self.servo_supply = Supply()
         self.faults = FaultInjector(self)
-        self._encoder_slip_rad = np.zeros(len(robot.servo_bus.servos))
         self._camera: HeadCamera | None = None
         self._camera_line: LineTamper | None = None
         self._seed = seed
@@ -108,7 +107,7 @@ class Twin:
     def slip_encoder(self, servo_id: int, offset_rad: float) -> None:
         """Let a servo measure its shaft further off than it does, as after a blow."""
         ids = [servo.id for servo in self.robot.servo_bus.servos]
-        self._encoder_slip_rad[ids.index(servo_id)] += offset_rad
+        self.engine.servos.slip(ids.index(servo_id), offset_rad)
 
     def step(self) -> None:
         """Let the firmware act, the physics follow and the sensors look."""
@@ -138,7 +137,7 @@ class Twin:
         shafts = engine.servos
         duty = self.servos.advance(
             now_ns,
-            shafts.position_rad() + self._encoder_slip_rad,
+            shafts.position_rad(),
             shafts.velocity_rad_s(),
             shafts.effort(),
             self.servo_supply.volts(now_ns),
