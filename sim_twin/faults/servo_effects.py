@@ -1,14 +1,16 @@
 """Declare what may befall the servo bus as a whole, and each servo on it."""
 
+from collections.abc import Callable
 from typing import Final
 
-from drivers.dynamixel.control_table import HardwareError
 from sim_twin.faults.effect import Effect, Ending, Parameter, Target
-from sim_twin.faults.line_effects import Rows, line_rows
+from sim_twin.faults.line_effects import DELAY, Rows, line_rows
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.supply import NOMINAL_V
 from sim_twin.faults.vocabulary import Component, Fault
+
+_COOL_C: Final = 40.0
 
 
 def _bus_line(target: Target) -> LineTamper:
@@ -19,33 +21,71 @@ def _bus_plug(target: Target) -> Plug:
     return target.twin.plugs[target.twin.robot.servo_bus.device]
 
 
-def _brown_out(target: Target) -> Ending:
-    twin, values = target.twin, target.values
-    twin.servo_supply.ramp_to(values["volts_v"], twin.now_ns, values["ramp_s"])
-    return lambda: twin.servo_supply.ramp_to(NOMINAL_V, twin.now_ns, values["ramp_s"])
+def _switched(summary: str, switch: Callable[[Target, bool], None]) -> Effect:
+    """Return a fault that is a matter of on and off."""
+
+    def begin(target: Target) -> Ending:
+        switch(target, True)
+        return lambda: switch(target, False)
+
+    return Effect(summary=summary, begin=begin)
 
 
-def _off(target: Target) -> Ending:
+def _silence(target: Target, on: bool) -> None:
+    target.twin.servos.silence(target.number, silent=on)
+
+
+def _stick(target: Target, on: bool) -> None:
+    target.twin.servos.stick(target.number, on)
+
+
+def _garble(target: Target, on: bool) -> None:
+    target.twin.servos.garble(target.number, on, seed=target.seed)
+
+
+def _clash(target: Target, on: bool) -> None:
+    target.twin.servos.set_clash(target.number, on, seed=target.seed)
+
+
+def _mistune(target: Target, on: bool) -> None:
+    target.twin.servos.set_wrong_baud(target.number, on)
+
+
+def _mistune_all(target: Target, on: bool) -> None:
+    for servo in target.twin.robot.servo_bus.servos:
+        target.twin.servos.set_wrong_baud(servo.id, on)
+
+
+def _echo(target: Target, on: bool) -> None:
+    target.twin.servos.set_echo(on)
+
+
+def _overload(target: Target, on: bool) -> None:
+    target.twin.servos.overload(target.number, on)
+
+
+def _overheat(target: Target) -> Ending:
     bank, servo_id = target.twin.servos, target.number
-    bank.silence(servo_id)
-    return lambda: bank.silence(servo_id, silent=False)
+    bank.heat(servo_id, target.values["temperature_c"])
+    return lambda: bank.heat(servo_id, _COOL_C)
 
 
-def _wrong(target: Target) -> Ending:
+def _delay(target: Target) -> Ending:
+    bank, servo_id = target.twin.servos, target.number
+    bank.delay(servo_id, target.values["delay_s"])
+    return lambda: bank.delay(servo_id, 0.0)
+
+
+def _slip(target: Target) -> Ending:
     twin, offset_rad = target.twin, target.values["offset_rad"]
     twin.slip_encoder(target.number, offset_rad)
     return lambda: twin.slip_encoder(target.number, -offset_rad)
 
 
-def _alert(bits: HardwareError) -> Effect:
-    """Return a fault that the servo reports itself; only a reboot ends it, so clearing does not."""
-
-    def begin(target: Target) -> Ending:
-        target.twin.servos.set_alert(target.number, bits)
-        return lambda: None
-
-    words = (bits.name or "").lower()
-    return Effect(summary=f"reports {words}; only a reboot clears it", begin=begin)
+def _brown_out(target: Target) -> Ending:
+    twin, values = target.twin, target.values
+    twin.servo_supply.ramp_to(values["volts_v"], twin.now_ns, values["ramp_s"])
+    return lambda: twin.servo_supply.ramp_to(NOMINAL_V, twin.now_ns, values["ramp_s"])
 
 
 _VOLTS: Final = Parameter(
@@ -54,8 +94,11 @@ _VOLTS: Final = Parameter(
 _RAMP: Final = Parameter(
     name="ramp_s", default=0.05, low=0.0, high=60.0, meaning="how long it takes, each way"
 )
-_SLIP: Final = Parameter(
+_OFFSET: Final = Parameter(
     name="offset_rad", default=1.0, low=-3.0, high=3.0, meaning="jump of the measured shaft angle"
+)
+_HEAT: Final = Parameter(
+    name="temperature_c", default=95.0, low=-20.0, high=150.0, meaning="what it is heated to"
 )
 
 SERVO_ROWS: Final[Rows] = {
@@ -63,10 +106,27 @@ SERVO_ROWS: Final[Rows] = {
     (Component.SERVO_BUS, Fault.BROWN_OUT): Effect(
         summary="the supply sags", begin=_brown_out, parameters=(_VOLTS, _RAMP)
     ),
-    (Component.SERVO, Fault.OFF): Effect(summary="silent and deaf; its motor goes on", begin=_off),
-    (Component.SERVO, Fault.WRONG): Effect(
-        summary="its encoder jumps", begin=_wrong, parameters=(_SLIP,)
+    (Component.SERVO_BUS, Fault.WRONG_BAUD): _switched(
+        "every servo at another rate than the host", _mistune_all
     ),
-    (Component.SERVO, Fault.OVERHEAT): _alert(HardwareError.OVERHEATING),
-    (Component.SERVO, Fault.OVERLOAD): _alert(HardwareError.OVERLOAD),
+    (Component.SERVO_BUS, Fault.ECHO): _switched("the adapter hears its own bytes", _echo),
+    (Component.SERVO, Fault.OFF): _switched("silent and deaf; its motor goes on", _silence),
+    (Component.SERVO, Fault.STUCK): _switched("shows for ever what it sensed last", _stick),
+    (Component.SERVO, Fault.GARBAGE): _switched("a byte of every answer is damaged", _garble),
+    (Component.SERVO, Fault.WRONG): Effect(
+        summary="its encoder jumps", begin=_slip, parameters=(_OFFSET,)
+    ),
+    (Component.SERVO, Fault.DELAYED): Effect(
+        summary="its answers come late", begin=_delay, parameters=(DELAY,)
+    ),
+    (Component.SERVO, Fault.OVERHEAT): Effect(
+        summary="hot until cleared; then only a reboot ends its alert",
+        begin=_overheat,
+        parameters=(_HEAT,),
+    ),
+    (Component.SERVO, Fault.OVERLOAD): _switched(
+        "overloaded until cleared; then only a reboot ends its alert", _overload
+    ),
+    (Component.SERVO, Fault.ID_CLASH): _switched("two servos answer to its id", _clash),
+    (Component.SERVO, Fault.WRONG_BAUD): _switched("at another rate than the host", _mistune),
 }

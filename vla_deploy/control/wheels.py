@@ -1,10 +1,12 @@
 """Keep the wheel drives: open, lose and reopen their bus, drive the base, tell where it went."""
 
+from collections.abc import Generator
+
 import numpy as np
 
 from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveState
+from drivers.drive_bus import DriveState, wait_for
 from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from platforms import Profile
@@ -48,6 +50,7 @@ class Wheels:
         self.w_rad_s = 0.0
         self._bus: WheelDriveBus | None = None
         self._next_open_ns = 0
+        self._reopening: Generator[None, None, None] | None = None
 
     def open(self) -> None:
         """Reset, check and configure the drives; they end up disabled.
@@ -55,34 +58,50 @@ class Wheels:
         Raises:
             DriverError: the interface is missing, or a drive is silent or not as declared.
         """
+        wait_for(self._connecting(), self._clock)
+
+    def try_reopen(self) -> bool:
+        """Go a step towards opening a lost bus again, and tell whether it is back.
+
+        A step never waits, for the servos must not miss their tick; a failed attempt is followed by
+        the next one a second after it began.
+        """
+        if not self.lost:
+            return False
+        try:
+            if self._reopening is None:
+                self._begin_reopening()
+            else:
+                next(self._reopening)
+        except StopIteration:
+            self._reopening = None
+            self.failure = ""
+            return True
+        except DriverError as error:
+            self._reopening = None
+            self.failure = str(error)
+        return False
+
+    def _begin_reopening(self) -> None:
+        now_ns = self._clock.now_ns()
+        if now_ns < self._next_open_ns:
+            return
+        self._next_open_ns = now_ns + REOPEN_NS
+        self.close()
+        self._reopening = self._connecting()
+
+    def _connecting(self) -> Generator[None, None, None]:
         bus = WheelDriveBus(
             self._devices.can(self.name), self._clock, self._specs, heartbeat_s=self._heartbeat_s
         )
         try:
-            bus.connect()
-        except DriverError:
+            yield from bus.connecting()
+        except (DriverError, GeneratorExit):
             bus.close()
             raise
         self._bus = bus
         self.lost = False
         self.odometry.forget_wheels()
-
-    def try_reopen(self) -> bool:
-        """Open a lost bus again, at most once a second, and tell whether it is back.
-
-        It waits for the drives to boot, so nothing else may depend on this tick.
-        """
-        if not self.lost or self._clock.now_ns() < self._next_open_ns:
-            return False
-        self._next_open_ns = self._clock.now_ns() + REOPEN_NS
-        self.close()
-        try:
-            self.open()
-        except DriverError as error:
-            self.failure = str(error)
-            return False
-        self.failure = ""
-        return True
 
     @property
     def enabled(self) -> bool:
@@ -160,6 +179,9 @@ class Wheels:
 
     def close(self) -> None:
         """Brake, and leave the bus."""
+        if self._reopening is not None:
+            self._reopening.close()
+            self._reopening = None
         bus, self._bus = self._bus, None
         if bus is not None:
             bus.close()

@@ -1,0 +1,178 @@
+"""`vla-deploy fault list | inject | clear | run`: make devices of the twin fail.
+
+Everything is asked of a running twin; a robot without one has nothing that could carry it out.
+"""
+
+import argparse
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S
+from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.cli.example import add_command
+from vla_deploy.cli.session import Session, attach
+from vla_deploy.cli.twin_link import ask_twin
+
+_EXAMPLES: Final = """  vla-deploy fault list                     what can fail
+  vla-deploy fault inject servo off left_elbow --for 2
+  vla-deploy fault inject servo_bus brown_out --set volts_v=4 --for 0.5
+  vla-deploy fault inject servo_bus intermittent --of unplug --period 1 --duty 0.1
+  vla-deploy fault clear                    end all faults
+  vla-deploy fault run servo_off            play a scenario
+"""
+_MARGIN_S: Final = 1.0
+_TIMES: Final = {
+    "start": ("start_s", "seconds from now until it begins"),
+    "for": ("duration_s", "seconds it lasts (default: until cleared)"),
+    "period": ("period_s", "intermittent: seconds from one beginning to the next"),
+    "duty": ("duty_ratio", "intermittent: share of each period that it is on"),
+    "probability": ("probability", "intermittent: chance of each period to be on as a whole"),
+}
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    fault = add_command(commands, "fault", "make the twin's devices fail", _EXAMPLES)
+    actions = fault.add_subparsers(dest="action", required=True, metavar="ACTION")
+    listing = actions.add_parser("list", help="what can fail, and what does now")
+    listing.set_defaults(run=run_list)
+    _register_inject(actions.add_parser("inject", help="add one fault"))
+    clear = actions.add_parser("clear", help="end one fault, or all")
+    clear.add_argument("id", nargs="?", type=int, help="the number that inject gave (default: all)")
+    clear.set_defaults(run=run_clear)
+    play = actions.add_parser("run", help="play a scenario and tell what the robot did")
+    play.add_argument("scenario", help="a TOML file, or the name of one that ships with the twin")
+    play.set_defaults(run=run_scenario)
+    for action in actions.choices.values():
+        action.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def _register_inject(inject: argparse.ArgumentParser) -> None:
+    inject.add_argument("component", help="see: vla-deploy fault list")
+    inject.add_argument("fault")
+    inject.add_argument("instance", nargs="?", help="joint or id of a servo or drive")
+    inject.add_argument("--of", metavar="FAULT", help="intermittent: the fault that comes and goes")
+    for option, (_, meaning) in _TIMES.items():
+        inject.add_argument(f"--{option}", type=float, metavar="N", help=meaning)
+    inject.add_argument("--seed", type=int, help="what is drawn by chance follows from it")
+    inject.add_argument(
+        "--set", action="append", default=[], metavar="NAME=NUMBER", help="how bad it is"
+    )
+    inject.set_defaults(run=run_inject)
+
+
+def run_list(arguments: argparse.Namespace) -> int:
+    """Print every supported combination and the faults in force."""
+    answer = ask_twin(attach(arguments.runtime_base).run_dir, "fault_list")
+    if arguments.json:
+        print(json.dumps(answer, indent=2))
+        return 0
+    for row in answer["catalogue"]:
+        print(" ".join([row["component"], *_instances(row["instances"])]))
+        for fault in row["faults"]:
+            print(f"  {fault['fault']:17} {fault['summary']}{_parameters(fault['parameters'])}")
+        print("  intermittent      any of these, coming and going (--of)")
+    print("scenarios: " + ", ".join(answer["scenarios"]))
+    _print_pending(answer["pending"])
+    return 0
+
+
+def run_inject(arguments: argparse.Namespace) -> int:
+    """Add a fault and print its number."""
+    details: dict[str, Any] = {
+        name: getattr(arguments, option)
+        for option, (name, _) in _TIMES.items()
+        if getattr(arguments, option) is not None
+    }
+    details |= {
+        name: getattr(arguments, name)
+        for name in ("component", "fault", "instance", "of", "seed")
+        if getattr(arguments, name) is not None
+    }
+    details |= dict(map(_setting, arguments.set))
+    answer = ask_twin(attach(arguments.runtime_base).run_dir, "fault_inject", **details)
+    if arguments.json:
+        print(json.dumps(answer, indent=2))
+    else:
+        print(f"fault {answer['injected']['id']}: {answer['injected']['fault']}")
+    return 0
+
+
+def run_clear(arguments: argparse.Namespace) -> int:
+    """End one fault, or all."""
+    session = attach(arguments.runtime_base)
+    answer = ask_twin(session.run_dir, "fault_clear", id=arguments.id)
+    if arguments.json:
+        print(json.dumps(answer, indent=2))
+    else:
+        _print_pending(answer["pending"])
+    return 0
+
+
+def run_scenario(arguments: argparse.Namespace) -> int:
+    """Play a scenario and tell what control said about it.
+
+    Raises:
+        CommandFailed: control named another cause than the scenario expects.
+    """
+    session = attach(arguments.runtime_base)
+    path = Path(arguments.scenario)
+    text = {"text": path.read_text(encoding="utf-8")} if path.is_file() else {}
+    played = ask_twin(session.run_dir, "fault_run", name=path.stem, **text)
+    if not arguments.json:
+        print(f"{played['scenario']}: {played['summary']} (robot meanwhile: {played['meanwhile']})")
+    seen = _watch(session, played["end_s"] + _MARGIN_S)
+    wanted = played["expect"]["cause"]
+    result = {**played, "seen": seen, "as_expected": seen["cause"] == wanted}
+    told = f"cause {seen['cause']}, state {seen['state']}"
+    if arguments.json:
+        print(json.dumps(result, indent=2))
+    else:
+        print(f"{told}; expected cause {wanted}")
+    if seen["cause"] != wanted:
+        raise CommandFailed(f"{played['scenario']}: {told}; expected cause {wanted}")
+    return 0
+
+
+def _watch(session: Session, duration_s: float) -> dict[str, Any]:
+    """Return the first cause that control tells within a time, and its state at the end."""
+    start_ns = now_ns = session.clock.now_ns()
+    seen: dict[str, Any] = {"cause": "none", "after_s": None, "state": "silent"}
+    while now_ns - start_ns < duration_s * NS_PER_S:
+        status: Mapping[str, Any] = session.document("control_status", age_limit_s=1.0) or {}
+        seen["state"] = status.get("state", "silent")
+        if seen["cause"] == "none" and status.get("cause"):
+            seen |= {"cause": status["cause"], "after_s": (now_ns - start_ns) / NS_PER_S}
+        session.pause()
+        now_ns = session.clock.now_ns()
+    return seen
+
+
+def _setting(word: str) -> tuple[str, float]:
+    name, _, number = word.partition("=")
+    try:
+        return name, float(number)
+    except ValueError:
+        raise UsageError(f"--set {word}: expected NAME=NUMBER, as in volts_v=4") from None
+
+
+def _instances(instances: Mapping[str, int]) -> list[str]:
+    named = ", ".join(f"{joint} ({number})" for joint, number in instances.items())
+    return [f"[{named}]"] if named else []
+
+
+def _parameters(parameters: list[Mapping[str, Any]]) -> str:
+    told = [
+        f"{each['name']}={each['default']:g} ({each['range'][0]:g}..{each['range'][1]:g})"
+        for each in parameters
+    ]
+    return f"; {', '.join(told)}" if told else ""
+
+
+def _print_pending(pending: list[Mapping[str, Any]]) -> None:
+    for fault in pending:
+        print(f"fault {fault['id']}: {fault['fault']} ({'on' if fault['on'] else 'off now'})")
+    if not pending:
+        print("no fault is in force")
