@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from sim_twin.device import WireDevice
+from sim_twin.device import TimedDevice, WireDevice
 
 
 class Tampering(Protocol):
@@ -33,6 +33,7 @@ class LineTamper:
         self, device: WireDevice, now_ns: Callable[[], int], frame_bytes: int | None = None
     ) -> None:
         self.device = device
+        self._timed = device if isinstance(device, TimedDevice) else None
         self._now_ns = now_ns
         self._frame_bytes = frame_bytes
         self._tamperings: list[Tampering] = []
@@ -64,9 +65,19 @@ class LineTamper:
             data = tampering.said(data, self._now_ns())
         return data
 
+    @property
+    def paced(self) -> bool:
+        """Tell whether the device's bytes take time."""
+        return self._timed is not None and self._timed.paced
+
+    def next_due_ns(self) -> int | None:
+        """Return when the device's next bytes arrive at the host; None when none are under way."""
+        return None if self._timed is None else self._timed.next_due_ns()
+
     def step(self, now_ns: int) -> None:
-        """Advance the device."""
-        self.device.step(now_ns)
+        """Tell the time to a device whose bytes take time; the twin steps all others itself."""
+        if self._timed is not None:
+            self._timed.step(now_ns)
 
     def last_frame_like(self, data: bytes) -> bytes:
         """Return the newest whole frames from before any tampering, in place of `data`.
