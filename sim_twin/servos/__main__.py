@@ -34,7 +34,11 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--link", type=Path, required=True, help="path of the link to the terminal")
     parser.add_argument("--servos", type=int, default=16, help="how many, with ids from 1")
     parser.add_argument(
-        "--models", nargs="+", choices=sorted(MODELS), default=["XM430-W350"], help="in turn"
+        "--models",
+        nargs="+",
+        choices=sorted(MODELS),
+        default=["XM430-W350"],
+        help="in turn; the first one's voltage supplies all",
     )
     parser.add_argument("--seconds", type=float, help="stop after this time; else run until killed")
     parser.add_argument(
@@ -79,7 +83,11 @@ def _build(options: argparse.Namespace) -> FreeServos:
             jitter_s=options.jitter_us / 1e6,
             seed=options.seed,
         )
-    return FreeServos(make_specs(options.servos, options.models, eeprom), timing=timing)
+    return FreeServos(
+        make_specs(options.servos, options.models, eeprom),
+        supply_v=MODELS[options.models[0]].voltage_v,
+        timing=timing,
+    )
 
 
 def main(arguments: Sequence[str]) -> int:

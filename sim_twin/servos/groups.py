@@ -16,16 +16,18 @@ from drivers.dynamixel.codec import (
     Instruction,
     Packet,
     encode_fast_status,
+    encode_status,
 )
 from sim_twin.servos.audience import Audience
 from sim_twin.servos.firmware import Firmware
 from sim_twin.servos.params import GROUP_WRITES, READ_REQUESTS, Request, range_of
-from sim_twin.servos.registers import Refused
+from sim_twin.servos.registers import LOWEST_SLOT, Refused
 from sim_twin.servos.speaker import Speaker, Store
 from sim_twin.servos.spec import FirmwareOptions
 from sim_twin.servos.timing import Reply
 
 FAST_READS: Final = frozenset({Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ})
+_SYNC_READS: Final = frozenset({Instruction.SYNC_READ, Instruction.FAST_SYNC_READ})
 
 _FAST_OVERHEAD_BYTES: Final = 4  # error, id, CRC
 _FAST_PREFIX_BYTES: Final = 8  # header .. instruction
@@ -59,12 +61,12 @@ class GroupAccess:
             Refused: the params are too short to be meant for anybody.
         """
         fast = packet.instruction in FAST_READS
-        if packet.instruction == Instruction.FAST_SYNC_READ:
-            reply = self._read_block(packet.params)
-            if reply:
-                return reply
+        if packet.instruction in _SYNC_READS:
+            replies = self._read_block(packet.params, fast=fast)
+            if replies:
+                return replies
         requests = READ_REQUESTS[packet.instruction](packet.params)
-        self._audience.feed(row for request in requests for row in self._audience.named(request[0]))
+        self._prepare(requests)
         return self._fast_replies(requests) if fast else self._plain_replies(requests)
 
     def write(self, packet: Packet) -> None:
@@ -83,23 +85,39 @@ class GroupAccess:
                 if audience.listens(row):
                     self._try_write(row, address, data)
 
-    def _read_block(self, params: bytes) -> list[Reply]:
-        """Answer the fast sync read that comes in every cycle in one go; none if it is another."""
-        if self._audience.deaf or self._speaker.faults.active or self._speaker.some_lack_fast:
+    def _read_block(self, params: bytes, *, fast: bool) -> list[Reply]:
+        """Answer the sync read that comes in every cycle in one go; none if it is another."""
+        speaker = self._speaker
+        if self._audience.deaf or speaker.faults.active or (fast and speaker.some_lack_fast):
             return []
         address, length = range_of(params)
         ids = params[_RANGE_BYTES:]
         rows = self._audience.group(ids)
         if not rows or len(rows) * (length + _FAST_OVERHEAD_BYTES) >= MAX_LENGTH:
             return []
-        self._speaker.refresh(rows, address, length)
+        if address + length > LOWEST_SLOT:
+            speaker.refresh(rows, address, length)
         spans = self._firmware.read_spans(rows, address, length)
         if not spans:
             return []
         self._audience.feed(rows)
         alerts = [ALERT if alert else 0 for alert in self._firmware.alerts(rows)]
-        entries = list(zip(alerts, ids, spans, strict=True))
-        return [Reply(encode_fast_status(entries), self._speaker.return_delay_ns(rows[0]))]
+        if fast:
+            packet = encode_fast_status(list(zip(alerts, ids, spans, strict=True)))
+            return [Reply(packet, speaker.return_delay_ns(rows[0]))]
+        return [
+            Reply(encode_status(servo_id, alert, span), speaker.return_delay_ns(row))
+            for servo_id, alert, span, row in zip(ids, alerts, spans, rows, strict=True)
+        ]
+
+    def _prepare(self, requests: list[Request]) -> None:
+        """Feed the watchdogs of those who are asked, and bring up to date what they will say."""
+        wanted: dict[tuple[int, int], list[int]] = {}
+        for servo_id, address, length in requests:
+            wanted.setdefault((address, length), []).extend(self._audience.named(servo_id))
+        for (address, length), rows in wanted.items():
+            self._audience.feed(rows)
+            self._speaker.refresh(rows, address, length)
 
     def _plain_replies(self, requests: list[Request]) -> list[Reply]:
         replies = []

@@ -140,7 +140,9 @@ class BusProtocol:
         return _PING.pack(table.get("model_number"), table.get("firmware_version"))
 
     def _read(self, row: int, params: bytes) -> bytes:
-        error, data = self.speaker.read(row, *range_of(params))
+        address, length = range_of(params)
+        self.speaker.refresh((row,), address, length)
+        error, data = self.speaker.read(row, address, length)
         if error & ~ALERT:
             raise Refused(StatusError(error & ~ALERT))
         return data

@@ -67,7 +67,8 @@ _BACKED_UP_RAM: Final = (
 """RAM that a control table backup holds, beside the EEPROM and the indirect addresses."""
 
 _RESTORE_AT_START: Final = 0x02
-_LOWEST_SLOT: Final = 208
+LOWEST_SLOT: Final = 208
+"""No model has indirect data below."""
 _SCATTERED_KEPT: Final = 64
 
 _FORMATS: Final = {1: "b", 2: "h", 4: "i"}
@@ -332,12 +333,14 @@ class RegisterFile:
         self, rows: Iterable[int], address: int, length: int
     ) -> tuple[tuple[int, int], ...]:
         """Return the ranges, start and length, where a read of these tables finds its bytes."""
+        if address + length <= LOWEST_SLOT:
+            return ((address, length),)
         scattered = self._scatter(list(rows), address, length)
         return ((address, length),) if scattered is None else scattered.sources
 
     def _scatter(self, rows: Sequence[int], address: int, length: int) -> Scattered | None:
         """Return where the bytes of a read are; None where all of them are where it says."""
-        if address + length <= _LOWEST_SLOT or address + length > TABLE_BYTES:
+        if address + length <= LOWEST_SLOT or address + length > TABLE_BYTES:
             return None
         key = address, length, bytes(rows)
         if key not in self._scattered:

@@ -52,8 +52,7 @@ class Speaker:
             self._firmware.refresh(start, size)
 
     def read(self, row: int, address: int, length: int) -> tuple[int, bytes]:
-        """Return error byte and data of a read."""
-        self.refresh((row,), address, length)
+        """Return error byte and data of a read whose values are up to date."""
         try:
             data = self._tables[row].read(address, length, self.faults.frozen.get(row))
         except Refused as refusal:

@@ -38,7 +38,7 @@ class Bench:
         self.bank = ServoBank(specs, options)
         self.rotors = FreeRotors(self.models, inertia_kg_m2)
         self.now_ns = NS_PER_S
-        self.supply_v = 12.0
+        self.supply_v = self.models[0].voltage_v
         self.blocked = False
         self.duty = np.zeros(len(models))
         self._step()
