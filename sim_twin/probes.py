@@ -33,6 +33,7 @@ class RangeProbe:
         self._rotation = data.xmat[model.body(ROBOT_ROOT).id].reshape(3, 3)
         self._centres = data.geom_xpos
         self._view = copy.copy(model)
+        self._view_groups = self._view.geom_group
         self._groups = model.geom_group.copy()
         self._radius_m = np.where(model.geom_type == _PLANE, _ENDLESS_M, model.geom_rbound)
         self._reach_m = _reach_from_level_plane(model, data, self._radius_m)
@@ -63,10 +64,11 @@ class RangeProbe:
 
     def _show_what_the_plane_meets(self) -> None:
         normal = self._rotation[:, 2]
-        lean = math.hypot(normal[0], normal[1])
-        distance_m = np.abs((self._centres - self._origin) @ normal)
-        meets = distance_m <= self._reach_m + lean * self._radius_m
-        self._view.geom_group[:] = np.where(meets, self._groups, _HIDDEN_GROUP)
+        distance_m = self._centres @ normal
+        distance_m -= self._origin @ normal
+        np.abs(distance_m, out=distance_m)
+        distance_m -= math.hypot(normal[0], normal[1]) * self._radius_m
+        self._view_groups[:] = np.where(distance_m <= self._reach_m, self._groups, _HIDDEN_GROUP)
 
 
 def _reach_from_level_plane(

@@ -16,6 +16,7 @@ MIN_RANGE_M = 0.02
 MAX_RANGE_M = 12.0
 INTENSITY = 200
 _NS_PER_MS = 1_000_000
+_MM_PER_M = 1000.0
 _PACKETS_PER_S = POINTS_PER_S // POINTS_PER_PACKET
 _POINT = np.dtype([("distance_mm", "<u2"), ("intensity", "u1")])
 _PACKET = np.dtype(
@@ -31,7 +32,7 @@ _PACKET = np.dtype(
 )
 _CHECKED_BYTES = _PACKET.itemsize - 1
 _PLACES = np.arange(_CHECKED_BYTES)
-_NUMBERS = np.arange(POINTS_PER_PACKET)
+_LAST_POINT = POINTS_PER_PACKET - 1
 
 
 def _crc_parts() -> NDArray[np.uint8]:
@@ -118,21 +119,23 @@ class LidarDevice:
         A packet's stamp is when its last point was measured, whenever the host reads it.
         """
         self._follow_rate()
-        numbers = np.arange(self._sent_packets, end)
-        points = numbers[:, None] * POINTS_PER_PACKET + _NUMBERS
-        angles_deg = np.multiply(points, self._step_deg, dtype=np.float64) + self._phase_deg
-        hundredths = np.rint(angles_deg[:, (0, -1)] * 100.0).astype(np.int64) % 36_000
-        due_ns = self._start_ns - (numbers + 1) * -NS_PER_S // _PACKETS_PER_S
-        packets = np.empty(numbers.size, _PACKET)
+        first, count = self._sent_packets, end - self._sent_packets
+        points = np.arange(first * POINTS_PER_PACKET, end * POINTS_PER_PACKET, dtype=np.float64)
+        angles_deg = points.reshape(count, POINTS_PER_PACKET) * self._step_deg + self._phase_deg
+        hundredths = np.rint(angles_deg[:, ::_LAST_POINT] * 100.0) % 36_000.0
+        numbers = range(first + 1, end + 1)
+        due_ns = [self._start_ns - number * -NS_PER_S // _PACKETS_PER_S for number in numbers]
+        packets = np.empty(count, _PACKET)
         packets["header"] = HEADER
         packets["speed_deg_s"] = round(self.rate_hz * 360.0)
         packets["start"], packets["end"] = hundredths.T
-        packets["points"]["distance_mm"] = distances_mm = self._distances_mm(angles_deg)
-        packets["points"]["intensity"] = INTENSITY * (distances_mm > 0)
-        packets["stamp_ms"] = due_ns // _NS_PER_MS % STAMP_WRAP_MS
-        checked = packets.view(np.uint8).reshape(-1, _PACKET.itemsize)[:, :_CHECKED_BYTES]
+        distances_mm, seen = self._look(angles_deg)
+        packets["points"]["distance_mm"] = distances_mm
+        packets["points"]["intensity"] = seen * INTENSITY
+        packets["stamp_ms"] = [due // _NS_PER_MS % STAMP_WRAP_MS for due in due_ns]
+        checked = packets.view(np.uint8).reshape(count, _PACKET.itemsize)[:, :_CHECKED_BYTES]
         packets["crc"] = np.bitwise_xor.reduce(_CRC_PARTS[_PLACES, checked], axis=1)
-        self._due_ns = deque(due_ns.tolist())
+        self._due_ns = deque(due_ns)
         self._packets = packets.tobytes()
 
     def _follow_rate(self) -> None:
@@ -142,10 +145,14 @@ class LidarDevice:
         self._phase_deg += first * (self._step_deg - step_deg)
         self._step_deg = step_deg
 
-    def _distances_mm(self, angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _look(
+        self, angles_deg: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return distances in millimetres, 0 where nothing is in range, and where something is."""
         beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64) % BEAMS
         true_m = self._cast(beams.ravel()).reshape(beams.shape)
-        noise_m = self._sigma_m * self._random.standard_normal(true_m.shape)
-        noisy_m = self.range_ratio * true_m + noise_m
+        told_mm = self._random.standard_normal(beams.shape)
+        told_mm *= self._sigma_m * _MM_PER_M
+        told_mm += true_m * (self.range_ratio * _MM_PER_M)
         seen = (true_m >= MIN_RANGE_M) & (true_m <= MAX_RANGE_M)
-        return np.where(seen, np.rint(noisy_m * 1000.0).clip(1.0, 65_535.0), 0.0)
+        return np.rint(told_mm).clip(1.0, 65_535.0) * seen, seen
