@@ -105,7 +105,8 @@ class DrivePort:
         counts, *torque_steps = _unpacked(self.position_wire, data)
         if torque_steps:
             torque_ratio = torque_steps[0] / TORQUE_STEPS_PER_RATED
-            self.torque_nm = self.spec.sign * torque_ratio * self.rated_torque_nm
+            motor_nm = torque_ratio * self.rated_torque_nm
+            self.torque_nm = self.spec.sign * self.spec.gear_ratio * motor_nm
         if self._counts is None:
             self._travel_counts = counts
         else:

@@ -10,6 +10,8 @@ from drivers.canopen.objects import OperatingMode
 class DriveSpec:
     """Describe one drive; `sign` is -1 where its positive direction turns the joint backwards.
 
+    `gear_ratio` is motor turns per joint turn behind the drive; `counts_per_rev` are the motor's.
+
     Raises:
         ValueError: a value is out of its range.
     """
@@ -18,6 +20,7 @@ class DriveSpec:
     joint: str
     sign: int = 1
     counts_per_rev: int = 16384
+    gear_ratio: float = 1.0
     mode: OperatingMode = OperatingMode.PROFILE_VELOCITY
     acceleration_rad_s2: float = 20.0
     quick_stop_rad_s2: float = 40.0
@@ -27,6 +30,7 @@ class DriveSpec:
             ("node_id", 1 <= self.node_id <= 127, "1..127"),
             ("sign", self.sign in (-1, 1), "-1 or 1"),
             ("counts_per_rev", self.counts_per_rev > 0, "above 0"),
+            ("gear_ratio", self.gear_ratio > 0.0, "above 0"),
             ("acceleration_rad_s2", self.acceleration_rad_s2 > 0.0, "above 0"),
             ("quick_stop_rad_s2", self.quick_stop_rad_s2 > 0.0, "above 0"),
         )
@@ -42,4 +46,4 @@ class DriveSpec:
     @property
     def counts_per_rad(self) -> float:
         """Return encoder counts per joint radian, with the sign of the mounting."""
-        return self.sign * self.counts_per_rev / math.tau
+        return self.sign * self.counts_per_rev * self.gear_ratio / math.tau

@@ -49,7 +49,9 @@ class Arming:
 
     def _wait_for_clear(self) -> bool | None:
         if self._wheels.faulted:
-            return self._unless_late(f"{self._wheels.name}: a drive does not leave its fault")
+            return self._unless_late(
+                f"{self._wheels.name}: {self._wheels.failure or 'a drive does not leave its fault'}"
+            )
         self._cleared = True
         self._queue = self._servos.unguarded.tolist()
         return None

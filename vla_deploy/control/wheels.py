@@ -4,18 +4,17 @@ from collections.abc import Generator
 
 import numpy as np
 
-from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveState, wait_for
+from drivers.drive_bus import DriveBus, DriveState, wait_for
 from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from platforms import Profile
+from vla_deploy.control.drive_buses import drive_bus
 from vla_deploy.control.odometry import DifferentialDrive, Odometry
 from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import DriveSample
 
 REOPEN_NS = NS_PER_S
-_COUNTS_PER_REV = 16384
 _STILL_RAD_S = 0.02
 _UNKNOWN_FAULT = 0xFFFF
 
@@ -32,23 +31,15 @@ class Wheels:
         self.state: DriveState | None = None
         self._devices = devices
         self._clock = clock
-        self._heartbeat_s = profile.can_heartbeat_s
-        self._specs = [
-            DriveSpec(
-                node_id=drive.node_id,
-                joint=drive.joint,
-                sign=drive.sign,
-                counts_per_rev=round(_COUNTS_PER_REV * drive.gear_ratio),
-            )
-            for drive in robot.can_bus.drives
-        ]
+        self._profile = profile
+        self._wiring = robot.can_bus
         self._geometry = DifferentialDrive(
             wheel_radius_m=robot.base.wheel_radius_m, track_m=robot.base.track_m
         )
         self.odometry = Odometry(self._geometry)
         self.v_m_s = 0.0
         self.w_rad_s = 0.0
-        self._bus: WheelDriveBus | None = None
+        self._bus: DriveBus | None = None
         self._next_open_ns = 0
         self._reopening: Generator[None, None, None] | None = None
 
@@ -91,9 +82,8 @@ class Wheels:
         self._reopening = self._connecting()
 
     def _connecting(self) -> Generator[None, None, None]:
-        bus = WheelDriveBus(
-            self._devices.can(self.name), self._clock, self._specs, heartbeat_s=self._heartbeat_s
-        )
+        opened = self._devices.can(self.name)
+        bus = drive_bus(self._wiring, self._profile, opened, self._clock)
         try:
             yield from bus.connecting()
         except (DriverError, GeneratorExit):
@@ -132,12 +122,12 @@ class Wheels:
             return ()
         return tuple(
             DriveSample(
-                name=spec.joint,
+                name=drive.joint,
                 lost=state.lost[row],
                 age_s=float(state.age_s[row]),
                 fault_code=_fault_code(state, row),
             )
-            for row, spec in enumerate(self._specs)
+            for row, drive in enumerate(self._wiring.drives)
         )
 
     def cycle(self, v_m_s: float, w_rad_s: float) -> None:
@@ -173,9 +163,9 @@ class Wheels:
             self._bus.quick_stop()
 
     def reset_fault(self) -> None:
-        """Ask faulted drives to leave their fault; they stay disabled."""
+        """Ask faulted drives to leave their fault; `failure` says which of them may not."""
         if self._bus is not None and self.faulted:
-            self._bus.reset_fault()
+            self.failure = "; ".join(self._bus.reset_fault())
 
     def close(self) -> None:
         """Brake, and leave the bus."""

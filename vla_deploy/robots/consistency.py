@@ -81,6 +81,32 @@ def nothing_used_twice(document: Document) -> Iterator[Fault]:
     yield from _repeats([(f"{d}.device", table(document, d).get("device")) for d in DEVICES])
 
 
+NODE_IDS: Mapping[str, range] = {"cia402": range(1, 128), "odrive": range(0x3F)}
+
+
+def drives_fit_protocol(document: Document) -> Iterator[Fault]:
+    """Node ids are those of the protocol, and ODrive axes have their list of endpoints."""
+    bus = table(document, "can_bus")
+    protocol = bus.get("protocol", "cia402")
+    allowed = NODE_IDS.get(protocol) if isinstance(protocol, str) else None
+    if allowed is None:
+        return
+    for i, row in enumerate(_drives(document)):
+        node_id = row.get("node_id")
+        if isinstance(node_id, int) and node_id not in allowed:
+            yield Fault(
+                key=f"can_bus.drives[{i}].node_id",
+                got=repr(node_id),
+                expected=f"an integer in {allowed[0]}..{allowed[-1]}, as {protocol} has them",
+            )
+    if protocol == "odrive" and "endpoints" not in bus:
+        yield Fault(
+            key="can_bus.endpoints",
+            got="nothing",
+            expected="the flat_endpoints.json of the axes' firmware: it arms their watchdog",
+        )
+
+
 def models_are_listed(document: Document) -> Iterator[Fault]:
     """Each servo's model has its datasheet figures."""
     models = subtables(document, "servo_models")
@@ -194,6 +220,7 @@ def places_are_distinct(document: Document) -> Iterator[Fault]:
 
 CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
     nothing_used_twice,
+    drives_fit_protocol,
     models_are_listed,
     limits_match_servos,
     servos_reach,
@@ -206,7 +233,13 @@ CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
 
 def missing_files(document: Document, directory: Path) -> Iterator[Fault]:
     """Yield a fault for each file that the robot file names and that is not there."""
-    named = (("mjcf", document.get("mjcf")), ("home.map", table(document, "home").get("map")))
+    can_bus = table(document, "can_bus")
+    named = (
+        ("mjcf", document.get("mjcf")),
+        ("home.map", table(document, "home").get("map")),
+        ("can_bus.eds", can_bus.get("eds")),
+        ("can_bus.endpoints", can_bus.get("endpoints")),
+    )
     for key, name in named:
         if isinstance(name, str) and not (directory / name).is_file():
             yield Fault(key=key, got=repr(name), expected=f"a file under {directory}")

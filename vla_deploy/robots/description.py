@@ -56,21 +56,34 @@ class ServoBus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """Tie one CiA 402 drive to one wheel: wheel speed = sign * motor speed / gear_ratio."""
+    """Tie one drive to one wheel: wheel speed = sign * motor speed / gear_ratio.
+
+    `mode` and `counts_per_rev`, of the motor, are a CiA 402 drive's, `current_limit_a` an ODrive's.
+    """
 
     node_id: int
     joint: str
     sign: int
     gear_ratio: float
+    mode: str = "profile_velocity"
+    counts_per_rev: int = 16384
+    current_limit_a: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CanBus:
-    """Describe the CAN bus that carries the wheel drives."""
+    """Describe the CAN bus that carries the wheel drives.
+
+    `eds_path` is the file of CiA 402 drives that are not the stack's own, `endpoints_path` the
+    vendor's list of an ODrive firmware's properties.
+    """
 
     device: str
     path: str
     bitrate: int
+    protocol: str = "cia402"
+    eds_path: Path | None = None
+    endpoints_path: Path | None = None
     drives: tuple[Drive, ...]
 
 

@@ -142,7 +142,7 @@ def _as_table(value: Any) -> Document:
 
 
 def _build(document: Document, directory: Path) -> RobotDescription:
-    servo_bus, can_bus = document["servo_bus"], document["can_bus"]
+    servo_bus = document["servo_bus"]
     return RobotDescription(
         name=document["name"],
         mjcf_path=directory / document["mjcf"],
@@ -150,7 +150,7 @@ def _build(document: Document, directory: Path) -> RobotDescription:
             **{**servo_bus, "servos": tuple(Servo(**row) for row in servo_bus["servos"])}
         ),
         servo_models={k: ServoModel(**row) for k, row in document["servo_models"].items()},
-        can_bus=CanBus(**{**can_bus, "drives": tuple(Drive(**row) for row in can_bus["drives"])}),
+        can_bus=_can_bus(document["can_bus"], directory),
         base=BaseGeometry(**document["base"]),
         lidar=SerialSensor(**document["lidar"]),
         imu=SerialSensor(**document["imu"]),
@@ -169,6 +169,21 @@ def _build(document: Document, directory: Path) -> RobotDescription:
 def _group(name: str, row: Document) -> Group:
     category = StopCategory(row["stop_category"])
     return Group(name=name, joints=tuple(row["joints"]), stop_category=category)
+
+
+def _can_bus(record: Document, directory: Path) -> CanBus:
+    plain = {key: value for key, value in record.items() if key not in ("eds", "endpoints")}
+    drives = tuple(Drive(**row) for row in record["drives"])
+    return CanBus(
+        **{**plain, "drives": drives},
+        eds_path=_beside(record, "eds", directory),
+        endpoints_path=_beside(record, "endpoints", directory),
+    )
+
+
+def _beside(record: Document, key: str, directory: Path) -> Path | None:
+    """Return a file that the record names relative to the robot file."""
+    return directory / record[key] if key in record else None
 
 
 def _home(row: Document, directory: Path) -> Home:

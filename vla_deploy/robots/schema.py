@@ -42,10 +42,12 @@ def _integer(low: int, high: int) -> Check:
     return Check(expected=f"an integer in {low}..{high}", holds=holds)
 
 
-def one_of(*choices: Any) -> Check:
+def one_of(*choices: Any, is_optional: bool = False) -> Check:
     """Return the check that a value is one of `choices`."""
     listed = ", ".join(str(choice) for choice in choices)
-    return Check(expected=f"one of {listed}", holds=lambda value: value in choices)
+    return Check(
+        expected=f"one of {listed}", holds=lambda value: value in choices, is_optional=is_optional
+    )
 
 
 NUMBER = Check(expected="a number", holds=is_number)
@@ -53,6 +55,8 @@ POSITIVE = Check(expected="a number above 0", holds=lambda value: is_number(valu
 TEXT = Check(expected="a text", holds=lambda value: isinstance(value, str) and value != "")
 TABLE = Check(expected="a table", holds=lambda value: isinstance(value, dict))
 OPTIONAL_TABLE = Check(expected="a table", holds=TABLE.holds, is_optional=True)
+OPTIONAL_TEXT = Check(expected="a text", holds=TEXT.holds, is_optional=True)
+OPTIONAL_POSITIVE = Check(expected=POSITIVE.expected, holds=POSITIVE.holds, is_optional=True)
 TABLES = Check(
     expected="a list of tables",
     holds=lambda value: isinstance(value, list) and all(isinstance(row, dict) for row in value),
@@ -117,13 +121,23 @@ CAN_BUS: Shape = {
     "device": TEXT,
     "path": TEXT,
     "bitrate": one_of(125000, 250000, 500000, 800000, 1000000),
+    "protocol": one_of("cia402", "odrive", is_optional=True),
+    "eds": OPTIONAL_TEXT,
+    "endpoints": OPTIONAL_TEXT,
     "drives": TABLES,
 }
 DRIVE: Shape = {
-    "node_id": _integer(1, 127),
+    "node_id": _integer(0, 127),
     "joint": TEXT,
     "sign": one_of(-1, 1),
     "gear_ratio": POSITIVE,
+    "mode": one_of("profile_velocity", "cyclic_synchronous_velocity", is_optional=True),
+    "counts_per_rev": Check(
+        expected="an integer above 0",
+        holds=lambda value: POSITIVE.holds(value) and isinstance(value, int),
+        is_optional=True,
+    ),
+    "current_limit_a": OPTIONAL_POSITIVE,
 }
 BASE: Shape = {
     "wheel_radius_m": POSITIVE,
