@@ -7,6 +7,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from vla_deploy.robots import schema
+from vla_deploy.robots.calibration import calibrated
 from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
 from vla_deploy.robots.description import (
     Audio,
@@ -65,12 +66,14 @@ LISTED: Mapping[tuple[str, str], Shape] = {
 def load_robot(name_or_path: str | Path) -> RobotDescription:
     """Return the robot of that name under `vla_deploy/robots`, or of that file or folder.
 
+    What `calibration.toml` in the same folder has measured replaces signs and offsets.
+
     Raises:
         RobotFileError: the file is missing, is not TOML, or has faults; all of them are listed.
     """
     file = _find(name_or_path)
-    document = _parse(file)
-    faults = tuple(_faults(document, file.parent))
+    document, calibration_faults = calibrated(_parse(file), file.parent)
+    faults = (*calibration_faults, *_faults(document, file.parent))
     if faults:
         raise RobotFileError(file, faults)
     return _build(document, file.parent)
