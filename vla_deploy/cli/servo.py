@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from vla_deploy.cli import servo_change, servo_find, servo_monitor
+from vla_deploy.cli import servo_calibrate, servo_change, servo_find, servo_monitor
 from vla_deploy.cli.example import add_command
 
-PARTS = (servo_find, servo_monitor, servo_change)
+PARTS = (servo_find, servo_monitor, servo_calibrate, servo_change)
 
 
 def register(commands: Any) -> None:
