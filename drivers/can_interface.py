@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Final
 
 import can
-from can.interfaces.slcan import slcanBus
 
 from drivers.can_hub import HubBus
+from drivers.can_serial import SerialCanBus
 from drivers.errors import DeviceMissing
 
 SERIAL_PREFIX: Final = "slcan:"
@@ -65,9 +65,7 @@ def _is_down(channel: str, sysfs_net: Path) -> bool:
 def _open_serial(path: str, bitrate: int) -> can.BusABC:
     what = f"CAN adapter {path}"
     try:
-        # The default would wait two seconds for boards that reset when they are opened, and a
-        # millisecond in every read; the control tick can afford neither.
-        return slcanBus(path, bitrate=bitrate, sleep_after_open=0.0, timeout=0.0)
+        return SerialCanBus(path, bitrate)
     except ValueError as error:
         raise DeviceMissing(
             f"{what}: bit rate {bitrate}: {error}; correct the robot file"
