@@ -107,3 +107,52 @@ def test_a_replugged_line_carries_only_new_bytes(line: MemoryLine, device: Shout
 def test_closing_twice_is_allowed(line: MemoryLine) -> None:
     line.close()
     line.close()
+
+
+class Postman(Shouter):
+    """A device whose answer is under way for a while."""
+
+    def __init__(self, travel_ns: int, *, paced: bool) -> None:
+        super().__init__()
+        self.paced = paced
+        self.time_ns = 0
+        self._travel_ns = travel_ns
+        self._due_ns: int | None = None
+
+    def receive(self, data: bytes) -> None:
+        super().receive(data)
+        self._due_ns = self.time_ns + self._travel_ns
+
+    def transmit(self) -> bytes:
+        if self._due_ns is None or self.time_ns < self._due_ns:
+            return b""
+        self._due_ns = None
+        return super().transmit()
+
+    def step(self, now_ns: int) -> None:
+        self.time_ns = now_ns
+
+    def next_due_ns(self) -> int | None:
+        return self._due_ns
+
+
+@pytest.mark.parametrize("paced", [False, True])
+def test_a_read_moves_time_to_the_arrival_of_what_is_under_way(
+    clock: FakeClock, paced: bool
+) -> None:
+    line = MemoryLine(Postman(300, paced=paced), clock)
+    line.write(b"hello")
+    assert line.read(64, 400) == b"HELLO"
+    assert clock.now_ns() == 300
+
+
+@pytest.mark.parametrize(("paced", "waited_ns"), [(False, 0), (True, 200)])
+def test_a_read_that_ends_too_early_waits_to_its_deadline_on_a_paced_line_only(
+    clock: FakeClock, paced: bool, waited_ns: int
+) -> None:
+    line = MemoryLine(Postman(300, paced=paced), clock)
+    line.write(b"hello")
+    assert line.read(64, 200) == b""
+    assert clock.now_ns() == waited_ns
+    assert line.read(64, 300) == b"HELLO"
+    assert clock.now_ns() == 300

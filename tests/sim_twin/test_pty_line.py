@@ -1,11 +1,14 @@
 import os
 import select
+import termios
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from drivers.clock import MonotonicClock
 from drivers.errors import LinkLost
+from drivers.serial_port import SerialPort
 from sim_twin.pty_line import PtyLine
 
 EVERY_BYTE = bytes(range(256))
@@ -117,3 +120,56 @@ def test_a_stale_link_is_replaced(device: Echo, tmp_path: Path) -> None:
     line.close()
     line.close()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("baud", [9_600, 57_600, 1_000_000, 4_000_000])
+def test_the_speed_that_the_host_has_set_is_told_before_its_bytes(
+    device: Echo, tmp_path: Path, baud: int
+) -> None:
+    told: list[tuple[int, bytes]] = []
+    line = PtyLine(
+        device, tmp_path / "servos", on_baud=lambda rate: told.append((rate, device.ready))
+    )
+    port = SerialPort(line.link_path, baud, MonotonicClock())
+    port.write(b"x")
+    assert readable(line.fileno(), 1000)
+    line.poll_once()
+    assert told == [(baud, b"")]
+    port.close()
+    line.close()
+
+
+def test_a_speed_without_a_constant_is_told_too(device: Echo, tmp_path: Path) -> None:
+    serial = pytest.importorskip("serial")
+    told: list[int] = []
+    line = PtyLine(device, tmp_path / "servos", on_baud=told.append)
+    assert not hasattr(termios, "B4500000")
+    with serial.Serial(str(line.link_path), 4_500_000) as host:
+        host.write(b"x")
+        assert readable(line.fileno(), 1000)
+        line.poll_once()
+    assert told == [4_500_000]
+    line.close()
+
+
+def test_a_device_on_wall_time_is_told_the_time_before_it_is_asked(tmp_path: Path) -> None:
+    class Watch(Echo):
+        def __init__(self) -> None:
+            super().__init__()
+            self.told_ns: list[int] = []
+
+        def step(self, now_ns: int) -> None:
+            self.told_ns.append(now_ns)
+
+    class Clock:
+        def now_ns(self) -> int:
+            return 77
+
+        def sleep_until(self, deadline_ns: int) -> None:
+            raise AssertionError("a line never sleeps")
+
+    device = Watch()
+    line = PtyLine(device, tmp_path / "servos", clock=Clock())
+    line.poll_once()
+    assert device.told_ns == [77]
+    line.close()
