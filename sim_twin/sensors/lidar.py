@@ -149,8 +149,9 @@ class LidarDevice:
         self, angles_deg: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Return distances in millimetres, 0 where nothing is in range, and where something is."""
-        beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64) % BEAMS
-        true_m = self._cast(beams.ravel()).reshape(beams.shape)
+        beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64)
+        first, last = beams[-1, -1], beams[0, 0]
+        true_m = self._cast(np.arange(first, last + 1) % BEAMS)[beams - first]
         told_mm = self._random.standard_normal(beams.shape)
         told_mm *= self._sigma_m * _MM_PER_M
         told_mm += true_m * (self.range_ratio * _MM_PER_M)
