@@ -1,6 +1,6 @@
 """Declare the byte transport that every serial or stream driver talks through."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 class ByteTransport(Protocol):
@@ -30,4 +30,45 @@ class ByteTransport(Protocol):
 
     def close(self) -> None:
         """Release the device; closing twice is allowed."""
+        ...
+
+
+@runtime_checkable
+class BurstTransport(Protocol):
+    """Offer, on top of a `ByteTransport`, to wait for many bytes with few wake-ups."""
+
+    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+        """Return `count` bytes, or what of them has arrived by `deadline_ns`.
+
+        Raises:
+            LinkLost: the other end has gone.
+        """
+        ...
+
+
+@runtime_checkable
+class TunableTransport(Protocol):
+    """Offer, on top of a `ByteTransport`, to try other speeds."""
+
+    @property
+    def bauds(self) -> tuple[int, ...]:
+        """Return the speeds on offer."""
+        ...
+
+    def set_baud(self, baud: int) -> None:
+        """Go on at another speed; what was not read is dropped.
+
+        Raises:
+            ValueError: the speed is none of `bauds`.
+            LinkLost: the other end has gone.
+        """
+        ...
+
+
+@runtime_checkable
+class CheckedTransport(Protocol):
+    """Offer, on top of a `ByteTransport`, to tell what is wrong with the adapter."""
+
+    def adapter_fault(self) -> str:
+        """Return what slows the adapter down and how to mend it, or "" when nothing does."""
         ...

@@ -2,6 +2,7 @@ from drivers.dynamixel.bus import DynamixelBus
 from drivers.dynamixel.control_table import HardwareError, OperatingMode
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.handshake import ServoSetup
+from drivers.dynamixel.layout import Layout
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
 from drivers.dynamixel.watchdog import WatchdogState
@@ -11,6 +12,7 @@ __all__ = [
     "BusState",
     "DynamixelBus",
     "HardwareError",
+    "Layout",
     "OperatingMode",
     "ServoSetup",
     "ServoSpec",

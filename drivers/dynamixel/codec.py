@@ -22,7 +22,8 @@ ALERT: Final = 0x80
 MAX_LENGTH: Final = 4096
 """Longest LEN taken for real; a larger one is noise that looks like a header."""
 
-_PATTERN: Final = b"\xff\xff\xfd"
+STUFFED_PATTERN: Final = b"\xff\xff\xfd"
+"""What is stuffed wherever it occurs between INST and the end of the params."""
 _STUFFED: Final = b"\xff\xff\xfd\xfd"
 _LENGTH: Final = struct.Struct("<H")
 _PREFIX_BYTES: Final = 7  # header, id, length
@@ -90,7 +91,7 @@ def _crc_table() -> tuple[int, ...]:
 _CRC_TABLE: Final = _crc_table()
 
 
-def table_crc16(data: bytes) -> int:
+def table_crc16(data: bytes | memoryview) -> int:
     """Return the CRC-16/UMTS of `data` without compiled code."""
     crc = 0
     table = _CRC_TABLE
@@ -99,7 +100,7 @@ def table_crc16(data: bytes) -> int:
     return crc
 
 
-def _fastest_crc16() -> Callable[[bytes], int]:
+def _fastest_crc16() -> Callable[[bytes | memoryview], int]:
     try:
         from fastcrc.crc16 import umts
     except ImportError:  # no wheel for this machine: costs about 50 us more per bus cycle
@@ -123,12 +124,12 @@ def _frame(servo_id: int, payload: bytes) -> bytes:
 
 def stuff(payload: bytes) -> bytes:
     """Insert FD behind every FF FF FD."""
-    return payload.replace(_PATTERN, _STUFFED)
+    return payload.replace(STUFFED_PATTERN, _STUFFED)
 
 
 def unstuff(payload: bytes) -> bytes:
     """Undo `stuff`."""
-    return payload.replace(_STUFFED, _PATTERN)
+    return payload.replace(_STUFFED, STUFFED_PATTERN)
 
 
 def encode_instruction(servo_id: int, instruction: int, params: bytes = b"") -> bytes:

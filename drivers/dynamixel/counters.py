@@ -21,6 +21,8 @@ class BusCounters:
     discarded_bytes: int = 0
     suspensions: int = 0
     """Times that a silent servo was taken out of the block read."""
+    returns: int = 0
+    """Times that a servo was set up again after it had been away."""
     link_lost: int = 0
 
     def as_dict(self) -> dict[str, int]:

@@ -6,7 +6,8 @@ DriverError
 ├── ProtocolError
 │   └── CorruptReply         an answer came, its CRC or length was wrong
 ├── WrongDevice
-│   └── WrongServo           model, firmware or a persistent setting is not what the robot file says
+│   ├── WrongServo           model, firmware or a persistent setting is not what the robot file says
+│   └── SlowAdapter          the adapter holds back what it receives
 ├── DeviceFault
 │   ├── ServoFault           the servo reports a hardware error
 │   └── WatchdogTripped      the bus was silent too long; goals are refused until it is cleared
@@ -36,6 +37,10 @@ class CorruptReply(ProtocolError):
 
 class WrongServo(WrongDevice):
     """Say in what a servo differs from the robot file."""
+
+
+class SlowAdapter(WrongDevice):
+    """Say that the adapter holds back received bytes, and how to stop that."""
 
 
 class ServoFault(DeviceFault):

@@ -7,7 +7,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.dynamixel.codec import Instruction
+from drivers.dynamixel.codec import (
+    BROADCAST_ID,
+    HEADER,
+    STUFFED_PATTERN,
+    Instruction,
+    crc16,
+    encode_instruction,
+)
 from drivers.dynamixel.control_table import PWM_FULL
 from drivers.dynamixel.handshake import ServoSetup
 from drivers.dynamixel.link import Link, Patience
@@ -17,6 +24,8 @@ from drivers.errors import DriverError, LinkLost
 
 _GOAL: Final = np.dtype([("id", "u1"), ("pulse", "<i4")])
 _GOAL_POSITION_HEAD: Final = b"\x74\x00\x04\x00"  # address 116, 4 bytes
+_FRAME_HEAD_BYTES: Final = 12  # header .. instruction, address, length
+_FRAME_CRC_BYTES: Final = 2
 
 Floats = NDArray[np.float64]
 
@@ -48,8 +57,7 @@ class GoalWriter:
             servo.id: setup.pwm_limit for servo, setup in zip(servos, setups, strict=True)
         }
         self._pwm: dict[int, int] = {}
-        self._records = np.zeros(len(servos), dtype=_GOAL)
-        self._records["id"] = [servo.id for servo in servos]
+        self._frame = GoalFrame([servo.id for servo in servos])
 
     def write(self, position_rad: Floats) -> Floats:
         """Send a goal to every servo and return what was sent, on the joint side.
@@ -58,16 +66,17 @@ class GoalWriter:
             ValueError: a goal is not finite, or there is not one per servo.
             LinkLost: the adapter is gone.
         """
-        self._check(position_rad)
+        goals = position_rad.tolist()
+        if len(goals) != len(self._joints) or not all(map(isfinite, goals)):
+            self._refuse(position_rad)
         pulses = position_rad * self._pulses_per
-        np.add(pulses, self._pulse_at_zero, out=pulses)
-        np.rint(pulses, out=pulses)
+        np.add(pulses, self._pulse_at_zero, pulses)
+        np.rint(pulses, pulses)
         np.maximum(pulses, self._minimum, out=pulses)
         np.minimum(pulses, self._maximum, out=pulses)
-        self._records["pulse"] = pulses
-        self._link.broadcast(Instruction.SYNC_WRITE, _GOAL_POSITION_HEAD + self._records.tobytes())
-        np.multiply(pulses, self._per_pulse, out=pulses)
-        np.add(pulses, self._at_pulse_zero, out=pulses)
+        self._link.send(self._frame.of(pulses))
+        np.multiply(pulses, self._per_pulse, pulses)
+        np.add(pulses, self._at_pulse_zero, pulses)
         return pulses
 
     def write_pwm(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
@@ -104,10 +113,35 @@ class GoalWriter:
             )
         return min(round(ratio * PWM_FULL), self._pwm_limit[servo_id])
 
-    def _check(self, position_rad: Floats) -> None:
+    def _refuse(self, position_rad: Floats) -> None:
         if position_rad.shape != (len(self._joints),):
             raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
-        finite = [isfinite(goal) for goal in position_rad.tolist()]
-        if not all(finite):
-            bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
-            raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")
+        finite = np.isfinite(position_rad)
+        bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
+        raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")
+
+
+class GoalFrame:
+    """Hold the sync write of all goal positions; only pulses and CRC change."""
+
+    def __init__(self, ids: Sequence[int]) -> None:
+        records = np.zeros(len(ids), dtype=_GOAL)
+        records["id"] = ids
+        params = _GOAL_POSITION_HEAD + records.tobytes()
+        self._frame = bytearray(encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, params))
+        body = np.frombuffer(self._frame, _GOAL, len(ids), _FRAME_HEAD_BYTES)
+        self._pulses = body["pulse"]
+        self._end = len(self._frame) - _FRAME_CRC_BYTES
+        self._body = memoryview(self._frame)[: self._end]
+
+    def of(self, pulses: Floats) -> bytes:
+        """Return the packet that sends these pulses, stuffed where it must be."""
+        self._pulses[:] = pulses
+        frame = self._frame
+        if frame.find(STUFFED_PATTERN, len(HEADER)) >= 0:
+            params = bytes(frame[_FRAME_HEAD_BYTES - len(_GOAL_POSITION_HEAD) : self._end])
+            return encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, params)
+        crc = crc16(self._body)
+        frame[self._end] = crc & 0xFF
+        frame[self._end + 1] = crc >> 8
+        return bytes(frame)

@@ -3,28 +3,32 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drivers.dynamixel.baud_search import where_they_answer
 from drivers.dynamixel.control_table import (
     MODELS_BY_NUMBER,
     WATCHDOG_TRIPPED,
     OperatingMode,
     StatusReturnLevel,
 )
-from drivers.dynamixel.errors import ServoSilent, WrongServo
+from drivers.dynamixel.errors import ServoSilent, SlowAdapter, WrongServo
+from drivers.dynamixel.layout import Block, Layout, block_of
 from drivers.dynamixel.registers import Registers, decode
 from drivers.dynamixel.servo import ServoSpec
+from drivers.dynamixel.settings import IMAGE_BYTES, differences, write_differences, write_map
 from drivers.errors import NoReply
 
 _EXTENDED_RANGE = (-1_048_575, 1_048_575)
-_IMAGE_END = 71  # model number .. hardware error status
+_ECHO_MARGIN_S = 0.02
 _EXPECTED = {
     "homing_offset": "keep offsets in the robot file",
     "drive_mode": "keep directions in the robot file, and profiles velocity-based",
+    "startup_configuration": "a servo must not power its motor by itself",
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoSetup:
-    """Hold what the handshake learned of one servo."""
+    """Hold what the handshake learned of one servo, and what it has written there."""
 
     firmware: int
     minimum_pulse: int
@@ -33,6 +37,10 @@ class ServoSetup:
     torque_on: bool
     error: int
     watchdog: int
+    block: Block
+    fast_sync: bool
+    written: tuple[str, ...] = ()
+    """The settings that were changed: name, old value -> new value."""
 
     @property
     def watchdog_tripped(self) -> bool:
@@ -41,54 +49,74 @@ class ServoSetup:
 
 
 def shake_hands(
-    registers: Registers, servos: Sequence[ServoSpec], *, fast_sync: bool
+    registers: Registers, servos: Sequence[ServoSpec], *, fast_sync: bool | None, layout: Layout
 ) -> list[ServoSetup]:
-    """Check every servo, write settings that differ, and return what was learned.
+    """Check adapter and servos, write settings that differ, and return what was learned.
 
-    Torque is left as it is.
+    Torque is left as it is. `fast_sync` None uses the fast sync read wherever a servo has it.
 
     Raises:
-        ServoSilent: names all servos that do not answer.
+        SlowAdapter: the adapter holds back what it receives.
+        ServoSilent: names all servos that do not answer, and the speed at which they would.
         WrongServo: names all that are not as declared, with expected and got.
         Rejected: a servo refuses a setting.
         LinkLost: the adapter is gone.
     """
+    link = registers.link
+    if fault := link.adapter_fault:
+        raise SlowAdapter(fault)
+    link.detect_echo(servos[0].id, _ECHO_MARGIN_S)
     identities = _ping_all(registers, servos)
+    firmwares = [firmware for _, firmware in identities]
     faults = [
         fault
         for servo, (number, firmware) in zip(servos, identities, strict=True)
-        for fault in _identity_faults(servo, number, firmware, fast_sync=fast_sync)
+        for fault in _identity_faults(servo, number, firmware, fast_sync=fast_sync, layout=layout)
     ]
     _raise_faults(faults)
     registers.write_many("status_return_level", servos, StatusReturnLevel.ALL)
-    images = [registers.read_span(servo, 0, _IMAGE_END) for servo in servos]
+    images = [registers.read_span(servo, 0, IMAGE_BYTES) for servo in servos]
     for servo, image in zip(servos, images, strict=True):
         faults += _setting_faults(servo, image)
     _raise_faults(faults)
-    for servo, image in zip(servos, images, strict=True):
-        _write_differences(registers, servo, image)
     return [
-        _setup(registers, servo, image, firmware)
-        for servo, image, (_, firmware) in zip(servos, images, identities, strict=True)
+        _set_up(registers, servo, image, firmware, fast_sync=fast_sync, layout=layout)
+        for servo, image, firmware in zip(servos, images, firmwares, strict=True)
     ]
 
 
 def _ping_all(registers: Registers, servos: Sequence[ServoSpec]) -> list[tuple[int, int]]:
-    found, silent = [], []
+    found: list[tuple[int, int]] = []
+    silent: list[ServoSpec] = []
     for servo in servos:
         try:
             found.append(registers.ping(servo))
         except NoReply:
-            silent.append(str(servo))
+            silent.append(servo)
     if silent:
+        names = ", ".join(str(servo) for servo in silent)
         raise ServoSilent(
-            f"{len(silent)} of {len(servos)} servos do not answer: {', '.join(silent)}; "
-            "check motor power, the cable before the first of them, ids and baud rate"
+            f"{len(silent)} of {len(servos)} servos do not answer at "
+            f"{registers.link.baud} baud: {names}; " + _remedy(registers, silent)
         )
     return found
 
 
-def _identity_faults(servo: ServoSpec, number: int, firmware: int, *, fast_sync: bool) -> list[str]:
+def _remedy(registers: Registers, silent: Sequence[ServoSpec]) -> str:
+    found = where_they_answer(registers, silent)
+    if not found:
+        return "check motor power, the cable before the first of them, ids and baud rate"
+    wanted = registers.link.baud
+    return "; ".join(
+        f"servo {servo_id} answers at {baud} baud: set it to {wanted} "
+        f"(`vla-deploy servo set-baud`), or correct the robot file"
+        for servo_id, baud in found.items()
+    )
+
+
+def _identity_faults(
+    servo: ServoSpec, number: int, firmware: int, *, fast_sync: bool | None, layout: Layout
+) -> list[str]:
     if number != servo.model.number:
         got = MODELS_BY_NUMBER.get(number)
         return [
@@ -109,42 +137,39 @@ def _identity_faults(servo: ServoSpec, number: int, firmware: int, *, fast_sync:
             f"{servo}: fast sync read needs firmware {fast}, got {firmware}; "
             "update it with DYNAMIXEL Wizard or set fast_sync = false"
         )
+    try:
+        block_of(servo.model, firmware, layout)
+    except ValueError as error:
+        faults.append(f"{servo}: {error}")
     return faults
-
-
-def _wanted(servo: ServoSpec) -> dict[str, int]:
-    return {"return_delay_time": 0, "operating_mode": servo.operating_mode}
-
-
-def _differences(servo: ServoSpec, image: bytes) -> dict[str, int]:
-    return {
-        name: value
-        for name, value in _wanted(servo).items()
-        if decode(servo, image, 0, name) != value
-    }
 
 
 def _setting_faults(servo: ServoSpec, image: bytes) -> list[str]:
     faults = [
         f"{servo}: expected {name} 0, got {got}; {reason}, then write 0"
         for name, reason in _EXPECTED.items()
-        if (got := decode(servo, image, 0, name)) != 0
+        if name in servo.model.registers and (got := decode(servo, image, 0, name)) != 0
     ]
     if decode(servo, image, 0, "torque_enable"):
         faults += [
-            f"{servo}: expected {name} {value}, got {decode(servo, image, 0, name)}, "
+            f"{servo}: expected {name} {new}, got {old}, "
             "and torque is on, which locks it; disable torque, then connect again"
-            for name, value in _differences(servo, image).items()
+            for name, (old, new) in differences(servo, image).items()
         ]
     return faults
 
 
-def _write_differences(registers: Registers, servo: ServoSpec, image: bytes) -> None:
-    for name, value in _differences(servo, image).items():
-        registers.write(servo, name, value)
-
-
-def _setup(registers: Registers, servo: ServoSpec, image: bytes, firmware: int) -> ServoSetup:
+def _set_up(
+    registers: Registers,
+    servo: ServoSpec,
+    image: bytes,
+    firmware: int,
+    *,
+    fast_sync: bool | None,
+    layout: Layout,
+) -> ServoSetup:
+    block = block_of(servo.model, firmware, layout)
+    written = [*write_differences(registers, servo, image), *write_map(registers, servo, block)]
     minimum, maximum = _EXTENDED_RANGE
     if servo.operating_mode == OperatingMode.POSITION:
         minimum = decode(servo, image, 0, "min_position_limit")
@@ -157,6 +182,9 @@ def _setup(registers: Registers, servo: ServoSpec, image: bytes, firmware: int) 
         torque_on=bool(decode(servo, image, 0, "torque_enable")),
         error=decode(servo, image, 0, "hardware_error_status"),
         watchdog=registers.read(servo, "bus_watchdog"),
+        block=block,
+        fast_sync=servo.model.has_fast_sync(firmware) if fast_sync is None else fast_sync,
+        written=tuple(text for text in written if text),
     )
 
 

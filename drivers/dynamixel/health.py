@@ -1,7 +1,7 @@
 """Poll what changes slowly, one servo at a time, so that the cycle stays short."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,7 +13,7 @@ from drivers.dynamixel.registers import Registers, decode
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
-from drivers.errors import NoReply, ProtocolError
+from drivers.errors import DriverError, LinkLost, NoReply, ProtocolError
 
 _STATUS_START: Final = 64  # torque_enable .. bus_watchdog
 _STATUS_BYTES: Final = 35
@@ -23,7 +23,11 @@ _PROBE_EVERY_TURNS: Final = 5
 
 
 class HealthPoll:
-    """Read one servo's status or climate every few cycles; a new alert goes first and at once."""
+    """Read one servo's status or climate every few cycles; a new alert goes first and at once.
+
+    Servos whose block already holds both are left out. A servo that returns is set up again with
+    one transaction per cycle, so that the others are not kept waiting.
+    """
 
     def __init__(
         self,
@@ -32,13 +36,14 @@ class HealthPoll:
         roster: Roster,
         state: BusState,
         *,
+        asked: Collection[int],
         every_cycles: int,
         margin_s: float,
-        on_return: Callable[[int], None],
+        bring_back: Callable[[int], Iterator[None]],
     ) -> None:
-        """Poll with the bus' own state and roster.
+        """Poll the servos `asked` (by index) with the bus' own state and roster.
 
-        `on_return` is told the index of a suspended servo that answers again.
+        `bring_back` sets up a suspended servo that answers again, a transaction at each step.
         """
         self._registers = registers
         self._servos = servos
@@ -46,11 +51,13 @@ class HealthPoll:
         self._state = state
         self._every_cycles = every_cycles
         self._patience = Patience(margin_s=margin_s, attempts=1)
-        self._on_return = on_return
+        self._bring_back = bring_back
+        self._returns: dict[int, Iterator[None]] = {}
+        self._asked = np.zeros(len(servos), dtype=np.bool_)
+        self._asked[list(asked)] = True
         self._cycle = 0
         self._turn = 0
         self._seen_alert: NDArray[np.bool_] = np.zeros(len(servos), dtype=np.bool_)
-        self._seen_alert_bytes = self._seen_alert.tobytes()
         self._urgent: deque[int] = deque()
 
     def step(self) -> bool:
@@ -59,42 +66,58 @@ class HealthPoll:
         Raises:
             LinkLost: the adapter is gone.
         """
-        self._note_alerts()
         if self._urgent:
             self._read_status(self._urgent.popleft())
+            return True
+        if self._returns:
+            self._go_on_with_return()
             return True
         self._cycle += 1
         if self._cycle % self._every_cycles:
             return False
-        self._take_turn()
-        return True
+        return self._take_turn()
+
+    def expect(self, index: int) -> None:
+        """Set a suspended servo up again that is known to answer."""
+        self._returns[index] = self._bring_back(index)
 
     def ask_soon(self, index: int) -> None:
         """Read a servo's status in one of the next cycles."""
         if index not in self._urgent:
             self._urgent.append(index)
 
-    def _note_alerts(self) -> None:
+    def note_alerts(self) -> None:
+        """Ask a servo that has begun to report an error for its status, first of all."""
         alert = self._state.alert
-        alert_bytes = alert.tobytes()
-        if alert_bytes == self._seen_alert_bytes:  # much cheaper than comparing arrays
-            return
-        for index in np.flatnonzero(alert & ~self._seen_alert):
+        for index in np.flatnonzero(alert & ~self._seen_alert & self._asked):
             self.ask_soon(int(index))
-        self._state.error[~alert] = 0
+        self._state.error[~alert & self._asked] = 0
         self._seen_alert[:] = alert
-        self._seen_alert_bytes = alert_bytes
 
-    def _take_turn(self) -> None:
+    def _go_on_with_return(self) -> None:
+        index, steps = next(iter(self._returns.items()))
+        try:
+            next(steps)
+        except StopIteration:
+            del self._returns[index]
+        except LinkLost:
+            raise
+        except DriverError:  # counted by the link; the next probe begins anew
+            del self._returns[index]
+
+    def _take_turn(self) -> bool:
         self._turn += 1
         suspended = self._roster.suspended
         if suspended and self._turn % _PROBE_EVERY_TURNS == 0:
             self._probe(suspended[self._turn // _PROBE_EVERY_TURNS % len(suspended)])
-            return
-        polled = self._roster.polled
+            return True
+        polled = [index for index in self._roster.polled if self._asked[index]]
+        if not polled:
+            return False
         round_number, position = divmod(self._turn, len(polled))
         read = self._read_climate if round_number % 2 else self._read_status
         read(polled[position])
+        return True
 
     def _read_status(self, index: int) -> None:
         servo = self._servos[index]
@@ -129,4 +152,4 @@ class HealthPoll:
         except (NoReply, ProtocolError):  # still away
             return
         if number == self._servos[index].model.number:
-            self._on_return(index)
+            self.expect(index)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.base import ByteTransport
+from drivers.base import BurstTransport, ByteTransport, CheckedTransport, TunableTransport
 from drivers.clock import NS_PER_S, Clock
 from drivers.dynamixel.codec import (
     ALERT,
@@ -19,8 +19,11 @@ from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES, Entry, ReplyColle
 from drivers.errors import LinkLost
 
 _BITS_PER_BYTE: Final = 10
+PING_REPLY_BYTES: Final = STATUS_OVERHEAD_BYTES + 3
 _STALE_BYTES: Final = 4096
 _STALE_READS: Final = 16
+_STALL_RATIO: Final = 0.6
+"""How much of the margin the next part of a chained reply may be late."""
 _WATCHFUL_SENDS: Final = 8
 """How many transactions after a missing answer look for it before they ask anew."""
 
@@ -46,7 +49,14 @@ class Link:
         self.last_sent_ns = clock.now_ns()
         self._transport = transport
         self._clock = clock
-        self._ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
+        self._burst = transport if isinstance(transport, BurstTransport) else None
+        self.baud = baud
+        self.ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
+        self.turnaround_ns = 0
+        """The longest time beyond the wire's that a single answer has taken."""
+        self.echoes = False
+        """The adapter hears itself: all that is sent comes back first."""
+        self._unheard = b""
         self._watchful = _WATCHFUL_SENDS
         self._lost: LinkLost | None = None
 
@@ -57,6 +67,44 @@ class Link:
     def close(self) -> None:
         """Release the transport."""
         self._transport.close()
+
+    def set_baud(self, baud: int) -> None:
+        """Go on at another speed, where the transport can; see `other_bauds`.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        if isinstance(self._transport, TunableTransport):
+            self._transport.set_baud(baud)
+            self.baud = baud
+            self.ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
+
+    @property
+    def other_bauds(self) -> tuple[int, ...]:
+        """Return the speeds to which the transport can be set, but for the present one."""
+        if not isinstance(self._transport, TunableTransport):
+            return ()
+        return tuple(baud for baud in self._transport.bauds if baud != self.baud)
+
+    @property
+    def adapter_fault(self) -> str:
+        """Return what slows the adapter down and how to mend it, or ""."""
+        transport = self._transport
+        return transport.adapter_fault() if isinstance(transport, CheckedTransport) else ""
+
+    def detect_echo(self, servo_id: int, margin_s: float) -> None:
+        """Find out by a ping whether the adapter hears what it sends, and go on accordingly.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        frame = encode_instruction(servo_id, Instruction.PING)
+        deadline_ns = self.ask(frame, len(frame) + PING_REPLY_BYTES, margin_s)
+        heard = self._receive(len(frame), deadline_ns)
+        self.echoes = heard == frame
+        rest = PING_REPLY_BYTES if self.echoes else PING_REPLY_BYTES - len(heard)
+        if heard:
+            self._receive(rest, deadline_ns)
 
     def send(self, frame: bytes) -> None:
         """Send a packet that nobody answers.
@@ -73,6 +121,8 @@ class Link:
         except LinkLost as error:
             raise self._note_loss(error) from error
         self.last_sent_ns = self._clock.now_ns()
+        if self.echoes:
+            self._unheard += frame
 
     def exchange(self, frame: bytes, reply_bytes: int, margin_s: float) -> tuple[bytes, int]:
         """Send a request and return what came of the expected bytes, and the deadline used.
@@ -80,15 +130,77 @@ class Link:
         Raises:
             LinkLost: the adapter is gone.
         """
+        deadline_ns = self.ask(frame, reply_bytes, margin_s)
+        return self.receive_all(reply_bytes, deadline_ns), deadline_ns
+
+    def ask(self, frame: bytes, reply_bytes: int, margin_s: float) -> int:
+        """Send a request and return until when its answer is waited for.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
         self.send(frame)
-        deadline_ns = self._deadline_ns(len(frame) + reply_bytes, margin_s)
-        data = self.receive(reply_bytes, deadline_ns)
-        while len(data) < reply_bytes:
-            more = self.receive(reply_bytes - len(data), deadline_ns)
+        wire_ns = (len(frame) + reply_bytes) * self.ns_per_byte
+        return self.last_sent_ns + wire_ns + round(margin_s * NS_PER_S)
+
+    def wire_ns(self, read: SyncRead, margin_s: float) -> int:
+        """Return how long a sync read takes at most."""
+        wire_bytes = len(read.request) + read.reply_bytes
+        return wire_bytes * self.ns_per_byte + round(margin_s * NS_PER_S)
+
+    def receive_all(self, count: int, deadline_ns: int) -> bytes:
+        """Return `count` bytes behind the adapter's echo, or what of them came by the deadline.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        if not self.echoes:
+            return self._receive(count, deadline_ns)
+        echo, self._unheard = self._unheard, b""
+        data = self._receive(len(echo) + count, deadline_ns)
+        # a damaged echo stays: the parsers find the answer behind it
+        return data.removeprefix(echo)
+
+    def receive_chained(self, read: SyncRead, deadline_ns: int, margin_s: float) -> bytes:
+        """Return what came of a fast sync read's reply; give up early where it has stopped.
+
+        The reply is one packet to which each servo adds its part. When the next part does not
+        begin in time, nothing more will come.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        stall_ns = max(round(margin_s * _STALL_RATIO * NS_PER_S), 2 * self.turnaround_ns)
+        sent_ns, wire_bytes = self.last_sent_ns, len(read.request) + STATUS_OVERHEAD_BYTES
+        data = b""
+        while len(data) < read.reply_bytes:
+            part_ns = (wire_bytes + len(data) + read.size) * self.ns_per_byte
+            limit_ns = min(deadline_ns, sent_ns + part_ns + stall_ns)
+            more = self.receive_all(read.reply_bytes - len(data), limit_ns)
             if not more:
                 break
             data += more
-        return data, deadline_ns
+        return data
+
+    def _receive(self, count: int, deadline_ns: int) -> bytes:
+        if self._burst is None:
+            return self._receive_in_parts(count, deadline_ns)
+        try:
+            data = self._burst.read_burst(count, deadline_ns)
+        except LinkLost as error:
+            raise self._note_loss(error) from error
+        if len(data) < count:
+            self._watchful = _WATCHFUL_SENDS
+        return data
+
+    def _receive_in_parts(self, count: int, deadline_ns: int) -> bytes:
+        data = self.receive(count, deadline_ns)
+        while len(data) < count:
+            more = self.receive(count - len(data), deadline_ns)
+            if not more:
+                break
+            data += more
+        return data
 
     def receive(self, max_bytes: int, deadline_ns: int) -> bytes:
         """Return what arrives by the deadline; nothing means that later bytes would be stale.
@@ -186,6 +298,8 @@ class Link:
         data, deadline_ns = self.exchange(frame, reply_bytes, margin_s)
         parser.feed(data)
         packets = parser.packets()
+        if packets and len(data) == reply_bytes:
+            self._note_turnaround(len(frame) + reply_bytes)
         while (packet := _answer(packets, servo_id, answer_bytes)) is None:
             data = self.receive(reply_bytes, deadline_ns)
             if not data:
@@ -194,15 +308,19 @@ class Link:
             packets = parser.packets()
         return packet
 
-    def _deadline_ns(self, wire_bytes: int, margin_s: float) -> int:
-        return self._clock.now_ns() + wire_bytes * self._ns_per_byte + round(margin_s * NS_PER_S)
+    def _note_turnaround(self, wire_bytes: int) -> None:
+        taken_ns = self._clock.now_ns() - self.last_sent_ns - wire_bytes * self.ns_per_byte
+        self.turnaround_ns = max(self.turnaround_ns, taken_ns)
 
     def _drop_stale_input(self) -> None:
         """Forget answers that came too late, or the next reply would be read one cycle old."""
         self._watchful -= 1
+        unheard, self._unheard = len(self._unheard), b""
         try:
             for _ in range(_STALE_READS):
                 stale = self._transport.read(_STALE_BYTES, self._clock.now_ns())
+                stale = stale[unheard:]
+                unheard = 0
                 if not stale:
                     return
                 self._watchful = _WATCHFUL_SENDS

@@ -1,141 +1,178 @@
-"""Run the block read of each cycle and put its values, on the joint side, into the state."""
+"""Run the block reads of each cycle and keep the age of every servo's values.
 
-from collections.abc import Sequence
+Servos whose block lies at the same address share one sync read; a bus of one layout needs one.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel.block import BlockRead, Records, records_of
-from drivers.dynamixel.codec import ALERT
+from drivers.dynamixel.completion import complete
+from drivers.dynamixel.group import Group, ServoRead
 from drivers.dynamixel.link import Link
 from drivers.dynamixel.roster import Roster
-from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
 
 _NEVER_NS: Final = -1
-_Rows = NDArray[np.intp]
 
 
 class StateReader:
-    """Read the block of all polled servos; what one servo does costs the others nothing."""
+    """Read the blocks of all polled servos; what one servo does costs the others nothing."""
 
     def __init__(
         self,
         link: Link,
-        servos: Sequence[ServoSpec],
+        reads: Sequence[ServoRead],
         roster: Roster,
         state: BusState,
         *,
-        fast_sync: bool,
         margin_s: float,
+        on_lost_map: Callable[[int], None],
     ) -> None:
+        """Read as `reads` says, servo by servo.
+
+        `on_lost_map` is told the index of a servo that has forgotten its indirect addresses.
+        """
         self._link = link
-        self._servos = servos
+        self._reads = tuple(reads)
         self._roster = roster
         self._state = state
-        self._fast = fast_sync
         self._margin_s = margin_s
-        self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
-        self._at_pulse_zero = np.array([servo.to_joint(0) for servo in servos])
-        self._per_velocity = np.array(
-            [
-                servo.model.velocity_unit_rad_s * servo.sign * servo.travel_per_rad
-                for servo in servos
-            ]
-        )
-        self._per_effort = np.array(
-            [servo.model.effort_unit_ratio * servo.sign for servo in servos]
-        )
-        self._stamps_ns = np.full(len(servos), _NEVER_NS, dtype=np.int64)
-        self._rows: _Rows | None = None
+        self._on_lost_map = on_lost_map
+        self._stamps_ns: NDArray[np.int64] = np.full(len(reads), _NEVER_NS, dtype=np.int64)
         self._all_fresh = False
+        self._deadline_ns = 0
+        self._unusual = 0
+        self._lost: list[int] = []
+        self.groups: tuple[Group, ...] = ()
         self.rebuild()
 
     def rebuild(self) -> None:
-        """Prepare the request for the servos that are polled now."""
+        """Prepare the requests for the servos that are polled now."""
         polled = self._roster.polled
-        ids = [self._servos[index].id for index in polled]
-        self._block = BlockRead(ids, fast=self._fast)
-        everyone = len(ids) == len(self._servos)
-        self._rows = None if everyone else np.array(polled, dtype=np.intp)
+        keys = {index: self._reads[index].key for index in polled}
+        self.groups = tuple(
+            Group([n for n in polled if keys[n] == key], self._reads, self._state)
+            for key in dict.fromkeys(keys.values())
+        )
 
     def read(self) -> None:
-        """Run one block read and update the state's first group.
+        """Run one cycle's reads and update the state's first group.
 
         Raises:
             LinkLost: the adapter is gone.
         """
-        request = self._block.sync_read
-        reply, deadline_ns = self._link.exchange(
-            request.request, request.reply_bytes, self._margin_s
-        )
-        counters = self._link.counters
-        counters.cycles += 1
-        records = self._block.match(reply)
-        if records is not None:
-            self._roster.note_complete()
-            if self._rows is None:
-                self._store_all(records)
-            else:
-                self._store(records, self._rows)
-            return
-        records, indices = self._frame_anew(reply, deadline_ns)
-        complete = len(indices) == len(self._roster.polled)
-        counters.stuffed += complete
-        counters.partial_cycles += not complete
-        self._store(records, np.array(indices, dtype=np.intp))
-        self._review_roster(indices)
+        self._begin()
+        for group in self.groups:
+            self._send(group)
+            self._collect(group)
+        self._finish()
+
+    def read_in_turns(self) -> Iterator[None]:
+        """Do as `read`, but pause whenever a request is on its way.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        self._begin()
+        for group in self.groups:
+            self._send(group)
+            yield
+            self._collect(group)
+        self._finish()
 
     def note_silence(self) -> None:
         """Let all values grow old: the link is lost."""
-        self._all_fresh = False
+        self._forget_freshness(self._state.stamp_ns)
         self._state.valid[:] = False
         self._state.stamp_ns = self._link.now_ns()
         self._update_ages()
 
-    def _frame_anew(self, reply: bytes, deadline_ns: int) -> tuple[Records, list[int]]:
-        entries = self._link.collect(self._block.sync_read, reply, deadline_ns)
-        indices = [index for index in self._roster.polled if self._servos[index].id in entries]
-        ids = [self._servos[index].id for index in indices]
-        return records_of(entries, ids), indices
+    def take_news(self) -> tuple[bool, bool]:
+        """Tell whether errors, and whether the status, may differ since this was asked last."""
+        errors = status = False
+        for group in self.groups:
+            errors |= group.error_news
+            status |= group.status_news
+            group.error_news = group.status_news = False
+        return errors, status
 
-    def _review_roster(self, answered: list[int]) -> None:
-        if len(answered) == len(self._roster.polled):
-            self._roster.note_complete()
-        elif dropped := self._roster.note_partial(answered, chained=self._fast):
-            self._link.counters.suspensions += len(dropped)
-            self.rebuild()
+    def forget_status(self) -> None:
+        """Take the next status of every servo for news: the state was changed meanwhile."""
+        for group in self.groups:
+            group.forget_status()
 
-    def _store_all(self, records: Records) -> None:
-        """Do what `_store` does when all servos have answered, without scatter and temporaries."""
+    def _begin(self) -> None:
+        self._link.counters.cycles += 1
+        self._unusual = 0
+
+    def _send(self, group: Group) -> None:
+        request = group.read.sync_read
+        self._deadline_ns = self._link.ask(request.request, request.reply_bytes, self._margin_s)
+
+    def _collect(self, group: Group) -> None:
+        read = group.read
+        if read.fast:
+            reply = self._link.receive_chained(read.sync_read, self._deadline_ns, self._margin_s)
+        else:
+            reply = self._link.receive_all(read.sync_read.reply_bytes, self._deadline_ns)
+        if read.take(reply) and 0 not in read.voltage_low:
+            group.store()
+        else:
+            self._collect_anew(group, reply)
+
+    def _finish(self) -> None:
         state = self._state
-        np.multiply(records["position"], self._per_pulse, out=state.position_rad)
-        np.add(state.position_rad, self._at_pulse_zero, out=state.position_rad)
-        np.multiply(records["velocity"], self._per_velocity, out=state.velocity_rad_s)
-        np.multiply(records["effort"], self._per_effort, out=state.effort_ratio)
-        np.greater_equal(records["error"], ALERT, out=state.alert)
-        state.stamp_ns = self._link.now_ns()
-        self._stamps_ns.fill(state.stamp_ns)
+        before_ns, state.stamp_ns = state.stamp_ns, self._link.now_ns()
+        if self._unusual or len(self._roster.polled) < len(self._reads):
+            self._finish_partial(before_ns)
+            return
         if not self._all_fresh:
             self._all_fresh = True
             state.valid.fill(True)
             state.age_s.fill(0.0)
+        self._roster.note_complete()
 
-    def _store(self, records: Records, rows: _Rows) -> None:
-        self._all_fresh = False
-        state = self._state
-        position = records["position"] * self._per_pulse[rows]
-        state.position_rad[rows] = position + self._at_pulse_zero[rows]
-        state.velocity_rad_s[rows] = records["velocity"] * self._per_velocity[rows]
-        state.effort_ratio[rows] = records["effort"] * self._per_effort[rows]
-        state.alert[rows] = records["error"] >= ALERT
+    def _collect_anew(self, group: Group, reply: bytes) -> None:
+        self._unusual += 1
+        request = group.read.sync_read
+        entries, blamed = complete(self._link, request, reply, self._deadline_ns, self._margin_s)
+        group.blamed = [group.members[group.ids.index(servo_id)] for servo_id in blamed]
+        self._lost += group.store_entries(entries)
+
+    def _finish_partial(self, before_ns: int) -> None:
+        self._forget_freshness(before_ns)
+        answered = [index for group in self.groups for index in group.answered]
+        state, counters = self._state, self._link.counters
         state.valid[:] = False
-        state.valid[rows] = True
-        state.stamp_ns = self._link.now_ns()
-        self._stamps_ns[rows] = state.stamp_ns
+        state.valid[answered] = True
+        self._stamps_ns[answered] = state.stamp_ns
         self._update_ages()
+        asked = sum(len(group.members) for group in self.groups)
+        if len(answered) == asked:
+            counters.stuffed += bool(self._unusual)
+            self._roster.note_complete()
+            return
+        counters.partial_cycles += 1
+        self._review_roster(answered)
+
+    def _review_roster(self, answered: Sequence[int]) -> None:
+        """Suspend who keeps silent; when nobody answers, nobody is to blame."""
+        blamed = [index for group in self.groups for index in group.blamed]
+        if answered and (dropped := self._roster.note_missing(blamed)):
+            self._link.counters.suspensions += len(dropped)
+            self.rebuild()
+        lost, self._lost = self._lost, []
+        for index in lost:
+            self._on_lost_map(index)
+
+    def _forget_freshness(self, since_ns: int) -> None:
+        if self._all_fresh:
+            self._stamps_ns.fill(since_ns)
+        self._all_fresh = False
 
     def _update_ages(self) -> None:
         age_s = (self._state.stamp_ns - self._stamps_ns) / NS_PER_S

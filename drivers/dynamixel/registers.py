@@ -39,6 +39,11 @@ class Registers:
     def __init__(self, link: Link) -> None:
         self._link = link
 
+    @property
+    def link(self) -> Link:
+        """Return what carries the transactions."""
+        return self._link
+
     def ping(self, servo: ServoSpec, patience: Patience = SETUP) -> tuple[int, int]:
         """Return a servo's model number and firmware version.
 
@@ -99,6 +104,24 @@ class Registers:
             answer_bytes=0,
             patience=patience,
             name=f"write {servo} {name} = {value}",
+        )
+
+    def write_span(
+        self, servo: ServoSpec, address: int, data: bytes, patience: Patience = SETUP
+    ) -> None:
+        """Write neighbouring bytes at one instant and wait for the servo's consent.
+
+        Raises:
+            Rejected: the servo refuses; the class tells why.
+            ServoSilent: no answer.
+        """
+        self._link.request(
+            servo.id,
+            Instruction.WRITE,
+            address.to_bytes(2, "little") + data,
+            answer_bytes=0,
+            patience=patience,
+            name=f"write {servo} address {address}, {len(data)} bytes",
         )
 
     def read_many(

@@ -1,17 +1,13 @@
 """Decide which servos the block read asks, so that a dead one does not cost the others."""
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from typing import Final
 
 SUSPEND_AFTER: Final = 3
 
 
 class Roster:
-    """Keep the servos (by index) that are polled; a suspended one is asked for by a ping instead.
-
-    In a fast sync read each servo waits for the one before it, so a silent servo also mutes those
-    behind it: then only the first missing one is blamed. When nobody answers, nobody is blamed.
-    """
+    """Keep the servos, by index, that are polled; a suspended one is pinged now and then."""
 
     def __init__(self, count: int) -> None:
         self.polled = tuple(range(count))
@@ -28,14 +24,12 @@ class Roster:
         if self._misses:
             self._misses.clear()
 
-    def note_partial(self, answered: Collection[int], *, chained: bool) -> tuple[int, ...]:
-        """Blame the missing servos and return those that are suspended now."""
-        missing = [index for index in self.polled if index not in answered]
-        if not answered or not missing:
-            return ()
-        blamed = missing[:1] if chained else missing
+    def note_missing(self, blamed: Sequence[int]) -> tuple[int, ...]:
+        """Count a cycle that some servos spoiled; return those that are suspended now."""
         self._misses = {index: self._misses.get(index, 0) + 1 for index in blamed}
         dropped = tuple(index for index in blamed if self._misses[index] >= SUSPEND_AFTER)
+        if len(dropped) == len(self.polled):
+            return ()
         self.polled = tuple(index for index in self.polled if index not in dropped)
         return dropped
 

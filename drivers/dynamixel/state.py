@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from drivers.dynamixel.servo import ServoSpec
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+_READINGS: Final = 5
 
 
 @dataclass(slots=True, eq=False)
@@ -19,8 +21,12 @@ class BusState:
 
     The first group comes with each cycle's block read. A servo that gave no value keeps its last
     one: then `valid` is False and `age_s` grows (infinite before the first value). The second group
-    is polled a servo at a time, and known in part since the handshake; NaN means not read yet.
+    comes with it where the block holds it (`Layout.INDIRECT`); else it is polled a servo at a time,
+    and known in part since the handshake. NaN means not read yet.
     """
+
+    readings: Floats
+    """Rows: position, velocity, effort, voltage, temperature; those below are views of it."""
 
     position_rad: Floats
     velocity_rad_s: Floats
@@ -44,29 +50,32 @@ class BusState:
     @classmethod
     def of(cls, count: int) -> "BusState":
         """Return the state of `count` servos of which nothing is known."""
+        readings = np.full((_READINGS, count), np.nan)
         return cls(
-            position_rad=np.full(count, np.nan),
-            velocity_rad_s=np.full(count, np.nan),
-            effort_ratio=np.full(count, np.nan),
+            readings=readings,
+            position_rad=readings[0],
+            velocity_rad_s=readings[1],
+            effort_ratio=readings[2],
+            voltage_v=readings[3],
+            temperature_c=readings[4],
             age_s=np.full(count, np.inf),
             valid=np.zeros(count, dtype=np.bool_),
             alert=np.zeros(count, dtype=np.bool_),
             error=np.zeros(count, dtype=np.uint8),
             torque_on=np.zeros(count, dtype=np.bool_),
             watchdog=np.zeros(count, dtype=np.int16),
-            voltage_v=np.full(count, np.nan),
-            temperature_c=np.full(count, np.nan),
         )
 
     def copy(self) -> "BusState":
         """Return a state that the next cycle does not change."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return BusState(
-            **{
-                name: value.copy() if name != "stamp_ns" else value
-                for name, value in values.items()
-            }
-        )
+        copied = BusState.of(len(self.valid))
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name == "stamp_ns":
+                copied.stamp_ns = value
+            else:
+                getattr(copied, field.name)[:] = value
+        return copied
 
     def faults(self, servos: Sequence[ServoSpec]) -> list[str]:
         """Return a line for each servo that reports a hardware error."""

@@ -16,6 +16,7 @@ STATUS_OVERHEAD_BYTES: Final = 11
 _FAST_OVERHEAD_BYTES: Final = 8
 _FAST_ENTRY_OVERHEAD_BYTES: Final = 4
 _FAST_HEAD: Final = HEADER + bytes((BROADCAST_ID,))
+_STATUS: Final = bytes((Instruction.STATUS,))
 
 
 class Entry(NamedTuple):
@@ -31,6 +32,7 @@ class SyncRead:
 
     def __init__(self, ids: Sequence[int], address: int, size: int, *, fast: bool) -> None:
         self.ids = tuple(ids)
+        self.address = address
         self.size = size
         self.fast = fast
         instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
@@ -93,6 +95,8 @@ class ReplyCollector:
 
     def _scan_fast_reply(self) -> None:
         start = self._received.find(_FAST_HEAD)
+        while start >= 0 and self._received[start + 7 : start + 8] != _STATUS:  # our own echo
+            start = self._received.find(_FAST_HEAD, start + 1)
         if start < 0:
             return
         for error, servo_id, data in decode_fast_entries(self._received[start:], self._read.size):

@@ -8,6 +8,9 @@ from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.errors import ServoSilent
 from drivers.dynamixel.link import Link, Patience
+from sim_twin.lines import MemoryLine
+from sim_twin.servos import EmulatedServoSpec, FirmwareOptions
+from sim_twin.servos.server import FreeServos
 
 BYTE_NS = 10_000  # at 1 Mbps
 SPECS = [ServoSpec(id=n, model_name="XM430-W350", joint=f"joint_{n}") for n in range(1, 17)]
@@ -53,6 +56,31 @@ class BabblingLine(SilentLine):
         return b"\x00" * min(20, max_bytes)
 
 
+class SwitchedLine:
+    """Answer as sixteen emulated servos do, until the line goes bad."""
+
+    def __init__(self, clock: StillClock, bad: SilentLine) -> None:
+        servos = FreeServos(
+            [EmulatedServoSpec(id=s.id, model_name=s.model_name) for s in SPECS], FirmwareOptions()
+        )
+        servos.advance_to(clock.time_ns)
+        self._good = MemoryLine(servos.bank, clock)
+        self._bad = bad
+        self.answering = True
+
+    def write(self, data: bytes) -> None:
+        if self.answering:
+            self._good.write(data)
+
+    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
+        line = self._good if self.answering else self._bad
+        return line.read(max_bytes, deadline_ns)
+
+    def discard_input(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
 class FloodedLine(SilentLine):
     """Have bytes without end already waiting."""
 
@@ -67,16 +95,18 @@ def test_a_cycle_without_answers_costs_the_wire_time_and_two_milliseconds(
     line_type: type[SilentLine], fast_sync: bool
 ) -> None:
     clock = StillClock()
-    line = line_type(clock)
+    line = SwitchedLine(clock, line_type(clock))
     bus = DynamixelBus(
         line, clock, SPECS, baud=1_000_000, fast_sync=fast_sync, health_every_cycles=1000
     )
+    bus.connect()
+    line.answering = False
     start_ns = clock.time_ns
     bus.read_state()
     wire_ns = (30 + (232 if fast_sync else 336)) * BYTE_NS
     assert clock.time_ns - start_ns <= wire_ns + 2_000_000 + 20 * BYTE_NS
     assert not bus.state.valid.any()
-    assert bus.counters.timeouts == 16
+    assert bus.counters.timeouts >= 16  # in a fast sync read some are asked twice
 
 
 def test_bytes_without_end_do_not_hold_the_bus() -> None:
