@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from sim_twin.faults.scenario import NO_CAUSE, Meanwhile, Scenario
+import numpy as np
+
+from sim_twin.faults.scenario import Meanwhile, Scenario
 from sim_twin.faults.verdict import failures
-from sim_twin.faults.witness import STANDSTILL_RAD_S, Witness
+from sim_twin.faults.witness import Witness
 from sim_twin.stack import LockstepControl, LockstepStack
 
 _SAMPLE_S: Final = 0.004
@@ -17,6 +19,7 @@ _SETTLE_S: Final = 0.3
 _RETURN_S: Final = 1.3  # a lost bus is opened again once a second
 _ACT_S: Final = 3.0
 _ACT_EVERY_S: Final = 0.5
+_STILL_RAD: Final = 0.02
 _TRAVEL_S: Final = 20.0
 _TRAVEL_M: Final = 0.8
 _DRIVE_M_S: Final = 0.3
@@ -109,13 +112,13 @@ class Rehearsal:
     def _return(self, seen: Witness) -> list[str]:
         """See what happens once the fault has gone: nothing moves without an operator's act."""
         expect, wrong = self._scenario.expect, []
-        stands = expect.cause != NO_CAUSE and expect.recovery and not math.isnan(seen.rest_s)
-        fastest = 0.0
+        stands = expect.recovery and not expect.runs_back and not math.isnan(seen.rest_s)
+        place, furthest = seen.where(), 0.0
         for _ in self._samples(self._scenario.end_s + _RETURN_S):
             seen.look_at_pose()
-            fastest = max(fastest, seen.speed_rad_s())
-        if stands and expect.torque != "off" and fastest > STANDSTILL_RAD_S:
-            wrong.append(f"it moved again without an operator's act, at {fastest:.2f} rad/s")
+            furthest = max(furthest, float(np.abs(seen.where() - place).max()))
+        if stands and expect.torque != "off" and furthest > _STILL_RAD:
+            wrong.append(f"it moved on without an operator's act, by {furthest:.3f} rad")
         if expect.recovery and self._stack.status()["state"] == "armed":
             wrong.append("it armed again without an operator's act")
         for act in expect.recovery:

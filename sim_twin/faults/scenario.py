@@ -38,6 +38,7 @@ class Expectation:
     alert           a joint whose servo must report a hardware error
     stale_topics    these must go stale while the fault is on; no other one may
     counts          counters of a bus that must rise, as "servos.crc_errors"
+    runs_back       once the fault has gone, a servo itself runs back: no command of control's
     recovery        the acts that bring the robot back to armed once the fault has gone
     pose_error_m    how far perception's pose may be off while the fault is on and after it
     travel          what becomes of the command on a travel: "succeeds" or "fails"
@@ -51,6 +52,7 @@ class Expectation:
     alert: str | None = None
     stale_topics: tuple[str, ...] | None = None
     counts: tuple[str, ...] = ()
+    runs_back: bool = False
     recovery: tuple[str, ...] = ()
     pose_error_m: float | None = None
     travel: str | None = None
@@ -176,6 +178,7 @@ _CHECKS: Final[Mapping[str, Callable[[object], bool]]] = {
     "alert": _is_text,
     "stale_topics": _are_texts,
     "counts": _are_texts,
+    "runs_back": lambda value: isinstance(value, bool),
     "recovery": _are_acts,
     "pose_error_m": _is_time,
     "travel": lambda value: value in ("succeeds", "fails"),

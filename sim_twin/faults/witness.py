@@ -5,6 +5,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from drivers.clock import NS_PER_S
 from sim_twin.faults.scenario import NO_CAUSE
 from sim_twin.stack import LockstepControl
@@ -33,7 +36,9 @@ class Witness:
         self.states: set[str] = set()
         self._stack = stack
         self._begin_s = begin_s
-        self._parts = parts
+        model = stack.lockstep.twin.engine.model
+        self._dofs = [int(model.joint(part).dofadr[0]) for part in parts]
+        self._places = [int(model.joint(part).qposadr[0]) for part in parts]
         self._joints = stack.space.cell_reader("joint_state")
         self._pose = stack.space.cell_reader("pose")
         self._topics = _topics(stack)
@@ -64,8 +69,12 @@ class Witness:
 
     def speed_rad_s(self) -> float:
         """Return the speed of the fastest part."""
-        joints = self._stack.lockstep.truth()["joints"]
-        return max(abs(float(joints[name]["velocity"])) for name in self._parts)
+        return float(np.abs(self._stack.lockstep.twin.engine.data.qvel[self._dofs]).max())
+
+    def where(self) -> NDArray[np.float64]:
+        """Return where the parts are."""
+        places: NDArray[np.float64] = self._stack.lockstep.twin.engine.data.qpos[self._places]
+        return places
 
     def counters(self) -> dict[str, int]:
         """Return what control's buses have counted, as "servos.crc_errors"."""
