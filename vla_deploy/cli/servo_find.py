@@ -157,6 +157,18 @@ def _raise_findings(
             f"{wire.port} at {reports[0].baud} baud: no answer from {names}; check power, cable "
             "and speed (see the table for servos at another speed)"
         )
+    if wrong := _wrong_models(wire, reports[0]):
+        raise CommandFailed(f"{'; '.join(wrong)}; correct the robot file or the wiring")
+
+
+def _wrong_models(wire: ServoWire, report: SpeedReport) -> list[str]:
+    declared = {one.id: one.model for one in wire.robot.servo_bus.servos} if wire.robot else {}
+    return [
+        f"{wire.label(one.servo_id)} is {one.model_name}, the robot file says "
+        f"{declared[one.servo_id]}"
+        for one in report.servos
+        if declared.get(one.servo_id, one.model_name) != one.model_name
+    ]
 
 
 def _nothing_found(wire: ServoWire, reports: Sequence[SpeedReport]) -> str:

@@ -10,10 +10,12 @@ from typing import Final
 
 from drivers.dynamixel.codec import BROADCAST_ID, MAX_SERVO_ID, Instruction, encode_instruction
 from drivers.dynamixel.errors import CorruptReply, ServoSilent
+from drivers.dynamixel.link import Patience
 from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES
 from drivers.dynamixel.tools.bench_link import (
     ONE_TRY,
     PING_ANSWER_BYTES,
+    THREE_TRIES,
     BenchLink,
     FoundServo,
 )
@@ -52,13 +54,14 @@ def scan_speed(
     Raises:
         LinkLost: the adapter is gone.
     """
-    noise_bytes = 0
+    noise_bytes, doubtful = 0, True
     if ids is None:
         progress(f"{link.baud} baud: all ids at once")
         servos, noise_bytes = _ask_everyone(link)
         doubtful = noise_bytes > 0 or len({one.servo_id for one in servos}) < len(servos)
         ids = ALL_IDS if doubtful else sorted(one.servo_id for one in servos)
-    found, clashes = _ask_each(link, ids, progress)
+    patience = ONE_TRY if doubtful else THREE_TRIES
+    found, clashes = _ask_each(link, ids, patience, progress)
     return SpeedReport(
         baud=link.baud,
         servos=tuple(found),
@@ -71,17 +74,17 @@ def scan_speed(
 def is_clash(link: BenchLink, servo_id: int) -> bool:
     """Tell whether more than one servo answers to an id, by what two can never agree on.
 
+    One clean answer is enough for a no, so that neither noise nor a late answer looks like a clash.
+
     Raises:
         LinkLost: the adapter is gone.
     """
     params = _PROBED_ADDRESS.to_bytes(2, "little") + _PROBED_BYTES.to_bytes(2, "little")
-    damaged = 0
     for _ in range(_PROBES):
         packets, junk_bytes = link.listen(servo_id, Instruction.READ, params, _PROBED_BYTES)
-        if len(packets) > 1:
-            return True
-        damaged += junk_bytes > 0
-    return damaged == _PROBES
+        if len(packets) < 2 and not junk_bytes:
+            return False
+    return True
 
 
 def _ask_everyone(link: BenchLink) -> tuple[list[FoundServo], int]:
@@ -95,28 +98,22 @@ def _ask_everyone(link: BenchLink) -> tuple[list[FoundServo], int]:
 
 
 def _ask_each(
-    link: BenchLink, ids: Iterable[int], progress: Progress
+    link: BenchLink, ids: Iterable[int], patience: Patience, progress: Progress
 ) -> tuple[list[FoundServo], list[int]]:
     found, clashes = [], []
     for servo_id in ids:
         progress(f"{link.baud} baud: id {servo_id}")
-        if not _answers(link, servo_id):
+        try:
+            servo = link.ping(servo_id, patience)
+        except ServoSilent:
             continue
+        except CorruptReply:  # something answers; what it is shows next
+            servo = None
         if is_clash(link, servo_id):
             clashes.append(servo_id)
         else:
-            found.append(link.ping(servo_id))
+            found.append(servo or link.ping(servo_id))
     return found, clashes
-
-
-def _answers(link: BenchLink, servo_id: int) -> bool:
-    try:
-        link.ping(servo_id, ONE_TRY)
-    except ServoSilent:
-        return False
-    except CorruptReply:  # something answers; what it is, the caller finds out
-        return True
-    return True
 
 
 def _ask_protocol_1(link: BenchLink) -> tuple[int, ...]:
