@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from drivers.clock import Clock
+from drivers.clock import NS_PER_S, Clock
 from drivers.errors import DeviceBusy, DeviceMissing, LinkLost
 
 _SPEEDS: Final = {
@@ -27,6 +27,10 @@ _SPEEDS: Final = {
     4_000_000: termios.B4000000,
 }
 _WRITE_PATIENCE_MS: Final = 50
+_BITS_PER_BYTE: Final = 10
+_WAKE_EARLY_NS: Final = 150_000
+"""How long before the last byte is due a sleep ends: a timer may be late by as much."""
+_MOST_LATENCY_MS: Final = 1
 _GONE: Final = frozenset({errno.EIO, errno.ENXIO, errno.ENODEV, errno.EBADF})
 _OPEN_ERRORS: Final = {
     errno.ENOENT: (DeviceMissing, "plug the adapter in, or correct the path in the robot file"),
@@ -61,7 +65,9 @@ class SerialPort:
     Reads wait in the kernel, never by spinning. The port is locked against other processes.
     """
 
-    def __init__(self, path: Path, baud: int, clock: Clock) -> None:
+    def __init__(
+        self, path: Path, baud: int, clock: Clock, *, sysfs_root: Path = Path("/sys")
+    ) -> None:
         """Open and configure the port.
 
         Raises:
@@ -69,15 +75,16 @@ class SerialPort:
             DeviceMissing: the path is not there, not permitted or not a tty.
             DeviceBusy: another process holds it.
         """
-        if baud not in _SPEEDS:
-            raise ValueError(f"{path}: baud must be one of {sorted(_SPEEDS)}, got {baud}")
         self._path = path
+        speed = self._speed(baud)
         self._clock = clock
+        self._sysfs_root = sysfs_root
+        self._ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
         with _mapped_open_errors(path):
             self._fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
             try:
                 fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                _make_raw(self._fd, _SPEEDS[baud])
+                _make_raw(self._fd, speed)
             except (OSError, termios.error):
                 os.close(self._fd)
                 raise
@@ -119,6 +126,67 @@ class SerialPort:
                 raise LinkLost(f"{self._path}: hung up; plug it in again, then reconnect")
             return data
 
+    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+        """Return `count` bytes, or what of them has arrived by `deadline_ns`, with few wake-ups.
+
+        Once the first have come, the others need their time on the wire: it is slept through.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        data = self.read(count, deadline_ns)
+        while data and len(data) < count:
+            now_ns = self._clock.now_ns()
+            due_ns = now_ns + (count - len(data)) * self._ns_per_byte - _WAKE_EARLY_NS
+            if due_ns > now_ns:
+                self._clock.sleep_until(min(due_ns, deadline_ns))
+            more = self.read(count - len(data), deadline_ns)
+            if not more:
+                break
+            data += more
+        return data
+
+    @property
+    def bauds(self) -> tuple[int, ...]:
+        """Return the speeds on offer."""
+        return tuple(_SPEEDS)
+
+    def set_baud(self, baud: int) -> None:
+        """Go on at another speed; what was not read is dropped.
+
+        Raises:
+            ValueError: the speed is none of `bauds`.
+            LinkLost: the adapter is gone.
+        """
+        speed = self._speed(baud)
+        try:
+            _make_raw(self._fd, speed)
+        except termios.error as error:
+            raise self._lost(OSError(*error.args)) from error
+        self._ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
+
+    def adapter_fault(self) -> str:
+        """Return what makes the adapter hold back bytes and how to mend it, or "" if nothing does.
+
+        An FTDI chip passes on what it has received when its buffer is full or its timer is over;
+        the low-latency flag makes its driver set the timer to 1 ms, whatever the file says.
+        """
+        if self.low_latency:
+            return ""
+        timer = self._sysfs_root / "bus/usb-serial/devices" / self._path.resolve().name
+        timer /= "latency_timer"
+        try:
+            latency_ms = int(timer.read_text())
+        except (OSError, ValueError):  # not an FTDI adapter
+            return ""
+        if latency_ms <= _MOST_LATENCY_MS:
+            return ""
+        return (
+            f"{self._path}: the adapter's latency timer is expected to be {_MOST_LATENCY_MS} ms, "
+            f"got {latency_ms} ms, which bounds the bus to some {1000 // (latency_ms + 2)} Hz; "
+            f"`echo {_MOST_LATENCY_MS} | sudo tee {timer}`, or install the udev rule of the docs"
+        )
+
     def discard_input(self) -> None:
         """Drop what has arrived and was not read.
 
@@ -135,6 +203,11 @@ class SerialPort:
         if self._fd >= 0:
             os.close(self._fd)
             self._fd = -1
+
+    def _speed(self, baud: int) -> int:
+        if baud not in _SPEEDS:
+            raise ValueError(f"{self._path}: baud must be one of {sorted(_SPEEDS)}, got {baud}")
+        return _SPEEDS[baud]
 
     def _wait_writable(self) -> None:
         poll = select.poll()

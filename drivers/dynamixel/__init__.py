@@ -1,4 +1,5 @@
 from drivers.dynamixel.bus import DynamixelBus
+from drivers.dynamixel.bus_group import BusGroup
 from drivers.dynamixel.control_table import HardwareError, OperatingMode
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.handshake import ServoSetup
@@ -9,6 +10,7 @@ from drivers.dynamixel.watchdog import WatchdogState
 
 __all__ = [
     "BusCounters",
+    "BusGroup",
     "BusState",
     "DynamixelBus",
     "HardwareError",

@@ -127,3 +127,44 @@ def test_a_line_that_takes_no_bytes_is_given_up_instead_of_blocking(
         port.write(bytes(1_000_000))
     assert CLOCK.now_ns() - start < 1_000_000_000
     port.close()
+
+
+@pytest.mark.parametrize(("latency", "fault"), [("1", ""), ("16", "got 16 ms")])
+def test_an_adapter_that_holds_back_bytes_is_told_with_the_remedy(
+    pty: tuple[int, Path], tmp_path: Path, latency: str, fault: str
+) -> None:
+    _, path = pty
+    device = tmp_path / "sys/bus/usb-serial/devices" / path.resolve().name
+    device.mkdir(parents=True)
+    (device / "latency_timer").write_text(latency + "\n")
+    port = SerialPort(path, 1_000_000, CLOCK, sysfs_root=tmp_path / "sys")
+    text = port.adapter_fault()
+    port.close()
+    assert fault in text
+    assert bool(text) == bool(fault)
+    assert not fault or f"sudo tee {device / 'latency_timer'}" in text
+
+
+def test_a_port_that_is_no_usb_adapter_has_no_latency_timer(pty: tuple[int, Path]) -> None:
+    port = SerialPort(pty[1], 1_000_000, CLOCK)
+    assert port.adapter_fault() == ""
+    port.close()
+
+
+def test_a_burst_is_the_bytes_asked_for_or_what_came_of_them(pty: tuple[int, Path]) -> None:
+    master, path = pty
+    port = SerialPort(path, 1_000_000, CLOCK)
+    os.write(master, b"0123456789")
+    assert port.read_burst(4, soon(1.0)) == b"0123"
+    assert port.read_burst(10, soon(0.05)) == b"456789"
+    assert port.read_burst(10, soon(0.0)) == b""
+    port.close()
+
+
+def test_the_speed_can_be_changed_to_one_on_offer(pty: tuple[int, Path]) -> None:
+    port = SerialPort(pty[1], 1_000_000, CLOCK)
+    port.set_baud(57_600)
+    with pytest.raises(ValueError, match="baud must be one of"):
+        port.set_baud(12_345)
+    assert 57_600 in port.bauds
+    port.close()
