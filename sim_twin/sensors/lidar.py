@@ -53,7 +53,8 @@ class LidarDevice:
     `cast` returns the ranges in metres of the beams it is given, beam i at i degrees
     counter-clockwise from the robot's front, 0 for no return. It is called `casts_per_turn` times a
     turn for the points up to the next cast, so that a moving robot distorts the scan as it does in
-    life. `rate_hz` and `range_ratio` (told over true range) may be changed at any time.
+    life, in steps of 33 ms. `rate_hz` and `range_ratio` (told over true range) may be changed at
+    any time.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class LidarDevice:
         sigma_m: float = 0.005,
         seed: int = 0,
         mounting_yaw_rad: float = 0.0,
-        casts_per_turn: int = 5,
+        casts_per_turn: int = 3,
     ) -> None:
         self.rate_hz = rate_hz
         self.range_ratio = 1.0
@@ -99,7 +100,9 @@ class LidarDevice:
             self._start_ns = self._next_cast_ns = now_ns
         if now_ns >= self._next_cast_ns:
             self._next_cast_ns += self._cast_every_ns
-            self._measure(max(self._packets_due(self._next_cast_ns), self._packets_due(now_ns)))
+            end = max(self._packets_due(self._next_cast_ns), self._packets_due(now_ns))
+            if end > self._sent_packets:
+                self._measure(end)
         while self._due_ns and self._due_ns[0] <= now_ns:
             self._send()
 
