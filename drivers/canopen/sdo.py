@@ -24,10 +24,10 @@ _HEADER: Final = struct.Struct("<BHB")
 _ABORT: Final = struct.Struct("<BHBI")
 
 # Client and server command specifiers, the upper three bits of the first byte
-_DOWNLOAD, _UPLOAD, _UPLOAD_SEGMENT, _ABORTED = 1 << 5, 2 << 5, 3 << 5, 4 << 5
-_DOWNLOADED, _UPLOADED, _SEGMENT_TAKEN = 3 << 5, 2 << 5, 1 << 5
-_SPECIFIER: Final = 0xE0
-_SIZED, _EXPEDITED, _LAST, _TOGGLE = 0x01, 0x02, 0x01, 0x10
+START_DOWNLOAD, START_UPLOAD, UPLOAD_SEGMENT, ABORTED = 1 << 5, 2 << 5, 3 << 5, 4 << 5
+DOWNLOADED, UPLOADED, SEGMENT_TAKEN = 3 << 5, 2 << 5, 1 << 5
+SPECIFIER: Final = 0xE0
+SIZED, EXPEDITED, LAST, TOGGLE = 0x01, 0x02, 0x01, 0x10
 
 TOGGLE_NOT_ALTERNATED: Final = 0x0503_0000
 UNKNOWN_COMMAND: Final = 0x0504_0001
@@ -51,12 +51,18 @@ class SdoClient:
     """Talk to the SDO server of one node over its default channel; one transfer at a time."""
 
     def __init__(
-        self, send: Callable[[int, bytes], None], node_id: int, name: str, clock: Clock
+        self,
+        send: Callable[[int, bytes], None],
+        node_id: int,
+        name: str,
+        clock: Clock,
+        timeout_ns: int = SDO_TIMEOUT_NS,
     ) -> None:
         self._send = send
         self._request_id = SDO_REQUEST_COB + node_id
         self._name = name
         self._clock = clock
+        self._timeout_ns = timeout_ns
         self._replies: deque[bytes] = deque(maxlen=MAX_REPLIES)
         self.replies_refused = 0
 
@@ -79,29 +85,29 @@ class SdoClient:
             ProtocolError: the reply does not fit the request.
         """
         what = f"{self._name}: reading 0x{index:04X}:{subindex:X}"
-        reply = yield from self._ask(_HEADER.pack(_UPLOAD, index, subindex) + bytes(4), what)
+        reply = yield from self._ask(_HEADER.pack(START_UPLOAD, index, subindex) + bytes(4), what)
         command = reply[0]
-        if command & _SPECIFIER != _UPLOADED:
+        if command & SPECIFIER != UPLOADED:
             self._abort(index, subindex, UNKNOWN_COMMAND)
             raise ProtocolError(f"{what}: reply 0x{command:02X} is no upload response")
-        if command & _EXPEDITED:
-            size = EXPEDITED_BYTES - (command >> 2 & 3) if command & _SIZED else EXPEDITED_BYTES
+        if command & EXPEDITED:
+            size = EXPEDITED_BYTES - (command >> 2 & 3) if command & SIZED else EXPEDITED_BYTES
             return reply[4 : 4 + size]
-        size_told = int.from_bytes(reply[4:8], "little") if command & _SIZED else None
+        size_told = int.from_bytes(reply[4:8], "little") if command & SIZED else None
         return (yield from self._upload_segments(index, subindex, size_told, what))
 
     def _upload_segments(self, index: int, subindex: int, size: int | None, what: str) -> Reading:
         data, toggle = bytearray(), 0
         while len(data) <= MAX_OBJECT_BYTES:
-            reply = yield from self._ask(bytes((_UPLOAD_SEGMENT | toggle,)) + bytes(7), what)
+            reply = yield from self._ask(bytes((UPLOAD_SEGMENT | toggle,)) + bytes(7), what)
             command = reply[0]
-            if command & _SPECIFIER or command & _TOGGLE != toggle:
+            if command & SPECIFIER or command & TOGGLE != toggle:
                 self._abort(index, subindex, TOGGLE_NOT_ALTERNATED)
                 raise ProtocolError(f"{what}: segment 0x{command:02X} is out of order")
             data += reply[1 : 1 + SEGMENT_BYTES - (command >> 1 & 7)]
-            if command & _LAST:
+            if command & LAST:
                 return self._whole(index, subindex, bytes(data), size, what)
-            toggle ^= _TOGGLE
+            toggle ^= TOGGLE
         self._abort(index, subindex, OUT_OF_MEMORY)
         raise ProtocolError(f"{what}: longer than {MAX_OBJECT_BYTES} bytes")
 
@@ -122,12 +128,12 @@ class SdoClient:
         what = f"{self._name}: writing {data.hex(' ')} to 0x{index:04X}:{subindex:X}"
         expedited = 0 < len(data) <= EXPEDITED_BYTES
         if expedited:
-            command = _DOWNLOAD | (EXPEDITED_BYTES - len(data)) << 2 | _EXPEDITED | _SIZED
+            command = START_DOWNLOAD | (EXPEDITED_BYTES - len(data)) << 2 | EXPEDITED | SIZED
             first = data.ljust(EXPEDITED_BYTES, b"\0")
         else:
-            command, first = _DOWNLOAD | _SIZED, len(data).to_bytes(4, "little")
+            command, first = START_DOWNLOAD | SIZED, len(data).to_bytes(4, "little")
         reply = yield from self._ask(_HEADER.pack(command, index, subindex) + first, what)
-        if reply[0] & _SPECIFIER != _DOWNLOADED:
+        if reply[0] & SPECIFIER != DOWNLOADED:
             self._abort(index, subindex, UNKNOWN_COMMAND)
             raise ProtocolError(f"{what}: reply 0x{reply[0]:02X} is no download response")
         if not expedited:
@@ -137,36 +143,36 @@ class SdoClient:
         toggle = 0
         for start in range(0, max(1, len(data)), SEGMENT_BYTES):
             segment = data[start : start + SEGMENT_BYTES]
-            last = _LAST if start + SEGMENT_BYTES >= len(data) else 0
+            last = LAST if start + SEGMENT_BYTES >= len(data) else 0
             command = toggle | (SEGMENT_BYTES - len(segment)) << 1 | last
             frame = bytes((command,)) + segment.ljust(SEGMENT_BYTES, b"\0")
             reply = yield from self._ask(frame, what)
-            if reply[0] & (_SPECIFIER | _TOGGLE) != _SEGMENT_TAKEN | toggle:
+            if reply[0] & (SPECIFIER | TOGGLE) != SEGMENT_TAKEN | toggle:
                 self._abort(index, subindex, TOGGLE_NOT_ALTERNATED)
                 raise ProtocolError(f"{what}: segment response 0x{reply[0]:02X} is out of order")
-            toggle ^= _TOGGLE
+            toggle ^= TOGGLE
 
     def _ask(self, request: bytes, what: str) -> Reading:
         """Send a frame and return its reply; a late reply about another object is passed over."""
-        starts = request[0] & _SPECIFIER in (_UPLOAD, _DOWNLOAD)
+        starts = request[0] & SPECIFIER in (START_UPLOAD, START_DOWNLOAD)
         self._replies.clear()
         self._send(self._request_id, request)
-        deadline_ns = self._clock.now_ns() + SDO_TIMEOUT_NS
+        deadline_ns = self._clock.now_ns() + self._timeout_ns
         while True:
             while self._replies:
                 reply = self._replies.popleft()
-                if reply[0] & _SPECIFIER == _ABORTED:
+                if reply[0] & SPECIFIER == ABORTED:
                     raise SdoAborted(what, _ABORT.unpack(reply)[3])
                 if not starts or reply[1:4] == request[1:4]:
                     return reply
                 self.replies_refused += 1
             if self._clock.now_ns() > deadline_ns:
-                self._send(self._request_id, _ABORT.pack(_ABORTED, 0, 0, 0x0504_0000))
+                self._send(self._request_id, _ABORT.pack(ABORTED, 0, 0, 0x0504_0000))
                 raise NoReply(
-                    f"{what}: no reply in {SDO_TIMEOUT_NS // 1_000_000} ms; check its power, node "
-                    "id, bit rate and the bus termination"
+                    f"{what}: no reply in {self._timeout_ns // 1_000_000} ms; check its power, "
+                    "node id, bit rate and the bus termination"
                 )
             yield
 
     def _abort(self, index: int, subindex: int, code: int) -> None:
-        self._send(self._request_id, _ABORT.pack(_ABORTED, index, subindex, code))
+        self._send(self._request_id, _ABORT.pack(ABORTED, index, subindex, code))

@@ -1,0 +1,237 @@
+"""`vla-deploy can scan | monitor`: see who is on a CAN bus and what is said; nothing is changed."""
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import Any
+
+import can
+
+from drivers.can_interface import SERIAL_PREFIX, open_can_bus
+from drivers.can_link import CanLink
+from drivers.can_scan import BusScan, FoundAxis, FoundNode, ScanReport
+from drivers.can_words import Words, describe_canopen, describe_odrive
+from drivers.clock import NS_PER_S, MonotonicClock
+from drivers.drive_bus import wait_for
+from drivers.errors import ProtocolError
+from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.cli.example import add_command
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.description import CanBus
+
+INTERFACES = ("socketcan", "slcan", "vla_hub")
+BITRATES = (125_000, 250_000, 500_000, 800_000, 1_000_000)
+POLL_NS = 1_000_000
+DESCRIBERS: dict[str, Callable[[can.Message], Words]] = {
+    "canopen": describe_canopen,
+    "odrive": describe_odrive,
+}
+_PROTOCOL_OF_ROBOT = {"cia402": "canopen", "odrive": "odrive"}
+
+
+def register(commands: Any) -> None:
+    """Add the group of commands."""
+    group = add_command(
+        commands,
+        "can",
+        "find CAN nodes and watch the traffic",
+        "  vla-deploy can scan --robot butler\n"
+        "  vla-deploy can monitor --interface slcan --channel /dev/ttyACM0 --bitrate 500000\n",
+    ).add_subparsers(dest="can_command", required=True, metavar="CAN_COMMAND")
+    scan = add_command(
+        group,
+        "scan",
+        "find CANopen nodes and ODrive axes",
+        "  vla-deploy can scan --robot butler\n"
+        "  vla-deploy can scan --interface socketcan --channel can0 --protocol odrive --json\n",
+    )
+    _add_bus_arguments(scan)
+    scan.set_defaults(run=run_scan)
+    monitor = add_command(
+        group,
+        "monitor",
+        "print the traffic in words",
+        "  vla-deploy can monitor --robot butler --seconds 5\n"
+        "  vla-deploy can monitor --interface vla_hub --channel ./can --count 20 --json\n",
+    )
+    _add_bus_arguments(monitor)
+    monitor.add_argument("--count", type=_positive(int), help="stop after so many frames")
+    monitor.add_argument("--seconds", type=_positive(float), help="stop after this time")
+    monitor.set_defaults(run=run_monitor)
+
+
+def _positive(kind: type[int] | type[float]) -> Callable[[str], float]:
+    def parse(text: str) -> float:
+        value = kind(text)
+        if not value > 0:
+            raise argparse.ArgumentTypeError(f"expected more than 0, got {text!r}")
+        return value
+
+    parse.__name__ = kind.__name__
+    return parse
+
+
+def _add_bus_arguments(command: argparse.ArgumentParser) -> None:
+    which = command.add_mutually_exclusive_group(required=True)
+    which.add_argument("--robot", metavar="NAME", help="the bus of this robot's wheel drives")
+    which.add_argument("--interface", choices=INTERFACES, help="kind of interface")
+    command.add_argument("--channel", help="can0, /dev/ttyACM0, or the path of a twin's hub")
+    command.add_argument("--bitrate", type=int, choices=BITRATES, metavar="N", help="bit/s")
+    command.add_argument(
+        "--protocol",
+        choices=tuple(DESCRIBERS),
+        help="(default: the robot's; else a scan looks for both, the monitor expects canopen)",
+    )
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _wiring(arguments: argparse.Namespace) -> tuple[str, int, str | None]:
+    """Return channel, bit rate and protocol.
+
+    Raises:
+        UsageError: an interface is given without its channel.
+    """
+    if arguments.robot is not None:
+        bus: CanBus = load_robot(arguments.robot).can_bus
+        protocol = arguments.protocol or _PROTOCOL_OF_ROBOT[bus.protocol]
+        return arguments.channel or bus.path, arguments.bitrate or bus.bitrate, protocol
+    channel = arguments.channel
+    if channel is None:
+        raise UsageError(f"--interface {arguments.interface} needs --channel, such as can0")
+    if arguments.interface == "slcan":
+        channel = SERIAL_PREFIX + channel
+    elif arguments.interface == "vla_hub" and "/" not in channel:
+        channel = f"./{channel}"
+    return channel, arguments.bitrate or BITRATES[-1], arguments.protocol
+
+
+@contextmanager
+def _opened(channel: str, bitrate: int) -> Iterator[can.BusABC]:
+    bus = open_can_bus(channel, bitrate)
+    try:
+        yield bus
+    finally:
+        bus.shutdown()
+
+
+def run_scan(arguments: argparse.Namespace) -> int:
+    """Print who is on the bus.
+
+    Raises:
+        CommandFailed: nobody is.
+    """
+    channel, bitrate, protocol = _wiring(arguments)
+    clock = MonotonicClock()
+    with _opened(channel, bitrate) as bus:
+        link = CanLink(bus, clock)
+        scan = BusScan(link, clock, canopen=protocol != "odrive", odrive=protocol != "canopen")
+        wait_for(scan.steps(), clock)
+        trouble = link.trouble
+    report = scan.report
+    if arguments.json:
+        print(json.dumps(_scan_document(channel, report), indent=2))
+    else:
+        print("\n".join(_scan_lines(report)))
+    if not report.nodes and not report.axes:
+        reason = trouble or "check power, bit rate, wiring and termination"
+        raise CommandFailed(f"{channel}: nobody answers at {bitrate} bit/s; {reason}")
+    return 0
+
+
+def _scan_document(channel: str, report: ScanReport) -> dict[str, Any]:
+    return {
+        "channel": channel,
+        "canopen": [
+            {**asdict(node), "profile": node.profile} for _, node in sorted(report.nodes.items())
+        ],
+        "odrive": [asdict(axis) for _, axis in sorted(report.axes.items())],
+        "silent_nodes_were_asked": report.probed,
+    }
+
+
+def _scan_lines(report: ScanReport) -> Iterator[str]:
+    for _, node in sorted(report.nodes.items()):
+        yield _node_line(node)
+    for _, axis in sorted(report.axes.items()):
+        yield _axis_line(axis)
+    if report.axes and not report.probed:
+        yield "silent CANopen nodes were not asked: to ODrive axes that could be a command"
+
+
+def _node_line(node: FoundNode) -> str:
+    if node.device_type is None:
+        return f"CANopen node {node.node_id:3}: {node.state}, does not answer by SDO"
+    identity = ", ".join(
+        f"{name} {'unknown' if value is None else f'0x{value:08X}'}"
+        for name, value in (
+            ("vendor", node.vendor),
+            ("product", node.product),
+            ("revision", node.revision),
+            ("serial", node.serial),
+        )
+    )
+    return f"CANopen node {node.node_id:3}: profile {node.profile}, {identity}, {node.state}"
+
+
+def _axis_line(axis: FoundAxis) -> str:
+    return (
+        f"ODrive axis {axis.node_id:4}: firmware {axis.firmware}, {axis.state}, "
+        f"errors {axis.errors}"
+    )
+
+
+def run_monitor(arguments: argparse.Namespace) -> int:
+    """Print frames until the count or the time is reached, or Ctrl-C."""
+    channel, bitrate, protocol = _wiring(arguments)
+    describe = DESCRIBERS[protocol or "canopen"]
+    clock = MonotonicClock()
+    start_ns = clock.now_ns()
+    end_ns = None if arguments.seconds is None else start_ns + round(arguments.seconds * NS_PER_S)
+    seen = 0
+    with _opened(channel, bitrate) as bus:
+        while (arguments.count is None or seen < arguments.count) and (
+            end_ns is None or clock.now_ns() < end_ns
+        ):
+            frame = _next_frame(bus)
+            if frame is None:
+                clock.sleep_until(clock.now_ns() + POLL_NS)
+                continue
+            seen += 1
+            time_s = (clock.now_ns() - start_ns) / NS_PER_S
+            tell = _frame_json if arguments.json else _frame_line
+            print(tell(time_s, frame, describe(frame)), flush=True)
+    return 0
+
+
+def _next_frame(bus: can.BusABC) -> can.Message | None:
+    """Return the next frame; what the interface could not read as one is passed over."""
+    try:
+        return bus.recv(0.0)
+    except ProtocolError:
+        return None
+    except can.CanError as error:
+        raise CommandFailed(f"{bus.channel_info}: {error}") from error
+
+
+def _frame_line(time_s: float, frame: can.Message, words: Words) -> str:
+    node = "" if words.node is None else f" {words.node}"
+    data = bytes(frame.data).hex(" ")
+    return (
+        f"{time_s:10.4f}  0x{frame.arbitration_id:03X}  {data:24}{words.kind}{node}  {words.text}"
+    )
+
+
+def _frame_json(time_s: float, frame: can.Message, words: Words) -> str:
+    return json.dumps(
+        {
+            "time_s": round(time_s, 6),
+            "id": frame.arbitration_id,
+            "data": bytes(frame.data).hex(),
+            "remote": frame.is_remote_frame,
+            "kind": words.kind,
+            "node": words.node,
+            "text": words.text,
+        }
+    )
