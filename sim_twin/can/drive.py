@@ -20,21 +20,31 @@ from drivers.canopen.objects import (
     SDO_REPLY_COB,
     SDO_REQUEST_COB,
     SYNC_COB,
-    TARGET_VELOCITY,
     TPDO1,
     TPDO2,
     NmtCommand,
     NmtState,
 )
 from drivers.clock import NS_PER_S
+from sim_twin.can.cia402_axis import Cia402Axis
+from sim_twin.can.error_frames import is_restart
 from sim_twin.can.heartbeat import HeartbeatConsumer, HeartbeatProducer
-from sim_twin.can.motor import Motor
-from sim_twin.can.object_dictionary import VALUE_RANGE, ObjectDictionary, SdoAbort
+from sim_twin.can.object_dictionary import VALUE_RANGE, Key, ObjectDictionary, SdoAbort
+from sim_twin.can.pdo_server import PdoServer
+from sim_twin.can.power_stage import Encoder, MotorSpec, PowerStage, Trip
 from sim_twin.can.sdo_server import SdoServer
 from sim_twin.can.velocity_loop import VelocityLoop
 
 HEARTBEAT_LOST: Final = 0x8130
+RECOVERED_FROM_BUS_OFF: Final = 0x8140
 COMMUNICATION_ERROR: Final = 0x11
+# EMCY code and error register of each cause (CiA 402-2 and CiA 301)
+TRIP_CODES: Final = {
+    Trip.OVERLOAD: (0x2310, 0x03),
+    Trip.OVER_VOLTAGE: (0x3210, 0x05),
+    Trip.UNDER_VOLTAGE: (0x3220, 0x05),
+    Trip.OVER_TEMPERATURE: (0x4310, 0x09),
+}
 ERROR_FIELD_LENGTH: Final = 4
 MAX_NODE_ID: Final = 127
 
@@ -54,39 +64,42 @@ class WheelDrive:
         counts_per_rev: int = 16384,
         kv: float = 8.0,
         ki: float = 20.0,
-        torque_limit_nm: float = 4.0,
+        motor: MotorSpec | None = None,
     ) -> None:
         self.node_id = node_id
         self._sign = sign
         self._objects = ObjectDictionary(node_id)
-        loop = VelocityLoop(kv, ki, torque_limit_nm)
-        self._motor = Motor(
-            self._objects, loop, counts_per_rev=counts_per_rev, rated_nm=torque_limit_nm
-        )
+        self._stage = PowerStage(motor or MotorSpec())
+        self._encoder = Encoder(counts_per_rev)
+        self._axis = Cia402Axis(self._objects, VelocityLoop(kv, ki), self._stage, self._encoder)
         self._sdo = SdoServer(self._objects)
         self._producer = HeartbeatProducer(self._objects)
         self._consumer = HeartbeatConsumer(self._objects)
         self._objects.on_write[CONTROLWORD, 0] = self._on_controlword
         self._objects.on_write[ERROR_FIELD, 0] = self._clear_history
-        # Like a CAN controller's acceptance filter: nothing is done for the frames of others.
-        self._heeded = frozenset(
-            {
-                NMT_COB,
-                SYNC_COB,
-                RPDO1.cob_base + node_id,
-                SDO_REQUEST_COB + node_id,
-                *range(HEARTBEAT_COB, HEARTBEAT_COB + MAX_NODE_ID + 1),
-            }
-        )
+        self._rpdo = PdoServer(self._objects, RPDO1, transmits=False)
+        self._tpdos = [PdoServer(self._objects, pdo, transmits=True) for pdo in (TPDO1, TPDO2)]
+        self._rpdo.on_change = self._heed
+        self._heed()
+        self._setpoint: dict[Key, int] = {}
         self._nmt_state = NmtState.BOOT_UP
         self._send_frame: Callable[[can.Message], None] = lambda frame: None
         self._now_ns: int | None = None
         self._supplied = True
+        self._silent = False
+        self._tripped: Trip | None = None
+
+    def _heed(self) -> None:
+        """Choose the frames to look at, like a CAN controller's acceptance filter."""
+        self._setpoint_id = self._rpdo.cob_id
+        heartbeats = range(HEARTBEAT_COB, HEARTBEAT_COB + MAX_NODE_ID + 1)
+        own = {NMT_COB, SYNC_COB, SDO_REQUEST_COB + self.node_id, self._setpoint_id}
+        self._heeded = frozenset(own | set(heartbeats))
 
     @property
     def power_state(self) -> PowerState:
         """Return the CiA 402 state, for tests and for the referee."""
-        return self._motor.state
+        return self._axis.state
 
     @property
     def nmt_state(self) -> NmtState:
@@ -111,11 +124,39 @@ class WheelDrive:
             self._boot()
         elif not on:
             self._supplied = False
-            self._motor.lose_supply()
+            self._axis.lose_supply()
+
+    def set_supply_v(self, volts: float) -> None:
+        """Change the supply's voltage; below what the electronics need, the drive is off."""
+        self._stage.supply_v = self._stage.bus_v = volts
+        self.set_supply(on=volts >= self._stage.spec.logic_v)
+
+    def set_node_id(self, node_id: int) -> None:
+        """Give the drive another address, taken over by a restart."""
+        self.node_id = node_id
+        self._objects.readdress(node_id)
+        self.set_supply(on=False)
+        self.set_supply(on=True)
+
+    def freeze(self, on: bool) -> None:
+        """Stick the encoder's and the torque's values as they are told, or free them."""
+        self._encoder.frozen = on
+
+    def silence(self, on: bool) -> None:
+        """Send nothing, or speak again; the drive goes on listening and acting."""
+        self._silent = on
+
+    def overheat(self) -> None:
+        """Heat the motor beyond its limit; it trips, and cools down by itself."""
+        self._stage.overheat()
+
+    def overload(self, on: bool) -> None:
+        """Let the full current flow without moving anything, as in a jammed gear; I²t trips."""
+        self._stage.jammed = on
 
     def raise_fault(self, code: int, error_register: int = 0x01) -> None:
         """Enter the fault reaction and tell the code by EMCY, as a real cause would."""
-        self._motor.fail()
+        self._axis.fail()
         self._report(code, error_register)
 
     def advance(self, now_ns: int, position_rad: float, velocity_rad_s: float) -> float:
@@ -123,20 +164,40 @@ class WheelDrive:
         dt_s = 0.0 if self._now_ns is None else (now_ns - self._now_ns) / NS_PER_S
         self._now_ns = now_ns
         if not self._supplied:
+            self._stage.load(0.0, 0.0, dt_s)
             return 0.0
+        self._beat(now_ns)
+        sign = self._sign
+        velocity_rad_s *= sign
+        self._encoder.measure(sign * position_rad, velocity_rad_s)
+        torque_nm = self._axis.advance(dt_s, velocity_rad_s)
+        self._stage.load(torque_nm, velocity_rad_s, dt_s)
+        self._protect()
+        return sign * torque_nm
+
+    def _beat(self, now_ns: int) -> None:
         if self._producer.due(now_ns):
             self._send(HEARTBEAT_COB, bytes((self._nmt_state,)))
         if self._consumer.expired(now_ns):
-            self._motor.on_connection_lost()
+            self._axis.on_connection_lost()
             self._report(HEARTBEAT_LOST, COMMUNICATION_ERROR)
-        sign = self._sign
-        return sign * self._motor.advance(dt_s, sign * position_rad, sign * velocity_rad_s)
+
+    def _protect(self) -> None:
+        """Trip on a new cause, and on a lasting one where the fault was reset."""
+        trip = self._stage.trip(self._axis.armed)
+        if trip is not None and (trip is not self._tripped or not self._axis.faulted):
+            self.raise_fault(*TRIP_CODES[trip])
+        self._tripped = trip
 
     def receive(self, frame: can.Message) -> None:
         """Take one frame from the wire."""
+        if frame.is_error_frame:
+            if is_restart(frame):
+                self._report(RECOVERED_FROM_BUS_OFF, COMMUNICATION_ERROR)
+            return
         if frame.arbitration_id not in self._heeded:
             return
-        ordinary = not (frame.is_extended_id or frame.is_remote_frame or frame.is_error_frame)
+        ordinary = not (frame.is_extended_id or frame.is_remote_frame)
         if not (self._supplied and ordinary):
             return
         can_id, data = frame.arbitration_id, bytes(frame.data)
@@ -144,7 +205,7 @@ class WheelDrive:
             self._on_nmt(data)
         elif can_id == SYNC_COB:
             self._on_sync()
-        elif can_id == RPDO1.cob_base + self.node_id:
+        elif can_id == self._setpoint_id:
             self._on_setpoint(data)
         elif can_id == SDO_REQUEST_COB + self.node_id:
             self._on_sdo(data)
@@ -161,17 +222,17 @@ class WheelDrive:
                 self._enter(NmtState.PRE_OPERATIONAL)
             case NmtCommand.STOP:
                 self._enter(NmtState.STOPPED)
-                self._motor.on_connection_lost()
+                self._axis.on_connection_lost()
             case NmtCommand.RESET_NODE:
                 self._objects.reset()
                 self._boot()
             case NmtCommand.RESET_COMMUNICATION:
-                self._motor.on_connection_lost()
+                self._axis.on_connection_lost()
                 self._objects.reset(communication_only=True)
                 self._announce()
 
     def _boot(self) -> None:
-        self._motor.start()
+        self._axis.start()
         self._announce()
 
     def _announce(self) -> None:
@@ -181,7 +242,7 @@ class WheelDrive:
 
     def _enter(self, state: NmtState) -> None:
         self._nmt_state = state
-        self._motor.remote = state is NmtState.OPERATIONAL
+        self._axis.remote = state is NmtState.OPERATIONAL
 
     def _on_heartbeat(self, node_id: int) -> None:
         if node_id and node_id == self._consumer.node_id and self._now_ns is not None:
@@ -190,20 +251,31 @@ class WheelDrive:
     def _on_sync(self) -> None:
         if self._nmt_state is not NmtState.OPERATIONAL:
             return
-        motor = self._motor
-        status = TPDO1.wire.pack(motor.statusword(), motor.velocity_counts_s)
-        self._send(TPDO1.cob_base, status)
-        self._send(TPDO2.cob_base, TPDO2.wire.pack(motor.position_counts, motor.torque_steps))
+        setpoint, self._setpoint = self._setpoint, {}
+        self._follow(setpoint)
+        for pdo in self._tpdos:
+            if pdo.due_on_sync() and pdo.cob_id is not None:
+                self._transmit(pdo.cob_id, pdo.pack())
 
     def _on_setpoint(self, data: bytes) -> None:
-        if self._nmt_state is not NmtState.OPERATIONAL or len(data) != RPDO1.wire.size:
+        if self._nmt_state is not NmtState.OPERATIONAL or len(data) != self._rpdo.size:
             return
-        controlword, target = RPDO1.wire.unpack(data)
-        self._objects.set(TARGET_VELOCITY, 0, target)
-        self._on_controlword(controlword)
+        setpoint = self._rpdo.unpack(data)
+        if self._rpdo.synchronous:
+            self._setpoint = setpoint
+        else:
+            self._follow(setpoint)
+
+    def _follow(self, setpoint: dict[Key, int]) -> None:
+        """Take over what came by PDO; what is out of range is left as it was."""
+        controlword = setpoint.pop((CONTROLWORD, 0), None)
+        for key, value in setpoint.items():
+            self._objects.store_if_valid(key, value)
+        if controlword is not None:
+            self._on_controlword(controlword)
 
     def _on_controlword(self, controlword: int) -> None:
-        if self._motor.on_controlword(controlword):
+        if self._axis.on_controlword(controlword):
             self._report(0, 0)
 
     def _on_sdo(self, data: bytes) -> None:
@@ -234,6 +306,8 @@ class WheelDrive:
             raise SdoAbort(VALUE_RANGE)
 
     def _send(self, cob_base: int, data: bytes) -> None:
-        self._send_frame(
-            can.Message(arbitration_id=cob_base + self.node_id, is_extended_id=False, data=data)
-        )
+        self._transmit(cob_base + self.node_id, data)
+
+    def _transmit(self, can_id: int, data: bytes) -> None:
+        if not self._silent:
+            self._send_frame(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))

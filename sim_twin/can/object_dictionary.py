@@ -32,17 +32,17 @@ class ObjectDictionary:
     """Read and write objects as numbers inside and as bytes for the SDO server.
 
     `live` computes an object when it is read; `on_write` sees a new value before it is stored and
-    may refuse it by raising SdoAbort.
+    may refuse it by raising SdoAbort; `after_write` sees it stored.
     """
 
     def __init__(self, node_id: int, eds_path: Path = EDS_PATH) -> None:
+        self._eds_path = eds_path
         self._od = canopen.import_od(str(eds_path), node_id)
-        self._variables: dict[Key, Any] = {
-            (variable.index, variable.subindex): variable for variable in _variables(self._od)
-        }
+        self._variables = _by_key(self._od)
         self._values: dict[Key, Any] = {}
         self.live: dict[Key, Callable[[], int]] = {}
         self.on_write: dict[Key, Callable[[int], object]] = {}
+        self.after_write: dict[Key, Callable[[], None]] = {}
         self.reset()
 
     def reset(self, *, communication_only: bool = False) -> None:
@@ -50,6 +50,8 @@ class ObjectDictionary:
         for key, variable in self._variables.items():
             if key[0] <= LAST_COMMUNICATION_INDEX or not communication_only:
                 self._values[key] = variable.default
+        for follow in dict.fromkeys(self.after_write.values()):
+            follow()
 
     def get(self, index: int, subindex: int = 0) -> int:
         """Return a numeric object."""
@@ -81,10 +83,8 @@ class ObjectDictionary:
         Raises:
             SdoAbort: no such object, not writable, wrong length, out of range, or refused.
         """
-        variable = self._variable(index, subindex)
-        if not variable.writable:
-            raise SdoAbort(READ_ONLY)
-        if len(data) * 8 != len(variable):
+        variable = self.check_writable(index, subindex)
+        if _has_fixed_length(variable) and len(data) * 8 != len(variable):
             raise SdoAbort(WRONG_LENGTH)
         value = variable.decode_raw(data)
         if _outside(value, variable.min, variable.max):
@@ -93,12 +93,59 @@ class ObjectDictionary:
         if react is not None:
             react(value)
         self._values[index, subindex] = value
+        follow = self.after_write.get((index, subindex))
+        if follow is not None:
+            follow()
+
+    def check_writable(self, index: int, subindex: int) -> Any:
+        """Return the description of an object that may be written.
+
+        Raises:
+            SdoAbort: no such object, or not writable.
+        """
+        variable = self._variable(index, subindex)
+        if not variable.writable:
+            raise SdoAbort(READ_ONLY)
+        return variable
+
+    def store_if_valid(self, key: Key, value: int) -> None:
+        """Store a number that came by PDO, unless it is out of range: nobody can be told."""
+        variable = self._variables[key]
+        if not _outside(value, variable.min, variable.max):
+            self._values[key] = value
+
+    def readdress(self, node_id: int) -> None:
+        """Take the defaults of another node id, with the next reset."""
+        self._variables = _by_key(canopen.import_od(str(self._eds_path), node_id))
+
+    def has(self, key: Key) -> bool:
+        """Tell whether there is such an object."""
+        return key in self._variables
+
+    def highest_subindex(self, index: int) -> int:
+        """Return the highest sub-index of a record."""
+        return max(subindex for known, subindex in self._variables if known == index)
+
+    def mappable(self, key: Key, bits: int, *, transmits: bool) -> bool:
+        """Tell whether an object of that length may be part of a PDO."""
+        variable = self._variable(*key)
+        allowed = variable.readable if transmits else variable.writable
+        return bool(variable.pdo_mappable and allowed and len(variable) == bits)
+
+    def wire_format(self, key: Key) -> str:
+        """Return the struct format of a numeric object."""
+        layout: str = self._variable(*key).STRUCT_TYPES[self._variable(*key).data_type].format
+        return layout.lstrip("<")
 
     def _variable(self, index: int, subindex: int) -> Any:
         variable = self._variables.get((index, subindex))
         if variable is not None:
             return variable
         raise SdoAbort(NO_SUBINDEX if index in self._od else NO_OBJECT)
+
+
+def _by_key(od: canopen.ObjectDictionary) -> dict[Key, Any]:
+    return {(variable.index, variable.subindex): variable for variable in _variables(od)}
 
 
 def _variables(od: canopen.ObjectDictionary) -> list[Any]:
@@ -109,6 +156,10 @@ def _variables(od: canopen.ObjectDictionary) -> list[Any]:
         )
         found.extend(members)
     return found
+
+
+def _has_fixed_length(variable: Any) -> bool:
+    return variable.data_type not in canopen.objectdictionary.DATA_TYPES
 
 
 def _outside(value: int, low: int | None, high: int | None) -> bool:

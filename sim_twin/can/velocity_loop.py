@@ -13,10 +13,9 @@ def ramp_towards(present: float, target: float, up: float, down: float) -> float
 class VelocityLoop:
     """Control velocity with a PI law; the integrator stops where the torque saturates."""
 
-    def __init__(self, kv: float, ki: float, torque_limit_nm: float) -> None:
-        self._kv = kv
-        self._ki = ki
-        self._limit_nm = torque_limit_nm
+    def __init__(self, kv: float, ki: float) -> None:
+        self.kv = kv
+        self.ki = ki
         self._integral_nm = 0.0
         self.saturated = False
 
@@ -25,12 +24,13 @@ class VelocityLoop:
         self._integral_nm = 0.0
         self.saturated = False
 
-    def torque_nm(self, demand_rad_s: float, velocity_rad_s: float, dt_s: float) -> float:
-        """Return the torque for the next `dt_s`."""
-        error = demand_rad_s - velocity_rad_s
-        wanted_nm = self._kv * error + self._integral_nm
-        torque_nm = min(max(wanted_nm, -self._limit_nm), self._limit_nm)
+    def torque_nm(
+        self, error_rad_s: float, dt_s: float, low_nm: float, high_nm: float, ahead_nm: float = 0.0
+    ) -> float:
+        """Return the torque for the next `dt_s` within what is possible."""
+        wanted_nm = self.kv * error_rad_s + self._integral_nm + ahead_nm
+        torque_nm = min(max(wanted_nm, low_nm), high_nm)
         self.saturated = torque_nm != wanted_nm
         if not self.saturated:
-            self._integral_nm += self._ki * error * dt_s
+            self._integral_nm += self.ki * error_rad_s * dt_s
         return torque_nm

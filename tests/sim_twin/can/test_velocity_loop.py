@@ -9,17 +9,17 @@ STEP = st.floats(0.001, 10.0)
 
 
 def test_the_integral_does_not_wind_up_while_the_torque_saturates() -> None:
-    loop = VelocityLoop(kv=2.0, ki=20.0, torque_limit_nm=4.0)
+    loop = VelocityLoop(kv=2.0, ki=20.0)
     for _ in range(1000):
-        assert loop.torque_nm(10.0, 0.0, 0.002) == 4.0
+        assert loop.torque_nm(10.0, 0.002, -4.0, 4.0) == 4.0
     assert loop.saturated
-    assert loop.torque_nm(0.0, 1.0, 0.002) == pytest.approx(-2.0)
+    assert loop.torque_nm(-1.0, 0.002, -4.0, 4.0) == pytest.approx(-2.0)
 
 
 def test_the_integral_takes_a_constant_load() -> None:
-    loop = VelocityLoop(kv=2.0, ki=20.0, torque_limit_nm=4.0)
+    loop = VelocityLoop(kv=2.0, ki=20.0)
     for _ in range(500):
-        torque_nm = loop.torque_nm(0.1, 0.0, 0.002)
+        torque_nm = loop.torque_nm(0.1, 0.002, -4.0, 4.0)
     assert torque_nm == pytest.approx(0.2 + 20.0 * 0.1 * 0.002 * 499)
 
 

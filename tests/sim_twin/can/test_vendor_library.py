@@ -71,7 +71,7 @@ def test_it_reads_and_writes_objects_and_long_texts(node: BaseNode402) -> None:
     ("index", "subindex", "data", "code"),
     [
         (0x6041, 0, b"\0\0", 0x06010002),
-        (0x2000, 0, b"\0", 0x06020000),
+        (0x2100, 0, b"\0", 0x06020000),
         (0x1018, 9, b"\0", 0x06090011),
         (0x6083, 0, b"\0\0", 0x06070010),
         (0x6060, 0, b"\x01", 0x06090030),

@@ -1,10 +1,9 @@
-"""Emulate the CiA 402 part of a wheel drive: power state, ramps, velocity loop, encoder."""
+"""Emulate the CiA 402 part of a wheel drive: power state, ramps, velocity loop, objects."""
 
-import math
 from collections.abc import Callable
 from typing import Final
 
-from drivers.canopen.cia402 import PowerState
+from drivers.canopen.cia402 import FAULT_STATES, PowerState
 from drivers.canopen.objects import (
     ABORT_CONNECTION_OPTION,
     CONTROLWORD,
@@ -31,31 +30,47 @@ from drivers.canopen.objects import (
     OperatingMode,
 )
 from sim_twin.can.object_dictionary import VALUE_RANGE, ObjectDictionary, SdoAbort
+from sim_twin.can.power_stage import Encoder, PowerStage
 from sim_twin.can.power_state_machine import RAMP_OPTIONS, STATE_BITS, PowerStateMachine
 from sim_twin.can.velocity_loop import VelocityLoop, ramp_towards
 
 HALT_BIT: Final = 0x0100
 FAULT_REACTION_OPTIONS: Final = (0, 1, 2)
+# Which ramp an option brakes on: 1 and 5 slow down as the profile does, 2 and 6 stop quickly.
+FAULT_RAMPS: Final = {1: PROFILE_DECELERATION, 2: QUICK_STOP_DECELERATION}
+QUICK_STOP_RAMPS: Final = {
+    1: PROFILE_DECELERATION,
+    2: QUICK_STOP_DECELERATION,
+    5: PROFILE_DECELERATION,
+    6: QUICK_STOP_DECELERATION,
+}
+ARMED: Final = frozenset(
+    {PowerState.SWITCHED_ON, PowerState.OPERATION_ENABLED, PowerState.QUICK_STOP_ACTIVE}
+)
+RATED_CURRENT: Final = 0x6075
+CURRENT_ACTUAL: Final = 0x6078
+DC_LINK_VOLTAGE: Final = 0x6079
+MOTOR_TEMPERATURE: Final = 0x2001
+MILLI: Final = 1000
 _REMOTE, _TARGET_REACHED, _LIMIT_ACTIVE, _SPEED_ZERO = (1 << bit for bit in (9, 10, 11, 12))
 
 
-class Motor:
+class Cia402Axis:
     """Turn controlwords and a velocity target into torque; all values are on the motor's side."""
 
     def __init__(
-        self, objects: ObjectDictionary, loop: VelocityLoop, *, counts_per_rev: int, rated_nm: float
+        self, objects: ObjectDictionary, loop: VelocityLoop, stage: PowerStage, encoder: Encoder
     ) -> None:
         self._objects = objects
         self._loop = loop
-        self._counts_per_rev = counts_per_rev
-        self._counts_per_rad = counts_per_rev / math.tau
-        self._rated_nm = rated_nm
+        self._stage = stage
+        self._encoder = encoder
+        self._rated_nm = stage.spec.torque_limit_nm
         self._machine = PowerStateMachine()
-        self._zero_rad: float | None = None
-        self._position_rad = 0.0
         self._velocity_rad_s = 0.0
         self._demand_rad_s = 0.0
         self._torque_nm = 0.0
+        self._told_nm = 0.0
         self.remote = False
         self._publish()
 
@@ -66,8 +81,13 @@ class Motor:
                 (MODE_DISPLAY, 0): lambda: self._objects.get(MODE_OF_OPERATION),
                 (POSITION_ACTUAL, 0): lambda: self.position_counts,
                 (VELOCITY_ACTUAL, 0): lambda: self.velocity_counts_s,
-                (VELOCITY_DEMAND, 0): lambda: round(self._demand_rad_s * self._counts_per_rad),
+                (VELOCITY_DEMAND, 0): lambda: round(
+                    self._demand_rad_s * self._encoder.counts_per_rad
+                ),
                 (TORQUE_ACTUAL, 0): lambda: self.torque_steps,
+                (CURRENT_ACTUAL, 0): lambda: self.torque_steps,  # the torque constant is constant
+                (DC_LINK_VOLTAGE, 0): lambda: round(self._stage.bus_v * MILLI),
+                (MOTOR_TEMPERATURE, 0): lambda: round(self._stage.temperature_c),
             }
         )
         self._objects.on_write.update(
@@ -87,19 +107,19 @@ class Motor:
     @property
     def position_counts(self) -> int:
         """Return the encoder's 32-bit counter; it starts at 0 with the supply."""
-        travelled_rad = self._position_rad - (self._zero_rad or 0.0)
-        counts = round(travelled_rad * self._counts_per_rad)
-        return (counts + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000
+        return (self._encoder.travelled + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000
 
     @property
     def velocity_counts_s(self) -> int:
         """Return the measured velocity in whole counts per second."""
-        return round(self._velocity_rad_s * self._counts_per_rad)
+        return round(self._encoder.counts_s)
 
     @property
     def torque_steps(self) -> int:
         """Return the torque in thousandths of the rated torque."""
-        return round(self._torque_nm / self._rated_nm * TORQUE_STEPS_PER_RATED)
+        if not self._encoder.frozen:
+            self._told_nm = self._torque_nm
+        return round(self._told_nm / self._rated_nm * TORQUE_STEPS_PER_RATED)
 
     def statusword(self) -> int:
         """Return the statusword (6041)."""
@@ -116,13 +136,16 @@ class Motor:
 
     def start(self) -> None:
         """Boot the firmware: power off, everything at its default."""
-        self._objects.set(ENCODER_RESOLUTION, 1, self._counts_per_rev)
+        self._objects.set(ENCODER_RESOLUTION, 1, self._encoder.counts_per_rev)
         self._objects.set(RATED_TORQUE, 0, round(self._rated_nm * RATED_TORQUE_PER_NM))
+        rated_a = self._stage.spec.current_limit_a
+        self._objects.set(RATED_CURRENT, 0, round(rated_a * MILLI))
+        self._stage.forget_load()
         self._machine.initialise()
 
     def lose_supply(self) -> None:
         """Forget the encoder's count and produce no torque."""
-        self._zero_rad = None
+        self._encoder.lose_supply()
         self._torque_nm = 0.0
 
     def on_controlword(self, controlword: int) -> bool:
@@ -132,7 +155,7 @@ class Motor:
 
     def fail(self) -> None:
         """React to a fault as 605E says."""
-        if self.state not in (PowerState.FAULT, PowerState.FAULT_REACTION_ACTIVE):
+        if not self.faulted:
             self._machine.fail(self._objects.get(FAULT_REACTION_OPTION))
 
     def on_connection_lost(self) -> None:
@@ -145,30 +168,42 @@ class Motor:
             case AbortConnection.QUICK_STOP:
                 self._machine.quick_stop(self._objects.get(QUICK_STOP_OPTION))
 
-    def advance(self, dt_s: float, position_rad: float, velocity_rad_s: float) -> float:
-        """Measure, move the demand along its ramp and return the torque."""
-        if self._zero_rad is None:
-            self._zero_rad = position_rad
-        self._position_rad = position_rad
+    @property
+    def faulted(self) -> bool:
+        """Tell whether the drive is in one of its fault states."""
+        return self.state in FAULT_STATES
+
+    @property
+    def armed(self) -> bool:
+        """Tell whether the power stage is switched on."""
+        return self.state in ARMED
+
+    def advance(self, dt_s: float, velocity_rad_s: float) -> float:
+        """Move the demand along its ramp and return the torque."""
         self._velocity_rad_s = velocity_rad_s
         if not self._machine.powered:
             self._demand_rad_s = velocity_rad_s
             self._loop.reset()
             self._torque_nm = 0.0
             return 0.0
-        self._demand_rad_s = self._next_demand(dt_s)
-        self._torque_nm = self._loop.torque_nm(self._demand_rad_s, velocity_rad_s, dt_s)
-        if self._demand_rad_s == 0.0 and self._stands():
+        self._demand_rad_s = demand_rad_s = self._next_demand(dt_s)
+        low_nm, high_nm = self._stage.torque_range_nm(velocity_rad_s)
+        error_rad_s = demand_rad_s - velocity_rad_s
+        self._torque_nm = self._loop.torque_nm(error_rad_s, dt_s, low_nm, high_nm)
+        if demand_rad_s == 0.0 and self._stands():
             self._machine.at_standstill(self._objects.get(QUICK_STOP_OPTION))
         return self._torque_nm
 
     def _next_demand(self, dt_s: float) -> float:
-        if self.state is not PowerState.OPERATION_ENABLED:
-            return self._braked(QUICK_STOP_DECELERATION, dt_s)
-        if self._objects.get(CONTROLWORD) & HALT_BIT:
+        objects = self._objects
+        if self.state is PowerState.FAULT_REACTION_ACTIVE:
+            return self._braked(FAULT_RAMPS[objects.get(FAULT_REACTION_OPTION)], dt_s)
+        if self.state is PowerState.QUICK_STOP_ACTIVE:
+            return self._braked(QUICK_STOP_RAMPS[objects.get(QUICK_STOP_OPTION)], dt_s)
+        if objects.get(CONTROLWORD) & HALT_BIT:
             return self._braked(PROFILE_DECELERATION, dt_s)
-        target_rad_s = self._target_counts_s() / self._counts_per_rad
-        if self._objects.get(MODE_OF_OPERATION) == OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY:
+        target_rad_s = self._target_counts_s() / self._encoder.counts_per_rad
+        if objects.get(MODE_OF_OPERATION) == OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY:
             return target_rad_s
         up, down = self._step(PROFILE_ACCELERATION, dt_s), self._step(PROFILE_DECELERATION, dt_s)
         return ramp_towards(self._demand_rad_s, target_rad_s, up, down)
@@ -178,13 +213,15 @@ class Motor:
         return ramp_towards(self._demand_rad_s, 0.0, step, step)
 
     def _step(self, ramp: int, dt_s: float) -> float:
-        return self._objects.get(ramp) / self._counts_per_rad * dt_s
+        return self._objects.get(ramp) / self._encoder.counts_per_rad * dt_s
 
     def _target_counts_s(self) -> int:
         return self._objects.get(TARGET_VELOCITY)
 
     def _stands(self) -> bool:
-        return abs(self.velocity_counts_s) <= self._objects.get(VELOCITY_THRESHOLD)
+        # The control loop measures finer than the counts of a few steps tell.
+        counts_s = self._velocity_rad_s * self._encoder.counts_per_rad
+        return abs(counts_s) <= self._objects.get(VELOCITY_THRESHOLD)
 
 
 def _one_of(allowed: tuple[int, ...]) -> Callable[[int], None]:

@@ -1,0 +1,139 @@
+"""Model a wheel motor and its power stage: limits, back-EMF, supply, heat, encoder."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+# No edge for this long reads as standstill.
+EDGE_TIMEOUT_S: Final = 0.05
+
+
+class Trip(Enum):
+    """Name what makes a drive protect itself."""
+
+    UNDER_VOLTAGE = "DC link under-voltage"
+    OVER_VOLTAGE = "DC link over-voltage"
+    OVER_TEMPERATURE = "motor over-temperature"
+    OVERLOAD = "continuous over-current"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorSpec:
+    """Describe a gearless hub motor with its power stage on a 24 V supply.
+
+    `overload_s` is how long the full current may flow, from cold, until the I²t guard trips.
+    """
+
+    torque_limit_nm: float = 4.0
+    torque_nm_per_a: float = 0.5
+    resistance_ohm: float = 0.6
+    continuous_current_a: float = 4.5
+    overload_s: float = 20.0
+    heat_capacity_j_k: float = 100.0
+    thermal_resistance_k_w: float = 6.0
+    ambient_c: float = 25.0
+    temperature_limit_c: float = 100.0
+    temperature_hysteresis_c: float = 15.0
+    supply_v: float = 24.0
+    supply_resistance_ohm: float = 0.1
+    logic_v: float = 8.0
+    under_voltage_v: float = 16.0
+    over_voltage_v: float = 32.0
+
+    @property
+    def current_limit_a(self) -> float:
+        """Return the largest current that the power stage gives."""
+        return self.torque_limit_nm / self.torque_nm_per_a
+
+
+class PowerStage:
+    """Tell which torque is possible and what it costs in volts, heat and I²t."""
+
+    def __init__(self, spec: MotorSpec) -> None:
+        self.spec = spec
+        self.supply_v = spec.supply_v
+        self.bus_v = spec.supply_v
+        self.bus_current_a = 0.0
+        self.current_a = 0.0
+        self.temperature_c = spec.ambient_c
+        self.current_limit_a = spec.current_limit_a
+        self.jammed = False
+        self._i2t_a2s = 0.0
+        self._i2t_limit_a2s = spec.overload_s * (
+            spec.current_limit_a**2 - spec.continuous_current_a**2
+        )
+        self._hot = False
+
+    def torque_range_nm(self, velocity_rad_s: float) -> tuple[float, float]:
+        """Return the torques that current limit and back-EMF allow, the lowest first."""
+        spec, limit_a = self.spec, self.current_limit_a
+        emf_v = spec.torque_nm_per_a * velocity_rad_s
+        low_a = min(max((-self.bus_v - emf_v) / spec.resistance_ohm, -limit_a), limit_a)
+        high_a = max(min((self.bus_v - emf_v) / spec.resistance_ohm, limit_a), -limit_a)
+        return low_a * spec.torque_nm_per_a, high_a * spec.torque_nm_per_a
+
+    def load(self, torque_nm: float, velocity_rad_s: float, dt_s: float) -> None:
+        """Let a torque act for `dt_s`: the supply sags, the winding heats or cools."""
+        spec = self.spec
+        self.current_a = current_a = torque_nm / spec.torque_nm_per_a
+        copper_w = spec.resistance_ohm * current_a * current_a
+        self.bus_current_a = (copper_w + torque_nm * velocity_rad_s) / max(self.bus_v, 1.0)
+        self.bus_v = self.supply_v - spec.supply_resistance_ohm * self.bus_current_a
+        cooling_w = (self.temperature_c - spec.ambient_c) / spec.thermal_resistance_k_w
+        self.temperature_c += (copper_w - cooling_w) / spec.heat_capacity_j_k * dt_s
+        felt_a = spec.current_limit_a if self.jammed else current_a
+        surplus_a2 = felt_a * felt_a - spec.continuous_current_a**2
+        self._i2t_a2s = max(0.0, self._i2t_a2s + surplus_a2 * dt_s)
+
+    def trip(self, armed: bool) -> Trip | None:
+        """Return what forbids torque now; voltage and I²t count only where power is `armed`."""
+        spec = self.spec
+        limit_c = spec.temperature_limit_c - self._hot * spec.temperature_hysteresis_c
+        self._hot = self.temperature_c > limit_c
+        if self._hot:
+            return Trip.OVER_TEMPERATURE
+        if not armed:
+            return None
+        if self.bus_v < spec.under_voltage_v:
+            return Trip.UNDER_VOLTAGE
+        if self.bus_v > spec.over_voltage_v:
+            return Trip.OVER_VOLTAGE
+        return Trip.OVERLOAD if self._i2t_a2s > self._i2t_limit_a2s else None
+
+    def overheat(self) -> None:
+        """Heat the winding beyond its limit; it cools down by itself."""
+        spec = self.spec
+        self.temperature_c = spec.temperature_limit_c + spec.temperature_hysteresis_c
+
+    def forget_load(self) -> None:
+        """Clear what the firmware keeps in memory, as a reset does; the heat stays."""
+        self._i2t_a2s = 0.0
+        self.current_limit_a = self.spec.current_limit_a
+
+
+class Encoder:
+    """Count whole steps since power-on; the velocity comes from the time between their edges."""
+
+    def __init__(self, counts_per_rev: int) -> None:
+        self.counts_per_rev = counts_per_rev
+        self.counts_per_rad = counts_per_rev / math.tau
+        self.frozen = False
+        self.travelled = 0
+        self.counts_s = 0.0
+        self._zero_rad: float | None = None
+
+    def lose_supply(self) -> None:
+        """Forget the count."""
+        self._zero_rad = None
+        self.frozen = False
+
+    def measure(self, position_rad: float, velocity_rad_s: float) -> None:
+        """Take the shaft's angle and speed."""
+        if self.frozen:
+            return
+        if self._zero_rad is None:
+            self._zero_rad = position_rad
+        self.travelled = round((position_rad - self._zero_rad) * self.counts_per_rad)
+        counts_s = velocity_rad_s * self.counts_per_rad
+        self.counts_s = counts_s if abs(counts_s) * EDGE_TIMEOUT_S >= 1.0 else 0.0
