@@ -15,6 +15,7 @@ from sim_twin.device import WireDevice
 from sim_twin.faults import FaultInjector
 from sim_twin.lines import MemoryLine
 from sim_twin.schedule import Closable, Schedule
+from sim_twin.servos import WireTiming
 from sim_twin.twin import Twin
 from vla_deploy.node import Node, NodeContext
 from vla_deploy.robots import load_robot
@@ -123,15 +124,16 @@ class Lockstep:
         profile: str = "desktop",
         *,
         tmp_path: Path,
+        servo_timing: WireTiming | None = None,
     ) -> None:
-        """Build the robot in its world.
+        """Build the robot in its world; without `servo_timing` the servo bus takes no time.
 
         Raises:
             RobotFileError: the robot file has faults.
             ModelMismatch: there is no such world, or robot and world do not fit together.
         """
         self.robot = load_robot(robot)
-        self.twin = Twin(self.robot, world, seed)
+        self.twin = Twin(self.robot, world, seed, servo_timing)
         self.clock = SimClock(self.twin)
         self.devices = MemoryOpener(self.twin, self.clock)
         self.context = NodeContext(

@@ -1,5 +1,7 @@
 """Join the physics to every emulated device: what a bus says moves a motor, and back."""
 
+from typing import TypeVar
+
 import numpy as np
 
 from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES
@@ -18,9 +20,12 @@ from sim_twin.load import load_engine
 from sim_twin.sensors.estop import EstopButtonDevice
 from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
-from sim_twin.servos import EmulatedServoSpec, ServoBank
+from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
+from sim_twin.servos import EmulatedServoSpec, ServoBank, WireTiming
 from sim_twin.streams import streamed_devices
 from vla_deploy.robots import RobotDescription
+
+S = TypeVar("S")
 
 
 class Twin:
@@ -30,15 +35,21 @@ class Twin:
     both, and the devices behind them.
     """
 
-    def __init__(self, robot: RobotDescription, world: str = "flat", seed: int = 0) -> None:
-        """Build the robot in its world.
+    def __init__(
+        self,
+        robot: RobotDescription,
+        world: str = "flat",
+        seed: int = 0,
+        servo_timing: WireTiming | None = None,
+    ) -> None:
+        """Build the robot in its world; without `servo_timing` the servo bus takes no time.
 
         Raises:
             ModelMismatch: there is no such world, or robot and world do not fit together.
         """
         self.robot = robot
         self.engine = load_engine(robot, world, seed)
-        self.servos = ServoBank(_servo_specs(robot))
+        self.servos = ServoBank(_servo_specs(robot), timing=servo_timing)
         self.drives = tuple(
             WheelDrive(drive.node_id, sign=drive.sign) for drive in robot.can_bus.drives
         )
@@ -58,7 +69,7 @@ class Twin:
             name: LineTamper(device, self._now_ns, frame_bytes.get(name))
             for name, device in self.serial_devices.items()
         }
-        self.streamed_devices = streamed_devices(robot)
+        self.streamed_devices = streamed_devices(robot, seed)
         self.stream_lines = {
             name: LineTamper(device, self._now_ns) for name, device in self.streamed_devices.items()
         }
@@ -82,10 +93,25 @@ class Twin:
         Raises:
             ModelMismatch: the robot file declares none that the twin has.
         """
-        for device in self.streamed_devices.values():
-            if isinstance(device, EstopButtonDevice):
-                return device
-        raise ModelMismatch(f"{self.robot.name} has no e-stop button of model HID in its file")
+        return self._streamed(EstopButtonDevice, "an e-stop button of model HID")
+
+    @property
+    def microphone(self) -> MicrophoneDevice:
+        """Return the microphone, to which sound can be played.
+
+        Raises:
+            ModelMismatch: the robot file declares none.
+        """
+        return self._streamed(MicrophoneDevice, "a microphone")
+
+    @property
+    def speaker(self) -> SpeakerDevice:
+        """Return the speaker, which keeps what the robot says.
+
+        Raises:
+            ModelMismatch: the robot file declares none.
+        """
+        return self._streamed(SpeakerDevice, "a speaker")
 
     @property
     def camera(self) -> HeadCamera:
@@ -128,6 +154,12 @@ class Twin:
         """Release OpenGL where the camera was used."""
         if self._camera is not None:
             self._camera.close()
+
+    def _streamed(self, kind: type[S], what: str) -> S:
+        for device in self.streamed_devices.values():
+            if isinstance(device, kind):
+                return device
+        raise ModelMismatch(f"the twin of {self.robot.name} needs {what} in the robot file")
 
     def _now_ns(self) -> int:
         return self.engine.now_ns

@@ -2,5 +2,6 @@
 
 from sim_twin.servos.bank import ServoBank
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
+from sim_twin.servos.timing import WireTiming
 
-__all__ = ["EmulatedServoSpec", "FirmwareOptions", "ServoBank"]
+__all__ = ["EmulatedServoSpec", "FirmwareOptions", "ServoBank", "WireTiming"]

@@ -11,6 +11,7 @@ from drivers.dynamixel.codec import Instruction, encode_instruction
 from drivers.dynamixel.control_table import MODELS
 from drivers.errors import DeviceMissing
 from sim_twin.lockstep import Lockstep, MemoryOpener
+from sim_twin.servos import WireTiming
 
 HEAD_PAN_ID = 21
 
@@ -129,3 +130,16 @@ def test_the_camera_streams_at_the_rate_asked_for_in_simulated_time(lockstep: Lo
 def test_a_device_that_is_not_there_is_named(lockstep: Lockstep, kind: str) -> None:
     with pytest.raises(DeviceMissing, match="'toaster'"):
         getattr(lockstep.devices, kind)("toaster")
+
+
+@pytest.mark.parametrize("timing", [None, WireTiming(baud=1_000_000)])
+def test_time_passes_while_a_driver_waits_on_a_paced_servo_bus_only(
+    tmp_path: Path, timing: WireTiming | None
+) -> None:
+    lockstep = Lockstep(tmp_path=tmp_path, servo_timing=timing)
+    line = lockstep.devices.serial("servos")
+    start_ns = lockstep.twin.now_ns
+    line.write(encode_instruction(HEAD_PAN_ID, Instruction.PING))
+    assert len(line.read(64, start_ns + 50_000_000)) == 14
+    assert (lockstep.twin.now_ns > start_ns) is (timing is not None)
+    lockstep.close()

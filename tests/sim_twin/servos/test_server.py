@@ -156,10 +156,40 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def test_a_count_that_no_bus_can_hold_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_paced_bus_is_never_faster_than_its_wire(tmp_path: Path) -> None:
+    baud, wire_bytes = 1_000_000, 30 + 16 * 15
+    server = start_server(tmp_path / "servos", "--baud", str(baud), "--return-delay-us", "100")
+    port = PortHandler(str(tmp_path / "servos"))
+    assert port.openPort()
+    assert port.setBaudRate(baud)
+    read = GroupSyncRead(port, PacketHandler(2.0), POSITION, 4)
+    for servo_id in IDS:
+        read.addParam(servo_id)
+    times_s = []
+    for _ in range(20):
+        start_s = time.monotonic()
+        assert read.txRxPacket() == COMM_SUCCESS
+        times_s.append(time.monotonic() - start_s)
+    assert min(times_s) > wire_bytes * 10 / baud + 16 * 100e-6
+    port.closePort()
+    server.send_signal(signal.SIGTERM)
+    assert server.wait(timeout=10) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--servos", "300"], "expected 1..252, got 300"),
+        (["--return-delay-us", "600"], "--return-delay-us: expected 0..508, got 600"),
+        (["--latency-timer-ms", "16"], "--latency-timer-ms: only a paced bus has it; give --baud"),
+        (["--baud", "9600", "--jitter-us", "-1"], "--jitter-us: expected 0 or more, got -1.0"),
+        (["--baud", "12345"], "invalid choice: 12345"),
+    ],
+)
+def test_arguments_that_no_bus_can_have_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
 ) -> None:
     with pytest.raises(SystemExit) as exit_info:
-        main(["--link", str(tmp_path / "servos"), "--servos", "300"])
+        main(["--link", str(tmp_path / "servos"), *arguments])
     assert exit_info.value.code == 2
-    assert "expected 1..252, got 300" in capsys.readouterr().err
+    assert said in capsys.readouterr().err
