@@ -8,12 +8,14 @@ A recorder that cannot write any more (a full disk) says so once and stops; the 
 
 import logging
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 import can
 
-from drivers.base import ByteTransport
+from drivers.base import BurstTransport, ByteTransport, CheckedTransport, TunableTransport
 from drivers.clock import Clock
 from drivers.errors import DeviceMissing, LinkLost
 from drivers.wire_recording import (
@@ -94,7 +96,10 @@ class WireRecorder:
 
 
 class RecordingTransport:
-    """Be a `ByteTransport` that records what passes through it."""
+    """Be a `ByteTransport` that records what passes through it.
+
+    It offers bursts, other speeds and a look at the adapter as far as the transport behind it does.
+    """
 
     def __init__(self, transport: ByteTransport, recorder: WireRecorder) -> None:
         self._transport = transport
@@ -107,11 +112,8 @@ class RecordingTransport:
             LinkLost: the other end has gone.
         """
         self._recorder.record(RecordKind.WRITE, data)
-        try:
+        with self._recorded_loss():
             self._transport.write(data)
-        except LinkLost as error:
-            self._recorder.record(RecordKind.LOST, str(error).encode())
-            raise
 
     def read(self, max_bytes: int, deadline_ns: int) -> bytes:
         """Return 1..max_bytes as soon as any have arrived, or b"" at `deadline_ns`.
@@ -119,14 +121,49 @@ class RecordingTransport:
         Raises:
             LinkLost: the other end has gone.
         """
-        try:
+        with self._recorded_loss():
             data = self._transport.read(max_bytes, deadline_ns)
-        except LinkLost as error:
-            self._recorder.record(RecordKind.LOST, str(error).encode())
-            raise
-        if data:
-            self._recorder.record(RecordKind.READ, data)
+        return self._recorded(data)
+
+    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+        """Return `count` bytes, or what of them has arrived by `deadline_ns`.
+
+        Raises:
+            LinkLost: the other end has gone.
+        """
+        if isinstance(self._transport, BurstTransport):
+            with self._recorded_loss():
+                return self._recorded(self._transport.read_burst(count, deadline_ns))
+        data = b""
+        while len(data) < count:
+            more = self.read(count - len(data), deadline_ns)
+            if not more:
+                break
+            data += more
         return data
+
+    @property
+    def bauds(self) -> tuple[int, ...]:
+        """Return the speeds on offer."""
+        inner = self._transport
+        return inner.bauds if isinstance(inner, TunableTransport) else ()
+
+    def set_baud(self, baud: int) -> None:
+        """Go on at another speed; a note says so.
+
+        Raises:
+            ValueError: the speed is none of `bauds`.
+            LinkLost: the other end has gone.
+        """
+        if not isinstance(self._transport, TunableTransport):
+            raise ValueError(f"this line has one speed only, got {baud} baud")
+        self._transport.set_baud(baud)
+        self._recorder.record(RecordKind.NOTE, f"{baud} baud from here".encode())
+
+    def adapter_fault(self) -> str:
+        """Return what slows the adapter down and how to mend it, or "" when nothing does."""
+        inner = self._transport
+        return inner.adapter_fault() if isinstance(inner, CheckedTransport) else ""
 
     def discard_input(self) -> None:
         """Drop what has arrived and was not read; it is not recorded."""
@@ -136,6 +173,19 @@ class RecordingTransport:
         """Release the device and end the recording."""
         self._transport.close()
         self._recorder.close()
+
+    def _recorded(self, data: bytes) -> bytes:
+        if data:
+            self._recorder.record(RecordKind.READ, data)
+        return data
+
+    @contextmanager
+    def _recorded_loss(self) -> Iterator[None]:
+        try:
+            yield
+        except LinkLost as error:
+            self._recorder.record(RecordKind.LOST, str(error).encode())
+            raise
 
 
 class RecordingCanBus(can.BusABC):  # type: ignore[misc]

@@ -100,7 +100,60 @@ def test_a_record_reads_as_a_line(file: Path, clock: SteppedClock) -> None:
     ]
 
 
-@pytest.mark.parametrize("act", [lambda w: w.write(b"x"), lambda w: w.read(1, 0)])
+class FullLine(EchoLine):
+    """Offer all that a transport may offer."""
+
+    bauds = (9_600, 57_600)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.baud = 9_600
+
+    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+        return self.read(count, deadline_ns)
+
+    def set_baud(self, baud: int) -> None:
+        self.baud = baud
+
+    def adapter_fault(self) -> str:
+        return "latency timer is 16 ms"
+
+
+def test_what_a_line_offers_beyond_bytes_is_offered_through_the_recorder(
+    file: Path, clock: SteppedClock
+) -> None:
+    line = FullLine()
+    wire = RecordingTransport(line, WireRecorder(file, clock))
+    wire.write(b"abcdef")
+    assert wire.read_burst(6, 0) == b"fedcba"
+    assert wire.bauds == (9_600, 57_600)
+    wire.set_baud(57_600)
+    assert line.baud == 57_600
+    assert wire.adapter_fault() == "latency timer is 16 ms"
+    assert [record.payload for record in read_recording(file)] == [
+        b"abcdef",
+        b"fedcba",
+        b"57600 baud from here",
+    ]
+
+
+def test_a_line_that_offers_only_bytes_does_not_pretend_more(
+    file: Path, clock: SteppedClock
+) -> None:
+    wire = RecordingTransport(EchoLine(), WireRecorder(file, clock))
+    wire.write(b"abc")
+    wire.write(b"de")
+    assert wire.read_burst(4, 0) == b"cbae"
+    assert wire.read_burst(4, 0) == b"d"
+    assert wire.bauds == ()
+    assert wire.adapter_fault() == ""
+    with pytest.raises(ValueError, match="this line has one speed only, got 57600"):
+        wire.set_baud(57_600)
+
+
+@pytest.mark.parametrize(
+    "act", [lambda w: w.write(b"x"), lambda w: w.read(1, 0), lambda w: w.read_burst(1, 0)]
+)
 def test_a_lost_link_is_recorded_and_raised(
     act: Callable[[RecordingTransport], object], file: Path, clock: SteppedClock
 ) -> None:

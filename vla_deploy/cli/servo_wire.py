@@ -54,6 +54,7 @@ class ServoWire:
             transport = RecordingTransport(transport, self._recorder(self.record, baud))
         link = BenchLink(transport, self.clock, baud)
         try:
+            link.detect_echo()
             yield link
         finally:
             link.close()

@@ -6,7 +6,13 @@ from typing import Final
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.codec import Instruction, Packet, PacketParser, encode_instruction
+from drivers.dynamixel.codec import (
+    MAX_SERVO_ID,
+    Instruction,
+    Packet,
+    PacketParser,
+    encode_instruction,
+)
 from drivers.dynamixel.control_table import MODELS_BY_NUMBER, Model
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.errors import ServoSilent, WrongServo
@@ -71,6 +77,14 @@ class BenchLink:
     def close(self) -> None:
         """Release the transport; closing twice is allowed."""
         self.link.close()
+
+    def detect_echo(self) -> None:
+        """Find out whether the adapter hears what it sends; then its echo is left out from now on.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        self.link.detect_echo(MAX_SERVO_ID, ONE_TRY.margin_s)
 
     def ping(self, servo_id: int, patience: Patience = THREE_TRIES) -> FoundServo:
         """Return what a servo says of itself.

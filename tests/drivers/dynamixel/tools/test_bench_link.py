@@ -1,6 +1,7 @@
 import pytest
 
 from drivers.dynamixel.errors import RejectedAccess, ServoSilent, WrongServo
+from drivers.dynamixel.tools import scan_speed
 from drivers.dynamixel.tools.bench_link import FoundServo, Keep
 from sim_twin.servos import EmulatedServoSpec
 
@@ -73,3 +74,20 @@ def test_a_factory_reset_with_torque_on_is_refused(wire):
     link.write(servo, "torque_enable", 1)
     with pytest.raises(RejectedAccess, match="factory reset of servo 2"):
         link.factory_reset(servo, Keep.ID)
+
+
+def test_an_adapter_that_hears_itself_is_noticed_and_its_echo_left_out(wire):
+    heard = wire.receive
+
+    def echoing(data):
+        wire.echo += data
+        heard(data)
+
+    wire.echo = b""
+    answers = wire.transmit
+    wire.receive = echoing
+    wire.transmit = lambda: (wire.__dict__.pop("echo"), setattr(wire, "echo", b""))[0] + answers()
+    link = wire.open()
+    link.detect_echo()
+    assert [one.servo_id for one in scan_speed(link).servos] == [2, 6]
+    assert link.read(link.servo(2), "position_p_gain") == 800
