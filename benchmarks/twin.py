@@ -1,8 +1,15 @@
 """Measure what the emulated devices cost on top of the physics, and how fast lock-step runs.
 
-Three runs of the same robot in the same world take turns, so that a busy machine hits all of them;
-medians are compared: raw `mj_step`; the twin (16 servos, two drives, 360-beam lidar, IMU; no
-camera); and lock-step with the real control node on its buses, disarmed, at the profile's rate.
+Four runs of the same robot in the same world take turns, so that a busy machine hits all of them;
+medians of CPU time are compared:
+
+- raw `mj_step`;
+- the twin alone, its servos without torque (16 servos, two drives, lidar, IMU; no camera);
+- the twin in lock-step with the real drivers: all servos hold torque and follow goals and the base
+  turns, 250 bus cycles a second; of this run comes `real_time_factor`, and `mj_step_cpu_ratio`, the
+  share of `mj_step` in the CPU time of the twin's own step. `mj_step_cpu_ratio_with_answers` counts
+  to the twin also what the devices do to answer the buses, in `receive` and `transmit`;
+- lock-step with the whole control node on the buses, disarmed, at the profile's rate.
 """
 
 import argparse
@@ -11,12 +18,15 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 import mujoco
 
+from benchmarks.device_traffic import DeviceTraffic
+from benchmarks.stopwatch import Stopwatch
 from platforms import load_profile
 from sim_twin.compose import STEP_S
 from sim_twin.engine import Engine
@@ -29,21 +39,23 @@ from vla_deploy.robots import RobotDescription, load_robot
 _SEED: Final = 0
 _WARM_UP_STEPS: Final = 200
 
+Runner = Callable[[int], None]
+
 
 def measure(robot_name: str, world: str, rounds: int, steps: int) -> dict[str, Any]:
-    """Return step rates, their ratio and real-time factors; medians over the rounds."""
+    """Return step rates, their ratios and real-time factors; medians over the rounds."""
     robot = load_robot(robot_name)
     engine = load_engine(robot, world, _SEED)
     twin = Twin(robot, world, _SEED)
-    with tempfile.TemporaryDirectory() as folder:
-        lockstep = _lockstep(robot_name, robot, world, Path(folder))
-        runners: dict[str, Callable[[int], None]] = {
+    with _busy_lockstep(robot_name, world) as busy, _controlled_lockstep(robot, world) as control:
+        watch = Stopwatch(busy.twin)
+        runners: dict[str, Runner] = {
             "raw": lambda count: _step_raw(engine, count),
             "twin": lambda count: _step_twin(twin, count),
-            "lockstep": lambda count: lockstep.run_for(count * STEP_S),
+            "busy": lambda count: busy.run_for(count * STEP_S),
+            "control": lambda count: control.run_for(count * STEP_S),
         }
         rates = _median_rates(runners, rounds, steps)
-        lockstep.close()
     return {
         "robot": robot_name,
         "world": world,
@@ -53,13 +65,21 @@ def measure(robot_name: str, world: str, rounds: int, steps: int) -> dict[str, A
         "twin_steps_per_s": rates["twin"],
         "step_rate_ratio_vs_raw": rates["twin"] / rates["raw"],
         "twin_real_time_factor": rates["twin"] * STEP_S,
-        "real_time_factor": rates["lockstep"] * STEP_S,
+        "mj_step_cpu_ratio": watch.physics_ns / watch.step_ns,
+        "mj_step_cpu_ratio_with_answers": watch.physics_ns / (watch.step_ns + watch.answer_ns),
+        "real_time_factor": rates["busy"] * STEP_S,
+        "control_real_time_factor": rates["control"] * STEP_S,
     }
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the comparison."""
-    parser = argparse.ArgumentParser(prog="bench twin", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="bench twin",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example:\n  vla-deploy bench twin --json",
+    )
     parser.add_argument("--robot", default="butler")
     parser.add_argument("--world", default="flat")
     parser.add_argument("--rounds", type=int, default=7, help="interleaved rounds of each run")
@@ -71,25 +91,38 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _lockstep(name: str, robot: RobotDescription, world: str, folder: Path) -> Lockstep:
-    lockstep = Lockstep(name, world, _SEED, tmp_path=folder)
-    profile = load_profile(lockstep.context.profile)
-    lockstep.add(ControlNode(lockstep.context, robot, profile, lockstep.devices))
-    return lockstep
+@contextmanager
+def _busy_lockstep(robot: str, world: str) -> Iterator[Lockstep]:
+    """Give a lock-step whose devices all work: torque on, goals followed, buses answered."""
+    with tempfile.TemporaryDirectory() as folder:
+        lockstep = Lockstep(robot, world, _SEED, tmp_path=Path(folder))
+        traffic = DeviceTraffic(lockstep)
+        lockstep.add(traffic)
+        traffic.await_motion(lockstep)
+        yield lockstep
+        lockstep.close()
 
 
-def _median_rates(
-    runners: dict[str, Callable[[int], None]], rounds: int, steps: int
-) -> dict[str, float]:
-    """Return steps per wall second of each runner."""
+@contextmanager
+def _controlled_lockstep(robot: RobotDescription, world: str) -> Iterator[Lockstep]:
+    with tempfile.TemporaryDirectory() as folder:
+        lockstep = Lockstep(robot.name, world, _SEED, tmp_path=Path(folder))
+        profile = load_profile(lockstep.context.profile)
+        lockstep.add(ControlNode(lockstep.context, robot, profile, lockstep.devices))
+        yield lockstep
+        lockstep.close()
+
+
+def _median_rates(runners: Mapping[str, Runner], rounds: int, steps: int) -> dict[str, float]:
+    """Return steps per second of CPU time of each runner."""
     for run in runners.values():
         run(_WARM_UP_STEPS)
     rates: dict[str, list[float]] = {name: [] for name in runners}
     for _ in range(rounds):
         for name, run in runners.items():
-            started_s = time.perf_counter()
+            started_s = time.thread_time()
             run(steps)
-            rates[name].append(steps / (time.perf_counter() - started_s))
+            rates[name].append(steps / (time.thread_time() - started_s))
     return {name: statistics.median(values) for name, values in rates.items()}
 
 
@@ -109,7 +142,9 @@ def _text(report: dict[str, Any]) -> str:
         f"twin                  {report['twin_steps_per_s']:8.0f} steps/s, "
         f"{report['step_rate_ratio_vs_raw']:.2f} of raw, "
         f"{report['twin_real_time_factor']:.1f} x real time\n"
-        f"lock-step + control   {report['real_time_factor']:8.1f} x real time"
+        f"lock-step + drivers   {report['real_time_factor']:8.1f} x real time, "
+        f"mj_step {report['mj_step_cpu_ratio']:.0%} of the twin's CPU\n"
+        f"lock-step + control   {report['control_real_time_factor']:8.1f} x real time"
     )
 
 
