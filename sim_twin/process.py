@@ -122,7 +122,8 @@ class TwinProcess:
         for line in self._lines:
             line.poll_once()
         for stream in self._streams:
-            stream.poll_once()
+            if stream.has_client:
+                stream.poll_once()
         now_ns = self._twin.now_ns
         self._factor.update(wall_ns, now_ns)
         if self._camera is not None:
@@ -130,12 +131,16 @@ class TwinProcess:
 
     def _filenos(self) -> list[int]:
         lines = [line.fileno() for line in self._lines]
-        return [*lines, *self._hub.filenos(), *self._referee.filenos()]
+        streams = [fileno for stream in self._streams for fileno in stream.filenos()]
+        return [*lines, *streams, *self._hub.filenos(), *self._referee.filenos()]
 
     def _serve(self, ready: set[int]) -> None:
         for line in self._lines:
             if line.fileno() in ready:
                 line.poll_once()
+        for stream in self._streams:
+            if not ready.isdisjoint(stream.filenos()):
+                stream.poll_once()
         if not ready.isdisjoint(self._hub.filenos()):
             self._hub.poll_once()
         if not ready.isdisjoint(self._referee.filenos()):

@@ -32,6 +32,11 @@ class StreamLine:
         """Return whether the client has yet to take what it was sent."""
         return len(self._pending) > 0
 
+    @property
+    def has_client(self) -> bool:
+        """Return whether somebody is there to be sent anything."""
+        return self._client is not None
+
     def filenos(self) -> list[int]:
         """Return the descriptors whose input matters."""
         client = [] if self._client is None else [self._client.fileno()]

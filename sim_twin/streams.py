@@ -2,8 +2,10 @@
 
 from typing import Protocol
 
+from drivers.audio.base import AudioFormat
 from sim_twin.device import WireDevice
 from sim_twin.sensors.estop import EstopButtonDevice
+from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from vla_deploy.robots import RobotDescription
 
 
@@ -15,7 +17,7 @@ class StreamedDevice(WireDevice, Protocol):
         ...
 
 
-def streamed_devices(robot: RobotDescription) -> dict[str, StreamedDevice]:
+def streamed_devices(robot: RobotDescription, seed: int) -> dict[str, StreamedDevice]:
     """Return what the robot file declares, by device name.
 
     A button on GPIO is none of these: the twin has no GPIO lines.
@@ -23,4 +25,10 @@ def streamed_devices(robot: RobotDescription) -> dict[str, StreamedDevice]:
     devices: dict[str, StreamedDevice] = {}
     if robot.estop is not None and robot.estop.model == "HID":
         devices[robot.estop.device] = EstopButtonDevice(robot.estop.number)
+    if (ear := robot.microphone) is not None:
+        format_ = AudioFormat(rate_hz=ear.rate_hz, channels=ear.channels)
+        devices[ear.device] = MicrophoneDevice(format_, seed=seed)
+    if (mouth := robot.speaker) is not None:
+        format_ = AudioFormat(rate_hz=mouth.rate_hz, channels=mouth.channels)
+        devices[mouth.device] = SpeakerDevice(format_)
     return devices

@@ -73,6 +73,7 @@ class WireBench(Generic[D]):
         self, device: WireDevice, connect: Connect[D], hang_up: Callable[[], None] | None = None
     ) -> None:
         self.clock = ManualClock(NS_PER_S)
+        self._device = device
         self._line = LineTamper(device, self.clock.now_ns)
         self._plug = Plug()
         self._connect = connect
@@ -97,7 +98,7 @@ class WireBench(Generic[D]):
         end_ns = self.clock.ns + round(seconds * NS_PER_S)
         while self.clock.ns < end_ns:
             self.clock.ns += STEP_NS
-            self._line.step(self.clock.ns)
+            self._device.step(self.clock.ns)
 
     def unplug(self) -> None:
         """Pull the cable."""
