@@ -1,7 +1,8 @@
 """Let replies take their time: baud rate, return delay, jitter, and the adapter's latency timer.
 
 A USB adapter of the FTDI kind passes bytes on when its buffer is full or its timer runs out; the
-timer starts anew with every delivery. Without it a reply is delivered when its last byte is there.
+timer starts anew with every delivery. A plain UART, which has none, passes on what its FIFO holds:
+a reply when its last byte is there, and a long one in pieces meanwhile.
 
 Source: FTDI application note AN232B-04 (62 data bytes per packet, a timer of 16 ms as delivered).
 """
@@ -16,6 +17,7 @@ from drivers.clock import NS_PER_S
 
 BITS_PER_BYTE: Final = 10
 ADAPTER_BYTES: Final = 62
+FIFO_BYTES: Final = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,11 +155,12 @@ class ReplyQueue:
             for due_ns, chunk in self._adapter.take(start_ns, self._byte_ns, data):
                 self._push(due_ns, chunk)
             return
-        due_ns = start_ns + round(len(data) * self._byte_ns)
-        if due_ns <= now_ns:
+        if start_ns <= now_ns and not self.paced:
             self._now.append(data)
-        else:
-            self._push(due_ns, data)
+            return
+        for start in range(0, len(data), FIFO_BYTES):
+            piece = data[start : start + FIFO_BYTES]
+            self._push(start_ns + round((start + len(piece)) * self._byte_ns), piece)
 
     def _push(self, due_ns: int, data: bytes) -> None:
         self._count += 1

@@ -10,7 +10,7 @@ from drivers.dynamixel.codec import BROADCAST_ID, Instruction, encode_instructio
 from drivers.dynamixel.control_table import BAUD_RATES
 from sim_twin.lines import MemoryLine
 from sim_twin.servos.server import FreeServos, make_specs
-from sim_twin.servos.timing import WireTiming
+from sim_twin.servos.timing import FIFO_BYTES, WireTiming
 
 COUNT = 16
 BLOCK = struct.pack("<HH", 126, 10) + bytes(range(1, COUNT + 1))
@@ -73,6 +73,12 @@ def test_a_transaction_takes_its_bytes_at_the_baud_rate(baud: int, request_: byt
 def test_each_reply_arrives_with_its_last_byte(baud: int = 1_000_000) -> None:
     _, times_ns = PacedBus(WireTiming(baud=baud)).ask(READ)
     assert times_ns == [round(wire_ns(30 + 21 * count, baud)) for count in range(1, COUNT + 1)]
+
+
+def test_a_long_reply_arrives_in_pieces() -> None:
+    reply, times_ns = PacedBus(WireTiming(baud=1_000_000)).ask(FAST_READ)
+    arrived = [*range(FIFO_BYTES, len(reply), FIFO_BYTES), len(reply)]
+    assert times_ns == [(300 + 10 * count) * US for count in arrived]
 
 
 def test_the_return_delay_register_delays_every_reply_and_a_fast_read_once() -> None:
