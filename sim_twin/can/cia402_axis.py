@@ -144,8 +144,7 @@ class Cia402Axis:
         self._machine.initialise()
 
     def lose_supply(self) -> None:
-        """Forget the encoder's count and produce no torque."""
-        self._encoder.lose_supply()
+        """Produce no torque."""
         self._torque_nm = 0.0
 
     def on_controlword(self, controlword: int) -> bool:

@@ -1,6 +1,5 @@
 """Emulate one CiA 402 wheel drive as a CANopen node: NMT, heartbeats, SDO, PDO, EMCY."""
 
-from collections.abc import Callable
 from typing import Final
 
 import can
@@ -25,13 +24,13 @@ from drivers.canopen.objects import (
     NmtCommand,
     NmtState,
 )
-from drivers.clock import NS_PER_S
 from sim_twin.can.cia402_axis import Cia402Axis
+from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.error_frames import is_restart
 from sim_twin.can.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from sim_twin.can.object_dictionary import VALUE_RANGE, Key, ObjectDictionary, SdoAbort
 from sim_twin.can.pdo_server import PdoServer
-from sim_twin.can.power_stage import Encoder, MotorSpec, PowerStage, Trip
+from sim_twin.can.power_stage import MotorSpec, Trip
 from sim_twin.can.sdo_server import SdoServer
 from sim_twin.can.velocity_loop import VelocityLoop
 
@@ -49,10 +48,9 @@ ERROR_FIELD_LENGTH: Final = 4
 MAX_NODE_ID: Final = 127
 
 
-class WheelDrive:
+class WheelDrive(EmulatedDrive):
     """Answer CAN frames at once; physics asks for torque with `advance`.
 
-    `sign` is -1 for a drive mounted so that its positive direction turns the joint backwards.
     The loop is stable where kv · step < 2 · (wheel inertia + armature).
     """
 
@@ -66,11 +64,8 @@ class WheelDrive:
         ki: float = 20.0,
         motor: MotorSpec | None = None,
     ) -> None:
-        self.node_id = node_id
-        self._sign = sign
+        super().__init__(node_id, sign=sign, counts_per_rev=counts_per_rev, motor=motor)
         self._objects = ObjectDictionary(node_id)
-        self._stage = PowerStage(motor or MotorSpec())
-        self._encoder = Encoder(counts_per_rev)
         self._axis = Cia402Axis(self._objects, VelocityLoop(kv, ki), self._stage, self._encoder)
         self._sdo = SdoServer(self._objects)
         self._producer = HeartbeatProducer(self._objects)
@@ -83,11 +78,6 @@ class WheelDrive:
         self._heed()
         self._setpoint: dict[Key, int] = {}
         self._nmt_state = NmtState.BOOT_UP
-        self._send_frame: Callable[[can.Message], None] = lambda frame: None
-        self._now_ns: int | None = None
-        self._supplied = True
-        self._silent = False
-        self._tripped: Trip | None = None
 
     def _heed(self) -> None:
         """Choose the frames to look at, like a CAN controller's acceptance filter."""
@@ -107,73 +97,37 @@ class WheelDrive:
         return self._nmt_state
 
     @property
-    def supplied(self) -> bool:
-        """Tell whether the drive has power."""
-        return self._supplied
+    def armed(self) -> bool:
+        """Tell whether the power stage is switched on."""
+        return self._axis.armed
 
-    def connect(self, send: Callable[[can.Message], None]) -> None:
-        """Remember how to put a frame on the wire, and boot."""
-        self._send_frame = send
-        self._boot()
+    @property
+    def faulted(self) -> bool:
+        """Tell whether the drive is in one of its fault states."""
+        return self._axis.faulted
 
     def set_supply(self, on: bool) -> None:
         """Switch the drive's supply: off is silent and without torque, on boots anew."""
-        if on and not self._supplied:
-            self._supplied = True
-            self._objects.reset()
-            self._boot()
-        elif not on:
-            self._supplied = False
+        super().set_supply(on)
+        if not on:
             self._axis.lose_supply()
-
-    def set_supply_v(self, volts: float) -> None:
-        """Change the supply's voltage; below what the electronics need, the drive is off."""
-        self._stage.supply_v = self._stage.bus_v = volts
-        self.set_supply(on=volts >= self._stage.spec.logic_v)
 
     def set_node_id(self, node_id: int) -> None:
         """Give the drive another address, taken over by a restart."""
-        self.node_id = node_id
         self._objects.readdress(node_id)
-        self.set_supply(on=False)
-        self.set_supply(on=True)
-
-    def freeze(self, on: bool) -> None:
-        """Stick the encoder's and the torque's values as they are told, or free them."""
-        self._encoder.frozen = on
-
-    def silence(self, on: bool) -> None:
-        """Send nothing, or speak again; the drive goes on listening and acting."""
-        self._silent = on
-
-    def overheat(self) -> None:
-        """Heat the motor beyond its limit; it trips, and cools down by itself."""
-        self._stage.overheat()
-
-    def overload(self, on: bool) -> None:
-        """Let the full current flow without moving anything, as in a jammed gear; I²t trips."""
-        self._stage.jammed = on
+        super().set_node_id(node_id)
 
     def raise_fault(self, code: int, error_register: int = 0x01) -> None:
         """Enter the fault reaction and tell the code by EMCY, as a real cause would."""
         self._axis.fail()
         self._report(code, error_register)
 
-    def advance(self, now_ns: int, position_rad: float, velocity_rad_s: float) -> float:
-        """Take the joint's state at `now_ns` and return the torque on the joint in N·m."""
-        dt_s = 0.0 if self._now_ns is None else (now_ns - self._now_ns) / NS_PER_S
-        self._now_ns = now_ns
-        if not self._supplied:
-            self._stage.load(0.0, 0.0, dt_s)
-            return 0.0
+    def _act(self, now_ns: int, dt_s: float, velocity_rad_s: float) -> float:
         self._beat(now_ns)
-        sign = self._sign
-        velocity_rad_s *= sign
-        self._encoder.measure(sign * position_rad, velocity_rad_s)
-        torque_nm = self._axis.advance(dt_s, velocity_rad_s)
-        self._stage.load(torque_nm, velocity_rad_s, dt_s)
-        self._protect()
-        return sign * torque_nm
+        return self._axis.advance(dt_s, velocity_rad_s)
+
+    def _trip(self, cause: Trip) -> None:
+        self.raise_fault(*TRIP_CODES[cause])
 
     def _beat(self, now_ns: int) -> None:
         if self._producer.due(now_ns):
@@ -181,13 +135,6 @@ class WheelDrive:
         if self._consumer.expired(now_ns):
             self._axis.on_connection_lost()
             self._report(HEARTBEAT_LOST, COMMUNICATION_ERROR)
-
-    def _protect(self) -> None:
-        """Trip on a new cause, and on a lasting one where the fault was reset."""
-        trip = self._stage.trip(self._axis.armed)
-        if trip is not None and (trip is not self._tripped or not self._axis.faulted):
-            self.raise_fault(*TRIP_CODES[trip])
-        self._tripped = trip
 
     def receive(self, frame: can.Message) -> None:
         """Take one frame from the wire."""
@@ -224,7 +171,6 @@ class WheelDrive:
                 self._enter(NmtState.STOPPED)
                 self._axis.on_connection_lost()
             case NmtCommand.RESET_NODE:
-                self._objects.reset()
                 self._boot()
             case NmtCommand.RESET_COMMUNICATION:
                 self._axis.on_connection_lost()
@@ -232,6 +178,7 @@ class WheelDrive:
                 self._announce()
 
     def _boot(self) -> None:
+        self._objects.reset()
         self._axis.start()
         self._announce()
 
@@ -307,7 +254,3 @@ class WheelDrive:
 
     def _send(self, cob_base: int, data: bytes) -> None:
         self._transmit(cob_base + self.node_id, data)
-
-    def _transmit(self, can_id: int, data: bytes) -> None:
-        if not self._silent:
-            self._send_frame(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))

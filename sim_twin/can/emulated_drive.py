@@ -1,0 +1,136 @@
+"""Be what all emulated drives share: supply, motor, encoder, the step with the physics, faults."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+import can
+
+from drivers.clock import NS_PER_S
+from sim_twin.can.power_stage import Encoder, MotorSpec, PowerStage, Trip
+
+
+class EmulatedDrive(ABC):
+    """Turn one joint; a subclass speaks the protocol and decides on the torque.
+
+    `sign` is -1 for a drive mounted so that its positive direction turns the joint backwards.
+    """
+
+    def __init__(
+        self, node_id: int, *, sign: int, counts_per_rev: int, motor: MotorSpec | None
+    ) -> None:
+        self.node_id = node_id
+        self._sign = sign
+        self._stage = PowerStage(motor or MotorSpec())
+        self._encoder = Encoder(counts_per_rev)
+        self._send_frame: Callable[[can.Message], None] = lambda frame: None
+        self._now_ns: int | None = None
+        self._supplied = True
+        self._silent = False
+        self._tripped: Trip | None = None
+
+    @property
+    def supplied(self) -> bool:
+        """Tell whether the drive has power."""
+        return self._supplied
+
+    @property
+    def temperature_c(self) -> float:
+        """Return the winding's temperature, for tests and for the referee."""
+        return self._stage.temperature_c
+
+    @property
+    @abstractmethod
+    def armed(self) -> bool:
+        """Tell whether the power stage is switched on."""
+
+    @property
+    @abstractmethod
+    def faulted(self) -> bool:
+        """Tell whether an error holds the drive."""
+
+    @abstractmethod
+    def receive(self, frame: can.Message) -> None:
+        """Take one frame from the wire."""
+
+    @abstractmethod
+    def raise_fault(self, code: int, error_register: int = 0x01) -> None:
+        """Fail with one of the protocol's error codes, as a real cause would."""
+
+    @abstractmethod
+    def _boot(self) -> None:
+        """Start with everything at its defaults."""
+
+    @abstractmethod
+    def _act(self, now_ns: int, dt_s: float, velocity_rad_s: float) -> float:
+        """Return the motor's torque for the next step."""
+
+    @abstractmethod
+    def _trip(self, cause: Trip) -> None:
+        """Protect the motor."""
+
+    def connect(self, send: Callable[[can.Message], None]) -> None:
+        """Remember how to put a frame on the wire, and boot."""
+        self._send_frame = send
+        self._boot()
+
+    def advance(self, now_ns: int, position_rad: float, velocity_rad_s: float) -> float:
+        """Take the joint's state at `now_ns` and return the torque on the joint in N·m."""
+        dt_s = 0.0 if self._now_ns is None else (now_ns - self._now_ns) / NS_PER_S
+        self._now_ns = now_ns
+        stage, sign = self._stage, self._sign
+        if not self._supplied:
+            stage.load(0.0, 0.0, dt_s)
+            return 0.0
+        velocity_rad_s *= sign
+        self._encoder.measure(sign * position_rad, velocity_rad_s)
+        torque_nm = self._act(now_ns, dt_s, velocity_rad_s)
+        stage.load(torque_nm, velocity_rad_s, dt_s)
+        self._protect()
+        return sign * torque_nm
+
+    def _protect(self) -> None:
+        """Trip on a new cause, and on a lasting one where the fault was reset."""
+        cause = self._stage.trip(self.armed)
+        if cause is not None and (cause is not self._tripped or not self.faulted):
+            self._trip(cause)
+        self._tripped = cause
+
+    def set_supply(self, on: bool) -> None:
+        """Switch the drive's supply: off is silent and without torque, on boots anew."""
+        if on and not self._supplied:
+            self._supplied = True
+            self._boot()
+        elif not on:
+            self._supplied = False
+            self._encoder.lose_supply()
+
+    def set_supply_v(self, volts: float) -> None:
+        """Change the supply's voltage; below what the electronics need, the drive is off."""
+        self._stage.supply_v = self._stage.bus_v = volts
+        self.set_supply(on=volts >= self._stage.spec.logic_v)
+
+    def set_node_id(self, node_id: int) -> None:
+        """Give the drive another address, taken over by a restart."""
+        self.node_id = node_id
+        self.set_supply(on=False)
+        self.set_supply(on=True)
+
+    def freeze(self, on: bool) -> None:
+        """Stick the encoder's and the torque's values as they are told, or free them."""
+        self._encoder.frozen = on
+
+    def silence(self, on: bool) -> None:
+        """Send nothing, or speak again; the drive goes on listening and acting."""
+        self._silent = on
+
+    def overheat(self) -> None:
+        """Heat the motor beyond its limit; it trips, and cools down by itself."""
+        self._stage.overheat()
+
+    def overload(self, on: bool) -> None:
+        """Let the full current flow without moving anything, as in a jammed gear; I²t trips."""
+        self._stage.jammed = on
+
+    def _transmit(self, can_id: int, data: bytes) -> None:
+        if not self._silent:
+            self._send_frame(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
