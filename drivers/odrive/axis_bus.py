@@ -222,13 +222,21 @@ class ODriveBus:
             if fell_out or any(port.fault or port.lost(now_ns) for port in self._ports):
                 self.quick_stop()
         elif self._goal is Goal.QUICK_STOP:
-            standing = all(abs(port.velocity_rad_s) < STILL_RAD_S for port in self._ports)
-            if standing or now_ns > self._goal_until_ns:
+            if not self._brakes(now_ns) or now_ns > self._goal_until_ns:
                 self.disable()
         elif self._goal is Goal.FAULT_RESET:
             cleared = all(port.fault is None for port in self._ports)
             if cleared or now_ns > self._goal_until_ns:
                 self.disable()
+
+    def _brakes(self, now_ns: int) -> bool:
+        """Tell whether a wheel still has to be braked; one without power or voice cannot be."""
+        return any(
+            port.power_state is PowerState.OPERATION_ENABLED
+            and not port.lost(now_ns)
+            and abs(port.velocity_rad_s) >= STILL_RAD_S
+            for port in self._ports
+        )
 
     def _send_setpoints(self, velocity_rad_s: NDArray[np.float64] | None) -> None:
         wanted = velocity_rad_s if self.enabled else None

@@ -36,4 +36,4 @@ class AxisFault:
         """Return who may clear them: the strictest rule of all bits."""
         if self.code & REPAIR_ERRORS:
             return ResetRule.NEVER
-        return ResetRule.OPERATOR if self.code & ~AUTOMATIC_ERRORS else ResetRule.AUTOMATIC
+        return ResetRule.OPERATOR if self.code & ~int(AUTOMATIC_ERRORS) else ResetRule.AUTOMATIC

@@ -1,0 +1,170 @@
+"""Hold the ODrive bus to what is its own: watchdog, endpoints, firmware, units."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.drive_bus import ResetRule
+from drivers.errors import DeviceMissing, NoReply, ProtocolError, WrongDevice
+from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
+from drivers.odrive.codec import (
+    MESSAGES,
+    AxisError,
+    AxisState,
+    Command,
+    can_id,
+    decode,
+    encode,
+    split_id,
+)
+from drivers.odrive.endpoints import (
+    ENABLE_WATCHDOG,
+    ENCODER_RATE,
+    RAMP_RATE,
+    WATCHDOG_TIMEOUT,
+    read_endpoints,
+)
+from drivers.odrive.faults import AxisFault
+from sim_twin.can import MemoryBus
+
+
+def with_endpoints(bench: Any, path: Path) -> ODriveBus:
+    return ODriveBus(
+        MemoryBus(bench.world.wire), bench.world, [AxisSpec(node_id=0, joint="left")], path
+    )
+
+
+def written(tmp_path: Path, change: Any) -> Path:
+    document = json.loads(EMULATED_ENDPOINTS.read_text())
+    change(document)
+    path = tmp_path / "endpoints.json"
+    path.write_text(json.dumps(document))
+    return path
+
+
+def test_the_watchdog_is_armed_with_the_heartbeat_time(odrive: Any) -> None:
+    odrive.bus.connect()
+    for axis in odrive.axes:
+        assert axis.value(ENABLE_WATCHDOG)
+        assert axis.value(WATCHDOG_TIMEOUT) == pytest.approx(0.1)
+        assert axis.value(RAMP_RATE) == pytest.approx(20.0 / 6.2831853, rel=1e-6)
+    odrive.bus.close()
+
+
+def test_a_watchdog_that_does_not_arm_is_refused(odrive: Any) -> None:
+    odrive.axes[1].deaf_values.add(ENABLE_WATCHDOG)
+    with pytest.raises(WrongDevice, match=r"right .*enable_watchdog is 0 after 1 was written"):
+        odrive.bus.connect()
+    odrive.bus.close()
+
+
+def test_a_file_of_another_firmware_is_refused_before_anything_is_written(odrive: Any) -> None:
+    odrive.axes[0].firmware = (0, 6, 10)
+    with pytest.raises(WrongDevice, match=r"firmware 0\.6\.10, but .* is of 0\.0\.0"):
+        odrive.bus.connect()
+    assert not odrive.axes[0].value(ENABLE_WATCHDOG)
+    odrive.bus.close()
+
+
+def test_a_missing_endpoint_file_says_where_to_get_it(odrive: Any, tmp_path: Path) -> None:
+    with pytest.raises(DeviceMissing, match="vendor's release page"):
+        with_endpoints(odrive, tmp_path / "none.json").connect()
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"endpoints": {"a": 1}, "fw_version": "1"}'])
+def test_a_file_that_is_no_endpoint_file_is_refused(odrive: Any, tmp_path: Path, text: str) -> None:
+    path = tmp_path / "endpoints.json"
+    path.write_text(text)
+    with pytest.raises(WrongDevice, match=r"no flat_endpoints|lacks"):
+        with_endpoints(odrive, path).connect()
+
+
+def test_a_file_without_the_watchdog_is_refused(odrive: Any, tmp_path: Path) -> None:
+    path = written(tmp_path, lambda document: document["endpoints"].pop(ENABLE_WATCHDOG))
+    with pytest.raises(WrongDevice, match="watchdog cannot be armed"):
+        with_endpoints(odrive, path).connect()
+
+
+def test_without_the_rate_endpoint_estimates_are_asked_for(odrive: Any, tmp_path: Path) -> None:
+    odrive.axes[0].set_value(ENCODER_RATE, 0)
+    bus = with_endpoints(
+        odrive, written(tmp_path, lambda document: document["endpoints"].pop(ENCODER_RATE))
+    )
+    bus.connect()
+    assert any(ENCODER_RATE in note for note in bus.notes)
+    for _ in range(20):
+        state = bus.cycle(None)
+        odrive.pause(0.004)
+    assert state.healthy
+    assert state.age_s[0] < 0.01
+    bus.close()
+
+
+def test_an_axis_that_was_never_calibrated_says_what_to_do(odrive: Any) -> None:
+    odrive.axes[0].calibrated = False
+    with pytest.raises(WrongDevice, match="calibrate"):
+        odrive.bus.connect()
+    odrive.bus.close()
+
+
+def test_an_axis_without_an_sdo_answer_is_never_enabled(odrive: Any) -> None:
+    odrive.axes[0].on_sdo = lambda opcode, endpoint, value: None
+    with pytest.raises(NoReply, match="the watchdog cannot be verified"):
+        odrive.bus.connect()
+    odrive.bus.close()
+
+
+def test_a_rebooted_axis_is_lost(odrive: Any) -> None:
+    odrive.bus.connect()
+    odrive.bus.enable()
+    assert odrive.run(0.2).enabled
+    odrive.kill(0)
+    odrive.run(0.12)
+    assert odrive.run(0.0).lost[0]
+    odrive.bus.close()
+
+
+@pytest.mark.parametrize("node_id", [-1, 0x3F])
+def test_a_node_id_that_no_axis_can_have_is_refused(node_id: int) -> None:
+    with pytest.raises(ValueError, match="node_id"):
+        AxisSpec(node_id=node_id, joint="left")
+
+
+@pytest.mark.parametrize("command", list(Command))
+def test_every_message_takes_its_own_bytes_and_padding_only(command: Command) -> None:
+    data = bytes(8)
+    assert len(decode(command, data)) == len(MESSAGES[command].signals)
+    with pytest.raises(ProtocolError, match="9 bytes"):
+        decode(command, bytes(9))
+
+
+def test_units_are_revolutions_and_identifiers_carry_the_node() -> None:
+    assert encode(Command.SET_INPUT_VEL, 1.0, 0.0).hex() == "0000803f00000000"
+    assert can_id(3, Command.SET_AXIS_STATE) == 0x67
+    assert split_id(0x67) == (3, Command.SET_AXIS_STATE)
+    assert encode(Command.SET_AXIS_STATE, AxisState.CLOSED_LOOP_CONTROL) == b"\x08\0\0\0"
+
+
+@pytest.mark.parametrize(
+    ("code", "rule"),
+    [
+        (AxisError.WATCHDOG_TIMER_EXPIRED, ResetRule.AUTOMATIC),
+        (AxisError.ESTOP_REQUESTED, ResetRule.OPERATOR),
+        (AxisError.WATCHDOG_TIMER_EXPIRED | AxisError.MOTOR_OVER_TEMP, ResetRule.OPERATOR),
+        (AxisError.DRV_FAULT | AxisError.MOTOR_OVER_TEMP, ResetRule.NEVER),
+        (1 << 31, ResetRule.OPERATOR),
+    ],
+)
+def test_the_strictest_error_decides_who_may_clear(code: int, rule: ResetRule) -> None:
+    assert AxisFault(code=int(code)).rule is rule
+
+
+def test_errors_are_told_in_words() -> None:
+    fault = AxisFault(code=int(AxisError.MOTOR_OVER_TEMP) | 1 << 31)
+    assert fault.text == "0x80002000 motor over temp, undocumented bits 0x80000000"
+
+
+def test_the_shipped_endpoints_are_of_no_real_firmware() -> None:
+    assert read_endpoints(EMULATED_ENDPOINTS).firmware == "0.0.0"
