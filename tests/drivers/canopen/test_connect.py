@@ -70,7 +70,7 @@ def test_another_pdo_layout_is_the_wrong_device() -> None:
 def test_a_refused_parameter_names_object_and_value() -> None:
     one = world(WheelDrive(1))
     bus = driver(one, DriveSpec(node_id=1, joint="left_wheel", acceleration_rad_s2=1e-5))
-    with pytest.raises(WrongDevice, match="node 1: 0x6083:0 .* takes 1..2147483647, not 0"):
+    with pytest.raises(WrongDevice, match=r"node 1: 0x6083:0 .* takes 1..2147483647, not 0"):
         bus.connect()
     bus.close()
 
