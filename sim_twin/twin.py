@@ -1,5 +1,6 @@
 """Join the physics to every emulated device: what a bus says moves a motor, and back."""
 
+from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 import numpy as np
@@ -8,7 +9,7 @@ from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES
 from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
-from sim_twin.can import CanWire, WheelDrive
+from sim_twin.can import CanWire, EmulatedDrive, ODriveAxis, WheelDrive
 from sim_twin.device import WireDevice
 from sim_twin.errors import ModelMismatch
 from sim_twin.faults.injector import FaultInjector
@@ -26,6 +27,7 @@ from sim_twin.streams import streamed_devices
 from vla_deploy.robots import RobotDescription
 
 S = TypeVar("S")
+DRIVES: Mapping[str, Callable[..., EmulatedDrive]] = {"cia402": WheelDrive, "odrive": ODriveAxis}
 
 
 class Twin:
@@ -51,9 +53,10 @@ class Twin:
         self.engine = load_engine(robot, world, seed)
         self.servos = ServoBank(_servo_specs(robot), timing=servo_timing)
         self.drives = tuple(
-            WheelDrive(drive.node_id, sign=drive.sign) for drive in robot.can_bus.drives
+            DRIVES[robot.can_bus.protocol](drive.node_id, sign=drive.sign)
+            for drive in robot.can_bus.drives
         )
-        self.can_wire = CanWire(self.drives)
+        self.can_wire = CanWire(self.drives, bitrate=robot.can_bus.bitrate)
         self.lidar = LidarDevice(self.engine.lidar.cast, seed=seed)
         self.imu = ImuDevice(self.engine.imu.read, seed=seed)
         self.serial_devices: dict[str, WireDevice] = {

@@ -1,8 +1,18 @@
-"""Emulate a CAN bus and CiA 402 wheel drives on it."""
+"""Emulate a CAN bus, and wheel drives on it: CiA 402 over CANopen, and ODrive axes."""
 
 from sim_twin.can.drive import WheelDrive
+from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.hub import CanHub
 from sim_twin.can.memory_bus import MemoryBus
+from sim_twin.can.odrive import ODriveAxis
 from sim_twin.can.wire import CanNode, CanWire
 
-__all__ = ["CanHub", "CanNode", "CanWire", "MemoryBus", "WheelDrive"]
+__all__ = [
+    "CanHub",
+    "CanNode",
+    "CanWire",
+    "EmulatedDrive",
+    "MemoryBus",
+    "ODriveAxis",
+    "WheelDrive",
+]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from sim_twin.can.drive import WheelDrive
+from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.wire import CanWire
 
 STEP_NS: Final = 2_000_000
@@ -15,7 +15,7 @@ STEP_NS: Final = 2_000_000
 class FreeWheel:
     """Turn one wheel with nothing but inertia and viscous friction."""
 
-    drive: WheelDrive
+    drive: EmulatedDrive
     inertia_kg_m2: float = 0.05
     friction_nm_s: float = 0.05
     position_rad: float = 0.0

@@ -5,7 +5,7 @@ from typing import Final
 import can
 
 from drivers.canopen.objects import SYNC_COB, TPDO1
-from sim_twin.can import WheelDrive
+from sim_twin.can import EmulatedDrive
 from sim_twin.can.wire import Port
 from sim_twin.faults.effect import Effect, Ending, Parameter, Target
 from sim_twin.faults.line_effects import DELAY, Rows
@@ -41,7 +41,7 @@ class ClashingNode:
             )
 
 
-def _drive(target: Target) -> WheelDrive:
+def _drive(target: Target) -> EmulatedDrive:
     return next(drive for drive in target.twin.drives if drive.node_id == target.number)
 
 
@@ -87,7 +87,7 @@ def _mistune(target: Target) -> Ending:
     return _mistuned(target, (_drive(target),))
 
 
-def _mistuned(target: Target, drives: tuple[WheelDrive, ...]) -> Ending:
+def _mistuned(target: Target, drives: tuple[EmulatedDrive, ...]) -> Ending:
     wire = target.twin.can_wire
 
     def switch(on: bool) -> None:

@@ -1,0 +1,358 @@
+"""Emulate one ODrive axis on CANSimple: states, errors, watchdog, cyclic messages, properties."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import can
+
+from drivers.clock import NS_PER_S
+from drivers.errors import ProtocolError
+from drivers.odrive.codec import (
+    BROADCAST_NODE_ID,
+    AxisError,
+    AxisState,
+    Command,
+    ControlMode,
+    InputMode,
+    SdoOpcode,
+    can_id,
+    decode,
+    encode,
+    split_id,
+)
+from drivers.odrive.endpoints import (
+    EMULATED_ENDPOINTS,
+    ENABLE_WATCHDOG,
+    ENCODER_RATE,
+    HEARTBEAT_RATE,
+    RAMP_RATE,
+    VELOCITY_LIMIT,
+    WATCHDOG_TIMEOUT,
+    read_endpoints,
+)
+from sim_twin.can.emulated_drive import EmulatedDrive
+from sim_twin.can.odrive_controller import ODriveController
+from sim_twin.can.power_stage import MotorSpec, Trip
+
+NS_PER_MS: Final = 1_000_000
+SERIAL_NUMBER: Final = 0x3946_3153_0000
+# Protocol 2, an emulated board, firmware 0.0.0: its endpoint numbers are those of our own file.
+VERSION: Final = (2, 0, 0, 0, 0, 0, 0, 1)
+DEFAULTS: Final = {
+    HEARTBEAT_RATE: 100.0,
+    ENCODER_RATE: 10.0,
+    ENABLE_WATCHDOG: 0.0,
+    WATCHDOG_TIMEOUT: 0.0,
+}
+TRIP_ERRORS: Final = {
+    Trip.UNDER_VOLTAGE: AxisError.DC_BUS_UNDER_VOLTAGE,
+    Trip.OVER_VOLTAGE: AxisError.DC_BUS_OVER_VOLTAGE,
+    Trip.OVER_TEMPERATURE: AxisError.MOTOR_OVER_TEMP,
+    Trip.OVERLOAD: AxisError.CURRENT_LIMIT_VIOLATION,
+}
+SUCCESS, CANCELLED, DISARMED = 0, 2, 3
+FLOAT_LAYOUT: Final = "<f"
+RESTART, SAVE_CONFIGURATION, ERASE_CONFIGURATION = range(3)
+
+
+class ODriveAxis(EmulatedDrive):
+    """Answer CAN frames at once; physics asks for torque with `advance`.
+
+    The gains are those of the joint, in N·m·s/rad and N·m/rad, as for `WheelDrive`.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        *,
+        sign: int = 1,
+        counts_per_rev: int = 16384,
+        kv: float = 8.0,
+        ki: float = 20.0,
+        motor: MotorSpec | None = None,
+    ) -> None:
+        super().__init__(node_id, sign=sign, counts_per_rev=counts_per_rev, motor=motor)
+        self._controller = ODriveController(self._stage, kv * math.tau, ki * math.tau)
+        self._serial = SERIAL_NUMBER + node_id
+        self._endpoints = {
+            each.number: each for each in read_endpoints(EMULATED_ENDPOINTS).endpoints.values()
+        }
+        self._saved: dict[str, float] = dict(DEFAULTS)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._properties = dict(self._saved)
+        self._controller.reset()
+        self._stage.forget_load()
+        self._state = AxisState.IDLE
+        self._errors = AxisError(0)
+        self._disarm_reason = AxisError(0)
+        self._procedure_result = SUCCESS
+        self._offset_rev = 0.0
+        self._torque_nm = 0.0
+        self._told_nm = 0.0
+        self._fed_ns = self._now_ns or 0
+        self._due_ns = {HEARTBEAT_RATE: 0, ENCODER_RATE: 0}
+
+    @property
+    def axis_state(self) -> AxisState:
+        """Return the axis' state, for tests and for the referee."""
+        return self._state
+
+    @property
+    def errors(self) -> AxisError:
+        """Return the active errors."""
+        return self._errors
+
+    @property
+    def disarm_reason(self) -> AxisError:
+        """Return what disarmed the axis last."""
+        return self._disarm_reason
+
+    @property
+    def armed(self) -> bool:
+        """Tell whether the axis is in closed loop control."""
+        return self._state is AxisState.CLOSED_LOOP_CONTROL
+
+    @property
+    def faulted(self) -> bool:
+        """Tell whether an error is active."""
+        return bool(self._errors)
+
+    def raise_fault(self, code: int, error_register: int = 0x01) -> None:
+        """Raise `AxisError` bits, as a real cause would; the axis disarms, its wheel coasts."""
+        self._errors |= AxisError(code)
+        if self.armed:
+            self._disarm_reason |= AxisError(code)
+            self._procedure_result = DISARMED
+            self._state = AxisState.IDLE
+        self._tell(Command.HEARTBEAT)
+
+    def _trip(self, cause: Trip) -> None:
+        self.raise_fault(TRIP_ERRORS[cause])
+
+    def _boot(self) -> None:
+        self._forget()
+        self._tell(Command.HEARTBEAT)
+
+    def _act(self, now_ns: int, dt_s: float, velocity_rad_s: float) -> float:
+        self._watch(now_ns)
+        velocity_rev_s = velocity_rad_s / math.tau
+        if self.armed and self._controller.overspeed(velocity_rev_s):
+            self.raise_fault(AxisError.VELOCITY_LIMIT_VIOLATION)
+        torque_nm = 0.0
+        if self.armed:
+            torque_nm = self._controller.torque_nm(dt_s, self._position_rev, velocity_rev_s)
+        self._torque_nm = torque_nm
+        if not self._encoder.frozen:
+            self._told_nm = torque_nm
+        self._speak(now_ns)
+        return torque_nm
+
+    def _watch(self, now_ns: int) -> None:
+        if not self._properties[ENABLE_WATCHDOG]:
+            return
+        limit_ns = self._properties[WATCHDOG_TIMEOUT] * NS_PER_S
+        expired = now_ns - self._fed_ns > limit_ns
+        if expired and AxisError.WATCHDOG_TIMER_EXPIRED not in self._errors:
+            self.raise_fault(AxisError.WATCHDOG_TIMER_EXPIRED)
+
+    def _speak(self, now_ns: int) -> None:
+        """Send what is due by itself; a rate of 0 ms is off."""
+        for name, command in _CYCLIC.items():
+            period_ns = int(self._properties[name]) * NS_PER_MS
+            if period_ns and now_ns >= self._due_ns[name]:
+                self._due_ns[name] = max(self._due_ns[name] + period_ns, now_ns)
+                self._tell(command)
+
+    @property
+    def _position_rev(self) -> float:
+        return self._encoder.travelled / self._encoder.counts_per_rev + self._offset_rev
+
+    @property
+    def _velocity_rev_s(self) -> float:
+        return self._encoder.counts_s / self._encoder.counts_per_rev
+
+    def receive(self, frame: can.Message) -> None:
+        """Take one frame from the wire; any that is for this axis feeds its watchdog."""
+        node_id, number = split_id(frame.arbitration_id)
+        strange = frame.is_extended_id or frame.is_error_frame or not self._supplied
+        if strange or node_id not in (self.node_id, BROADCAST_NODE_ID):
+            return
+        if node_id == self.node_id and self._now_ns is not None:
+            self._fed_ns = self._now_ns
+        try:
+            command = Command(number)
+            if frame.is_remote_frame:
+                self._tell(command)
+            elif command in _REACTIONS:
+                _REACTIONS[command](self, *decode(command, bytes(frame.data)))
+        except (ValueError, ProtocolError):
+            # CANSimple has no way to refuse: what does not fit changes nothing.
+            return
+
+    def _tell(self, command: Command) -> None:
+        told = _TOLD.get(command)
+        if told is not None:
+            self._transmit(can_id(self.node_id, command), encode(command, *told(self)))
+
+    def _on_axis_state(self, wanted: int) -> None:
+        if wanted == AxisState.IDLE:
+            self._state = AxisState.IDLE
+            self._procedure_result = SUCCESS
+        elif wanted == AxisState.CLOSED_LOOP_CONTROL:
+            self._arm()
+        else:
+            self._procedure_result = CANCELLED  # calibrations: the emulated motor needs none
+        self._tell(Command.HEARTBEAT)
+
+    def _arm(self) -> None:
+        if self.armed:
+            return
+        if not self._controller.supported:
+            self._errors |= AxisError.BAD_CONFIG
+        if self._errors:
+            self._procedure_result = DISARMED
+            return
+        self._disarm_reason = AxisError(0)
+        self._procedure_result = SUCCESS
+        self._controller.arm(self._position_rev, self._velocity_rev_s)
+        self._state = AxisState.CLOSED_LOOP_CONTROL
+
+    def _on_estop(self) -> None:
+        self.raise_fault(AxisError.ESTOP_REQUESTED)
+
+    def _on_clear_errors(self, _identify: int) -> None:
+        self._errors = self._disarm_reason = AxisError(0)
+        self._procedure_result = SUCCESS
+
+    def _on_reboot(self, action: int) -> None:
+        if action == SAVE_CONFIGURATION:
+            self._saved = dict(self._properties)
+        elif action == ERASE_CONFIGURATION:
+            self._saved = dict(DEFAULTS)
+        self._encoder.lose_supply()
+        self._boot()
+
+    def _on_controller_mode(self, control_mode: int, input_mode: int) -> None:
+        modes = ControlMode(control_mode), InputMode(input_mode)
+        self._controller.control_mode, self._controller.input_mode = modes
+
+    def _on_input_pos(self, position_rev: float, velocity: int, torque: int) -> None:
+        _refuse_nan(position_rev)
+        self._controller.input_rev = position_rev
+        self._controller.input_rev_s = velocity / 1000.0
+        self._controller.input_nm = torque / 1000.0
+
+    def _on_input_vel(self, velocity_rev_s: float, torque_nm: float) -> None:
+        _refuse_nan(velocity_rev_s, torque_nm)
+        self._controller.input_rev_s, self._controller.input_nm = velocity_rev_s, torque_nm
+
+    def _on_input_torque(self, torque_nm: float) -> None:
+        _refuse_nan(torque_nm)
+        self._controller.input_nm = torque_nm
+
+    def _on_limits(self, velocity_rev_s: float, current_a: float) -> None:
+        _refuse_nan(velocity_rev_s, current_a)
+        self._controller.velocity_limit_rev_s = velocity_rev_s
+        self._stage.current_limit_a = min(max(current_a, 0.0), self._stage.spec.current_limit_a)
+
+    def _on_position(self, position_rev: float) -> None:
+        _refuse_nan(position_rev)
+        self._offset_rev += position_rev - self._position_rev
+        self._controller.input_rev = position_rev
+
+    def _on_pos_gain(self, gain: float) -> None:
+        _refuse_nan(gain)
+        self._controller.position_gain = gain
+
+    def _on_vel_gains(self, gain: float, integrator_gain: float) -> None:
+        _refuse_nan(gain, integrator_gain)
+        self._controller.set_gains(gain, integrator_gain)
+
+    def _on_address(self, node_id: int, serial: bytes, _connection: int) -> None:
+        if int.from_bytes(serial, "little") == self._serial and node_id < BROADCAST_NODE_ID:
+            self.node_id = node_id
+            self._tell(Command.ADDRESS)
+
+    def _on_sdo(self, opcode: int, number: int, data: bytes) -> None:
+        endpoint = self._endpoints.get(number)
+        if endpoint is None:
+            return
+        if opcode == SdoOpcode.WRITE:
+            value = endpoint.decode(data)
+            _refuse_nan(value)
+            self._write_property(endpoint.name, value)
+        elif opcode == SdoOpcode.READ:
+            value = self._read_property(endpoint.name)
+            told = endpoint.encode(value if endpoint.layout.format == FLOAT_LAYOUT else int(value))
+            answer = encode(Command.TX_SDO, number, told)
+            self._transmit(can_id(self.node_id, Command.TX_SDO), answer)
+
+    def _read_property(self, name: str) -> float:
+        if name == VELOCITY_LIMIT:
+            return self._controller.velocity_limit_rev_s
+        return self._controller.ramp_rev_s2 if name == RAMP_RATE else self._properties[name]
+
+    def _write_property(self, name: str, value: float) -> None:
+        if name == VELOCITY_LIMIT:
+            self._controller.velocity_limit_rev_s = value
+        elif name == RAMP_RATE:
+            self._controller.ramp_rev_s2 = value
+        else:
+            self._properties[name] = value
+
+    def _heartbeat(self) -> tuple[int, ...]:
+        arrived = 1  # velocity and torque inputs have no trajectory to wait for
+        return self._errors | self._disarm_reason, self._state, self._procedure_result, arrived
+
+    def _currents(self) -> tuple[float, ...]:
+        per_a = self._stage.spec.torque_nm_per_a
+        return self._controller.target_nm / per_a, self._told_nm / per_a
+
+    def _powers(self) -> tuple[float, ...]:
+        stage = self._stage
+        mechanical_w = self._told_nm * self._velocity_rev_s * math.tau
+        return stage.bus_v * stage.bus_current_a, mechanical_w
+
+
+def _refuse_nan(*values: float) -> None:
+    """Refuse what is no finite number."""
+    if not all(map(math.isfinite, values)):
+        raise ValueError(f"not finite: {values}")
+
+
+_CYCLIC: Final = {
+    HEARTBEAT_RATE: Command.HEARTBEAT,
+    ENCODER_RATE: Command.GET_ENCODER_ESTIMATES,
+}
+_REACTIONS: Final[Mapping[Command, Callable[..., None]]] = {
+    Command.ESTOP: ODriveAxis._on_estop,
+    Command.RX_SDO: ODriveAxis._on_sdo,
+    Command.ADDRESS: ODriveAxis._on_address,
+    Command.SET_AXIS_STATE: ODriveAxis._on_axis_state,
+    Command.SET_CONTROLLER_MODE: ODriveAxis._on_controller_mode,
+    Command.SET_INPUT_POS: ODriveAxis._on_input_pos,
+    Command.SET_INPUT_VEL: ODriveAxis._on_input_vel,
+    Command.SET_INPUT_TORQUE: ODriveAxis._on_input_torque,
+    Command.SET_LIMITS: ODriveAxis._on_limits,
+    Command.REBOOT: ODriveAxis._on_reboot,
+    Command.CLEAR_ERRORS: ODriveAxis._on_clear_errors,
+    Command.SET_ABSOLUTE_POSITION: ODriveAxis._on_position,
+    Command.SET_POS_GAIN: ODriveAxis._on_pos_gain,
+    Command.SET_VEL_GAINS: ODriveAxis._on_vel_gains,
+}
+# A board's transistors are not modelled: they are as warm as the room.
+_TOLD: Final[Mapping[Command, Callable[[ODriveAxis], tuple[Any, ...]]]] = {
+    Command.GET_VERSION: lambda axis: VERSION,
+    Command.HEARTBEAT: ODriveAxis._heartbeat,
+    Command.GET_ERROR: lambda axis: (axis._errors, axis._disarm_reason),
+    Command.ADDRESS: lambda axis: (axis.node_id, axis._serial.to_bytes(6, "little"), 0),
+    Command.GET_ENCODER_ESTIMATES: lambda axis: (axis._position_rev, axis._velocity_rev_s),
+    Command.GET_IQ: ODriveAxis._currents,
+    Command.GET_TEMPERATURE: lambda axis: (axis._stage.spec.ambient_c, axis._stage.temperature_c),
+    Command.GET_BUS_VOLTAGE_CURRENT: lambda axis: (axis._stage.bus_v, axis._stage.bus_current_a),
+    Command.GET_TORQUES: lambda axis: (axis._controller.target_nm, axis._told_nm),
+    Command.GET_POWERS: ODriveAxis._powers,
+}
