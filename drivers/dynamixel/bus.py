@@ -48,7 +48,7 @@ class DynamixelBus:
         *,
         baud: int,
         fast_sync: bool | None = None,
-        layout: Layout = Layout.DIRECT,
+        layout: Layout = Layout.AUTO,
         watchdog_s: float = 0.1,
         reply_margin_s: float = 0.002,
         health_every_cycles: int = 5,

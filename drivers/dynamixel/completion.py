@@ -9,7 +9,7 @@ from typing import Final
 from drivers.dynamixel.link import Link
 from drivers.dynamixel.sync_read import Entry, SyncRead
 
-_LEAST_MARGIN_RATIO: Final = 0.2
+_LEAST_MARGIN_RATIO: Final = 0.1
 """What of the margin must be left for the second question, or it is not asked."""
 
 

@@ -20,6 +20,8 @@ _STATUS_BYTES: Final = 35
 _CLIMATE_START: Final = 144  # present_input_voltage, present_temperature
 _CLIMATE_BYTES: Final = 3
 _PROBE_EVERY_TURNS: Final = 5
+_MARGIN_SHARE: Final = 0.9
+"""A probe of a missing servo must not cost a cycle more than that servo's part of the block did."""
 
 
 class HealthPoll:
@@ -50,7 +52,7 @@ class HealthPoll:
         self._roster = roster
         self._state = state
         self._every_cycles = every_cycles
-        self._patience = Patience(margin_s=margin_s, attempts=1)
+        self._patience = Patience(margin_s=margin_s * _MARGIN_SHARE, attempts=1)
         self._bring_back = bring_back
         self._returns: dict[int, Iterator[None]] = {}
         self._asked = np.zeros(len(servos), dtype=np.bool_)

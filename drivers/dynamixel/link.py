@@ -22,6 +22,7 @@ _BITS_PER_BYTE: Final = 10
 PING_REPLY_BYTES: Final = STATUS_OVERHEAD_BYTES + 3
 _STALE_BYTES: Final = 4096
 _STALE_READS: Final = 16
+_ECHO_PATIENCE_NS: Final = 5_000_000
 _STALL_RATIO: Final = 0.6
 """How much of the margin the next part of a chained reply may be late."""
 _WATCHFUL_SENDS: Final = 8
@@ -52,11 +53,9 @@ class Link:
         self._burst = transport if isinstance(transport, BurstTransport) else None
         self.baud = baud
         self.ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
-        self.turnaround_ns = 0
-        """The longest time beyond the wire's that a single answer has taken."""
+        self._lateness_ns: int | None = None
         self.echoes = False
-        """The adapter hears itself: all that is sent comes back first."""
-        self._unheard = b""
+        """The adapter hears itself; what comes back of it is taken off the line."""
         self._watchful = _WATCHFUL_SENDS
         self._lost: LinkLost | None = None
 
@@ -100,11 +99,11 @@ class Link:
         """
         frame = encode_instruction(servo_id, Instruction.PING)
         deadline_ns = self.ask(frame, len(frame) + PING_REPLY_BYTES, margin_s)
-        heard = self._receive(len(frame), deadline_ns)
+        heard = self.receive_all(len(frame), deadline_ns)
         self.echoes = heard == frame
         rest = PING_REPLY_BYTES if self.echoes else PING_REPLY_BYTES - len(heard)
         if heard:
-            self._receive(rest, deadline_ns)
+            self.receive_all(rest, deadline_ns)
 
     def send(self, frame: bytes) -> None:
         """Send a packet that nobody answers.
@@ -122,7 +121,7 @@ class Link:
             raise self._note_loss(error) from error
         self.last_sent_ns = self._clock.now_ns()
         if self.echoes:
-            self._unheard += frame
+            self._hear_echo(frame)
 
     def exchange(self, frame: bytes, reply_bytes: int, margin_s: float) -> tuple[bytes, int]:
         """Send a request and return what came of the expected bytes, and the deadline used.
@@ -149,40 +148,11 @@ class Link:
         return wire_bytes * self.ns_per_byte + round(margin_s * NS_PER_S)
 
     def receive_all(self, count: int, deadline_ns: int) -> bytes:
-        """Return `count` bytes behind the adapter's echo, or what of them came by the deadline.
+        """Return `count` bytes, or what of them came by the deadline.
 
         Raises:
             LinkLost: the adapter is gone.
         """
-        if not self.echoes:
-            return self._receive(count, deadline_ns)
-        echo, self._unheard = self._unheard, b""
-        data = self._receive(len(echo) + count, deadline_ns)
-        # a damaged echo stays: the parsers find the answer behind it
-        return data.removeprefix(echo)
-
-    def receive_chained(self, read: SyncRead, deadline_ns: int, margin_s: float) -> bytes:
-        """Return what came of a fast sync read's reply; give up early where it has stopped.
-
-        The reply is one packet to which each servo adds its part. When the next part does not
-        begin in time, nothing more will come.
-
-        Raises:
-            LinkLost: the adapter is gone.
-        """
-        stall_ns = max(round(margin_s * _STALL_RATIO * NS_PER_S), 2 * self.turnaround_ns)
-        sent_ns, wire_bytes = self.last_sent_ns, len(read.request) + STATUS_OVERHEAD_BYTES
-        data = b""
-        while len(data) < read.reply_bytes:
-            part_ns = (wire_bytes + len(data) + read.size) * self.ns_per_byte
-            limit_ns = min(deadline_ns, sent_ns + part_ns + stall_ns)
-            more = self.receive_all(read.reply_bytes - len(data), limit_ns)
-            if not more:
-                break
-            data += more
-        return data
-
-    def _receive(self, count: int, deadline_ns: int) -> bytes:
         if self._burst is None:
             return self._receive_in_parts(count, deadline_ns)
         try:
@@ -192,6 +162,41 @@ class Link:
         if len(data) < count:
             self._watchful = _WATCHFUL_SENDS
         return data
+
+    def receive_chained(self, read: SyncRead, deadline_ns: int, margin_s: float) -> bytes:
+        """Return what came of a fast sync read's reply; give up early where it has stopped.
+
+        The reply is one packet to which each servo adds its part. When the next part does not
+        begin in time, nothing more will come. What is in time must be learned first: some adapters
+        and UARTs hold back a reply until it is over.
+
+        Raises:
+            LinkLost: the adapter is gone.
+        """
+        count = read.reply_bytes
+        data = self.receive(count, self._stall_ns(read, 0, deadline_ns, margin_s))
+        late_ns = self._clock.now_ns() - self._part_ns(read, 0)
+        while data and len(data) < count:
+            limit_ns = self._stall_ns(read, len(data), deadline_ns, margin_s)
+            more = self.receive_all(count - len(data), limit_ns)
+            if not more:
+                return data
+            data += more
+        if data:
+            self._lateness_ns = max(self._lateness_ns or 0, late_ns)
+        return data
+
+    def _part_ns(self, read: SyncRead, arrived: int) -> int:
+        """Return when the next part of a chained reply is over on the wire."""
+        wire_bytes = len(read.request) + arrived + STATUS_OVERHEAD_BYTES + read.size
+        return self.last_sent_ns + wire_bytes * self.ns_per_byte
+
+    def _stall_ns(self, read: SyncRead, arrived: int, deadline_ns: int, margin_s: float) -> int:
+        """Return when to take a chained reply for stopped."""
+        if self._lateness_ns is None:
+            return deadline_ns
+        patience_ns = max(round(margin_s * _STALL_RATIO * NS_PER_S), 2 * self._lateness_ns)
+        return min(deadline_ns, self._part_ns(read, arrived) + patience_ns)
 
     def _receive_in_parts(self, count: int, deadline_ns: int) -> bytes:
         data = self.receive(count, deadline_ns)
@@ -298,8 +303,6 @@ class Link:
         data, deadline_ns = self.exchange(frame, reply_bytes, margin_s)
         parser.feed(data)
         packets = parser.packets()
-        if packets and len(data) == reply_bytes:
-            self._note_turnaround(len(frame) + reply_bytes)
         while (packet := _answer(packets, servo_id, answer_bytes)) is None:
             data = self.receive(reply_bytes, deadline_ns)
             if not data:
@@ -308,19 +311,19 @@ class Link:
             packets = parser.packets()
         return packet
 
-    def _note_turnaround(self, wire_bytes: int) -> None:
-        taken_ns = self._clock.now_ns() - self.last_sent_ns - wire_bytes * self.ns_per_byte
-        self.turnaround_ns = max(self.turnaround_ns, taken_ns)
+    def _hear_echo(self, frame: bytes) -> None:
+        wire_ns = len(frame) * self.ns_per_byte
+        echo = self.receive_all(len(frame), self._clock.now_ns() + wire_ns + _ECHO_PATIENCE_NS)
+        if echo != frame:  # two talked at once: what follows is framed anew
+            self.counters.discarded_bytes += len(echo)
+            self._watchful = _WATCHFUL_SENDS
 
     def _drop_stale_input(self) -> None:
         """Forget answers that came too late, or the next reply would be read one cycle old."""
         self._watchful -= 1
-        unheard, self._unheard = len(self._unheard), b""
         try:
             for _ in range(_STALE_READS):
                 stale = self._transport.read(_STALE_BYTES, self._clock.now_ns())
-                stale = stale[unheard:]
-                unheard = 0
                 if not stale:
                     return
                 self._watchful = _WATCHFUL_SENDS

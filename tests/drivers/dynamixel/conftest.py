@@ -1,10 +1,12 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel import DynamixelBus, ServoSpec
+from drivers.dynamixel import DynamixelBus, Layout, ServoSpec
 from drivers.dynamixel.codec import Instruction, PacketParser
+from drivers.errors import LinkLost
 from sim_twin.lines import MemoryLine
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank
 from sim_twin.servos.server import FreeServos
@@ -47,7 +49,8 @@ class Bench:
         specs: Sequence[ServoSpec] | None = None,
         servos: Sequence[EmulatedServoSpec] | None = None,
         options: FirmwareOptions | None = None,
-        fast_sync: bool = True,
+        fast_sync: bool | None = True,
+        layout: Layout = Layout.DIRECT,
         health_every_cycles: int = 5,
     ) -> None:
         self.specs = list(specs) if specs is not None else make_specs(count)
@@ -64,6 +67,7 @@ class Bench:
         self.wire = Recorder(self.bank)
         self.line = MemoryLine(self.wire, self)
         self.fast_sync = fast_sync
+        self.layout = layout
         self.health_every_cycles = health_every_cycles
         self.bus = self.new_bus()
 
@@ -74,6 +78,7 @@ class Bench:
             self.specs,
             baud=1_000_000,
             fast_sync=self.fast_sync,
+            layout=self.layout,
             health_every_cycles=self.health_every_cycles,
         )
 
@@ -93,6 +98,124 @@ class Bench:
             self.bus.read_state()
 
 
+class SimulatedTime:
+    """Be the clock of paced lines; nothing happens unless somebody waits."""
+
+    def __init__(self) -> None:
+        self.time_ns = 10 * NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+
+
+class PacedLine:
+    """Carry bytes to emulated servos at the wire's speed; a wait passes in simulated time.
+
+    Bytes are handed over `chunk_bytes` at a time; a UART that collects a whole reply has a big one.
+    """
+
+    def __init__(
+        self,
+        clock: SimulatedTime,
+        servos: Sequence[EmulatedServoSpec],
+        *,
+        baud: int = 1_000_000,
+        bauds: tuple[int, ...] = (),
+        chunk_bytes: int = 14,
+    ) -> None:
+        self.servos = FreeServos(servos)
+        self.bank = self.servos.bank
+        self.bauds = bauds or (baud,)
+        self.adapter = ""
+        self.unplugged = False
+        self._clock = clock
+        self._byte_ns = 10 * NS_PER_S // baud
+        self._chunk_bytes = chunk_bytes
+        self._pending = bytearray()
+        self._first_ns = 0
+        self.servos.advance_to(clock.time_ns)
+
+    def write(self, data: bytes) -> None:
+        self._check()
+        now_ns = max(self._clock.time_ns, self._first_ns + len(self._pending) * self._byte_ns)
+        self.servos.advance_to(self._clock.time_ns)
+        self.bank.receive(data)
+        answer = self.bank.transmit()
+        if not self._pending:
+            own_bytes = 0 if answer.startswith(data) else len(data)
+            self._first_ns = now_ns + own_bytes * self._byte_ns
+        self._pending += answer
+
+    def read(self, max_bytes: int, deadline_ns: int) -> bytes:
+        self._check()
+        count = min(len(self._pending), self._chunk_bytes, max_bytes)
+        due_ns = self._first_ns + count * self._byte_ns
+        if not count or due_ns > max(deadline_ns, self._clock.time_ns):
+            self._clock.sleep_until(deadline_ns)
+            return b""
+        self._clock.sleep_until(due_ns)
+        arrived = (self._clock.time_ns - self._first_ns) // self._byte_ns
+        count = min(len(self._pending), arrived, max_bytes)
+        self._first_ns += count * self._byte_ns
+        data = bytes(self._pending[:count])
+        del self._pending[:count]
+        return data
+
+    def set_baud(self, baud: int) -> None:
+        self._pending.clear()
+        self.bank.set_host_baud(baud)
+
+    def adapter_fault(self) -> str:
+        return self.adapter
+
+    def discard_input(self) -> None:
+        self._pending.clear()
+
+    def close(self) -> None:
+        self._pending.clear()
+
+    def _check(self) -> None:
+        if self.unplugged:
+            raise LinkLost("test line: unplugged; plug it in again")
+
+
+class PacedBench:
+    """A bus of one model at the speed of the wire."""
+
+    def __init__(
+        self,
+        count: int = 16,
+        *,
+        clock: SimulatedTime | None = None,
+        eeprom: Mapping[str, int] | None = None,
+        bauds: tuple[int, ...] = (),
+        chunk_bytes: int = 14,
+        **options: Any,
+    ) -> None:
+        self.clock = clock or SimulatedTime()
+        self.specs = [
+            ServoSpec(id=n, model_name="XM430-W350", joint=f"joint_{n}")
+            for n in range(1, count + 1)
+        ]
+        settings = {"return_delay_time": 0, **(eeprom or {})}
+        emulated = [
+            EmulatedServoSpec(id=spec.id, model_name=spec.model_name, eeprom=settings)
+            for spec in self.specs
+        ]
+        self.line = PacedLine(self.clock, emulated, bauds=bauds, chunk_bytes=chunk_bytes)
+        self.bank = self.line.bank
+        options = {"health_every_cycles": 1000} | options
+        self.bus = DynamixelBus(self.line, self.clock, self.specs, baud=1_000_000, **options)
+
+    def timed_read_ns(self) -> int:
+        start_ns = self.clock.time_ns
+        self.bus.read_state()
+        return self.clock.time_ns - start_ns
+
+
 def make_specs(count: int) -> list[ServoSpec]:
     return [
         ServoSpec(
@@ -109,6 +232,11 @@ def make_specs(count: int) -> list[ServoSpec]:
 @pytest.fixture
 def make_bench() -> Callable[..., Bench]:
     return Bench
+
+
+@pytest.fixture
+def make_paced() -> Callable[..., PacedBench]:
+    return PacedBench
 
 
 @pytest.fixture
