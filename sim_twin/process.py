@@ -61,8 +61,10 @@ class TwinProcess:
         self._twin = Twin(robot, options.world, options.seed)
         self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
         self._camera = _start_camera(options)
+        hears_baud = {robot.servo_bus.device: self._twin.servos.set_host_baud}
         self._lines = [
-            PtyLine(device, devices / name) for name, device in self._twin.serial_devices.items()
+            PtyLine(device, devices / name, on_baud=hears_baud.get(name))
+            for name, device in self._twin.serial_devices.items()
         ]
         self._streams = [
             StreamLine(device, devices / name, device.announce)

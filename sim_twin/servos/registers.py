@@ -100,7 +100,10 @@ class ControlTable:
         self._registers = dict(self.model.registers) | {
             register.name: register for register in indirect_registers(self._banks)
         }
-        self._by_address = {each.address: each for each in self._registers.values()}
+        too_new = _too_new(self.model, spec.firmware_version)
+        self._by_address = {
+            each.address: each for each in self._registers.values() if each.name not in too_new
+        }
         self._backup: dict[str, int] = {}
         self._targets: dict[tuple[int, int], tuple[int, ...]] = {}
         self.end = max(r.address + r.size for r in self._registers.values())
@@ -291,6 +294,14 @@ class ControlTable:
         if self.get("operating_mode") != OperatingMode.POSITION:
             return True
         return self.get("min_position_limit") <= value <= self.get("max_position_limit")
+
+
+def _too_new(model: Model, firmware: int) -> frozenset[str]:
+    """Return the registers that came with a later firmware, and cannot be written in this one."""
+    late = (
+        frozenset({"startup_configuration"}) if not model.has_fast_sync(firmware) else frozenset()
+    )
+    return late | ({"bus_watchdog"} if firmware < model.min_firmware_watchdog else set())
 
 
 def _unpacker(register: Register, memory: memoryview) -> Callable[[], tuple[Any, ...]]:

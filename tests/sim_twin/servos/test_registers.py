@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from drivers.dynamixel.codec import BROADCAST_ID, Instruction, StatusError
+from drivers.dynamixel.codec import BROADCAST_ID, Instruction, StatusError, encode_instruction
 from drivers.dynamixel.control_table import MODELS
-from sim_twin.servos import EmulatedServoSpec
+from sim_twin.servos import EmulatedServoSpec, ServoBank
 
 ADDRESS_PAST_THE_END = 662
 
@@ -146,3 +146,22 @@ def test_a_specification_with_unknown_names_is_refused_with_what_is_expected() -
         EmulatedServoSpec(id=1, model_name="AX-12")
     with pytest.raises(ValueError, match=r"not in its EEPROM: \['goal_position'\]"):
         EmulatedServoSpec(id=1, model_name="XM430-W350", eeprom={"goal_position": 1})
+
+
+@pytest.mark.parametrize(
+    ("name", "firmware", "expected"),
+    [
+        ("bus_watchdog", 37, StatusError.ACCESS),
+        ("bus_watchdog", 38, StatusError.NONE),
+        ("startup_configuration", 44, StatusError.ACCESS),
+        ("startup_configuration", 45, StatusError.NONE),
+    ],
+)
+def test_a_register_that_came_with_a_later_firmware_cannot_be_written(
+    name: str, firmware: int, expected: StatusError
+) -> None:
+    bank = ServoBank([EmulatedServoSpec(id=1, model_name="XM430-W350", firmware_version=firmware)])
+    address = MODELS["XM430-W350"].registers[name].address
+    bank.receive(encode_instruction(1, Instruction.WRITE, struct.pack("<HB", address, 1)))
+    assert bank.transmit()[8] == expected
+    assert bank.register(1, name) == (expected == StatusError.NONE)
