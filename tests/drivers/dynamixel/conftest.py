@@ -207,7 +207,7 @@ class PacedBench:
         ]
         self.line = PacedLine(self.clock, emulated, bauds=bauds, chunk_bytes=chunk_bytes)
         self.bank = self.line.bank
-        options = {"health_every_cycles": 1000} | options
+        options = {"health_every_cycles": 1000, "layout": Layout.DIRECT} | options
         self.bus = DynamixelBus(self.line, self.clock, self.specs, baud=1_000_000, **options)
 
     def timed_read_ns(self) -> int:

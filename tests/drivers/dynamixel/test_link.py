@@ -3,7 +3,7 @@
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.dynamixel import DynamixelBus, ServoSpec
+from drivers.dynamixel import DynamixelBus, Layout, ServoSpec
 from drivers.dynamixel.codec import Instruction
 from drivers.dynamixel.counters import BusCounters
 from drivers.dynamixel.errors import ServoSilent
@@ -97,7 +97,7 @@ def test_a_cycle_without_answers_costs_the_wire_time_and_two_milliseconds(
     clock = StillClock()
     line = SwitchedLine(clock, line_type(clock))
     bus = DynamixelBus(
-        line, clock, SPECS, baud=1_000_000, fast_sync=fast_sync, health_every_cycles=1000
+        line, clock, SPECS, baud=1_000_000, fast_sync=fast_sync, layout=Layout.DIRECT
     )
     bus.connect()
     line.answering = False

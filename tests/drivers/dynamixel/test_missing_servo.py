@@ -6,21 +6,25 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.dynamixel import Layout
+
 MakePaced = Callable[..., Any]
 BYTE_NS = 10_000
 READ_BYTES = {False: 30 + 16 * 21, True: 30 + 8 + 16 * 14}
+MORE_BYTES = {Layout.DIRECT: 0, Layout.INDIRECT: 16 * 6}
 
 
+@pytest.mark.parametrize("layout", [Layout.DIRECT, Layout.INDIRECT])
 @pytest.mark.parametrize("fast_sync", [False, True])
 @pytest.mark.parametrize("dead", [1, 2, 8, 15, 16])
 def test_the_other_fifteen_are_delivered_in_every_cycle_in_bounded_time(
-    make_paced: MakePaced, dead: int, fast_sync: bool
+    make_paced: MakePaced, dead: int, fast_sync: bool, layout: Layout
 ) -> None:
-    bench = make_paced(fast_sync=fast_sync, health_every_cycles=5)
+    bench = make_paced(fast_sync=fast_sync, layout=layout, health_every_cycles=5)
     bench.bus.connect()
     bench.bus.read_state()
     bench.bank.silence(dead)
-    expected_ns = READ_BYTES[fast_sync] * BYTE_NS
+    expected_ns = (READ_BYTES[fast_sync] + MORE_BYTES[layout]) * BYTE_NS
     others = np.arange(1, 17) != dead
     for _ in range(40):
         assert bench.timed_read_ns() <= expected_ns + 2_000_000
