@@ -54,6 +54,7 @@ class CameraCounters:
     frames: int = 0
     superseded_frames: int = 0
     lost_frames: int = 0
+    repeated_frames: int = 0
     crc_errors: int = 0
     discarded_bytes: int = 0
     restarts: int = 0

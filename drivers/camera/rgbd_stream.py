@@ -34,6 +34,7 @@ class RgbdCamera:
         self._device_clock = DeviceClock()
         self._buffer = bytearray()
         self._last_sequence: int | None = None
+        self._last_shot: tuple[int, int] | None = None
         self._rate_hz = 0.0
         self._heard_ns = 0
 
@@ -112,7 +113,8 @@ class RgbdCamera:
                 self._reject()
                 continue
             del self._buffer[: end + CRC.size]
-            return self._frame(header, payload)
+            if not self._is_repeated(header):
+                return self._frame(header, payload)
         return None
 
     def _seek_magic(self) -> bool:
@@ -130,6 +132,13 @@ class RgbdCamera:
     def _discard(self, count: int) -> None:
         self.counters.discarded_bytes += count
         del self._buffer[:count]
+
+    def _is_repeated(self, header: FrameHeader) -> bool:
+        """Count a frame that was there before: a stuck camera's, which shows nothing of now."""
+        shot = header.sequence, header.exposure_ns
+        repeated, self._last_shot = shot == self._last_shot, shot
+        self.counters.repeated_frames += repeated
+        return repeated
 
     def _frame(self, header: FrameHeader, payload: bytes) -> RgbdFrame:
         self.counters.frames += 1

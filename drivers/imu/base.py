@@ -24,6 +24,7 @@ class ImuCounters:
     checksum_errors: int = 0
     discarded_bytes: int = 0
     lost_frames: int = 0
+    repeated_frames: int = 0
 
 
 class Imu(Protocol):

@@ -71,15 +71,20 @@ class Bno085Rvc:
                 self._discard(1)
                 continue
             del self._buffer[:FRAME_BYTES]
-            self._count(body[0])
-            bodies.append(body)
+            if self._is_new(body[0]):
+                bodies.append(body)
         return bodies
 
-    def _count(self, index: int) -> None:
+    def _is_new(self, index: int) -> bool:
+        """Count a frame; one with the last one's index is a stuck sensor's and tells nothing."""
         self.counters.frames += 1
+        if index == self._last_index:
+            self.counters.repeated_frames += 1
+            return False
         if self._last_index is not None:
             self.counters.lost_frames += (index - self._last_index - 1) % 256
         self._last_index = index
+        return True
 
     def _seek_header(self) -> bool:
         """Drop bytes up to the next header; false when there is none yet."""

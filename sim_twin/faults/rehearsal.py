@@ -22,6 +22,7 @@ _ACT_EVERY_S: Final = 0.5
 _STILL_RAD: Final = 0.02
 _TRAVEL_S: Final = 20.0
 _TRAVEL_M: Final = 0.8
+_TURN_RAD: Final = 2.5
 _DRIVE_M_S: Final = 0.3
 _REACH: Final = {"left_elbow": 1.9, "left_shoulder_pitch": 0.7, "right_elbow": 1.9}
 _WHEELS: Final = ("left_wheel", "right_wheel")
@@ -51,8 +52,8 @@ class Rehearsal:
 
     def __init__(self, scenario: Scenario, tmp_path: Path, seed: int = 0) -> None:
         self._scenario = scenario
-        travels = scenario.meanwhile is Meanwhile.TRAVEL
-        self._stack = (LockstepStack if travels else LockstepControl)(tmp_path, seed)
+        takes_all = scenario.meanwhile.takes_all
+        self._stack = (LockstepStack if takes_all else LockstepControl)(tmp_path, seed)
         self._base_command = self._stack.space.cell_writer("base_command")
         self._start_s = 0.0
 
@@ -68,8 +69,8 @@ class Rehearsal:
         self._stack.arm()
         lockstep.run_for(_SETTLE_S)
         self._start_s = lockstep.now_s
-        travels = scenario.meanwhile is Meanwhile.TRAVEL
-        parts = _WHEELS if travels else (*self._stack.robot.joint_names, *_WHEELS)
+        joints = () if scenario.meanwhile.takes_all else self._stack.robot.joint_names
+        parts = (*joints, *_WHEELS)
         seen = Witness(self._stack, self._start_s + scenario.begin_s, parts)
         before, command = seen.counters(), self._begin_activity()
         for request in scenario.faults:
@@ -94,10 +95,15 @@ class Rehearsal:
                 goal = {"kind": "goal", "motion_id": 1, "targets": _REACH, "speed_ratio": 0.7}
                 self._stack.space.ring_writer("motion_command").publish(goal)
             case Meanwhile.TRAVEL:
-                assert isinstance(self._stack, LockstepStack)
-                step = {"id": "a1", "skill": "move", "parameters": {"distance_m": _TRAVEL_M}}
-                return self._stack.give(plan={"goal": "go", "actions": [step]})
+                return self._give("move", distance_m=_TRAVEL_M)
+            case Meanwhile.TURN:
+                return self._give("turn", angle_rad=_TURN_RAD)
         return ""
+
+    def _give(self, skill: str, **parameters: float) -> str:
+        assert isinstance(self._stack, LockstepStack)
+        step = {"id": "a1", "skill": skill, "parameters": parameters}
+        return self._stack.give(plan={"goal": skill, "actions": [step]})
 
     def _samples(self, until_s: float) -> Iterator[None]:
         """Run on to a moment of the scenario, and stop every few milliseconds to look."""
@@ -127,6 +133,8 @@ class Rehearsal:
             wrong.append(f"it did not recover: {self._stack.status()}")
         if expect.pose_error_m is not None and seen.worst_pose_m > expect.pose_error_m:
             wrong.append(f"pose off by {seen.worst_pose_m:.3f} m, limit {expect.pose_error_m:g} m")
+        if expect.yaw_error_rad is not None and seen.worst_yaw_rad > expect.yaw_error_rad:
+            wrong.append(f"heading off by {seen.worst_yaw_rad:.3f}, limit {expect.yaw_error_rad:g}")
         return wrong
 
     def _do(self, act: str) -> None:

@@ -18,12 +18,18 @@ _KEYS: Final = frozenset({"summary", "meanwhile", "faults", "expect"})
 
 
 class Meanwhile(Enum):
-    """Name what the robot does when the fault strikes; TRAVEL is by the whole stack's own plan."""
+    """Name what the robot does when the fault strikes; travels and turns are the whole stack's."""
 
     HOLD = "hold"
     REACH = "reach"
     DRIVE = "drive"
     TRAVEL = "travel"
+    TURN = "turn"
+
+    @property
+    def takes_all(self) -> bool:
+        """Tell whether it takes the whole stack and not control alone."""
+        return self in (Meanwhile.TRAVEL, Meanwhile.TURN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +47,8 @@ class Expectation:
     runs_back       once the fault has gone, a servo itself runs back: no command of control's
     recovery        the acts that bring the robot back to armed once the fault has gone
     pose_error_m    how far perception's pose may be off while the fault is on and after it
-    travel          what becomes of the command on a travel: "succeeds" or "fails"
+    yaw_error_rad   likewise, for its heading
+    travel          what becomes of the command on a travel or turn: "succeeds" or "fails"
     """
 
     cause: str
@@ -55,6 +62,7 @@ class Expectation:
     runs_back: bool = False
     recovery: tuple[str, ...] = ()
     pose_error_m: float | None = None
+    yaw_error_rad: float | None = None
     travel: str | None = None
 
 
@@ -153,7 +161,7 @@ def _expectation(name: str, raw: Mapping[str, Any]) -> Expectation:
     return Expectation(**checked)
 
 
-def _is_time(value: object) -> bool:
+def _is_positive(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < 60.0
 
 
@@ -171,8 +179,8 @@ def _are_acts(value: object) -> bool:
 
 _CHECKS: Final[Mapping[str, Callable[[object], bool]]] = {
     "cause": _is_text,
-    "within_s": _is_time,
-    "rest_within_s": _is_time,
+    "within_s": _is_positive,
+    "rest_within_s": _is_positive,
     "torque": lambda value: value in ("kept", "off"),
     "stale_joints": _are_texts,
     "alert": _is_text,
@@ -180,6 +188,7 @@ _CHECKS: Final[Mapping[str, Callable[[object], bool]]] = {
     "counts": _are_texts,
     "runs_back": lambda value: isinstance(value, bool),
     "recovery": _are_acts,
-    "pose_error_m": _is_time,
+    "pose_error_m": _is_positive,
+    "yaw_error_rad": _is_positive,
     "travel": lambda value: value in ("succeeds", "fails"),
 }

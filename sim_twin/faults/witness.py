@@ -30,6 +30,7 @@ class Witness:
         self.cause_s = math.nan
         self.rest_s = math.nan
         self.worst_pose_m = 0.0
+        self.worst_yaw_rad = 0.0
         self.aged: set[str] = set()
         self.alerts: set[str] = set()
         self.silent: set[str] = set()
@@ -64,8 +65,9 @@ class Witness:
         sample = self._pose.latest()
         if sample is not None:
             true = self._stack.lockstep.truth()["robot"]
-            off = [float(sample.data[axis]) - true[axis] for axis in ("x_m", "y_m")]
-            self.worst_pose_m = max(self.worst_pose_m, math.hypot(*off))
+            x_m, y_m, yaw = (float(sample.data[a]) - true[a] for a in ("x_m", "y_m", "yaw_rad"))
+            self.worst_pose_m = max(self.worst_pose_m, math.hypot(x_m, y_m))
+            self.worst_yaw_rad = max(self.worst_yaw_rad, abs(math.remainder(yaw, math.tau)))
 
     def speed_rad_s(self) -> float:
         """Return the speed of the fastest part."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from sim_twin.faults.rehearsal import Rehearsal
-from sim_twin.faults.scenario import Meanwhile, load_scenario, scenario_paths
+from sim_twin.faults.scenario import load_scenario, scenario_paths
 from vla_deploy.robots import load_robot
 
 ROBOT = load_robot("butler")
@@ -13,7 +13,7 @@ SCENARIOS = [load_scenario(path, ROBOT) for path in scenario_paths()]
 
 
 def marked(scenario):
-    marks = [pytest.mark.gl] if scenario.meanwhile is Meanwhile.TRAVEL else []
+    marks = [pytest.mark.gl] if scenario.meanwhile.takes_all else []
     return pytest.param(scenario, id=scenario.name, marks=marks)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Generator
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveBus, DriveState, wait_for
+from drivers.drive_bus import DriveBus, DriveState, PowerState, wait_for
 from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from platforms import Profile
@@ -41,6 +41,7 @@ class Wheels:
         self.w_rad_s = 0.0
         self._bus: DriveBus | None = None
         self._next_open_ns = 0
+        self._followed = False
         self._reopening: Generator[None, None, None] | None = None
 
     def open(self) -> None:
@@ -125,7 +126,7 @@ class Wheels:
                 name=drive.joint,
                 lost=state.lost[row],
                 age_s=float(state.age_s[row]),
-                fault_code=_fault_code(state, row),
+                fault_code=_fault_code(state, row, dropped_out=self._dropped_out),
             )
             for row, drive in enumerate(self._wiring.drives)
         )
@@ -139,31 +140,47 @@ class Wheels:
             state = self._bus.cycle(wanted)
         except LinkLost as error:
             self.failure = str(error)
-            self.lost = True
+            self._note_loss()
             self.v_m_s = self.w_rad_s = 0.0
             return
         self.state = state
-        self.lost = any(state.lost)
+        self._followed = self._followed or self._bus.enabled
+        if any(state.lost):
+            self._note_loss()
         self.odometry.update(*state.position_rad.tolist())
         self.v_m_s, self.w_rad_s = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
 
+    @property
+    def _dropped_out(self) -> bool:
+        """Tell whether drives that followed have ceased to, and nobody asked them to."""
+        return self._followed and not self.enabled and not self.faulted
+
+    def _note_loss(self) -> None:
+        """Leave the drives a second to brake by themselves: the reset to come lets wheels coast."""
+        self.lost = True
+        self._next_open_ns = self._clock.now_ns() + REOPEN_NS
+
     def enable(self) -> None:
         """Begin to power the drives; `enabled` tells when they follow."""
+        self._followed = False
         if self._bus is not None:
             self._bus.enable()
 
     def disable(self) -> None:
         """Take the power off both drives."""
+        self._followed = False
         if self._bus is not None:
             self._bus.disable()
 
     def quick_stop(self) -> None:
         """Let the drives brake on their own ramp and then take their power off."""
+        self._followed = False
         if self._bus is not None:
             self._bus.quick_stop()
 
     def reset_fault(self) -> None:
         """Ask faulted drives to leave their fault; `failure` says which of them may not."""
+        self._followed = False
         if self._bus is not None and self.faulted:
             self.failure = "; ".join(self._bus.reset_fault())
 
@@ -177,8 +194,9 @@ class Wheels:
             bus.close()
 
 
-def _fault_code(state: DriveState, row: int) -> int:
+def _fault_code(state: DriveState, row: int, *, dropped_out: bool) -> int:
     if not state.faulted[row]:
-        return 0
+        stands_off = state.power_state[row] is not PowerState.OPERATION_ENABLED
+        return _UNKNOWN_FAULT if dropped_out and stands_off else 0
     fault = state.fault[row]
     return _UNKNOWN_FAULT if fault is None else fault.code

@@ -24,7 +24,7 @@ MIN_BEAM_M = 0.25
 MIN_POINTS = 60
 INLIER_M = 0.30
 MATCH_M = 0.10
-MIN_MATCH_RATIO = 0.4
+MIN_MATCH_RATIO = 0.6
 ITERATIONS = 6
 GAIN = 0.35
 # A corridor says nothing about the way along it: this holds the estimate there.

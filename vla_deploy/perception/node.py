@@ -14,7 +14,7 @@ from drivers.lidar.base import Lidar
 from drivers.opener import DeviceOpener
 from drivers.reopening import Reopening
 from platforms import Profile
-from vla_deploy.ipc import CellReader, CellWriter, FrameWriter, SharedSpace
+from vla_deploy.ipc import BY_NAME, CellReader, CellWriter, FrameWriter, SharedSpace
 from vla_deploy.navigation.grid_map import load_map
 from vla_deploy.navigation.localisation import Localiser, Pose2D
 from vla_deploy.node import NodeContext
@@ -28,6 +28,9 @@ from vla_deploy.robots.model import RobotModel, full_positions
 Array = NDArray[np.float64]
 
 STALE_JOINTS_NS = NS_PER_S // 10
+# Without a new yaw for this long, the turn is taken from the wheels.
+FRESH_YAW_NS = NS_PER_S // 25
+STALE_SCAN_NS = round(BY_NAME["scan"].deadline_s * NS_PER_S)
 # An image is used only where the camera was nearly still before its exposure.
 STILL_WINDOW_NS = 60_000_000
 MAX_CAMERA_TURN_RAD_S = 0.35
@@ -64,6 +67,7 @@ class PerceptionNode:
         self._scene = Scene()
         self._localiser = self._make_localiser()
         self._imu_yaw_rad: float | None = None
+        self._imu_ns = 0
         self._next_look_ns = 0
         self._next_scene_ns = 0
         self._base_stamp_ns = -1
@@ -119,7 +123,7 @@ class PerceptionNode:
         if not samples:
             return
         newest = samples[-1]
-        self._imu_yaw_rad = newest.yaw_rad
+        self._imu_yaw_rad, self._imu_ns = newest.yaw_rad, newest.stamp_ns
         self._writers["imu"].put(
             yaw_rad=newest.yaw_rad,
             pitch_rad=newest.pitch_rad,
@@ -134,7 +138,7 @@ class PerceptionNode:
             self._base_stamp_ns = sample.stamp_ns
             data = sample.data
             odometry = Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
-            self._localiser.predict(sample.stamp_ns, odometry, self._imu_yaw_rad)
+            self._localiser.predict(sample.stamp_ns, odometry, self._fresh_yaw_rad())
         pose = self._localiser.pose
         self._writers["pose"].put(
             x_m=pose.x_m,
@@ -143,9 +147,15 @@ class PerceptionNode:
             match_ratio=self._localiser.match_ratio,
         )
 
+    def _fresh_yaw_rad(self) -> float | None:
+        """Return the IMU's yaw unless it is out of date: a frozen one would hide every turn."""
+        age_ns = self._clock.now_ns() - self._imu_ns
+        return self._imu_yaw_rad if age_ns <= FRESH_YAW_NS else None
+
     def _read_scan(self) -> None:
+        """Publish a scan unless it is out of date already: its reader takes it for the present."""
         scan = self._lidar.poll(lambda lidar: lidar.poll(), None)
-        if scan is not None:
+        if scan is not None and self._clock.now_ns() - scan.stamp_ns <= STALE_SCAN_NS:
             self._writers["scan"].put(range_m=scan.range_m)
             self._localiser.correct(scan.range_m, scan.beam_stamp_ns)
 

@@ -17,6 +17,7 @@ from vla_deploy.navigation.follower import (
     Twist,
     wrap_angle,
 )
+from vla_deploy.navigation.localisation import MIN_MATCH_RATIO
 from vla_deploy.navigation.obstacles import is_blocked, scan_points
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import Skill, SkillContext
@@ -78,8 +79,8 @@ def follow(
     while follower.phase is not Phase.ARRIVED and not until():
         pose = context.link.pose
         twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
-        blocked = _blocked(context, twist, _distance(pose, points[-1]))
-        context.link.drive(patience.pass_on(twist, blocked))
+        hindrance = _hindrance(context, twist, _distance(pose, points[-1]))
+        context.link.drive(patience.pass_on(twist, hindrance))
         yield
     context.link.drive(AT_REST)
     yield from stand_still(context)
@@ -120,8 +121,8 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
         if _leaves_free_floor(context, sign):
             context.link.drive(AT_REST)
             raise NotPossible(f"the map shows no room for the last {left_m:.2f} m")
-        blocked = _blocked(context, twist, left_m, planned=False)
-        context.link.drive(patience.pass_on(twist, blocked))
+        hindrance = _hindrance(context, twist, left_m, planned=False)
+        context.link.drive(patience.pass_on(twist, hindrance))
         yield
     context.link.drive(AT_REST)
     yield from stand_still(context)
@@ -152,44 +153,51 @@ def stand_still(context: SkillContext, duration_s: float = 0.4) -> Skill:
 
 
 class _Patience:
-    """Hold the base while something stands in the way, and give up when it stays."""
+    """Hold the base while something hinders it, and give up when that stays."""
 
     def __init__(self, context: SkillContext) -> None:
         self._link = context.link
         self._clear_ns = context.link.clock.now_ns()
 
-    def pass_on(self, twist: Twist, blocked: bool) -> Twist:
-        """Return what to drive now.
+    def pass_on(self, twist: Twist, hindrance: str) -> Twist:
+        """Return what to drive now; no hindrance is "".
 
         Raises:
-            TryAgain: the way stayed blocked; the base is at rest.
+            TryAgain: the hindrance stayed; the base is at rest.
         """
         now_ns = self._link.clock.now_ns()
-        if not blocked:
+        if not hindrance:
             self._clear_ns = now_ns
             return twist
         if now_ns - self._clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
             self._link.drive(AT_REST)
-            raise TryAgain("something stands in the way")
+            raise TryAgain(hindrance)
         return AT_REST
 
 
-def _blocked(context: SkillContext, twist: Twist, remaining_m: float, planned: bool = True) -> bool:
-    """Tell whether the lidar sees something in the strip that the body is about to sweep.
+def _hindrance(
+    context: SkillContext, twist: Twist, remaining_m: float, planned: bool = True
+) -> str:
+    """Say what forbids to go on: no scan, one off the map, or something in the strip to be swept.
 
     A `planned` way keeps clear of what the map shows by itself.
     """
+    if abs(twist.v_m_s) < 1e-3:
+        return ""
     ranges_m = context.link.ranges_m
-    if abs(twist.v_m_s) < 1e-3 or ranges_m is None:
-        return False
+    if ranges_m is None:
+        return "the lidar tells nothing, and without it the robot does not drive"
+    if context.link.match_ratio < MIN_MATCH_RATIO:
+        return "what the lidar sees does not fit the map, so the robot may be elsewhere"
     points = scan_points(ranges_m)
     mapped = context.planner.is_mapped(on_floor(context.link.pose, points))
-    return is_blocked(
+    blocked = is_blocked(
         points * math.copysign(1.0, twist.v_m_s),
         mapped & planned,
         reach_m=min(STOP_DISTANCE_M + abs(twist.v_m_s) * 0.5, remaining_m),
         radius_m=context.robot.base.footprint_radius_m,
     )
+    return "something stands in the way" if blocked else ""
 
 
 def _leaves_free_floor(context: SkillContext, sign: float) -> bool:

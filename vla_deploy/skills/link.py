@@ -119,6 +119,12 @@ class RobotLink:
         )
 
     @property
+    def match_ratio(self) -> float:
+        """Return how much of the newest scan the map explains at this pose; 0 before the first."""
+        sample = self._pose.latest()
+        return 0.0 if sample is None else float(sample.data["match_ratio"])
+
+    @property
     def is_blind(self) -> bool:
         """Tell whether perception has just fallen silent: worth a wait before giving up."""
         sample = self._pose.latest()
