@@ -11,9 +11,12 @@ from pathlib import Path
 import can
 import pytest
 
+from drivers.audio.base import AudioFormat
+from drivers.audio.pcm_stream import PcmInput
 from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.clock import MonotonicClock
 from drivers.dynamixel.codec import Instruction, encode_instruction
+from drivers.estop.open_estop import open_estop
 from drivers.opener import PathOpener
 from sim_twin.errors import RefereeRefusal, Unreachable
 from sim_twin.referee import ask
@@ -188,3 +191,21 @@ def test_an_unknown_world_is_one_clear_line(tmp_path: Path) -> None:
     (line,) = refused.stderr.splitlines()
     assert "'moon'" in line
     assert "flat" in line
+
+
+def test_the_button_and_the_room_are_served(devices: PathOpener) -> None:
+    clock = MonotonicClock()
+    robot = load_robot("butler")
+    assert robot.estop is not None
+    assert robot.microphone is not None
+    ear = robot.microphone
+    button = open_estop("HID", devices, robot.estop.device, clock, number=robot.estop.number)
+    sound = AudioFormat(rate_hz=ear.rate_hz, channels=ear.channels)
+    microphone = PcmInput(devices.stream(ear.device), clock, sound)
+    await_that("button released", lambda: not button.poll().pressed, 5.0)
+    await_that("sound", lambda: microphone.poll() is not None, 5.0)
+    button.close()
+    again = open_estop("HID", devices, robot.estop.device, clock, number=robot.estop.number)
+    await_that("button released", lambda: not again.poll().pressed, 5.0)
+    again.close()
+    microphone.close()
