@@ -35,25 +35,28 @@ DISTURBANCES = st.one_of(
     st.tuples(st.just("write"), st.sampled_from(IDS), st.sampled_from(SETTINGS)),
     st.tuples(st.just("alert"), st.sampled_from(IDS), st.sampled_from([4, 32])),
     st.tuples(st.just("reboot"), st.sampled_from(IDS), st.none()),
+    st.tuples(st.just("map"), st.sampled_from(IDS), st.sampled_from([132, 70, 116, 144])),
 )
 WAITS = st.tuples(st.just("run"), st.sampled_from([0.0, 0.002, 0.002, 0.05, 0.3]), st.none())
 ASKED = st.one_of(st.just(list(IDS)), st.lists(st.sampled_from([*IDS, 9]), min_size=1, max_size=4))
 GOALS = st.lists(st.sampled_from([0, 1500, 2048, 3500, 4095, -5, 4096, 2**21]), min_size=4)
-SPANS = st.sampled_from([(126, 10), (116, 4), (0, 0), (140, 8), (64, 30)])
+SPANS = st.sampled_from([(126, 10), (116, 4), (0, 0), (140, 8), (64, 30), (224, 8), (220, 9)])
 CYCLES = st.tuples(
     DISTURBANCES,
     WAITS,
     st.tuples(st.just("goals"), ASKED, GOALS),
-    st.tuples(st.just("read"), ASKED, SPANS),
+    st.tuples(st.sampled_from(["read", "read plainly"]), ASKED, SPANS),
 )
+SYNC_READS = {"read": Instruction.FAST_SYNC_READ, "read plainly": Instruction.SYNC_READ}
+BULK_READS = {"read": Instruction.FAST_BULK_READ, "read plainly": Instruction.BULK_READ}
 EVERYONE = [("write", servo_id, ("torque_enable", 1)) for servo_id in IDS]
 
 
 def sync(act: str, ids: list[int], what: Any) -> bytes:
     """Return the packet of a cycle."""
-    if act == "read":
+    if act in SYNC_READS:
         params = struct.pack("<HH", *what) + bytes(ids)
-        return encode_instruction(BROADCAST_ID, Instruction.FAST_SYNC_READ, params)
+        return encode_instruction(BROADCAST_ID, SYNC_READS[act], params)
     goals = b"".join(struct.pack("<Bi", *pair) for pair in zip(ids, what, strict=False))
     params = struct.pack("<HH", 116, 4) + goals
     return encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, params)
@@ -61,9 +64,9 @@ def sync(act: str, ids: list[int], what: Any) -> bytes:
 
 def bulk(act: str, ids: list[int], what: Any) -> bytes:
     """Return the packet that asks for the same, servo by servo."""
-    if act == "read":
+    if act in BULK_READS:
         params = b"".join(struct.pack("<BHH", servo_id, *what) for servo_id in ids)
-        return encode_instruction(BROADCAST_ID, Instruction.FAST_BULK_READ, params)
+        return encode_instruction(BROADCAST_ID, BULK_READS[act], params)
     pairs = zip(ids, what, strict=False)
     params = b"".join(struct.pack("<BHHi", servo_id, 116, 4, goal) for servo_id, goal in pairs)
     return encode_instruction(BROADCAST_ID, Instruction.BULK_WRITE, params)
@@ -77,6 +80,9 @@ def play(bench: Any, acts: list[Any], packet: Callable[..., bytes]) -> list[byte
             register = bench.models[who - 1].registers[what[0]]
             params = struct.pack("<H", register.address) + register.to_bytes(what[1])
             bench.bank.receive(encode_instruction(who, Instruction.WRITE, params))
+        elif act == "map":
+            targets = struct.pack("<H6H", 170, *range(what, what + 6))
+            bench.bank.receive(encode_instruction(who, Instruction.WRITE, targets))
         elif act == "alert":
             bench.bank.set_alert(who, what)
         elif act == "reboot":

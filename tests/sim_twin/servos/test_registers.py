@@ -123,6 +123,22 @@ def test_a_factory_reset_keeps_what_its_option_says(
     assert table == bytes([id_after, baud_after, 250])
 
 
+@pytest.mark.parametrize(
+    ("params", "torque", "expected"),
+    [
+        (b"", 0, StatusError.DATA_LENGTH),
+        (b"\x03", 0, StatusError.DATA_RANGE),
+        (b"\x02", 1, StatusError.ACCESS),
+    ],
+)
+def test_a_factory_reset_is_refused_without_an_option_and_with_torque_on(
+    bench: Any, params: bytes, torque: int, expected: StatusError
+) -> None:
+    bench.write("torque_enable", torque)
+    assert bench.send(1, Instruction.FACTORY_RESET, params)[0].error == expected
+    assert bench.send(1, Instruction.PING)
+
+
 def test_a_broadcast_cannot_reset_all_ids_at_once(make_bench: Callable[..., Any]) -> None:
     bench = make_bench(["XM430-W350", "XL430-W250"])
     assert bench.send(BROADCAST_ID, Instruction.FACTORY_RESET, b"\xff") == []
