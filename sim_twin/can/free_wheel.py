@@ -2,20 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Generic
+
+from typing_extensions import TypeVar
 
 from drivers.clock import NS_PER_S
+from sim_twin.can.drive import WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.wire import CanWire
 
 STEP_NS: Final = 2_000_000
 
 
+D = TypeVar("D", bound=EmulatedDrive, default=WheelDrive)
+
+
 @dataclass(slots=True)
-class FreeWheel:
+class FreeWheel(Generic[D]):
     """Turn one wheel with nothing but inertia and viscous friction."""
 
-    drive: EmulatedDrive
+    drive: D
     inertia_kg_m2: float = 0.05
     friction_nm_s: float = 0.05
     position_rad: float = 0.0
@@ -29,10 +35,10 @@ class FreeWheel:
         self.position_rad += self.velocity_rad_s * dt_s
 
 
-class FreeWheelWorld:
+class FreeWheelWorld(Generic[D]):
     """Be the smallest lock-step world: a clock whose waiting turns the wheels."""
 
-    def __init__(self, wheels: Sequence[FreeWheel], start_ns: int = NS_PER_S) -> None:
+    def __init__(self, wheels: Sequence[FreeWheel[D]], start_ns: int = NS_PER_S) -> None:
         self.wheels = tuple(wheels)
         self.wire = CanWire([wheel.drive for wheel in wheels])
         self._now_ns = start_ns

@@ -16,8 +16,8 @@ class MemoryBus(can.BusABC):  # type: ignore[misc]
         self.channel_info = "CAN in memory"
         self._wire = wire
         self._received: deque[can.Message] = deque()
-        self._port = self._received.append
-        wire.attach(self._port)
+        self.port = self._received.append
+        wire.attach(self.port)
         super().__init__(channel="memory")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -29,7 +29,7 @@ class MemoryBus(can.BusABC):  # type: ignore[misc]
         """
         if self._is_shutdown:
             raise can.CanOperationError(f"{self.channel_info}: was shut down", errno.EBADF)
-        if not self._wire.send(msg, self._port):
+        if not self._wire.send(msg, self.port):
             raise can.CanOperationError(
                 f"{self.channel_info}: {os.strerror(errno.ENOBUFS)}", errno.ENOBUFS
             )
@@ -41,5 +41,5 @@ class MemoryBus(can.BusABC):  # type: ignore[misc]
     def shutdown(self) -> None:
         """Leave the wire; leaving twice is allowed."""
         if not self._is_shutdown:
-            self._wire.detach(self._port)
+            self._wire.detach(self.port)
         super().shutdown()

@@ -91,7 +91,7 @@ def test_it_sees_boot_up_and_heartbeat(node: BaseNode402) -> None:
     assert eventually(lambda: node.nmt.state == "PRE-OPERATIONAL")
     node.sdo[0x1017].raw = 20
     node.nmt.state = "OPERATIONAL"
-    assert node.nmt.wait_for_heartbeat(timeout=2.0) == "OPERATIONAL"
+    assert eventually(lambda: node.nmt.wait_for_heartbeat(timeout=2.0) == "OPERATIONAL")
 
 
 def test_it_reads_the_pdo_layout_that_the_driver_expects(drive: BaseNode402) -> None:
