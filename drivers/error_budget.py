@@ -118,11 +118,15 @@ class BusBudget:
         self.bus = BudgetState.OK
         self._budgets = tuple(ErrorBudget(member) for _ in self.names)
         self._bus_budget = ErrorBudget(bus)
-        self._quiet = True
+        self.quiet = True
+        """No failure is left in any window: good cycles need not be noted."""
 
     def note_cycle(self, failed: Collection[int], now_ns: int) -> None:
-        """Take note which members, by index, failed in a cycle; call it after every cycle."""
-        if not failed and self._quiet:
+        """Take note which members, by index, failed in a cycle; call it after every cycle.
+
+        A good cycle may be left out while `quiet`.
+        """
+        if not failed and self.quiet:
             return
         if any(self.members[index] is not BudgetState.LOST for index in failed):
             self._bus_budget.note_failure(now_ns)
@@ -131,7 +135,7 @@ class BusBudget:
         self.bus = self._bus_budget.state(now_ns)
         for index, budget in enumerate(self._budgets):
             self.members[index] = budget.state(now_ns)
-        self._quiet = not (self._bus_budget.count or any(one.count for one in self._budgets))
+        self.quiet = not (self._bus_budget.count or any(one.count for one in self._budgets))
 
     def reset(self, index: int) -> None:
         """Forget the failures of one member, as after it was rebooted or exchanged."""

@@ -8,6 +8,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S
 
 _SUB_BITS: Final = 3
+_WHOLE_BITS: Final = _SUB_BITS + 1
 _SUB_BUCKETS: Final = 1 << _SUB_BITS
 _LAST_OCTAVE: Final = 36  # 2^36 ns is 69 s; what takes longer is counted there
 _BUCKETS: Final = (_LAST_OCTAVE - _SUB_BITS + 1) * _SUB_BUCKETS
@@ -17,26 +18,32 @@ class LatencyHistogram:
     """Hold counts by duration; `record` costs a few integer operations and allocates nothing."""
 
     def __init__(self) -> None:
-        self.count = 0
         self.total_ns = 0
         self.max_ns = 0
         self._buckets = [0] * _BUCKETS
 
     def record(self, latency_ns: int) -> None:
         """Count one duration; a negative one counts as zero."""
-        latency_ns = max(latency_ns, 0)
-        self.count += 1
+        if latency_ns < _SUB_BUCKETS:
+            latency_ns = index = latency_ns if latency_ns > 0 else 0
+        else:
+            shift = latency_ns.bit_length() - _WHOLE_BITS
+            index = (shift << _SUB_BITS) + (latency_ns >> shift)
         self.total_ns += latency_ns
         if latency_ns > self.max_ns:
             self.max_ns = latency_ns
-        shift = latency_ns.bit_length() - _SUB_BITS - 1
-        index = latency_ns if shift < 0 else (shift << _SUB_BITS) + (latency_ns >> shift)
         self._buckets[index if index < _BUCKETS else -1] += 1
+
+    @property
+    def count(self) -> int:
+        """Return how many durations were recorded."""
+        return sum(self._buckets)
 
     @property
     def mean_ns(self) -> float:
         """Return the mean, 0 before the first duration."""
-        return self.total_ns / self.count if self.count else 0.0
+        count = self.count
+        return self.total_ns / count if count else 0.0
 
     def percentile_ns(self, ratio: float) -> int:
         """Return a duration that at least `ratio` of the counted ones do not exceed.
@@ -55,7 +62,7 @@ class LatencyHistogram:
 
     def reset(self) -> None:
         """Start over, as for the next telemetry period."""
-        self.count = self.total_ns = self.max_ns = 0
+        self.total_ns = self.max_ns = 0
         self._buckets[:] = [0] * _BUCKETS
 
     def as_dict(self) -> dict[str, Any]:

@@ -2,19 +2,21 @@
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
+from drivers.dynamixel.control_table import WATCHDOG_TRIPPED, HardwareError
 from drivers.dynamixel.counters import BusCounters
+from drivers.dynamixel.fault_policy import DEFAULT_RULES, FaultRule
 from drivers.dynamixel.goals import GoalWriter
 from drivers.dynamixel.group import ServoRead
 from drivers.dynamixel.handshake import ServoSetup, shake_hands
 from drivers.dynamixel.health import HealthPoll
+from drivers.dynamixel.journal import BusJournal
 from drivers.dynamixel.layout import DIRECT, Layout
 from drivers.dynamixel.link import Link, Patience
 from drivers.dynamixel.reader import StateReader
@@ -52,6 +54,7 @@ class DynamixelBus:
         watchdog_s: float = 0.1,
         reply_margin_s: float = 0.002,
         health_every_cycles: int = 5,
+        fault_rules: Mapping[HardwareError, FaultRule] = DEFAULT_RULES,
     ) -> None:
         """Take over the transport; nothing is sent yet.
 
@@ -64,6 +67,7 @@ class DynamixelBus:
         self.servos = tuple(servos)
         self.counters = BusCounters()
         self.state = BusState.of(len(servos))
+        self.journal = BusJournal(self.servos, self.state, fault_rules)
         self.watchdog = WatchdogState.OFF
         self._by_id = {servo.id: index for index, servo in enumerate(servos)}
         self._watchdog_units = watchdog_units(watchdog_s)
@@ -238,6 +242,10 @@ class DynamixelBus:
         self.state.watchdog[index] = 0
         self._suspend(index)
 
+    def telemetry(self) -> dict[str, Any]:
+        """Return counters, cycle times and error budgets by name."""
+        return {**self.counters.as_dict(), **self.journal.as_dict()}
+
     @property
     def notices(self) -> tuple[str, ...]:
         """Return what was written to servos and which have come back, the newest last."""
@@ -284,6 +292,7 @@ class DynamixelBus:
             reads,
             self._roster,
             self.state,
+            self.journal,
             margin_s=self._margin_s,
             on_lost_map=self._take_back,
         )
@@ -313,8 +322,9 @@ class DynamixelBus:
         errors, status = self._connected(self._reader).take_news()
         if errors:
             health.note_alerts()
-        if health.step() or status:
+        if health.step() or status or errors:
             self._note_watchdogs()
+            self.journal.note_errors()
         return self.state
 
     def _chosen(self, ids: Sequence[int] | None) -> list[int]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.completion import complete
 from drivers.dynamixel.group import Group, ServoRead
+from drivers.dynamixel.journal import BusJournal
 from drivers.dynamixel.link import Link
 from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.state import BusState
@@ -28,6 +29,7 @@ class StateReader:
         reads: Sequence[ServoRead],
         roster: Roster,
         state: BusState,
+        journal: BusJournal,
         *,
         margin_s: float,
         on_lost_map: Callable[[int], None],
@@ -40,6 +42,7 @@ class StateReader:
         self._reads = tuple(reads)
         self._roster = roster
         self._state = state
+        self._journal = journal
         self._margin_s = margin_s
         self._on_lost_map = on_lost_map
         self._stamps_ns: NDArray[np.int64] = np.full(len(reads), _NEVER_NS, dtype=np.int64)
@@ -127,8 +130,10 @@ class StateReader:
     def _finish(self) -> None:
         state = self._state
         before_ns, state.stamp_ns = state.stamp_ns, self._link.now_ns()
+        self._journal.answer_times_ns.append(state.stamp_ns - self._link.last_sent_ns)
         if self._unusual or len(self._roster.polled) < len(self._reads):
             self._finish_partial(before_ns)
+            self._journal.note_gaps()
             return
         if not self._all_fresh:
             self._all_fresh = True
