@@ -53,6 +53,9 @@ class Link:
         self._burst = transport if isinstance(transport, BurstTransport) else None
         self.baud = baud
         self.ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
+        self._sent_ns = 0
+        """When the last byte handed over has left, unless an answer shows that it has."""
+        self._answered = True
         self._lateness_ns: int | None = None
         self.echoes = False
         """The adapter hears itself; what comes back of it is taken off the line."""
@@ -119,7 +122,10 @@ class Link:
             self._transport.write(frame)
         except LinkLost as error:
             raise self._note_loss(error) from error
-        self.last_sent_ns = self._clock.now_ns()
+        now_ns = self.last_sent_ns = self._clock.now_ns()
+        start_ns = now_ns if self._answered else max(now_ns, self._sent_ns)
+        self._sent_ns = start_ns + len(frame) * self.ns_per_byte
+        self._answered = False
         if self.echoes:
             self._hear_echo(frame)
 
@@ -139,8 +145,7 @@ class Link:
             LinkLost: the adapter is gone.
         """
         self.send(frame)
-        wire_ns = (len(frame) + reply_bytes) * self.ns_per_byte
-        return self.last_sent_ns + wire_ns + round(margin_s * NS_PER_S)
+        return self._sent_ns + reply_bytes * self.ns_per_byte + round(margin_s * NS_PER_S)
 
     def wire_ns(self, read: SyncRead, margin_s: float) -> int:
         """Return how long a sync read takes at most."""
@@ -154,9 +159,15 @@ class Link:
             LinkLost: the adapter is gone.
         """
         if self._burst is None:
-            return self._receive_in_parts(count, deadline_ns)
+            data = self._receive_in_parts(count, deadline_ns)
+        else:
+            data = self._receive_burst(self._burst, count, deadline_ns)
+        self._answered = len(data) == count
+        return data
+
+    def _receive_burst(self, transport: BurstTransport, count: int, deadline_ns: int) -> bytes:
         try:
-            data = self._burst.read_burst(count, deadline_ns)
+            data = transport.read_burst(count, deadline_ns)
         except LinkLost as error:
             raise self._note_loss(error) from error
         if len(data) < count:
@@ -182,14 +193,15 @@ class Link:
             if not more:
                 return data
             data += more
+        self._answered = bool(data)
         if data:
             self._lateness_ns = max(self._lateness_ns or 0, late_ns)
         return data
 
     def _part_ns(self, read: SyncRead, arrived: int) -> int:
         """Return when the next part of a chained reply is over on the wire."""
-        wire_bytes = len(read.request) + arrived + STATUS_OVERHEAD_BYTES + read.size
-        return self.last_sent_ns + wire_bytes * self.ns_per_byte
+        wire_bytes = arrived + STATUS_OVERHEAD_BYTES + read.size
+        return self._sent_ns + wire_bytes * self.ns_per_byte
 
     def _stall_ns(self, read: SyncRead, arrived: int, deadline_ns: int, margin_s: float) -> int:
         """Return when to take a chained reply for stopped."""

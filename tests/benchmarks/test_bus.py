@@ -19,5 +19,15 @@ def test_the_report_holds_the_ratio_and_every_client(capsys: pytest.CaptureFixtu
         "ours_fast",
         "dynamixel_sdk",
         "dynamixel_sdk_fast",
+        "rustypot",
+        "rustypot_fast",
     }
+    for name in (
+        "cpu_ratio_vs_rustypot",
+        "core_share_1mbps_100hz",
+        "cycle_time_ratio_vs_wire_limit",
+        "reached_hz_1mbps",
+        "reached_hz_3mbps",
+    ):
+        assert report[name] > 0.0
     assert report["clients"]["ours_fast"]["wire_bytes_per_cycle"] == 356

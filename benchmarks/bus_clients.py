@@ -1,0 +1,127 @@
+"""Open each client of the bus comparison and hand out the function that runs one of its cycles.
+
+A cycle reads 10 bytes of each of 16 servos (current, velocity, position) and writes a 4-byte goal
+to each. Ours and dynamixel-sdk hand out numbers; rustypot's raw block hands out bytes.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from drivers.clock import MonotonicClock
+from drivers.dynamixel import DynamixelBus, Layout, ServoSpec
+from drivers.serial_port import SerialPort
+
+SERVOS: Final = 16
+MODEL: Final = "XM430-W350"
+_REPLY_MARGIN_S: Final = 0.1  # the emulator shares the machine; this is no measure of it
+_NO_HEALTH_POLL: Final = 1_000_000  # the peers do not do it
+_BLOCK: Final = (126, 10)
+_GOAL: Final = (116, 4)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Client:
+    """Name a client; `open` yields the function that runs one cycle."""
+
+    name: str
+    fast: bool
+    open: Callable[[Path, int, bool], Any]
+
+
+@contextmanager
+def ours(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
+    """Open our bus; a cycle in which a servo gives no value raises RuntimeError."""
+    clock = MonotonicClock()
+    bus = DynamixelBus(
+        SerialPort(link, baud, clock),
+        clock,
+        [ServoSpec(id=n, model_name=MODEL, joint=f"joint_{n}") for n in range(1, SERVOS + 1)],
+        baud=baud,
+        fast_sync=fast,
+        layout=Layout.DIRECT,
+        reply_margin_s=_REPLY_MARGIN_S,
+        health_every_cycles=_NO_HEALTH_POLL,
+    )
+    bus.connect()
+    goals = np.zeros(SERVOS)
+
+    def cycle() -> None:
+        state = bus.read_state()
+        if not state.valid.all():
+            raise RuntimeError("drivers.dynamixel: a servo gave no value; the bus is not in order")
+        bus.write_goals(goals)
+
+    try:
+        yield cycle
+    finally:
+        bus.close()
+
+
+@contextmanager
+def _sdk(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
+    import dynamixel_sdk as sdk
+
+    port = sdk.PortHandler(str(link))
+    port.openPort()
+    port.setBaudRate(baud)
+    handler = sdk.PacketHandler(2.0)
+    read = sdk.GroupSyncRead(port, handler, *_BLOCK)
+    write = sdk.GroupSyncWrite(port, handler, *_GOAL)
+    ids = range(1, SERVOS + 1)
+    for servo_id in ids:
+        read.addParam(servo_id)
+        write.addParam(servo_id, [0, 8, 0, 0])
+    transact = read.fastSyncRead if fast else read.txRxPacket
+
+    def cycle() -> None:
+        if transact() != sdk.COMM_SUCCESS:
+            raise RuntimeError("dynamixel-sdk: a servo gave no value; the bus is not in order")
+        for servo_id in ids:
+            _signed(read.getData(servo_id, 126, 2), 16)
+            _signed(read.getData(servo_id, 128, 4), 32)
+            _signed(read.getData(servo_id, 132, 4), 32)
+            write.changeParam(servo_id, [0, 8, 0, 0])
+        write.txPacket()
+
+    try:
+        yield cycle
+    finally:
+        port.closePort()
+
+
+@contextmanager
+def _rustypot(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
+    import rustypot
+
+    bus = rustypot.Xl430PyController(str(link), baud, _REPLY_MARGIN_S)
+    bus.set_fast_sync_read(fast)
+    ids = list(range(1, SERVOS + 1))
+    goals = [[0, 8, 0, 0] for _ in ids]
+
+    def cycle() -> None:
+        bus.sync_read_raw_data(ids, *_BLOCK)
+        bus.sync_write_raw_data(ids, _GOAL[0], goals)
+
+    try:
+        yield cycle
+    finally:
+        bus.close()
+
+
+def _signed(value: int, bits: int) -> int:
+    return value - (1 << bits) if value >> (bits - 1) else value
+
+
+CLIENTS: Final = (
+    Client(name="ours", fast=False, open=ours),
+    Client(name="dynamixel_sdk", fast=False, open=_sdk),
+    Client(name="rustypot", fast=False, open=_rustypot),
+    Client(name="ours_fast", fast=True, open=ours),
+    Client(name="dynamixel_sdk_fast", fast=True, open=_sdk),
+    Client(name="rustypot_fast", fast=True, open=_rustypot),
+)
