@@ -49,6 +49,7 @@ def _twin_options(options: argparse.Namespace) -> TwinOptions:
         seed=options.seed,
         run_dir=options.run_dir,
         camera=not options.no_camera,
+        viewer=options.viewer,
     )
 
 
@@ -64,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0, help="seed of object poses and noise")
     parser.add_argument("--run-dir", type=Path, required=True, help="folder of this run")
     parser.add_argument("--no-camera", action="store_true", help="serve no camera: no OpenGL")
+    parser.add_argument("--viewer", action="store_true", help="show the twin in a window")
     parser.add_argument("--parent-pid", type=int, help="process with which to end")
     return parser
 

@@ -19,12 +19,11 @@ from sim_twin.head_camera import HeadCamera
 from sim_twin.json_line_server import JsonLineServer
 from sim_twin.lifetime import die_with_parent
 from sim_twin.load import load_model
-from sim_twin.mirror import MirrorState, newest_state
+from sim_twin.mirror import READY, MirrorState, newest_state
 from sim_twin.referee import FILM_SOCKET
 from sim_twin.stream_line import StreamLine
 from vla_deploy.robots import load_robot
 
-READY = b"ready"
 _IDLE_S = 0.5
 
 

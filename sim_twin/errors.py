@@ -6,7 +6,7 @@ TwinError
 ├── RefereeRefusal   the referee does not know the object, container or operation
 ├── FilmFault        a film cannot be written: choose another path or ending
 ├── FaultRefused     the fault is unknown, not supported there, or out of range: see what is
-├── CameraFailed     the rendering process did not start: its own message says why
+├── DrawingFailed    the camera's or the window's process did not start: the message says why
 └── Unreachable      no twin answers under the run directory: start one
 """
 
@@ -39,5 +39,5 @@ class FilmFault(TwinError):
     """Say why a film cannot be written."""
 
 
-class CameraFailed(TwinError):
-    """Say that the rendering process did not start."""
+class DrawingFailed(TwinError):
+    """Say why a process that draws did not start."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+READY = b"ready"
+"""What a drawing process sends back once it draws; anything else is why it cannot."""
 _HEAD = struct.Struct("<qq")
 _MAX_STATE_BYTES = 65_536
 

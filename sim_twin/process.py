@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S, Clock
-from sim_twin.camera_link import CameraLink
 from sim_twin.can import CanHub
+from sim_twin.drawing import start_camera, start_viewer
 from sim_twin.engine import STEP_NS
 from sim_twin.errors import RefereeRefusal
 from sim_twin.json_line_server import JsonLineServer
+from sim_twin.mirror_link import MirrorLink
 from sim_twin.pacer import Pacer, RealTimeFactor
 from sim_twin.priority import claim_priority
 from sim_twin.pty_line import PtyLine
@@ -35,6 +36,7 @@ class TwinOptions:
     seed: int
     run_dir: Path
     camera: bool = True
+    viewer: bool = False
 
     @property
     def devices_dir(self) -> Path:
@@ -49,7 +51,8 @@ class TwinProcess:
         """Serve every device; the file `ready` appears last.
 
         Raises:
-            TwinError: the model does not load, or the camera cannot render.
+            TwinError: the model does not load, the camera cannot render, or there is no display
+                for a viewer.
             DeviceBusy: another twin serves the same folder.
         """
         devices = options.devices_dir
@@ -60,7 +63,7 @@ class TwinProcess:
         robot = load_robot(options.robot)
         self._twin = Twin(robot, options.world, options.seed)
         self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
-        self._camera = _start_camera(options)
+        self._drawings = _start_drawings(options)
         hears_baud = {robot.servo_bus.device: self._twin.servos.set_host_baud}
         self._lines = [
             PtyLine(device, devices / name, on_baud=hears_baud.get(name))
@@ -103,8 +106,8 @@ class TwinProcess:
             line.close()
         for stream in self._streams:
             stream.close()
-        if self._camera is not None:
-            self._camera.close()
+        for drawing in self._drawings:
+            drawing.close()
 
     def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Answer the referee's `truth` and `inside`.
@@ -128,8 +131,8 @@ class TwinProcess:
                 stream.poll_once()
         now_ns = self._twin.now_ns
         self._factor.update(wall_ns, now_ns)
-        if self._camera is not None:
-            self._camera.show(now_ns, wall_ns, self._twin.engine.data.qpos)
+        for drawing in self._drawings:
+            drawing.show(now_ns, wall_ns, self._twin.engine.data.qpos)
 
     def _filenos(self) -> list[int]:
         lines = [line.fileno() for line in self._lines]
@@ -161,13 +164,16 @@ class TwinProcess:
         return self._twin.engine.referee.inside(*names)
 
 
-def _start_camera(options: TwinOptions) -> CameraLink | None:
-    if not options.camera:
-        return None
-    camera = CameraLink(options.robot, options.world, options.seed, options.devices_dir)
+def _start_drawings(options: TwinOptions) -> list[MirrorLink]:
+    drawings: list[MirrorLink] = []
     try:
-        camera.wait_ready()
+        if options.viewer:
+            drawings.append(start_viewer(options.robot, options.world))
+        if options.camera:
+            devices_dir = options.devices_dir
+            drawings.append(start_camera(options.robot, options.world, options.seed, devices_dir))
     except BaseException:
-        camera.close()
+        for drawing in drawings:
+            drawing.close()
         raise
-    return camera
+    return drawings

@@ -10,6 +10,7 @@ from vla_deploy.supervisor import RunOptions, Supervisor
 
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
   vla-deploy run --twin --seed 7        other places for the objects
+  vla-deploy run --twin --viewer        the twin in a window
   vla-deploy run --robot butler         the real robot; arm it when it is safe: vla-deploy arm
 """
 
@@ -19,6 +20,7 @@ def register(commands: Any) -> None:
     run = add_command(commands, "run", "run the robot until Ctrl-C", EXAMPLES)
     add_robot_arguments(run)
     run.add_argument("--twin", action="store_true", help="replace the hardware by the twin")
+    run.add_argument("--viewer", action="store_true", help="show the twin in a window")
     run.add_argument(
         "--arm",
         action=argparse.BooleanOptionalAction,
@@ -44,12 +46,16 @@ def _seed(text: str) -> int:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run until SIGINT or SIGTERM."""
+    if arguments.viewer and not arguments.twin:
+        sys.stderr.write("run: --viewer shows the twin; add --twin\n")
+        return 2
     logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
     arm = arguments.twin if arguments.arm is None else arguments.arm
     options = RunOptions(
         robot=arguments.robot,
         profile=arguments.profile,
         twin=arguments.twin,
+        viewer=arguments.viewer,
         seed=arguments.seed,
         world=arguments.world,
         runtime_base=arguments.runtime_base,

@@ -73,6 +73,7 @@ class Crew:
         self._readiness[name].forget()
         spec = self._specs[name]
         command = spec.command + (spec.twin_command if self._options.twin else ())
+        command += spec.viewer_command if self._options.viewer else ()
         self._children[name] = ChildProcess(
             self._options.fill(command, self._run_dir), self._environment, self._log_path(name)
         )

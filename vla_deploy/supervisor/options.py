@@ -6,11 +6,15 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """Choose robot, profile and world; `arm` arms the robot once everything is ready."""
+    """Choose robot, profile and world; `arm` arms the robot once everything is ready.
+
+    `viewer` shows the twin in a window.
+    """
 
     robot: str = "butler"
     profile: str = "desktop"
     twin: bool = False
+    viewer: bool = False
     seed: int = 0
     world: str = "flat"
     runtime_base: Path | None = None
