@@ -155,3 +155,8 @@ def test_a_runtime_directory_of_someone_else_is_one_line_and_exit_code_2(
     error = capsys.readouterr().err
     assert f"runtime directory {tmp_path}: Permission denied; choose another" in error
     assert error.count("\n") == 1
+
+
+def test_a_viewer_without_a_twin_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--viewer"]) == 2
+    assert "add --twin" in capsys.readouterr().err
