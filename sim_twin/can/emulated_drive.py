@@ -127,6 +127,10 @@ class EmulatedDrive(ABC):
         """Heat the motor beyond its limit; it trips, and cools down by itself."""
         self._stage.overheat()
 
+    def cool(self) -> None:
+        """Bring the motor to the temperature of the room."""
+        self._stage.temperature_c = self._stage.spec.ambient_c
+
     def overload(self, on: bool) -> None:
         """Let the full current flow without moving anything, as in a jammed gear; I²t trips."""
         self._stage.jammed = on

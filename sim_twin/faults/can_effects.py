@@ -2,43 +2,13 @@
 
 from typing import Final
 
-import can
-
-from drivers.canopen.objects import SYNC_COB, TPDO1
 from sim_twin.can import EmulatedDrive
-from sim_twin.can.wire import Port
+from sim_twin.can.power_stage import MotorSpec
 from sim_twin.faults.effect import Effect, Ending, Parameter, Target
 from sim_twin.faults.line_effects import DELAY, Rows
 from sim_twin.faults.vocabulary import Component, Fault
 
-DRIVE_OVERHEATED: Final = 0x4310
-DRIVE_OVERLOADED: Final = 0x2310
-_TEMPERATURE_REGISTER: Final = 0x09
-_CURRENT_REGISTER: Final = 0x03
-
-
-class ClashingNode:
-    """Be a second drive of one node id: it answers each SYNC with a status of its own."""
-
-    def __init__(self, node_id: int) -> None:
-        self.supplied = True
-        self._cob_id = TPDO1.cob_base + node_id
-        self._send: Port = lambda frame: None
-
-    def connect(self, send: Port) -> None:
-        """Remember how to put a frame on the wire."""
-        self._send = send
-
-    def receive(self, frame: can.Message) -> None:
-        """Answer a SYNC."""
-        if self.supplied and frame.arbitration_id == SYNC_COB and not frame.is_error_frame:
-            self._send(
-                can.Message(
-                    arbitration_id=self._cob_id,
-                    is_extended_id=False,
-                    data=TPDO1.wire.pack(0xFFFF, -1),
-                )
-            )
+_SUPPLY_V: Final = MotorSpec().supply_v
 
 
 def _drive(target: Target) -> EmulatedDrive:
@@ -105,27 +75,36 @@ def _off(target: Target) -> Ending:
 
 
 def _clash(target: Target) -> Ending:
-    node = ClashingNode(target.number)
-    target.twin.can_wire.add_node(node)
-
-    def end() -> None:
-        node.supplied = False
-
-    return end
+    other = next(drive for drive in target.twin.drives if drive.node_id != target.number)
+    own_id = other.node_id
+    other.set_node_id(target.number)
+    return lambda: other.set_node_id(own_id)
 
 
-def _trip(code: int, error_register: int, summary: str) -> Effect:
-    """Return a fault that the drive reports itself; a fault reset ends it, clearing does not."""
+def _overheat(target: Target) -> Ending:
+    drive = _drive(target)
+    drive.overheat()
+    return drive.cool
 
-    def begin(target: Target) -> Ending:
-        _drive(target).raise_fault(code, error_register)
-        return lambda: None
 
-    return Effect(summary=summary, begin=begin)
+def _overload(target: Target) -> Ending:
+    drive = _drive(target)
+    drive.overload(True)
+    return lambda: drive.overload(False)
+
+
+def _brown_out(target: Target) -> Ending:
+    drive = _drive(target)
+    drive.set_supply_v(target.values["volts_v"])
+    return lambda: drive.set_supply_v(_SUPPLY_V)
 
 
 _DAMAGED: Final = Parameter(
     name="ratio", default=1.0, low=0.001, high=1.0, meaning="share of the frames that are destroyed"
+)
+
+_VOLTS: Final = Parameter(
+    name="volts_v", default=12.0, low=0.0, high=60.0, meaning="voltage it drops to"
 )
 
 CAN_ROWS: Final[Rows] = {
@@ -140,19 +119,25 @@ CAN_ROWS: Final[Rows] = {
         summary="every drive at another bit rate than the host", begin=_mistune_all
     ),
     (Component.CAN_BUS, Fault.BUS_OFF): Effect(
-        summary="the host's controller is off the bus until cleared", begin=_bus_off
+        summary="the host's controller leaves the bus, until cleared or opened anew", begin=_bus_off
     ),
     (Component.CAN_BUS, Fault.ARBITRATION_LOSS): Effect(
         summary="a babbling node wins every arbitration", begin=_babble
     ),
     (Component.DRIVE, Fault.OFF): Effect(summary="without supply", begin=_off),
-    (Component.DRIVE, Fault.OVERHEAT): _trip(
-        DRIVE_OVERHEATED, _TEMPERATURE_REGISTER, "reports over-temperature (EMCY 4310h)"
+    (Component.DRIVE, Fault.BROWN_OUT): Effect(
+        summary="its supply sags", begin=_brown_out, parameters=(_VOLTS,)
     ),
-    (Component.DRIVE, Fault.OVERLOAD): _trip(
-        DRIVE_OVERLOADED, _CURRENT_REGISTER, "reports over-current (EMCY 2310h)"
+    (Component.DRIVE, Fault.OVERHEAT): Effect(
+        summary="hot until cleared; then a fault reset ends it", begin=_overheat
     ),
-    (Component.DRIVE, Fault.ID_CLASH): Effect(summary="a second node has its id", begin=_clash),
+    (Component.DRIVE, Fault.OVERLOAD): Effect(
+        summary="full current as in a jammed gear; its I²t guard trips after some 20 s",
+        begin=_overload,
+    ),
+    (Component.DRIVE, Fault.ID_CLASH): Effect(
+        summary="another drive of the bus takes its id", begin=_clash
+    ),
     (Component.DRIVE, Fault.WRONG_BAUD): Effect(
         summary="at another bit rate than the bus", begin=_mistune
     ),

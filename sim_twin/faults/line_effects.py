@@ -1,8 +1,9 @@
 """Declare what may befall a device's line: the servo bus, the lidar, the IMU, the camera."""
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, TypeVar
 
+from sim_twin.errors import FaultRefused
 from sim_twin.faults.effect import Effect, Ending, Parameter, Target
 from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Silence, Stuck, Tampering
 from sim_twin.faults.plug import Plug
@@ -10,6 +11,7 @@ from sim_twin.faults.vocabulary import Component, Fault
 
 LineOf = Callable[[Target], LineTamper]
 PlugOf = Callable[[Target], Plug]
+Declared = TypeVar("Declared")
 Rows = dict[tuple[Component, Fault], Effect]
 
 DELAY: Final = Parameter(
@@ -108,6 +110,30 @@ def _slow_camera(target: Target) -> Ending:
     return _change(target.twin.camera.device, "rate_ratio", target.values["ratio"])
 
 
+def _estop_plug(target: Target) -> Plug:
+    return target.twin.plugs[_declared(target.twin.robot.estop, "emergency-stop button").device]
+
+
+def _microphone_line(target: Target) -> LineTamper:
+    return target.twin.stream_lines[_declared(target.twin.robot.microphone, "microphone").device]
+
+
+def _microphone_plug(target: Target) -> Plug:
+    return target.twin.plugs[_declared(target.twin.robot.microphone, "microphone").device]
+
+
+def _declared(device: Declared | None, what: str) -> Declared:
+    if device is None:
+        raise FaultRefused(f"this robot's file declares no {what}")
+    return device
+
+
+def _press(target: Target) -> Ending:
+    button = target.twin.estop_button
+    button.press()
+    return button.release
+
+
 _SLOW: Final = Parameter(
     name="ratio", default=0.2, low=0.001, high=0.999, meaning="share of the usual rate"
 )
@@ -140,4 +166,11 @@ SENSOR_ROWS: Final[Rows] = {
     (Component.CAMERA, Fault.SLOW): Effect(
         summary="fewer frames than asked for", begin=_slow_camera, parameters=(_SLOW,)
     ),
+    (Component.ESTOP, Fault.UNPLUG): Effect(
+        summary="the cable is out", begin=lambda target: _pull(_estop_plug(target))
+    ),
+    (Component.ESTOP, Fault.WRONG): Effect(
+        summary="it tells that it is pressed though nobody presses it", begin=_press
+    ),
+    **line_rows(Component.MICROPHONE, _microphone_line, _microphone_plug),
 }

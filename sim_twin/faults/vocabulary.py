@@ -34,3 +34,5 @@ class Component(Enum):
     LIDAR = "lidar"
     IMU = "imu"
     CAMERA = "camera"
+    ESTOP = "estop"
+    MICROPHONE = "microphone"
