@@ -210,7 +210,7 @@ class ODriveBus:
             self._fresh_until_ns = now_ns + FRESH_NS
             for port, setup in zip(self._ports, self._setups, strict=True):
                 port.ignored_errors = _WATCHDOG_ERRORS
-                setup.tell(Command.CLEAR_ERRORS, 0)
+                setup.clear_silence()
         elif now_ns > self._fresh_until_ns:
             for port in self._ports:
                 port.ignored_errors = 0

@@ -130,12 +130,17 @@ class AxisSetup:
         self.tell(Command.SET_INPUT_VEL, 0.0, 0.0)
 
     def _clear(self) -> Iterator[None]:
+        """Clear what the last host's silence left behind; the rest is the operator's to reset."""
         port = self._port
-        self.tell(Command.CLEAR_ERRORS, 0)
+        self.clear_silence()
         port.errors_told = False
         yield from self._obtain("errors", Command.GET_ERROR, lambda: port.errors_told)
-        if port.fault is not None:
-            raise DeviceFault(f"{port.spec.name}: {port.fault.text}, and clearing does not end it")
+
+    def clear_silence(self) -> None:
+        """Clear errors, unless there is one that is not for us to clear."""
+        fault = self._port.fault
+        if fault is None or fault.rule is ResetRule.AUTOMATIC:
+            self.tell(Command.CLEAR_ERRORS, 0)
 
     def _first_estimate(self) -> Iterator[None]:
         port = self._port

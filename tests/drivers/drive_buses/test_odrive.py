@@ -127,6 +127,15 @@ def test_an_axis_without_an_sdo_answer_is_never_enabled(
     odrive.bus.close()
 
 
+def test_an_error_that_is_the_operators_outlives_a_new_connection(odrive: Any) -> None:
+    odrive.fail(1)
+    odrive.bus.connect()
+    assert odrive.run(0.5).faulted == (False, True)
+    assert odrive.bus.reset_fault() == ()
+    assert odrive.run(0.5).healthy
+    odrive.bus.close()
+
+
 @pytest.mark.parametrize("node_id", [-1, 0x3F])
 def test_a_node_id_that_no_axis_can_have_is_refused(node_id: int) -> None:
     with pytest.raises(ValueError, match="node_id"):

@@ -1,0 +1,150 @@
+"""Run the CAN commands as a person does, on emulated drives behind a hub."""
+
+import json
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.can import CanHub, CanWire, WheelDrive
+from sim_twin.can.emulated_drive import EmulatedDrive
+from sim_twin.can.odrive import ODriveAxis
+from vla_deploy.cli.main import main
+
+CLOCK = MonotonicClock()
+
+
+class ServedBus:
+    """Drives on a hub, served by a thread."""
+
+    def __init__(self, path: Path, drives: Sequence[EmulatedDrive]) -> None:
+        self.path = str(path)
+        self._drives = drives
+        self._wire = CanWire(drives)
+        self._hub = CanHub(self._wire, path)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        while not self._stop.is_set():
+            self._hub.poll_once()
+            now_ns = CLOCK.now_ns()
+            for drive in self._drives:
+                drive.advance(now_ns, 0.0, 0.0)
+            self._wire.poll(now_ns)
+            CLOCK.sleep_until(now_ns + NS_PER_S // 1000)
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+        self._hub.close()
+
+
+@pytest.fixture
+def make_bus(tmp_path: Path) -> Iterator[Callable[..., ServedBus]]:
+    buses: list[ServedBus] = []
+
+    def make(*drives: EmulatedDrive) -> ServedBus:
+        buses.append(ServedBus(tmp_path / f"can{len(buses)}", drives))
+        return buses[-1]
+
+    yield make
+    for bus in buses:
+        bus.close()
+
+
+def on(bus: ServedBus, *words: str) -> int:
+    command, *rest = words
+    return main(["can", command, "--interface", "vla_hub", "--channel", bus.path, *rest])
+
+
+def test_a_scan_finds_canopen_nodes_with_their_identity(
+    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+) -> None:
+    bus = make_bus(WheelDrive(5), WheelDrive(126))
+    assert on(bus, "scan", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [node["node_id"] for node in found["canopen"]] == [5, 126]
+    assert found["canopen"][0]["profile"] == 402
+    assert found["canopen"][0]["vendor"] == 0x564C4144
+    assert found["odrive"] == []
+    assert found["silent_nodes_were_asked"] is True
+
+
+def test_a_scan_finds_odrive_axes_and_asks_no_silent_node(
+    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+) -> None:
+    axis = ODriveAxis(48)
+    bus = make_bus(axis, ODriveAxis(0))
+    assert on(bus, "scan") == 0
+    told = capsys.readouterr().out
+    assert "ODrive axis    0: firmware 0.0.0, IDLE, errors none" in told
+    assert "ODrive axis   48" in told
+    assert "silent CANopen nodes were not asked" in told
+    assert not axis.errors
+
+
+def test_a_scan_of_an_empty_bus_fails_with_a_remedy(
+    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert on(make_bus(), "scan", "--protocol", "odrive") == 1
+    assert "nobody answers at 1000000 bit/s" in capsys.readouterr().err
+
+
+def frames_of(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_the_monitor_prints_odrive_traffic_by_name(
+    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+) -> None:
+    bus = make_bus(ODriveAxis(3))
+    assert on(bus, "monitor", "--protocol", "odrive", "--count", "20", "--json") == 0
+    frames = frames_of(capsys.readouterr().out)
+    assert len(frames) == 20
+    assert {frame["kind"] for frame in frames} == {"Heartbeat", "Get_Encoder_Estimates"}
+    assert {frame["node"] for frame in frames} == {3}
+    beat = next(frame for frame in frames if frame["kind"] == "Heartbeat")
+    assert "Axis_Error none, Axis_State IDLE" in beat["text"]
+
+
+def test_the_monitor_prints_canopen_traffic_in_words_and_ends_in_time(
+    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = WheelDrive(1)
+    bus = make_bus(drive)
+    fault = threading.Timer(0.5, drive.raise_fault, (0x4310, 0x09))
+    fault.start()
+    assert on(bus, "monitor", "--seconds", "1.0") == 0
+    fault.join()
+    assert "EMCY 1  0x4310 drive over-temperature, error register 0x09" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["scan", "--interface", "socketcan"], "needs --channel"),
+        (["scan", "--interface", "vla_hub", "--channel", "none"], "start the twin first"),
+        (["monitor", "--interface", "slcan", "--channel", "/none"], "see /dev/serial/by-id"),
+        (["scan", "--robot", "nobody"], "nobody"),
+    ],
+)
+def test_what_cannot_be_opened_says_what_to_try(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["can", *words]) == 2
+    assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["scan"], ["monitor", "--robot", "butler", "--count", "0"]])
+def test_bad_arguments_are_told_in_one_line(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["can", *words])
+    assert end.value.code == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1

@@ -1,0 +1,148 @@
+"""Lose and reopen the wheel drives' bus while the control loop goes on, by either protocol."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import can
+import pytest
+
+from drivers.errors import DeviceMissing, WrongDevice
+from drivers.odrive import EMULATED_ENDPOINTS
+from platforms import load_profile
+from sim_twin.can import MemoryBus, WheelDrive
+from sim_twin.can.emulated_drive import EmulatedDrive
+from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
+from sim_twin.can.odrive import ODriveAxis
+from vla_deploy.control.wheels import Wheels
+from vla_deploy.robots import RobotDescription, load_robot
+
+TICK_NS = 4_000_000
+DRIVES: dict[str, Callable[..., EmulatedDrive]] = {"cia402": WheelDrive, "odrive": ODriveAxis}
+
+
+class Bench:
+    """Two drives, the wheels that own them, and the opener between them."""
+
+    def __init__(self, protocol: str) -> None:
+        kind = DRIVES[protocol]
+        self.world = FreeWheelWorld([FreeWheel(kind(1)), FreeWheel(kind(2, sign=-1))])
+        self.missing = False
+        butler = load_robot("butler")
+        wiring = replace(butler.can_bus, protocol=protocol, endpoints_path=EMULATED_ENDPOINTS)
+        self.robot: RobotDescription = replace(butler, can_bus=wiring)
+        self.wheels = Wheels(self.robot, load_profile("desktop"), self, self.world)  # type: ignore[arg-type]
+
+    def can(self, name: str) -> can.BusABC:
+        if self.missing:
+            raise DeviceMissing("no interface")
+        return MemoryBus(self.world.wire)
+
+    def is_lost(self) -> bool:
+        return self.wheels.lost
+
+    def run(self, ticks: int, v_m_s: float = 0.0) -> None:
+        for _ in range(ticks):
+            self.wheels.cycle(v_m_s, 0.0)
+            self.world.sleep_until(self.world.now_ns() + TICK_NS)
+
+    def reopen(self, ticks: int) -> bool:
+        """Take reopening steps, one per tick, and see that none of them waits."""
+        for _ in range(ticks):
+            before_ns = self.world.now_ns()
+            back = self.wheels.try_reopen()
+            assert self.world.now_ns() == before_ns
+            if back:
+                return True
+            self.world.sleep_until(before_ns + TICK_NS)
+        return False
+
+
+@pytest.fixture(params=["cia402", "odrive"])
+def bench(request: pytest.FixtureRequest) -> Bench:
+    return Bench(request.param)
+
+
+def test_the_base_drives_by_either_protocol(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(60)
+    assert bench.wheels.enabled
+    bench.run(250, 0.3)
+    assert bench.wheels.v_m_s == pytest.approx(0.3, abs=0.01)
+    assert bench.wheels.odometry.x_m > 0.15
+    bench.wheels.close()
+
+
+def test_a_lost_bus_comes_back_without_a_tick_that_waits(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(60, 0.2)
+    bench.world.wire.cut = True
+    bench.run(200, 0.2)
+    assert bench.is_lost()
+    assert not bench.reopen(50)
+    bench.world.wire.cut = False
+    assert bench.reopen(1500)
+    bench.run(50)
+    assert not bench.is_lost()
+    assert not bench.wheels.enabled
+    assert not bench.wheels.faulted
+    bench.wheels.close()
+
+
+def test_bus_off_ends_in_a_new_connection_with_the_drives_disabled(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(60, 0.2)
+    bench.world.wire.set_bus_off()
+    bench.run(2, 0.2)
+    assert bench.is_lost()
+    assert "bus-off" in bench.wheels.failure
+    bench.world.wire.restart()
+    assert bench.reopen(1500)
+    bench.run(50)
+    assert not bench.wheels.enabled
+    assert bench.wheels.failure == ""
+    bench.wheels.close()
+
+
+def test_an_interface_that_stays_away_is_told_and_tried_again(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.world.wire.cut = True
+    bench.run(200)
+    bench.missing = True
+    assert not bench.reopen(600)
+    assert bench.wheels.failure == "no interface"
+    bench.missing = False
+    bench.world.wire.cut = False
+    assert bench.reopen(1500)
+    bench.wheels.close()
+
+
+def test_the_drives_mode_and_gear_come_from_the_robot_file() -> None:
+    bench = Bench("cia402")
+    drives = [
+        replace(drive, mode="cyclic_synchronous_velocity", gear_ratio=3.0)
+        for drive in bench.robot.can_bus.drives
+    ]
+    robot = replace(bench.robot, can_bus=replace(bench.robot.can_bus, drives=tuple(drives)))
+    wheels = Wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
+    wheels.open()
+    first = bench.world.wheels[0].drive
+    assert isinstance(first, WheelDrive)
+    assert first._objects.get(0x6060) == 9
+    wheels.enable()
+    for _ in range(300):
+        wheels.cycle(0.2, 0.0)
+        bench.world.sleep_until(bench.world.now_ns() + TICK_NS)
+    assert bench.world.wheels[0].velocity_rad_s == pytest.approx(3.0 * 0.2 / 0.08, abs=0.1)
+    wheels.close()
+
+
+def test_other_motor_counts_than_declared_are_refused() -> None:
+    bench = Bench("cia402")
+    drives = tuple(replace(drive, counts_per_rev=4096) for drive in bench.robot.can_bus.drives)
+    robot = replace(bench.robot, can_bus=replace(bench.robot.can_bus, drives=drives))
+    wheels = Wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
+    with pytest.raises(WrongDevice, match="encoder increments"):
+        wheels.open()
