@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from drivers.base import ByteTransport
 from drivers.clock import NS_PER_S, Clock
-from drivers.dynamixel.control_table import WATCHDOG_TRIPPED, HardwareError
+from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.counters import BusCounters
-from drivers.dynamixel.fault_policy import DEFAULT_RULES, FaultRule
+from drivers.dynamixel.fault_policy import FaultPolicy
 from drivers.dynamixel.goals import GoalWriter
 from drivers.dynamixel.group import ServoRead
 from drivers.dynamixel.handshake import ServoSetup, shake_hands
@@ -54,10 +54,11 @@ class DynamixelBus:
         watchdog_s: float = 0.1,
         reply_margin_s: float = 0.002,
         health_every_cycles: int = 5,
-        fault_rules: Mapping[HardwareError, FaultRule] = DEFAULT_RULES,
+        fault_policy: FaultPolicy | None = None,
     ) -> None:
         """Take over the transport; nothing is sent yet.
 
+        A `fault_policy` that outlives the bus remembers its reboots when the bus is opened anew.
         `fast_sync` None uses the fast sync read for those servos whose model and firmware have it.
 
         Raises:
@@ -67,7 +68,7 @@ class DynamixelBus:
         self.servos = tuple(servos)
         self.counters = BusCounters()
         self.state = BusState.of(len(servos))
-        self.journal = BusJournal(self.servos, self.state, fault_rules)
+        self.journal = BusJournal(self.servos, self.state, fault_policy or FaultPolicy())
         self.watchdog = WatchdogState.OFF
         self._by_id = {servo.id: index for index, servo in enumerate(servos)}
         self._watchdog_units = watchdog_units(watchdog_s)

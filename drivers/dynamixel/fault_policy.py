@@ -106,9 +106,9 @@ class FaultPolicy:
             reason=rule.reason,
         )
 
-    def acknowledge(self, servo_id: int) -> None:
-        """Allow the servo's next reboot: a person has looked at it."""
-        self._rebooted.discard(servo_id)
+    def acknowledge(self) -> None:
+        """Allow every servo another reboot: a person has looked, and has reset the robot."""
+        self._rebooted.clear()
 
     def _worst(self, bits: int) -> FaultRule:
         rules = [self._rules.get(HardwareError(bit), _UNKNOWN) for bit in _single_bits(bits)]

@@ -1,13 +1,12 @@
 """Keep what telemetry tells of a servo bus: cycle times, error budgets, decisions about faults."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from drivers.dynamixel.fault_policy import FaultDecision, FaultPolicy, FaultRule
-from drivers.dynamixel.model import HardwareError
+from drivers.dynamixel.fault_policy import FaultDecision, FaultPolicy
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.state import BusState
 from drivers.error_budget import BusBudget
@@ -24,7 +23,7 @@ class BusJournal:
         self,
         servos: Sequence[ServoSpec],
         state: BusState,
-        rules: Mapping[HardwareError, FaultRule],
+        policy: FaultPolicy,
     ) -> None:
         self.latency = LatencyHistogram()
         """How long the answers of the cycles' block reads took."""
@@ -32,7 +31,7 @@ class BusJournal:
         """A cycle that gave no value of a servo is a failure of that servo."""
         self._servos = servos
         self._state = state
-        self._policy = FaultPolicy(rules)
+        self._policy = policy
         self._decisions: deque[FaultDecision] = deque(maxlen=_MOST_DECISIONS)
         self._seen_errors = bytes(len(servos))
         self.answer_times_ns: deque[int] = deque(maxlen=_MOST_TIMES)
@@ -53,16 +52,16 @@ class BusJournal:
                 self._decisions.append(decision)
         self._seen_errors = errors
 
+    @property
+    def has_decisions(self) -> bool:
+        """Tell whether `take_decisions` has something."""
+        return bool(self._decisions)
+
     def take_decisions(self) -> list[FaultDecision]:
         """Return the decisions made since this was called last."""
         decisions = list(self._decisions)
         self._decisions.clear()
         return decisions
-
-    def acknowledge(self) -> None:
-        """Allow every servo another reboot: a person has reset the robot."""
-        for servo in self._servos:
-            self._policy.acknowledge(servo.id)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it all for telemetry."""

@@ -1,6 +1,7 @@
 """Keep the servo bus: open, lose and reopen it, and take servos in and out of power one by one."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from drivers.errors import DriverError, LinkLost, NoReply
 from drivers.opener import DeviceOpener
 from platforms import Profile
 from vla_deploy.control.axes import Axes, Floats
+from vla_deploy.control.servo_faults import ServoFaults
 from vla_deploy.robots import RobotDescription
 
 REOPEN_NS = NS_PER_S
@@ -31,6 +33,7 @@ class ServoLine:
         self.name = robot.servo_bus.device
         self.lost = False
         self.failure = ""
+        self.faults = ServoFaults()
         self._devices = devices
         self._clock = clock
         self._baud = robot.servo_bus.baud
@@ -59,7 +62,12 @@ class ServoLine:
         """
         transport = self._devices.serial(self.name)
         bus = DynamixelBus(
-            transport, self._clock, self._specs, baud=self._baud, watchdog_s=self._watchdog_s
+            transport,
+            self._clock,
+            self._specs,
+            baud=self._baud,
+            watchdog_s=self._watchdog_s,
+            fault_policy=self.faults.policy,
         )
         try:
             bus.connect()
@@ -84,9 +92,9 @@ class ServoLine:
         return True
 
     @property
-    def counters(self) -> dict[str, int]:
-        """Return what the bus has counted; empty before it was opened."""
-        return {} if self._bus is None else self._bus.counters.as_dict()
+    def counters(self) -> dict[str, Any]:
+        """Return what the bus tells of itself; empty while it is not open."""
+        return {} if self._bus is None else {**self._bus.telemetry(), "faults": self.faults.newest}
 
     @property
     def watchdog_tripped(self) -> NDArray[np.bool_]:
@@ -106,6 +114,9 @@ class ServoLine:
             self._bus.read_state()
         except LinkLost as error:
             self._note_loss(error)
+            return
+        if self._bus.journal.has_decisions:
+            self._attempt(self.faults.carry_out)
 
     def write(self, goals: Floats) -> None:
         """Send a goal to every servo."""
@@ -153,6 +164,7 @@ class ServoLine:
             _raise_first(bus.disable_torque([self._ids[servo] for servo in servos]))
 
     def _reboot_faulted(self, bus: DynamixelBus) -> None:
+        self.faults.policy.acknowledge()
         for servo in np.flatnonzero(self.state.error):
             bus.reboot(self._ids[servo])
 

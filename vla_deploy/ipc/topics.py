@@ -103,7 +103,7 @@ TOPICS: tuple[Topic, ...] = (
         rate_hz=50,
         deadline_s=0.2,
         summary="control state, active verdict, tick statistics, as JSON",
-        fields=(Field("document", "json", 4096),),
+        fields=(Field("document", "json", 8192),),
     ),
     Topic(
         name="motion_command",

@@ -86,7 +86,7 @@ def test_a_person_who_has_looked_allows_the_next_reboot() -> None:
     policy = FaultPolicy()
     decided(policy, HardwareError.OVERLOAD)
     policy.decide(3, "left_elbow", 0)
-    policy.acknowledge(3)
+    policy.acknowledge()
     assert decided(policy, HardwareError.OVERLOAD).action is FaultAction.REBOOT_ONCE
 
 

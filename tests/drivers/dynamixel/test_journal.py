@@ -1,7 +1,7 @@
 import pytest
 
-from drivers.dynamixel import HardwareError
-from drivers.dynamixel.fault_policy import FaultAction
+from drivers.dynamixel import DynamixelBus, HardwareError
+from drivers.dynamixel.fault_policy import FaultAction, FaultPolicy
 
 
 def test_every_cycle_is_in_the_histogram(bench):
@@ -60,6 +60,10 @@ def test_a_hardware_error_is_decided_about_once(bench, bits, action):
 
 
 def test_a_servo_that_fails_again_after_its_reboot_stops_the_robot_until_acknowledged(bench):
+    policy = FaultPolicy()
+    bench.bus = DynamixelBus(bench.line, bench, bench.specs, baud=1_000_000, fault_policy=policy)
+    bench.bus.connect()
+
     def actions() -> list[FaultAction]:
         bench.bank.set_alert(2, HardwareError.OVERLOAD)
         bench.cycle(30)
@@ -70,5 +74,5 @@ def test_a_servo_that_fails_again_after_its_reboot_stops_the_robot_until_acknowl
     assert actions() == [FaultAction.REBOOT_ONCE]
     assert actions() == [FaultAction.STOP]
     assert actions() == [FaultAction.STOP]
-    bench.bus.journal.acknowledge()
+    policy.acknowledge()
     assert actions() == [FaultAction.REBOOT_ONCE]
