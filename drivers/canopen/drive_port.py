@@ -70,6 +70,11 @@ class DrivePort:
         return self.power_state in FAULT_STATES
 
     @property
+    def owes_answers(self) -> bool:
+        """Tell whether the last SYNC is not answered yet."""
+        return bool(self._awaited)
+
+    @property
     def reset_rule(self) -> ResetRule:
         """Return who may reset the drive's fault; a fault without a code is the operator's."""
         return ResetRule.OPERATOR if self.emergency is None else self.emergency.rule

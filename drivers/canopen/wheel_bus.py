@@ -1,5 +1,6 @@
 """Drive the wheels over CANopen: our own PDO cycle, 402 state machine and heartbeat, both ways."""
 
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
@@ -31,6 +32,7 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.drive_bus import (
     DriveState,
     Goal,
+    NodeBudget,
     PowerState,
     ResetRule,
     finite,
@@ -93,6 +95,7 @@ class WheelDriveBus:
             for port in self._ports
         )
         self._handlers = _handlers(self._nodes)
+        self._budget = NodeBudget([spec.joint for spec in drives])
         self._goal = Goal.DISABLED
         self._was_enabled = False
         self._reset_until_ns = 0
@@ -119,6 +122,7 @@ class WheelDriveBus:
         """
         self._goal = Goal.DISABLED
         self._was_enabled = False
+        self._budget.forget()
         for node in self._nodes:
             node.read_dictionary()
         yield from listening(
@@ -168,7 +172,7 @@ class WheelDriveBus:
     @property
     def counters(self) -> dict[str, int]:
         """Return what the bus has carried and lost since it was opened."""
-        return self._link.counters
+        return self._link.counters | self._budget.counters
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -225,6 +229,8 @@ class WheelDriveBus:
         wanted = None if velocity_rad_s is None else finite(velocity_rad_s)
         now_ns = self._clock.now_ns()
         self._take_frames()
+        owing = [row for row, port in enumerate(self._ports) if port.owes_answers]
+        self._budget.note_cycle(owing, now_ns)
         self._advance_goal(now_ns)
         if now_ns >= self._next_beat_ns:
             self._next_beat_ns = now_ns + self._beat_ns
@@ -251,7 +257,7 @@ class WheelDriveBus:
         if self._goal is Goal.ENABLED:
             self._was_enabled = self._was_enabled or self._all_enabled()
             fell_out = self._was_enabled and not self._all_enabled()
-            if fell_out or any(port.faulted or port.lost(now_ns) for port in self._ports):
+            if fell_out or any(self._lost(now_ns)) or any(port.faulted for port in self._ports):
                 self._goal = Goal.QUICK_STOP
         elif self._goal is Goal.FAULT_RESET:
             cleared = not any(port.faulted for port in self._ports)
@@ -277,6 +283,10 @@ class WheelDriveBus:
             port.expect_answers(now_ns)
         self._link.send(SYNC_COB)
 
+    def _lost(self, now_ns: int) -> tuple[bool, ...]:
+        silent = (port.lost(now_ns) for port in self._ports)
+        return tuple(map(operator.or_, silent, self._budget.lost))
+
     def _state(self, now_ns: int) -> DriveState:
         ports = self._ports
         return DriveState(
@@ -285,7 +295,7 @@ class WheelDriveBus:
             torque_nm=np.array([port.torque_nm for port in ports]),
             age_s=np.array([port.age_s(now_ns) for port in ports]),
             power_state=tuple(port.power_state for port in ports),
-            lost=tuple(port.lost(now_ns) for port in ports),
+            lost=self._lost(now_ns),
             faulted=tuple(port.faulted for port in ports),
             fault=tuple(port.emergency for port in ports),
             enabled=self.enabled,

@@ -1,5 +1,6 @@
 """Drive the wheels over ODrive's CANSimple protocol: own state machine, ramps and watch."""
 
+import operator
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
@@ -13,6 +14,7 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.drive_bus import (
     DriveState,
     Goal,
+    NodeBudget,
     PowerState,
     ResetRule,
     finite,
@@ -22,7 +24,7 @@ from drivers.drive_bus import (
 )
 from drivers.errors import LinkLost, ProtocolError
 from drivers.odrive.axis_port import AxisPort
-from drivers.odrive.axis_setup import LACKS, AxisSetup
+from drivers.odrive.axis_setup import FEEDBACK_MS, LACKS, AxisSetup
 from drivers.odrive.codec import AxisState, Command, split_id
 from drivers.odrive.endpoints import ENCODER_RATE, EndpointTable, read_endpoints
 from drivers.odrive.spec import AxisSpec
@@ -32,6 +34,7 @@ POLL_NS: Final = 25_000_000
 FAULT_RESET_NS: Final = NS_PER_S // 2
 BRAKE_TIMEOUT_NS: Final = 2 * NS_PER_S
 FRESH_NS: Final = NS_PER_S // 4
+LATE_S: Final = 3 * FEEDBACK_MS / 1000
 STILL_RAD_S: Final = 0.05
 MAX_REV_S: Final = 1e4
 _POLLED: Final = (
@@ -75,6 +78,7 @@ class ODriveBus:
         self._setups = tuple(
             AxisSetup(self._link.send, clock, port, heartbeat_s) for port in self._ports
         )
+        self._budget = NodeBudget([spec.joint for spec in axes])
         self._goal = Goal.DISABLED
         self._was_enabled = False
         self._goal_until_ns = 0
@@ -105,6 +109,7 @@ class ODriveBus:
         self._goal = Goal.DISABLED
         self._was_enabled = False
         self._fresh_until_ns = None
+        self._budget.forget()
         self._table = read_endpoints(self._endpoints_path)
         for port in self._ports:
             port.forget()
@@ -114,7 +119,7 @@ class ODriveBus:
     @property
     def counters(self) -> dict[str, int]:
         """Return what the bus has carried and lost since it was opened."""
-        return self._link.counters
+        return self._link.counters | self._budget.counters
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -179,6 +184,8 @@ class ODriveBus:
         wanted = None if velocity_rad_s is None else finite(velocity_rad_s)
         now_ns = self._clock.now_ns()
         self._take_frames()
+        late = [row for row, port in enumerate(self._ports) if port.age_s(now_ns) > LATE_S]
+        self._budget.note_cycle(late, now_ns)
         self._forgive_the_wait(now_ns)
         self._advance_goal(now_ns)
         self._send_setpoints(wanted)
@@ -219,7 +226,7 @@ class ODriveBus:
         if self._goal is Goal.ENABLED:
             self._was_enabled = self._was_enabled or self._all_enabled()
             fell_out = self._was_enabled and not self._all_enabled()
-            if fell_out or any(port.fault or port.lost(now_ns) for port in self._ports):
+            if fell_out or any(self._lost(now_ns)) or any(port.fault for port in self._ports):
                 self.quick_stop()
         elif self._goal is Goal.QUICK_STOP:
             if not self._brakes(now_ns) or now_ns > self._goal_until_ns:
@@ -267,6 +274,10 @@ class ODriveBus:
             setup.ask(_POLLED[self._polled])
         self._polled = (self._polled + 1) % len(_POLLED)
 
+    def _lost(self, now_ns: int) -> tuple[bool, ...]:
+        silent = (port.lost(now_ns) for port in self._ports)
+        return tuple(map(operator.or_, silent, self._budget.lost))
+
     def _state(self, now_ns: int) -> DriveState:
         ports = self._ports
         return DriveState(
@@ -275,7 +286,7 @@ class ODriveBus:
             torque_nm=np.array([port.torque_nm for port in ports]),
             age_s=np.array([port.age_s(now_ns) for port in ports]),
             power_state=tuple(self._power_state(port) for port in ports),
-            lost=tuple(port.lost(now_ns) for port in ports),
+            lost=self._lost(now_ns),
             faulted=tuple(port.fault is not None for port in ports),
             fault=tuple(port.fault for port in ports),
             enabled=self.enabled,

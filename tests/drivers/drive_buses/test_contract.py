@@ -173,6 +173,22 @@ class DriveBusContract:
         assert after["received"] > before["received"]
         assert after["malformed"] == 0
 
+    def test_a_node_that_answers_now_and_then_is_degraded_then_lost(self, enabled: Any) -> None:
+        enabled.world.wheels[0].drive.silence(on=True)
+        seen = set()
+        for _ in range(250):
+            enabled.world.wheels[0].drive.silence(on=False)
+            enabled.run(0.008)
+            enabled.world.wheels[0].drive.silence(on=True)
+            state = enabled.run(0.04)
+            counters = enabled.bus.counters
+            seen.add((counters["degraded_nodes"], counters["lost_nodes"]))
+            if state.lost[0]:
+                break
+        assert (1, 0) in seen
+        assert state.lost == (True, False)
+        assert not enabled.run(0.0).enabled
+
     def test_the_same_run_twice_gives_the_same_bits(self, enabled: Any) -> None:
         bench = type(enabled)()
         bench.bus.connect()
