@@ -160,3 +160,39 @@ def test_a_value_of_any_wrong_kind_never_crashes_the_loader(butler_copy: Path, v
             load_robot(butler_copy)
         except RobotFileError as error:
             assert error.faults
+
+
+def test_the_button_and_sound_are_optional(butler_copy: Path) -> None:
+    text = butler_copy.read_text()
+    for name in ("estop", "microphone", "speaker"):
+        text = re.sub(rf"^\[{name}\]\n(?:\w.*\n)+", "", text, flags=re.MULTILINE)
+    butler_copy.write_text(text)
+    robot = load_robot(butler_copy)
+
+    assert (robot.estop, robot.microphone, robot.speaker) == (None, None, None)
+    with pytest.raises(KeyError, match="no device 'estop'"):
+        robot.device_path("estop")
+
+
+def test_faults_of_the_button_and_of_sound_are_told_with_what_is_allowed(
+    butler_copy: Path,
+) -> None:
+    edit(
+        butler_copy,
+        (r'^model = "HID"', 'model = "ROPE"'),
+        (r"^number = 288", "number = 5000"),
+        (r"^rate_hz = 16000", "rate_hz = 7"),
+        (r'^device = "speaker"', 'device = "microphone"'),
+    )
+    faults = faults_of(butler_copy)
+
+    assert "one of HID, GPIO" in faults["estop.model"]
+    assert "an integer in 0..767" in faults["estop.number"]
+    assert "16000" in faults["microphone.rate_hz"]
+    assert "not used by microphone.device" in faults["speaker.device"]
+
+
+def test_a_sensor_without_a_driver_is_told_with_those_there_are(butler_copy: Path) -> None:
+    edit(butler_copy, (r'^model = "LD19"', 'model = "LD06"'))
+
+    assert "one of LD19" in faults_of(butler_copy)["lidar.model"]
