@@ -32,6 +32,10 @@ class Pacer:
         """Return how long from `wall_ns` to the next step, at least 0."""
         return max(0, self._due_ns - wall_ns)
 
+    def since_step_ns(self, wall_ns: int) -> int:
+        """Return how much of a step has passed since the last one, at most a whole one."""
+        return min(self._step_ns, max(0, wall_ns - self._due_ns + self._step_ns))
+
 
 class RealTimeFactor:
     """Measure simulated over wall time in windows of about a second."""

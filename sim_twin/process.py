@@ -20,6 +20,7 @@ from sim_twin.pacer import Pacer, RealTimeFactor
 from sim_twin.priority import claim_priority
 from sim_twin.pty_line import PtyLine
 from sim_twin.referee import REFEREE_SOCKET
+from sim_twin.servos import WireTiming
 from sim_twin.stream_line import StreamLine
 from sim_twin.twin import Twin
 from vla_deploy.robots import load_robot
@@ -37,6 +38,7 @@ class TwinOptions:
     run_dir: Path
     camera: bool = True
     viewer: bool = False
+    paced_servos: bool = False
 
     @property
     def devices_dir(self) -> Path:
@@ -61,12 +63,18 @@ class TwinProcess:
         self._ready.unlink(missing_ok=True)
         self._clock = clock
         robot = load_robot(options.robot)
-        self._twin = Twin(robot, options.world, options.seed)
+        timing = WireTiming(baud=robot.servo_bus.baud) if options.paced_servos else None
+        self._twin = Twin(robot, options.world, options.seed, timing)
         self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
         self._drawings = _start_drawings(options)
-        hears_baud = {robot.servo_bus.device: self._twin.servos.set_host_baud}
+        self._servo_line = PtyLine(
+            self._twin.servos,
+            devices / robot.servo_bus.device,
+            now_ns=self._now_ns,
+            on_baud=self._twin.servos.set_host_baud,
+        )
         self._lines = [
-            PtyLine(device, devices / name, on_baud=hears_baud.get(name))
+            self._servo_line if name == robot.servo_bus.device else PtyLine(device, devices / name)
             for name, device in self._twin.serial_devices.items()
         ]
         self._streams = [
@@ -92,10 +100,15 @@ class TwinProcess:
             wall_ns = self._clock.now_ns()
             if self._pacer.due(wall_ns):
                 self._step(wall_ns)
+            reply_ns = self._twin.servos.next_due_ns()
             wait_ns = self._pacer.wait_ns(self._clock.now_ns())
+            if reply_ns is not None:
+                wait_ns = min(wait_ns, max(0, reply_ns - self._now_ns()))
             ready, _, _ = select.select(self._filenos(), [], [], wait_ns / NS_PER_S)
             if ready:
                 self._serve(set(ready))
+            if reply_ns is not None and reply_ns <= self._now_ns():
+                self._servo_line.poll_once()
 
     def close(self) -> None:
         """Take every device away."""
@@ -120,6 +133,10 @@ class TwinProcess:
             known = ", ".join(self._operations)
             raise RefereeRefusal(f"no operation {request.get('op')!r}; there are {known}")
         return operation(request)
+
+    def _now_ns(self) -> int:
+        """Return simulated time, which passes between two steps too."""
+        return self._twin.now_ns + self._pacer.since_step_ns(self._clock.now_ns())
 
     def _step(self, wall_ns: int) -> None:
         self._twin.step()

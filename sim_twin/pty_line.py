@@ -16,7 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from drivers.clock import Clock
 from drivers.errors import LinkLost
 from sim_twin.device import WireDevice
 
@@ -30,7 +29,7 @@ those with a constant, as <asm-generic/termbits.h> has it."""
 class PtyLine:
     """Carry bytes between a pseudo-terminal and a device; belongs to one single-threaded loop.
 
-    With `clock` the device is told the time whenever bytes pass, for one that runs on wall time.
+    With `now_ns` the device is told its time whenever bytes may pass, not only when it is stepped.
     """
 
     def __init__(
@@ -38,16 +37,21 @@ class PtyLine:
         device: WireDevice,
         link_path: Path,
         *,
-        clock: Clock | None = None,
+        now_ns: Callable[[], int] | None = None,
         on_baud: Callable[[int], None] | None = None,
     ) -> None:
         self.link_path = link_path
         self.lost_bytes = 0
         self._device = device
-        self._clock = clock
+        self._now_ns = now_ns
         self._on_baud = on_baud
         self._ends: tuple[int, int] | None = None
         self.replug()
+
+    @property
+    def is_plugged(self) -> bool:
+        """Tell whether there is a terminal."""
+        return self._ends is not None
 
     def fileno(self) -> int:
         """Return the descriptor to poll for input.
@@ -65,8 +69,8 @@ class PtyLine:
         """
         line, terminal = self._plugged_ends()
         request = self._read(line)
-        if self._clock is not None:
-            self._device.step(self._clock.now_ns())
+        if self._now_ns is not None:
+            self._device.step(self._now_ns())
         if request:
             if self._on_baud is not None:
                 self._on_baud(_baud_of(terminal))

@@ -84,7 +84,7 @@ def serve(
     servos.advance_to(clock.now_ns())
     bank = servos.bank
     if bank.paced:
-        line = PtyLine(bank, link_path, clock=clock, on_baud=bank.set_host_baud)
+        line = PtyLine(bank, link_path, now_ns=clock.now_ns, on_baud=bank.set_host_baud)
     else:
         line = PtyLine(bank, link_path)
     try:

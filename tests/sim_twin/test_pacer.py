@@ -23,6 +23,17 @@ def test_the_wait_lasts_until_the_next_step() -> None:
     assert pacer.wait_ns(3 * MS) == 0
 
 
+def test_between_two_steps_time_goes_on_but_never_past_the_next() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    steps_due(pacer, 0)
+    assert [pacer.since_step_ns(wall) for wall in (0, MS, 2 * MS, 9 * MS)] == [
+        0,
+        MS,
+        2 * MS,
+        2 * MS,
+    ]
+
+
 def test_a_lag_within_the_cap_is_caught_up() -> None:
     pacer = Pacer(2 * MS, start_ns=0)
     assert steps_due(pacer, 20 * MS) == 11

@@ -98,6 +98,22 @@ def test_servos_answer_a_ping_between_two_steps(devices: PathOpener) -> None:
     assert statistics.median(waits_ns) < 4_000_000
 
 
+def test_paced_servos_take_their_return_delay_and_their_bytes(tmp_path: Path) -> None:
+    twin = start(tmp_path, "--no-camera", "--paced-servos")
+    robot = load_robot("butler")
+    clock = MonotonicClock()
+    line = PathOpener(device_links(robot, tmp_path / "dev"), clock).serial("servos")
+    waits_ns = []
+    for _ in range(20):
+        asked_ns = clock.now_ns()
+        line.write(encode_instruction(1, Instruction.PING))
+        assert len(line.read(64, asked_ns + 1_000_000_000)) == 14
+        waits_ns.append(clock.now_ns() - asked_ns)
+    line.close()
+    assert min(waits_ns) > 500_000 + (10 + 14) * 10 * 1_000_000_000 / robot.servo_bus.baud
+    end(twin)
+
+
 def test_drives_send_heartbeats_and_answer(devices: PathOpener) -> None:
     bus = devices.can("can")
     bus.send(can.Message(arbitration_id=0x602, data=bytes(8), is_extended_id=False))
