@@ -3,9 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-import numpy as np
-
-from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES
 from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
@@ -16,7 +13,7 @@ from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.supply import Supply
-from sim_twin.head_camera import HeadCamera
+from sim_twin.head_camera import HeadCamera, camera_line
 from sim_twin.load import load_engine
 from sim_twin.sensors.estop import EstopButtonDevice
 from sim_twin.sensors.imu import ImuDevice
@@ -128,9 +125,7 @@ class Twin:
     def camera_line(self) -> LineTamper:
         """Return the head camera's line."""
         if self._camera_line is None:
-            camera = self.robot.camera
-            frame_bytes = HEADER_BYTES + camera.width * camera.height * BYTES_PER_PIXEL + CRC.size
-            self._camera_line = LineTamper(self.camera.device, self._now_ns, frame_bytes)
+            self._camera_line = camera_line(self.camera, self.robot.camera, self._now_ns)
         return self._camera_line
 
     def slip_encoder(self, servo_id: int, offset_rad: float) -> None:
@@ -178,14 +173,9 @@ class Twin:
             self.servo_supply.volts(now_ns),
         )
         shafts.command(duty)
-        wheels = zip(
-            self.drives,
-            engine.drives.position_rad().tolist(),
-            engine.drives.velocity_rad_s().tolist(),
-            strict=True,
-        )
-        torque_nm = [drive.advance(now_ns, angle, speed) for drive, angle, speed in wheels]
-        engine.drives.command(np.array(torque_nm))
+        wheels = zip(self.drives, engine.drives.motions(), strict=True)
+        torque_nm = [drive.advance(now_ns, angle, speed) for drive, (angle, speed) in wheels]
+        engine.drives.command(torque_nm)
 
 
 def _servo_specs(robot: RobotDescription) -> list[EmulatedServoSpec]:

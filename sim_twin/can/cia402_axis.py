@@ -44,9 +44,12 @@ QUICK_STOP_RAMPS: Final = {
     5: PROFILE_DECELERATION,
     6: QUICK_STOP_DECELERATION,
 }
-ARMED: Final = frozenset(
-    {PowerState.SWITCHED_ON, PowerState.OPERATION_ENABLED, PowerState.QUICK_STOP_ACTIVE}
+ARMED: Final = (
+    PowerState.SWITCHED_ON,
+    PowerState.OPERATION_ENABLED,
+    PowerState.QUICK_STOP_ACTIVE,
 )
+_CYCLIC: Final = int(OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY)
 RATED_CURRENT: Final = 0x6075
 CURRENT_ACTUAL: Final = 0x6078
 DC_LINK_VOLTAGE: Final = 0x6079
@@ -194,25 +197,27 @@ class Cia402Axis:
         return self._torque_nm
 
     def _next_demand(self, dt_s: float) -> float:
-        objects = self._objects
-        if self.state is PowerState.FAULT_REACTION_ACTIVE:
-            return self._braked(FAULT_RAMPS[objects.get(FAULT_REACTION_OPTION)], dt_s)
-        if self.state is PowerState.QUICK_STOP_ACTIVE:
-            return self._braked(QUICK_STOP_RAMPS[objects.get(QUICK_STOP_OPTION)], dt_s)
-        if objects.get(CONTROLWORD) & HALT_BIT:
+        values, state = self._objects.values, self._machine.state
+        if state is PowerState.FAULT_REACTION_ACTIVE:
+            return self._braked(FAULT_RAMPS[values[FAULT_REACTION_OPTION, 0]], dt_s)
+        if state is PowerState.QUICK_STOP_ACTIVE:
+            return self._braked(QUICK_STOP_RAMPS[values[QUICK_STOP_OPTION, 0]], dt_s)
+        if values[CONTROLWORD, 0] & HALT_BIT:
             return self._braked(PROFILE_DECELERATION, dt_s)
-        target_rad_s = self._target_counts_s() / self._encoder.counts_per_rad
-        if objects.get(MODE_OF_OPERATION) == OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY:
-            return target_rad_s
-        up, down = self._step(PROFILE_ACCELERATION, dt_s), self._step(PROFILE_DECELERATION, dt_s)
+        counts_per_rad = self._encoder.counts_per_rad
+        target_rad_s = values[TARGET_VELOCITY, 0] / counts_per_rad
+        if values[MODE_OF_OPERATION, 0] == _CYCLIC or target_rad_s == self._demand_rad_s:
+            return float(target_rad_s)
+        step_s = dt_s / counts_per_rad
+        up, down = (
+            values[PROFILE_ACCELERATION, 0] * step_s,
+            values[PROFILE_DECELERATION, 0] * step_s,
+        )
         return ramp_towards(self._demand_rad_s, target_rad_s, up, down)
 
     def _braked(self, deceleration: int, dt_s: float) -> float:
-        step = self._step(deceleration, dt_s)
+        step = self._objects.get(deceleration) / self._encoder.counts_per_rad * dt_s
         return ramp_towards(self._demand_rad_s, 0.0, step, step)
-
-    def _step(self, ramp: int, dt_s: float) -> float:
-        return self._objects.get(ramp) / self._encoder.counts_per_rad * dt_s
 
     def _target_counts_s(self) -> int:
         return self._objects.get(TARGET_VELOCITY)

@@ -15,8 +15,10 @@ class HeartbeatProducer:
 
     def due(self, now_ns: int) -> bool:
         """Tell whether to send one now, and plan the next."""
+        if now_ns < self._next_ns:
+            return False
         period_ns = self._objects.get(HEARTBEAT_PRODUCER) * NS_PER_MS
-        if not period_ns or now_ns < self._next_ns:
+        if not period_ns:
             return False
         self._next_ns = max(self._next_ns + period_ns, now_ns)
         return True
@@ -44,8 +46,10 @@ class HeartbeatConsumer:
 
     def expired(self, now_ns: int) -> bool:
         """Tell once that the producer has gone silent."""
+        if self._heard_ns is None:
+            return False
         limit_ns = (self._objects.get(HEARTBEAT_CONSUMER, 1) & 0xFFFF) * NS_PER_MS
-        if self._heard_ns is None or not limit_ns or now_ns - self._heard_ns <= limit_ns:
+        if not limit_ns or now_ns - self._heard_ns <= limit_ns:
             return False
         self.forget()
         return True

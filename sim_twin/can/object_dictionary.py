@@ -31,15 +31,15 @@ class SdoAbort(Exception):
 class ObjectDictionary:
     """Read and write objects as numbers inside and as bytes for the SDO server.
 
-    `live` computes an object when it is read; `on_write` sees a new value before it is stored and
-    may refuse it by raising SdoAbort; `after_write` sees it stored.
+    `values` are those stored; `live` computes an object when it is read; `on_write` sees a new value
+    before it is stored and may refuse it by raising SdoAbort; `after_write` sees it stored.
     """
 
     def __init__(self, node_id: int, eds_path: Path = EDS_PATH) -> None:
         self._eds_path = eds_path
         self._od = canopen.import_od(str(eds_path), node_id)
         self._variables = _by_key(self._od)
-        self._values: dict[Key, Any] = {}
+        self.values: dict[Key, Any] = {}
         self.live: dict[Key, Callable[[], int]] = {}
         self.on_write: dict[Key, Callable[[int], object]] = {}
         self.after_write: dict[Key, Callable[[], None]] = {}
@@ -49,7 +49,7 @@ class ObjectDictionary:
         """Return all objects, or those below 2000, to the EDS file's defaults."""
         for key, variable in self._variables.items():
             if key[0] <= LAST_COMMUNICATION_INDEX or not communication_only:
-                self._values[key] = variable.default
+                self.values[key] = variable.default
         for follow in dict.fromkeys(self.after_write.values()):
             follow()
 
@@ -57,12 +57,12 @@ class ObjectDictionary:
         """Return a numeric object."""
         key = (index, subindex)
         live = self.live.get(key)
-        value: int = self._values[key] if live is None else live()
+        value: int = self.values[key] if live is None else live()
         return value
 
     def set(self, index: int, subindex: int, value: int) -> None:
         """Store a value from inside the drive, unchecked."""
-        self._values[index, subindex] = value
+        self.values[index, subindex] = value
 
     def read(self, index: int, subindex: int) -> bytes:
         """Return an object's bytes.
@@ -74,7 +74,7 @@ class ObjectDictionary:
         if not variable.readable:
             raise SdoAbort(WRITE_ONLY)
         live = self.live.get((index, subindex))
-        value = live() if live is not None else self._values[index, subindex]
+        value = live() if live is not None else self.values[index, subindex]
         return bytes(variable.encode_raw(value))
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
@@ -92,7 +92,7 @@ class ObjectDictionary:
         react = self.on_write.get((index, subindex))
         if react is not None:
             react(value)
-        self._values[index, subindex] = value
+        self.values[index, subindex] = value
         follow = self.after_write.get((index, subindex))
         if follow is not None:
             follow()
@@ -112,7 +112,7 @@ class ObjectDictionary:
         """Store a number that came by PDO, unless it is out of range: nobody can be told."""
         variable = self._variables[key]
         if not _outside(value, variable.min, variable.max):
-            self._values[key] = value
+            self.values[key] = value
 
     def readdress(self, node_id: int) -> None:
         """Take the defaults of another node id, with the next reset."""

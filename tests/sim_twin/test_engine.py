@@ -61,3 +61,13 @@ def test_only_free_bodies_are_placed(engine: Engine, body: str) -> None:
 def test_posing_an_unknown_joint_is_refused(engine: Engine) -> None:
     with pytest.raises(ModelMismatch, match="'knee'"):
         engine.pose({"knee": 1.0})
+
+
+def test_plain_numbers_tell_the_same_motion_as_arrays(engine: Engine) -> None:
+    engine.data.joint("arm").qpos[0] = 0.8
+    engine.data.joint("arm").qvel[0] = 0.1
+    engine.servos.slip(0, 0.05)
+    ((angle_rad, speed_rad_s),) = engine.servos.motions()
+    assert engine.servos.position_rad() == pytest.approx([angle_rad])
+    assert engine.servos.velocity_rad_s() == pytest.approx([speed_rad_s])
+    assert angle_rad == pytest.approx(-0.25)
