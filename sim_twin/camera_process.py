@@ -14,8 +14,9 @@ from pathlib import Path
 import mujoco
 
 from sim_twin.errors import TwinError
+from sim_twin.faults.camera_relay import CameraBench, CameraFaults
 from sim_twin.film_desk import FilmDesk
-from sim_twin.head_camera import HeadCamera
+from sim_twin.head_camera import HeadCamera, camera_line
 from sim_twin.json_line_server import JsonLineServer
 from sim_twin.lifetime import die_with_parent
 from sim_twin.load import load_model
@@ -41,9 +42,12 @@ class Studio:
         self._data = mujoco.MjData(self._model)
         self._camera = HeadCamera(self._model, self._data, robot.camera, seed)
         self._camera.open()
-        self._stream = StreamLine(
-            self._camera.device, devices_dir / robot.camera.device, self._camera.hang_up
-        )
+        self._shown_ns = 0
+        line = camera_line(self._camera, robot.camera, lambda: self._shown_ns)
+        self._stream = StreamLine(line, devices_dir / robot.camera.device, self._camera.hang_up)
+        bench = CameraBench(robot, self._camera, line, lambda: self._shown_ns)
+        bench.plugs[robot.camera.device].add_socket(self._stream)
+        self._faults = CameraFaults(bench)
         self._desk = FilmDesk(self._model, self._data)
         self._film_server = JsonLineServer(devices_dir / FILM_SOCKET, self._desk.answer)
 
@@ -73,6 +77,8 @@ class Studio:
 
     def _show(self, state: MirrorState) -> None:
         """Take over a state; stamp camera frames with wall time, which never slips."""
+        self._shown_ns = state.wall_ns
+        self._faults.follow(state.camera_faults)
         self._data.qpos[:] = state.qpos
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)

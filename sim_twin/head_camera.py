@@ -1,13 +1,22 @@
 """Be the robot's RGB-D camera: renders the head's view when a frame is due."""
 
 import math
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.protocol import Command, Intrinsics, encode_request
+from drivers.camera.protocol import (
+    BYTES_PER_PIXEL,
+    CRC,
+    HEADER_BYTES,
+    Command,
+    Intrinsics,
+    encode_request,
+)
 from sim_twin.errors import ModelMismatch
+from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.renderer import Renderer, fixed_camera
 from sim_twin.sensors.camera import CameraDevice
 from vla_deploy.robots.description import Camera
@@ -62,6 +71,12 @@ class HeadCamera:
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+
+
+def camera_line(head: HeadCamera, camera: Camera, now_ns: Callable[[], int]) -> LineTamper:
+    """Return the camera's line, on which faults may act."""
+    frame_bytes = HEADER_BYTES + camera.width * camera.height * BYTES_PER_PIXEL + CRC.size
+    return LineTamper(head.device, now_ns, frame_bytes)
 
 
 def _intrinsics(camera: Camera) -> Intrinsics:

@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 
 READY = b"ready"
 """What a drawing process sends back once it draws; anything else is why it cannot."""
-_HEAD = struct.Struct("<qq")
+_HEAD = struct.Struct("<qqI")
 _MAX_STATE_BYTES = 65_536
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MirrorState:
-    """Hold one moment: simulated time, monotonic time, and all positions."""
+    """Hold one moment: simulated time, monotonic time, all positions, and the camera's faults."""
 
     now_ns: int
     wall_ns: int
     qpos: NDArray[np.float64]
+    camera_faults: str = "[]"
 
 
 def mirror_pair() -> tuple[socket.socket, socket.socket]:
@@ -37,7 +38,8 @@ def send_state(sender: socket.socket, state: MirrorState) -> None:
         BrokenPipeError: the receiver has ended.
     """
     try:
-        sender.send(_HEAD.pack(state.now_ns, state.wall_ns) + state.qpos.tobytes())
+        head = _HEAD.pack(state.now_ns, state.wall_ns, len(state.qpos))
+        sender.send(head + state.qpos.tobytes() + state.camera_faults.encode())
     except BlockingIOError:
         return
 
@@ -59,6 +61,7 @@ def newest_state(receiver: socket.socket) -> MirrorState | None:
         newest = packet
     if newest is None:
         return None
-    now_ns, wall_ns = _HEAD.unpack_from(newest)
-    qpos = np.frombuffer(newest, np.float64, offset=_HEAD.size)
-    return MirrorState(now_ns=now_ns, wall_ns=wall_ns, qpos=qpos)
+    now_ns, wall_ns, count = _HEAD.unpack_from(newest)
+    qpos = np.frombuffer(newest, np.float64, count, offset=_HEAD.size)
+    faults = newest[_HEAD.size + qpos.nbytes :].decode()
+    return MirrorState(now_ns=now_ns, wall_ns=wall_ns, qpos=qpos, camera_faults=faults)

@@ -7,9 +7,6 @@ import subprocess
 import sys
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sim_twin.errors import DrawingFailed
 from sim_twin.mirror import READY, MirrorState, mirror_pair, send_state
 
@@ -65,13 +62,13 @@ class MirrorLink:
         if told != READY:
             raise DrawingFailed(told.decode() or f"the {self._name} ended, see its words above")
 
-    def show(self, now_ns: int, wall_ns: int, qpos: NDArray[np.float64]) -> None:
+    def show(self, state: MirrorState) -> None:
         """Pass the state on every 20 ms of simulated time."""
-        if not self.alive or now_ns < self._due_ns:
+        if not self.alive or state.now_ns < self._due_ns:
             return
-        self._due_ns = now_ns + PERIOD_NS
+        self._due_ns = state.now_ns + PERIOD_NS
         try:
-            send_state(self._sender, MirrorState(now_ns=now_ns, wall_ns=wall_ns, qpos=qpos))
+            send_state(self._sender, state)
         except BrokenPipeError:
             self.alive = False
             sys.stderr.write(

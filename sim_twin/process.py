@@ -14,7 +14,11 @@ from sim_twin.can import CanHub
 from sim_twin.drawing import start_camera, start_viewer
 from sim_twin.engine import STEP_NS
 from sim_twin.errors import RefereeRefusal
+from sim_twin.faults.camera_relay import faults_in_force
+from sim_twin.faults.desk import FaultDesk
+from sim_twin.faults.plug import Carrier
 from sim_twin.json_line_server import JsonLineServer
+from sim_twin.mirror import MirrorState
 from sim_twin.mirror_link import MirrorLink
 from sim_twin.pacer import Pacer, RealTimeFactor
 from sim_twin.priority import claim_priority
@@ -68,23 +72,29 @@ class TwinProcess:
         self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
         self._drawings = _start_drawings(options)
         self._servo_line = PtyLine(
-            self._twin.servos,
+            self._twin.lines[robot.servo_bus.device],
             devices / robot.servo_bus.device,
             now_ns=self._now_ns,
             on_baud=self._twin.servos.set_host_baud,
         )
-        self._lines = [
-            self._servo_line if name == robot.servo_bus.device else PtyLine(device, devices / name)
-            for name, device in self._twin.serial_devices.items()
-        ]
-        self._streams = [
-            StreamLine(device, devices / name, device.announce)
-            for name, device in self._twin.streamed_devices.items()
-        ]
+        self._lines = {
+            name: self._servo_line
+            if name == robot.servo_bus.device
+            else PtyLine(line, devices / name)
+            for name, line in self._twin.lines.items()
+        }
+        self._streams = {
+            name: StreamLine(line, devices / name, self._twin.streamed_devices[name].announce)
+            for name, line in self._twin.stream_lines.items()
+        }
+        served: dict[str, Carrier] = {**self._lines, **self._streams}
+        for name, carrier in served.items():
+            self._twin.plugs[name].add_socket(carrier)
         self._referee = JsonLineServer(devices / REFEREE_SOCKET, self.answer)
         self._operations: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "truth": self._truth,
             "inside": self._inside,
+            **FaultDesk(self._twin.faults, robot).operations,
         }
         gc.collect()
         gc.freeze()  # a full collection of the model and libraries takes longer than a step
@@ -107,7 +117,7 @@ class TwinProcess:
             ready, _, _ = select.select(self._filenos(), [], [], wait_ns / NS_PER_S)
             if ready:
                 self._serve(set(ready))
-            if reply_ns is not None and reply_ns <= self._now_ns():
+            if reply_ns is not None and reply_ns <= self._now_ns() and self._servo_line.is_plugged:
                 self._servo_line.poll_once()
 
     def close(self) -> None:
@@ -115,18 +125,19 @@ class TwinProcess:
         self._ready.unlink(missing_ok=True)
         self._referee.close()
         self._hub.close()
-        for line in self._lines:
+        for line in self._lines.values():
             line.close()
-        for stream in self._streams:
+        for stream in self._streams.values():
             stream.close()
         for drawing in self._drawings:
             drawing.close()
 
     def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Answer the referee's `truth` and `inside`.
+        """Answer the referee's `truth` and `inside`, and what the fault desk is asked.
 
         Raises:
             RefereeRefusal: the operation, object or container is unknown.
+            FaultRefused: the fault is unknown, not supported there, or out of range.
         """
         operation = self._operations.get(str(request.get("op")))
         if operation is None:
@@ -141,26 +152,35 @@ class TwinProcess:
     def _step(self, wall_ns: int) -> None:
         self._twin.step()
         self._pacer.stepped()
-        for line in self._lines:
+        for line in self._plugged():
             line.poll_once()
-        for stream in self._streams:
+        for stream in self._streams.values():
             if stream.has_client:
                 stream.poll_once()
         now_ns = self._twin.now_ns
         self._factor.update(wall_ns, now_ns)
+        state = MirrorState(
+            now_ns=now_ns,
+            wall_ns=wall_ns,
+            qpos=self._twin.engine.data.qpos,
+            camera_faults=faults_in_force(self._twin.faults),
+        )
         for drawing in self._drawings:
-            drawing.show(now_ns, wall_ns, self._twin.engine.data.qpos)
+            drawing.show(state)
+
+    def _plugged(self) -> list[PtyLine]:
+        return [line for line in self._lines.values() if line.is_plugged]
 
     def _filenos(self) -> list[int]:
-        lines = [line.fileno() for line in self._lines]
-        streams = [fileno for stream in self._streams for fileno in stream.filenos()]
+        lines = [line.fileno() for line in self._plugged()]
+        streams = [fileno for stream in self._streams.values() for fileno in stream.filenos()]
         return [*lines, *streams, *self._hub.filenos(), *self._referee.filenos()]
 
     def _serve(self, ready: set[int]) -> None:
-        for line in self._lines:
+        for line in self._plugged():
             if line.fileno() in ready:
                 line.poll_once()
-        for stream in self._streams:
+        for stream in self._streams.values():
             if not ready.isdisjoint(stream.filenos()):
                 stream.poll_once()
         if not ready.isdisjoint(self._hub.filenos()):

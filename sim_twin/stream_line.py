@@ -21,11 +21,8 @@ class StreamLine:
         self._hang_up = hang_up
         self._client: socket.socket | None = None
         self._pending = memoryview(b"")
-        path.unlink(missing_ok=True)
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._listener.setblocking(False)
-        self._listener.bind(str(path))
-        self._listener.listen()
+        self._listener: socket.socket | None = None
+        self.replug()
 
     @property
     def is_backed_up(self) -> bool:
@@ -39,8 +36,8 @@ class StreamLine:
 
     def filenos(self) -> list[int]:
         """Return the descriptors whose input matters."""
-        client = [] if self._client is None else [self._client.fileno()]
-        return [self._listener.fileno(), *client]
+        sockets = [each for each in (self._listener, self._client) if each is not None]
+        return [each.fileno() for each in sockets]
 
     def output_filenos(self) -> list[int]:
         """Return the descriptor that has bytes waiting for room."""
@@ -59,13 +56,31 @@ class StreamLine:
         except OSError:  # the client died: the device hears of it and awaits the next one
             self._drop()
 
-    def close(self) -> None:
-        """Hang up and take the socket away."""
+    def unplug(self) -> None:
+        """Hang up and take the socket away, as pulling the cable does."""
         self._drop()
-        self._listener.close()
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
         self._path.unlink(missing_ok=True)
 
+    def replug(self) -> None:
+        """Serve the socket again; nothing happens while it is served."""
+        if self._listener is not None:
+            return
+        self._path.unlink(missing_ok=True)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._listener.setblocking(False)
+        self._listener.bind(str(self._path))
+        self._listener.listen()
+
+    def close(self) -> None:
+        """Unplug for good; closing twice is allowed."""
+        self.unplug()
+
     def _accept(self) -> None:
+        if self._listener is None:
+            return
         try:
             client, _ = self._listener.accept()
         except BlockingIOError:
