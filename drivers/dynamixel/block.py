@@ -2,134 +2,87 @@
 
 The usual reply has a known length and known headers. Anything else - byte stuffing is an everyday
 event here, see `ReplyCollector` - takes the slow path to the same values.
+
+After a wait the caches are cold. Then a call of numpy costs ten times what it does in a loop, and
+`struct` with plain numbers is the faster way for the few servos that a bus has.
 """
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from drivers.dynamixel.codec import BROADCAST_ID, HEADER, Instruction, crc16
-from drivers.dynamixel.layout import CLIMATE, MOTION, STATUS, Block, Field
-from drivers.dynamixel.sync_read import Entry, SyncRead
+from drivers.dynamixel.layout import Block
+from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES, Entry, SyncRead
 
-_FAST_HEAD_BYTES: Final = 8
-_STATUS_HEAD_BYTES: Final = 9  # header .. error
-_FAST_STRIDE_OVERHEAD: Final = 4
-_STATUS_STRIDE_OVERHEAD: Final = 11
+_CODES: Final = {1: "B", 2: "H", 4: "I"}
+"""The struct code of an unsigned value by its bytes; a signed one has the small letter."""
+_FAST_OVERHEAD_BYTES: Final = 4
 
-Raw = NDArray[np.int32]
+Columns = dict[str, tuple[int, ...]]
+"""Raw values by the names of the block's fields, in the order of the servos."""
 
 
 class BlockRead:
     """Hold the request for one block of many servos, and the exact look of its usual reply.
 
-    `raw` has a row for each of `MOTION` (and of `CLIMATE` where the block has them) and a column
-    for each servo; `status` has a byte string for each of `STATUS`; `errors` the status packets'
-    error bytes; `voltage_low` the low bytes of the voltage. All are of the last reply taken.
-    Headers and CRCs are compared as bytes: after a wait the caches are cold, and then each numpy
-    call costs several times what it does in a loop.
+    `columns` and `errors`, the status packets' error bytes, are those of the last reply taken.
     """
 
     def __init__(self, ids: Sequence[int], block: Block, *, fast: bool) -> None:
         self.block = block
         self.fast = fast
-        self.ids = tuple(ids)
         self.sync_read = SyncRead(ids, block.address, block.size, fast=fast)
-        self.rows = MOTION + CLIMATE if "voltage" in block.fields else MOTION
-        self.errors = b""
-        self.status: tuple[bytes, ...] = ()
-        self.voltage_low = b""
+        self.columns: Columns = {}
+        self.errors: tuple[int, ...] = ()
+        names = sorted(block.fields, key=lambda name: block.fields[name].start)
+        codes = "".join(_code(block, name) for name in names)
+        self._names = names
+        self._one = struct.Struct("<" + codes)
+        self._stride = len(names) + 3  # error, id or head, fields, CRC
         if fast:
-            start, stride = _FAST_HEAD_BYTES + 2, block.size + _FAST_STRIDE_OVERHEAD
-            self._error_bytes = slice(_FAST_HEAD_BYTES, None, stride)
+            self._all = struct.Struct("<8x" + f"BB{codes}H" * len(ids))
+            self._keys: tuple[object, ...] = tuple(ids)
+            self._key, self._error = 1, 0
+            self._head = _head(BROADCAST_ID, len(ids) * (block.size + _FAST_OVERHEAD_BYTES) + 1)
+            self._checked = [slice(0, -2)]
+            self._crcs = slice(-1, None)
         else:
-            start, stride = _STATUS_HEAD_BYTES, block.size + _STATUS_STRIDE_OVERHEAD
-            self._error_bytes = slice(_STATUS_HEAD_BYTES - 1, None, stride)
-        self._picture = _Picture(len(ids), block, self.rows, start, stride)
-        self.raw = self._picture.raw
-        self._ids = bytes(ids)
-        self._id_bytes = slice(_FAST_HEAD_BYTES + 1, None, stride)
-        self._heads = tuple(_status_head(servo_id, block.size) for servo_id in ids)
-        self._heads_and_crcs = struct.Struct("<" + f"8s{block.size + 1}xH" * len(ids))
-        self._checked = [slice(n * stride, (n + 1) * stride - 2) for n in range(len(ids))]
-        length = len(ids) * (block.size + _FAST_STRIDE_OVERHEAD) + 1
-        self._fast_head = HEADER + bytes(
-            (BROADCAST_ID, length & 0xFF, length >> 8, Instruction.STATUS)
-        )
+            self._all = struct.Struct("<" + f"8sB{codes}H" * len(ids))
+            self._keys = tuple(_head(servo_id, block.size + 4) for servo_id in ids)
+            self._key, self._error = 0, 1
+            self._head = HEADER
+            size = block.size + STATUS_OVERHEAD_BYTES
+            self._checked = [slice(n * size, (n + 1) * size - 2) for n in range(len(ids))]
+            self._crcs = slice(self._stride - 1, None, self._stride)
 
     def take(self, reply: bytes) -> bool:
         """Decode a reply and tell so, unless it is not exactly the usual one."""
-        if len(reply) != self.sync_read.reply_bytes:
+        if len(reply) != self.sync_read.reply_bytes or not reply.startswith(self._head):
             return False
-        if not (self._is_fast(reply) if self.fast else self._is_each(reply)):
+        values, stride = self._all.unpack(reply), self._stride
+        if values[self._key :: stride] != self._keys:
             return False
-        self._picture.take(reply)
-        self.errors = reply[self._error_bytes]
-        self.status = tuple([reply[part] for part in self._picture.status])
-        self.voltage_low = reply[self._picture.voltage_low]
+        # in a fast reply the last CRC covers all that comes before, the other servos' CRCs too
+        if [crc16(reply[part]) for part in self._checked] != list(values[self._crcs]):
+            return False
+        self.errors = values[self._error :: stride]
+        self.columns = {
+            name: values[place::stride] for place, name in enumerate(self._names, start=2)
+        }
         return True
 
-    def decode(
-        self, entries: Mapping[int, Entry], ids: Sequence[int]
-    ) -> tuple[Raw, bytes, tuple[bytes, ...]]:
-        """Return raw values, error bytes and status of re-framed entries of some servos."""
-        picture = _Picture(len(ids), self.block, self.rows, 0, self.block.size)
-        data = b"".join([entries[servo_id].data for servo_id in ids])
-        picture.take(data)
-        errors = bytes([entries[servo_id].error for servo_id in ids])
-        return picture.raw, errors, tuple([data[part] for part in picture.status])
-
-    def _is_each(self, reply: bytes) -> bool:
-        heads_and_crcs = self._heads_and_crcs.unpack(reply)
-        return heads_and_crcs[0::2] == self._heads and heads_and_crcs[1::2] == tuple(
-            [crc16(reply[part]) for part in self._checked]
-        )
-
-    def _is_fast(self, reply: bytes) -> bool:
-        if not reply.startswith(self._fast_head) or reply[self._id_bytes] != self._ids:
-            return False
-        # the last CRC covers all that comes before, the CRCs of the other servos included
-        return crc16(reply[:-2]) == int.from_bytes(reply[-2:], "little")
+    def decode(self, entries: Sequence[Entry]) -> tuple[Columns, tuple[int, ...]]:
+        """Return the columns and error bytes of re-framed entries."""
+        rows = [self._one.unpack(entry.data) for entry in entries]
+        columns = dict(zip(self._names, zip(*rows, strict=True), strict=True)) if rows else {}
+        return columns, tuple(entry.error for entry in entries)
 
 
-class _Picture:
-    """Know where each byte of each value lies in a reply; one gather makes integers of them."""
-
-    def __init__(
-        self, count: int, block: Block, rows: Sequence[str], start: int, stride: int
-    ) -> None:
-        total = start + count * stride
-        self._bytes = bytearray(total + 1)  # the last byte stays zero
-        self._end = total
-        self._source = np.frombuffer(self._bytes, np.uint8)
-        offsets = start + stride * np.arange(count, dtype=np.intp)
-        self._index = np.stack([_byte_places(block.fields[n], offsets, total) for n in rows])
-        self._gathered = np.zeros(self._index.shape, np.uint8)
-        self.raw: Raw = self._gathered.view("<i4")[:, :, 0]
-        places = [block.fields[name].start for name in STATUS if name in block.fields]
-        self.status = [slice(start + place, total, stride) for place in places]
-        voltage = block.fields.get("voltage")
-        self.voltage_low = slice(start + voltage.start, total, stride) if voltage else slice(0, 0)
-
-    def take(self, reply: bytes) -> None:
-        self._bytes[: len(reply)] = reply
-        self._source.take(self._index, out=self._gathered, mode="clip")
+def _code(block: Block, name: str) -> str:
+    field = block.fields[name]
+    return _CODES[field.size].lower() if field.signed else _CODES[field.size]
 
 
-def _byte_places(field: Field, offsets: NDArray[np.intp], zero: int) -> NDArray[np.intp]:
-    """Return, per servo, which four bytes of a reply make up a value; `zero` is a zero byte."""
-    places = [offsets + field.start + n for n in range(field.size)]
-    padding = [np.full(len(offsets), zero, dtype=np.intp)] * (4 - field.size)
-    return np.stack(padding + places if field.signed else places + padding, axis=1)
-
-
-def raw_unit(field: Field) -> float:
-    """Return by what a raw value must be multiplied to be the register's."""
-    return 1.0 / (1 << 8 * (4 - field.size)) if field.signed else 1.0
-
-
-def _status_head(servo_id: int, size: int) -> bytes:
-    return HEADER + bytes((servo_id, size + 4, 0, Instruction.STATUS))
+def _head(servo_id: int, length: int) -> bytes:
+    return HEADER + bytes((servo_id, length & 0xFF, length >> 8, Instruction.STATUS))

@@ -122,9 +122,7 @@ class StateReader:
             reply = self._link.receive_chained(read.sync_read, self._deadline_ns, self._margin_s)
         else:
             reply = self._link.receive_all(read.sync_read.reply_bytes, self._deadline_ns)
-        if read.take(reply) and 0 not in read.voltage_low:
-            group.store()
-        else:
+        if not (read.take(reply) and group.store()):
             self._collect_anew(group, reply)
 
     def _finish(self) -> None:
