@@ -24,6 +24,21 @@ _FIRST_READS = 10
 GAINS = {"position_p_gain": 1600, "position_i_gain": 0, "position_d_gain": 8000}
 
 
+def servo_specs(robot: RobotDescription) -> list[ServoSpec]:
+    """Return what the bus driver must know of each servo of a robot."""
+    return [
+        ServoSpec(
+            id=servo.id,
+            model_name=servo.model,
+            joint=servo.joint,
+            sign=servo.sign,
+            offset_rad=servo.offset,
+            travel_per_rad=servo.travel_per_rad,
+        )
+        for servo in robot.servo_bus.servos
+    ]
+
+
 class ServoLine:
     """Own the bus of all servos; a lost link is remembered, not raised, after `open`."""
 
@@ -38,17 +53,7 @@ class ServoLine:
         self._clock = clock
         self._baud = robot.servo_bus.baud
         self._watchdog_s = profile.bus_watchdog_s
-        self._specs = [
-            ServoSpec(
-                id=servo.id,
-                model_name=servo.model,
-                joint=servo.joint,
-                sign=servo.sign,
-                offset_rad=servo.offset,
-                travel_per_rad=servo.travel_per_rad,
-            )
-            for servo in robot.servo_bus.servos
-        ]
+        self._specs = servo_specs(robot)
         self._ids = [spec.id for spec in self._specs]
         self._bus: DynamixelBus | None = None
         self._next_open_ns = 0
