@@ -1,6 +1,6 @@
 """Translate between the robot's joints and the motor shafts that the emulated firmware knows."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -37,9 +37,12 @@ class Shafts:
         self._zero_rad = np.array([shaft.offset for shaft in shafts]) / ratio
         self._per_joint = 1.0 / ratio
         self._sign = np.sign(ratio)
-        self._joints = list(
-            zip(model.jnt_qposadr[joints].tolist(), model.jnt_dofadr[joints].tolist(), strict=True)
-        )
+        self._rows = [
+            (int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint]), actuator, row)
+            for row, (joint, actuator) in enumerate(zip(joints, actuators, strict=True))
+        ]
+        self._per_joint_each: list[float] = self._per_joint.tolist()
+        self._sign_each: list[float] = self._sign.tolist()
 
     def position_rad(self) -> Floats:
         """Return shaft angles."""
@@ -54,11 +57,11 @@ class Shafts:
 
     def motions(self) -> list[tuple[float, float]]:
         """Return each shaft's angle and speed as plain numbers, which is faster for a few."""
-        qpos, qvel = self._all_qpos.item, self._all_qvel.item
-        scales = zip(self._joints, self._per_joint.tolist(), self._zero_rad.tolist(), strict=True)
+        qpos, qvel, zero_rad = self._all_qpos.item, self._all_qvel.item, self._zero_rad.item
+        per_joint = self._per_joint_each
         return [
-            (qpos(angle) * per_joint - zero_rad, qvel(speed) * per_joint)
-            for (angle, speed), per_joint, zero_rad in scales
+            (qpos(angle) * per_joint[row] - zero_rad(row), qvel(speed) * per_joint[row])
+            for angle, speed, _, row in self._rows
         ]
 
     def effort(self) -> Floats:
@@ -66,9 +69,15 @@ class Shafts:
         effort: Floats = self._all_force[self._actuator] * self._sign
         return effort
 
-    def command(self, value: Floats | list[float]) -> None:
+    def command(self, value: Floats) -> None:
         """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
         self._all_ctrl[self._actuator] = value * self._sign
+
+    def command_each(self, values: Iterable[float]) -> None:
+        """Set the motors' input from plain numbers."""
+        ctrl, signs = self._all_ctrl, self._sign_each
+        for value, (_, _, actuator, row) in zip(values, self._rows, strict=True):
+            ctrl[actuator] = value * signs[row]
 
     def slip(self, row: int, angle_rad: float) -> None:
         """Measure a shaft further off than it is, as an encoder does after a blow."""

@@ -174,8 +174,9 @@ class Twin:
         )
         shafts.command(duty)
         wheels = zip(self.drives, engine.drives.motions(), strict=True)
-        torque_nm = [drive.advance(now_ns, angle, speed) for drive, (angle, speed) in wheels]
-        engine.drives.command(torque_nm)
+        engine.drives.command_each(
+            [drive.advance(now_ns, angle, speed) for drive, (angle, speed) in wheels]
+        )
 
 
 def _servo_specs(robot: RobotDescription) -> list[EmulatedServoSpec]:

@@ -31,8 +31,8 @@ class SdoAbort(Exception):
 class ObjectDictionary:
     """Read and write objects as numbers inside and as bytes for the SDO server.
 
-    `values` are those stored; `live` computes an object when it is read; `on_write` sees a new value
-    before it is stored and may refuse it by raising SdoAbort; `after_write` sees it stored.
+    `values` are those stored; `live` computes an object when it is read; `on_write` sees a new
+    value before it is stored and may refuse it by raising SdoAbort; `after_write` sees it stored.
     """
 
     def __init__(self, node_id: int, eds_path: Path = EDS_PATH) -> None:
@@ -117,6 +117,10 @@ class ObjectDictionary:
     def readdress(self, node_id: int) -> None:
         """Take the defaults of another node id, with the next reset."""
         self._variables = _by_key(canopen.import_od(str(self._eds_path), node_id))
+
+    def reader(self, key: Key) -> Callable[[], int]:
+        """Return what reads a numeric object again and again."""
+        return self.live.get(key) or (lambda: self.get(*key))
 
     def has(self, key: Key) -> bool:
         """Tell whether there is such an object."""

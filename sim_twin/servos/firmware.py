@@ -310,5 +310,6 @@ class Firmware:
         self._stale = False
         self._motion.reload()
         self._goal_window.reload()
+        self._protection.reload()
         levels = self._columns.status_return_level
         self._all_readable = bool((levels >= StatusReturnLevel.READ).all())

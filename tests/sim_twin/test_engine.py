@@ -71,3 +71,5 @@ def test_plain_numbers_tell_the_same_motion_as_arrays(engine: Engine) -> None:
     assert engine.servos.position_rad() == pytest.approx([angle_rad])
     assert engine.servos.velocity_rad_s() == pytest.approx([speed_rad_s])
     assert angle_rad == pytest.approx(-0.25)
+    engine.servos.command_each([0.25])
+    assert engine.data.ctrl[0] == -0.25
