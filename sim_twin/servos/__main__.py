@@ -99,9 +99,8 @@ def main(arguments: Sequence[str]) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: stopped.append(received))
     servos = _build(options)
-    if options.baud is not None:
-        gc.freeze()  # a full collection takes longer than a reply
-        claim_priority()
+    gc.freeze()  # a full collection takes longer than a reply
+    claim_priority()
     serve(
         servos,
         options.link,

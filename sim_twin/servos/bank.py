@@ -162,9 +162,7 @@ class ServoBank:
 
     def answer_as(self, servo_id: int, other_id: int | None) -> None:
         """Let this servo put another id into its replies; None ends it."""
-        self._faults.aliases.pop(self._row(servo_id), None)
-        if other_id is not None:
-            self._faults.aliases[self._row(servo_id)] = other_id
+        self._faults.set_alias(self._row(servo_id), other_id)
 
     def delay(self, servo_id: int, seconds: float) -> None:
         """Let every reply of this servo come later by this time; 0 ends it."""

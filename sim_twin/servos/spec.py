@@ -11,7 +11,8 @@ class EmulatedServoSpec:
     """Say which servo sits on the bus; `eeprom` replaces factory values by register name.
 
     Raises:
-        ValueError: the model or a register is unknown, or a register is not in the EEPROM.
+        ValueError: the model or a register is unknown, a register is not in the EEPROM, or its
+            value is out of range.
     """
 
     id: int
@@ -31,6 +32,13 @@ class EmulatedServoSpec:
             raise ValueError(
                 f"servo {self.id} ({self.model_name}): eeprom: not in its EEPROM: {wrong}"
             )
+        for name, value in self.eeprom.items():
+            low, high = registers[name].minimum, registers[name].maximum
+            if low is not None and high is not None and not low <= value <= high:
+                raise ValueError(
+                    f"servo {self.id} ({self.model_name}): eeprom: {name}: expected {low}..{high}, "
+                    f"got {value}"
+                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

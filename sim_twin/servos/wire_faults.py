@@ -9,6 +9,7 @@ from random import Random
 from typing import Final
 
 from drivers.clock import NS_PER_S
+from drivers.dynamixel.codec import MAX_SERVO_ID
 
 _MAX_NOISE_BYTES: Final = 6
 
@@ -88,13 +89,25 @@ class WireFaults:
             del self._spoilers[row]
 
     def set_delay(self, row: int, delay_s: float) -> None:
-        """Let every reply of a servo come later by this time; 0 ends it."""
+        """Let every reply of a servo come later by this time; 0 ends it.
+
+        Raises:
+            ValueError: the time is negative.
+        """
+        if delay_s < 0.0:
+            raise ValueError(f"delay of a reply: expected 0 s or more, got {delay_s}")
         self._delays_ns.pop(row, None)
         if delay_s > 0.0:
             self._delays_ns[row] = round(delay_s * NS_PER_S)
 
     def set_loss(self, row: int, ratio: float, seed: int) -> None:
-        """Lose this share of a servo's replies; 0 ends it."""
+        """Lose this share of a servo's replies; 0 ends it.
+
+        Raises:
+            ValueError: the share is not within 0..1.
+        """
+        if not 0.0 <= ratio <= 1.0:
+            raise ValueError(f"share of lost replies: expected 0..1, got {ratio}")
         self._losses.pop(row, None)
         if ratio > 0.0:
             self._losses[row] = ratio, Random(f"{seed} {row} loss")
@@ -108,6 +121,18 @@ class WireFaults:
         self._shared_ids = {
             row: self._shared_ids.get(row) or Random(f"{row} shared") for row in rows
         }
+
+    def set_alias(self, row: int, servo_id: int | None) -> None:
+        """Let a servo answer under another id; None ends it.
+
+        Raises:
+            ValueError: no servo can have the id.
+        """
+        if servo_id is not None and not 0 <= servo_id <= MAX_SERVO_ID:
+            raise ValueError(f"id in replies: expected 0..{MAX_SERVO_ID}, got {servo_id}")
+        self.aliases.pop(row, None)
+        if servo_id is not None:
+            self.aliases[row] = servo_id
 
     def late_ns(self, row: int) -> int:
         """Return by how much a servo's reply is late."""

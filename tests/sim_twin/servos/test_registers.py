@@ -162,6 +162,8 @@ def test_a_specification_with_unknown_names_is_refused_with_what_is_expected() -
         EmulatedServoSpec(id=1, model_name="AX-12")
     with pytest.raises(ValueError, match=r"not in its EEPROM: \['goal_position'\]"):
         EmulatedServoSpec(id=1, model_name="XM430-W350", eeprom={"goal_position": 1})
+    with pytest.raises(ValueError, match=r"baud_rate: expected 0\.\.7, got 9"):
+        EmulatedServoSpec(id=1, model_name="XM430-W350", eeprom={"baud_rate": 9})
 
 
 @pytest.mark.parametrize(

@@ -185,3 +185,20 @@ def test_an_adapter_that_echoes_hears_itself_first(trio: Any) -> None:
 def test_the_name_of_an_unknown_servo_is_refused_with_those_there_are(trio: Any) -> None:
     with pytest.raises(KeyError, match=r"no servo has the id 9; there are \[1, 2, 3\]"):
         trio.bank.garble(9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda bank: bank.delay(1, -0.1), "expected 0 s or more, got -0.1"),
+        (lambda bank: bank.drop_ratio(1, 1.5), r"expected 0\.\.1, got 1.5"),
+        (lambda bank: bank.answer_as(1, 253), r"expected 0\.\.252, got 253"),
+    ],
+)
+def test_a_fault_that_no_servo_can_have_is_refused_and_changes_nothing(
+    trio: Any, wrong: Callable[[Any], None], said: str
+) -> None:
+    clean = hear(trio)
+    with pytest.raises(ValueError, match=said):
+        wrong(trio.bank)
+    assert hear(trio) == clean
