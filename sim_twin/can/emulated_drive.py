@@ -79,13 +79,16 @@ class EmulatedDrive(ABC):
         self._now_ns = now_ns
         stage, sign = self._stage, self._sign
         if not self._supplied:
-            stage.load(0.0, 0.0, dt_s)
+            if not stage.at_rest:
+                stage.load(0.0, 0.0, dt_s)
             return 0.0
         velocity_rad_s *= sign
         self._encoder.measure(sign * position_rad, velocity_rad_s)
         torque_nm = self._act(now_ns, dt_s, velocity_rad_s)
-        stage.load(torque_nm, velocity_rad_s, dt_s)
-        self._protect()
+        if torque_nm or not stage.at_rest:
+            stage.load(torque_nm, velocity_rad_s, dt_s)
+        if self.armed or not stage.at_rest:
+            self._protect()
         return sign * torque_nm
 
     def _protect(self) -> None:
@@ -133,7 +136,7 @@ class EmulatedDrive(ABC):
 
     def overload(self, on: bool) -> None:
         """Let the full current flow without moving anything, as in a jammed gear; I²t trips."""
-        self._stage.jammed = on
+        self._stage.jam(on)
 
     def _transmit(self, can_id: int, data: bytes) -> None:
         if not self._silent:

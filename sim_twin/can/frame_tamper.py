@@ -17,6 +17,11 @@ class FrameTamper:
         self._drop_random = random.Random(0)
         self._corrupt_random = random.Random(0)
 
+    @property
+    def idle(self) -> bool:
+        """Tell whether nothing is wrong."""
+        return not (self.delay_ns or self._drop_every or self._drop_ratio or self._corrupt_ratio)
+
     def drop_every(self, count: int) -> None:
         """Lose every `count`-th frame; 0 loses none."""
         if count < 0:

@@ -40,6 +40,10 @@ class PdoServer:
         self._transmits = transmits
         self._syncs = 0
         self.keys: tuple[Key, ...] = ()
+        self.cob_id: int | None = None
+        self.synchronous = True
+        self._every_syncs = 1
+        self._readers: list[Callable[[], int]] = []
         self._wire = struct.Struct("")
         self.on_change: Callable[[], None] = lambda: None
         react = objects.on_write
@@ -53,32 +57,21 @@ class PdoServer:
         self.refresh()
 
     @property
-    def cob_id(self) -> int | None:
-        """Return the identifier, or None where the PDO is invalid."""
-        value = self._objects.get(self._communication, COB_ID)
-        return None if value & INVALID_BIT else value & IDENTIFIER_MASK
-
-    @property
-    def transmission(self) -> int:
-        """Return the transmission type."""
-        return self._objects.get(self._communication, TRANSMISSION)
-
-    @property
-    def synchronous(self) -> bool:
-        """Tell whether the PDO waits for SYNC."""
-        return self.transmission <= LAST_SYNCHRONOUS
-
-    @property
     def size(self) -> int:
         """Return the length of the data in bytes."""
         return self._wire.size
 
     def refresh(self) -> None:
-        """Take over the parameters from the object dictionary."""
+        """Take over the parameters from the object dictionary; no `cob_id` is an invalid PDO."""
+        value = self._objects.get(self._communication, COB_ID)
+        self.cob_id = None if value & INVALID_BIT else value & IDENTIFIER_MASK
+        self._every_syncs = self._objects.get(self._communication, TRANSMISSION)
+        self.synchronous = self._every_syncs <= LAST_SYNCHRONOUS
         count = self._objects.get(self._mapping, 0)
         rows = [self._objects.get(self._mapping, row) for row in range(1, count + 1)]
         self.keys = tuple((entry >> 16, entry >> 8 & 0xFF) for entry in rows)
         self._wire = struct.Struct("<" + "".join(map(self._objects.wire_format, self.keys)))
+        self._readers = [self._objects.reader(key) for key in self.keys]
         self._syncs = 0
         self.on_change()
 
@@ -87,14 +80,14 @@ class PdoServer:
         if self.cob_id is None:
             return False
         self._syncs += 1
-        if self._syncs < self.transmission:
+        if self._syncs < self._every_syncs:
             return False
         self._syncs = 0
         return True
 
     def pack(self) -> bytes:
         """Return the mapped objects' present values."""
-        return self._wire.pack(*[self._objects.get(*key) for key in self.keys])
+        return self._wire.pack(*[read() for read in self._readers])
 
     def unpack(self, data: bytes) -> dict[Key, int]:
         """Return the values of the mapped objects."""

@@ -7,6 +7,8 @@ from typing import Final
 
 # No edge for this long reads as standstill.
 EDGE_TIMEOUT_S: Final = 0.05
+# A winding this little warmer than the room is cold: nothing about it changes any more.
+AT_REST_K: Final = 0.01
 
 
 class Trip(Enum):
@@ -64,6 +66,7 @@ class PowerStage:
             spec.current_limit_a**2 - spec.continuous_current_a**2
         )
         self._hot = False
+        self.at_rest = True
 
     def torque_range_nm(self, velocity_rad_s: float) -> tuple[float, float]:
         """Return the torques that current limit and back-EMF allow, the lowest first."""
@@ -85,6 +88,8 @@ class PowerStage:
         felt_a = spec.current_limit_a if self.jammed else current_a
         surplus_a2 = felt_a * felt_a - spec.continuous_current_a**2
         self._i2t_a2s = max(0.0, self._i2t_a2s + surplus_a2 * dt_s)
+        warm = self.temperature_c - spec.ambient_c > AT_REST_K
+        self.at_rest = not (torque_nm or warm or self._i2t_a2s or self.jammed)
 
     def trip(self, armed: bool) -> Trip | None:
         """Return what forbids torque now; voltage and I²t count only where power is `armed`."""
@@ -105,6 +110,12 @@ class PowerStage:
         """Heat the winding beyond its limit; it cools down by itself."""
         spec = self.spec
         self.temperature_c = spec.temperature_limit_c + spec.temperature_hysteresis_c
+        self.at_rest = False
+
+    def jam(self, on: bool) -> None:
+        """Let the I²t guard feel the full current, whatever flows."""
+        self.jammed = on
+        self.at_rest = False
 
     def forget_load(self) -> None:
         """Clear what the firmware keeps in memory, as a reset does; the heat stays."""
@@ -119,8 +130,8 @@ class Encoder:
         self.counts_per_rev = counts_per_rev
         self.counts_per_rad = counts_per_rev / math.tau
         self.frozen = False
-        self.travelled = 0
-        self.counts_s = 0.0
+        self._position_rad = 0.0
+        self._velocity_rad_s = 0.0
         self._zero_rad: float | None = None
 
     def lose_supply(self) -> None:
@@ -130,10 +141,19 @@ class Encoder:
 
     def measure(self, position_rad: float, velocity_rad_s: float) -> None:
         """Take the shaft's angle and speed."""
-        if self.frozen:
-            return
         if self._zero_rad is None:
             self._zero_rad = position_rad
-        self.travelled = round((position_rad - self._zero_rad) * self.counts_per_rad)
-        counts_s = velocity_rad_s * self.counts_per_rad
-        self.counts_s = counts_s if abs(counts_s) * EDGE_TIMEOUT_S >= 1.0 else 0.0
+        if not self.frozen:
+            self._position_rad = position_rad
+            self._velocity_rad_s = velocity_rad_s
+
+    @property
+    def travelled(self) -> int:
+        """Return the whole steps since power-on."""
+        return round((self._position_rad - (self._zero_rad or 0.0)) * self.counts_per_rad)
+
+    @property
+    def counts_s(self) -> float:
+        """Return the velocity in counts per second."""
+        counts_s = self._velocity_rad_s * self.counts_per_rad
+        return counts_s if abs(counts_s) * EDGE_TIMEOUT_S >= 1.0 else 0.0

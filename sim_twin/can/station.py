@@ -21,6 +21,7 @@ class Station:
 
     __slots__ = (
         "arbitration_losses",
+        "bus_off",
         "counters",
         "frames_refused",
         "is_node",
@@ -43,6 +44,7 @@ class Station:
         self.queue: deque[can.Message] = deque()
         self.counters = ErrorCounters()
         self.told = ErrorState.ACTIVE
+        self.bus_off = False
         self.ready_ns = 0
         self.restart_ns: int | None = None
         self.wrong_bitrate = False
@@ -51,9 +53,10 @@ class Station:
         self.frames_refused = 0
 
     @property
-    def bus_off(self) -> bool:
-        """Tell whether the controller has left the bus."""
-        return self.told is ErrorState.BUS_OFF
+    def sound(self) -> bool:
+        """Tell whether there is neither an error to remember nor a frame to send."""
+        counters = self.counters
+        return not (counters.tec or counters.rec or self.wrong_bitrate or self.queue)
 
     @property
     def error_active(self) -> bool:
@@ -77,6 +80,7 @@ class Station:
             return
         self.told = state
         if state is ErrorState.BUS_OFF:
+            self.bus_off = True
             self.queue.clear()
         self.receive(state_frame(self.counters))
 
@@ -119,4 +123,5 @@ class Station:
         self.restart_ns = None
         self.counters.reset()
         self.told = ErrorState.ACTIVE
+        self.bus_off = False
         self.receive(restarted_frame(self.counters))

@@ -15,6 +15,7 @@ class Stations:
     def __init__(self) -> None:
         self.cut = False
         self._by_owner: dict[Hashable, Station] = {}
+        self._all: tuple[Station, ...] = ()
 
     def add(
         self,
@@ -27,6 +28,7 @@ class Stations:
         """Connect a controller."""
         station = Station(receive, supplied, is_node=is_node)
         self._by_owner[owner] = station
+        self._all = tuple(self._by_owner.values())
         return station
 
     def of(self, owner: Hashable) -> Station:
@@ -39,31 +41,41 @@ class Stations:
 
     def remove(self, owner: Hashable) -> Station:
         """Disconnect a controller."""
-        return self._by_owner.pop(owner)
+        station = self._by_owner.pop(owner)
+        self._all = tuple(self._by_owner.values())
+        return station
 
     def chosen(self, owner: Hashable | None) -> tuple[Station, ...]:
         """Return one owner's controller; None stands for those of all ports."""
         if owner is not None:
             return (self.of(owner),)
-        return tuple(station for station in self._by_owner.values() if not station.is_node)
+        return tuple(station for station in self._all if not station.is_node)
 
     def all(self) -> tuple[Station, ...]:
         """Return every controller."""
-        return tuple(self._by_owner.values())
+        return self._all
+
+    def sound(self) -> bool:
+        """Tell whether no controller has met an error or has something to send."""
+        return all(station.sound for station in self._all)
 
     def waiting(self) -> list[Station]:
         """Return who has something to send."""
-        return [station for station in self._by_owner.values() if station.queue]
+        return [station for station in self._all if station.queue]
+
+    def others(self, sender: Station) -> list[Station]:
+        """Return all controllers but one."""
+        return [station for station in self._all if station is not sender]
 
     def listeners(self, senders: list[Station]) -> list[Station]:
         """Return the powered controllers that see what `senders` put on the wire."""
-        cut, sides = self.cut, {sender.is_node for sender in senders}
+        sides = {sender.is_node for sender in senders}
         return [
             station
-            for station in self._by_owner.values()
+            for station in self._all
             if station not in senders
             and not station.bus_off
-            and (not cut or station.is_node in sides)
+            and (not self.cut or station.is_node in sides)
             and station.supplied()
         ]
 
@@ -75,12 +87,15 @@ def arbitrate(contenders: list[Station]) -> list[Station]:
     """
     if len(contenders) == 1:
         return contenders
-    keys = {id(station): arbitration_key(station.queue[0]) for station in contenders}
-    best = min(keys.values())
-    winners = [station for station in contenders if keys[id(station)] == best]
-    for station in contenders:
-        station.arbitration_losses += keys[id(station)] != best
-    return sorted(winners, key=_content)
+    keys = [arbitration_key(station.queue[0]) for station in contenders]
+    best = min(keys)
+    winners = []
+    for station, key in zip(contenders, keys, strict=True):
+        if key == best:
+            winners.append(station)
+        else:
+            station.arbitration_losses += 1
+    return winners if len(winners) == 1 else sorted(winners, key=_content)
 
 
 def clash(senders: list[Station]) -> bool:

@@ -278,3 +278,99 @@ def test_no_sequence_of_frames_breaks_the_drive(frames: list[tuple[int, bytes]])
 def test_frames_of_another_kind_are_no_commands(host: Host, flag: str) -> None:
     host.send(0x000, b"" if flag == "is_remote_frame" else b"\x01\x01", **{flag: True})
     assert host.drive.nmt_state is NmtState.PRE_OPERATIONAL
+
+
+def state(host: Host) -> PowerState:
+    return host.drive.power_state
+
+
+def emergencies(host: Host) -> list[int]:
+    return [
+        int.from_bytes(data[:2], "little") for can_id, data in host.received() if can_id == 0x081
+    ]
+
+
+def test_an_undervoltage_faults_an_enabled_drive_only(host: Host) -> None:
+    host.drive.set_supply_v(12.0)
+    host.pass_time(0.01)
+    assert state(host) is PowerState.SWITCH_ON_DISABLED
+    host.enable()
+    host.pass_time(0.01)
+    assert state(host) is PowerState.FAULT
+    assert emergencies(host) == [0x3220]
+
+
+def test_a_brown_out_reboots_the_drive(host: Host) -> None:
+    host.drive.set_supply_v(5.0)
+    host.pass_time(0.01)
+    assert host.send(0x080) == []
+    host.drive.set_supply_v(24.0)
+    host.pass_time(0.01)
+    assert host.received() == [(0x701, b"\x00")]
+
+
+def test_a_hot_drive_faults_again_after_each_reset_until_it_has_cooled(host: Host) -> None:
+    host.enable()
+    host.drive.overheat()
+    host.pass_time(0.01)
+    assert state(host) is PowerState.FAULT
+    host.command(0x80)
+    host.pass_time(0.01)
+    assert state(host) is PowerState.FAULT
+    assert [code for code in emergencies(host) if code] == [0x4310]
+    host.pass_time(300.0)
+    host.command(0x00)
+    host.command(0x80)
+    host.pass_time(0.01)
+    assert state(host) is PowerState.SWITCH_ON_DISABLED
+
+
+def test_an_overload_trips_after_its_time(host: Host) -> None:
+    host.enable(1.0)
+    host.drive.overload(True)
+    host.pass_time(19.0)
+    assert state(host) is PowerState.OPERATION_ENABLED
+    host.pass_time(2.0)
+    assert state(host) is PowerState.FAULT
+    assert 0x2310 in emergencies(host)
+
+
+def test_a_frozen_drive_repeats_its_values_and_keeps_its_heartbeat(host: Host) -> None:
+    host.write(0x1017, 0, 20, 2)
+    host.enable(3.0)
+    host.pass_time(0.5)
+    host.drive.freeze(True)
+    first = host.send(0x080)[-2:]
+    host.pass_time(0.2)
+    assert any(can_id == 0x701 for can_id, _ in host.received())
+    assert host.send(0x080)[-2:] == first
+    host.drive.freeze(False)
+    host.pass_time(0.01)
+    assert host.send(0x080)[-2:] != first
+
+
+def test_a_silent_drive_still_obeys(host: Host) -> None:
+    host.enable(3.0)
+    host.drive.silence(True)
+    assert host.send(0x080) == []
+    host.pass_time(0.5)
+    assert host.wheel.velocity_rad_s == pytest.approx(3.0, abs=0.05)
+
+
+def test_a_restarted_controller_reports_its_recovery(host: Host) -> None:
+    host.wire.set_bus_off(host.drive)
+    host.wire.restart(host.drive)
+    host.pass_time(0.01)
+    assert emergencies(host) == [0x8140]
+
+
+@pytest.mark.parametrize(("option", "deceleration"), [(1, 10.0), (2, 20.0), (5, 10.0), (6, 20.0)])
+def test_a_quick_stop_option_chooses_its_ramp(host: Host, option: int, deceleration: float) -> None:
+    host.write(0x605A, 0, option, 2)
+    host.write(0x6084, 0, round(10.0 * COUNTS_PER_RAD), 4)
+    host.write(0x6085, 0, round(20.0 * COUNTS_PER_RAD), 4)
+    host.enable(6.0)
+    host.pass_time(0.8)
+    host.command(0x02)
+    host.pass_time(0.2)
+    assert host.wheel.velocity_rad_s == pytest.approx(6.0 - 0.2 * deceleration, abs=0.2)

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import canopen
@@ -25,6 +26,10 @@ def eventually(condition: Callable[[], bool], within_s: float = 5.0) -> bool:
             return True
         time.sleep(0.005)
     return condition()
+
+
+def is_near(drive: BaseNode402, target: int) -> bool:
+    return bool(abs(drive.sdo[0x606C].raw - target) < 100)
 
 
 @pytest.fixture
@@ -132,3 +137,46 @@ def test_it_gets_the_emergency_of_its_own_lost_heartbeat_and_resets_the_fault(
     assert drive.state == "OPERATION ENABLED"
     assert eventually(lambda: not drive.emcy.active)
     drive.state = "SWITCH ON DISABLED"
+
+
+def test_it_writes_a_long_text_by_segments(node: BaseNode402) -> None:
+    label = "left wheel, behind the battery, fuse 3"
+    node.sdo[0x2000].raw = label
+    assert node.sdo[0x2000].raw == label
+
+
+def test_it_maps_other_process_data_and_gets_them(
+    network: canopen.Network, node: BaseNode402
+) -> None:
+    node.tpdo.read()
+    pdo = node.tpdo[2]
+    pdo.clear()
+    pdo.add_variable("DC link circuit voltage")
+    pdo.add_variable("Motor temperature")
+    pdo.enabled = True
+    pdo.save()
+    node.nmt.state = "OPERATIONAL"
+    network.sync.start(0.005)
+    assert eventually(lambda: pdo["DC link circuit voltage"].raw == 24_000)
+    assert pdo["Motor temperature"].raw == 25
+
+
+def test_it_follows_cyclic_velocities_and_shows_the_mode(drive: BaseNode402) -> None:
+    drive.sdo[0x6060].raw = 9
+    assert drive.sdo[0x6061].raw == 9
+    drive.state = "OPERATION ENABLED"
+    for velocity_rad_s in (0.5, 1.0, 1.5):
+        target = round(velocity_rad_s * COUNTS_PER_RAD)
+        drive.rpdo[1]["Target velocity"].raw = target
+        drive.rpdo[1].transmit()
+        assert eventually(partial(is_near, drive, target))
+    drive.state = "SWITCH ON DISABLED"
+
+
+def test_it_reboots_a_drive_into_its_defaults(drive: BaseNode402) -> None:
+    drive.sdo[0x6083].raw = 4321
+    drive.state = "OPERATION ENABLED"
+    drive.nmt.state = "RESET"
+    assert eventually(lambda: drive.nmt.state == "PRE-OPERATIONAL")
+    assert drive.sdo[0x6083].raw == 52152
+    assert drive.sdo[0x6041].raw & 0x4F == 0x40
