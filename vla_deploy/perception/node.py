@@ -228,8 +228,12 @@ class PerceptionNode:
 
     def _away(self) -> dict[str, str]:
         """Return which sensors are away at present, and why: what they told is stale."""
-        slots = {"lidar": self._lidar, "imu": self._imu, "camera": self._camera}
-        return {name: slot.failure for name, slot in slots.items() if slot.failure}
+        failures = {
+            "lidar": self._lidar.failure,
+            "imu": self._imu.failure,
+            "camera": self._camera.failure,
+        }
+        return {name: failure for name, failure in failures.items() if failure}
 
     def _make_localiser(self) -> Localiser:
         return Localiser(
