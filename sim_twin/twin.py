@@ -1,12 +1,11 @@
 """Join the physics to every emulated device: what a bus says moves a motor, and back."""
 
-from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
-from sim_twin.can import CanWire, EmulatedDrive, ODriveAxis, WheelDrive
+from sim_twin.can import DRIVES, CanWire
 from sim_twin.device import WireDevice
 from sim_twin.errors import ModelMismatch
 from sim_twin.faults.injector import FaultInjector
@@ -24,7 +23,6 @@ from sim_twin.streams import streamed_devices
 from vla_deploy.robots import RobotDescription
 
 S = TypeVar("S")
-DRIVES: Mapping[str, Callable[..., EmulatedDrive]] = {"cia402": WheelDrive, "odrive": ODriveAxis}
 
 
 class Twin:

@@ -1,6 +1,7 @@
 """Emulate a CAN bus, and wheel drives on it: CiA 402 over CANopen, and ODrive axes."""
 
 from sim_twin.can.drive import WheelDrive
+from sim_twin.can.drives import DRIVES
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.hub import CanHub
 from sim_twin.can.memory_bus import MemoryBus
@@ -8,6 +9,7 @@ from sim_twin.can.odrive import ODriveAxis
 from sim_twin.can.wire import CanNode, CanWire
 
 __all__ = [
+    "DRIVES",
     "CanHub",
     "CanNode",
     "CanWire",

@@ -1,7 +1,8 @@
-"""Serve wheel drives with freely turning wheels on a CAN hub, to try a CANopen tool against.
+"""Serve wheel drives with freely turning wheels on a CAN hub, to try a CAN tool against.
 
 `python -m sim_twin.can --socket /tmp/can.sock --nodes 1 2`; another process then opens
-`can.Bus(interface="vla_hub", channel="/tmp/can.sock")`.
+`can.Bus(interface="vla_hub", channel="/tmp/can.sock")`. `--timed` gives frames the time of their
+bits, `--protocol odrive` serves ODrive axes.
 """
 
 import argparse
@@ -10,23 +11,28 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from sim_twin.can.drive import WheelDrive
+from sim_twin.can.drives import DRIVES
+from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.free_wheel import STEP_NS, FreeWheel
 from sim_twin.can.hub import CanHub
-from sim_twin.can.wire import CanWire
+from sim_twin.can.wire import DEFAULT_BITRATE, CanWire
 
 
-def serve(hub: CanHub, wire: CanWire, wheels: Sequence[FreeWheel], clock: Clock) -> None:
+def serve(
+    hub: CanHub, wire: CanWire, wheels: Sequence[FreeWheel[EmulatedDrive]], clock: Clock
+) -> None:
     """Carry frames as they come and turn the wheels every 2 ms, until interrupted."""
     step_at_ns = clock.now_ns()
     while True:
-        wait_s = max(0.0, (step_at_ns - clock.now_ns()) / NS_PER_S)
-        if select.select(hub.filenos(), [], [], wait_s)[0]:
+        due_ns = min(step_at_ns, wire.next_due_ns() or step_at_ns)
+        wait_s = max(0.0, (due_ns - clock.now_ns()) / NS_PER_S)
+        ready = select.select(hub.filenos(), [], [], wait_s)[0]
+        wire.poll(clock.now_ns())
+        if ready:
             hub.poll_once()
         if clock.now_ns() >= step_at_ns:
             for wheel in wheels:
                 wheel.step(clock.now_ns(), STEP_NS / NS_PER_S)
-            wire.poll(clock.now_ns())
             step_at_ns = max(step_at_ns + STEP_NS, clock.now_ns())
 
 
@@ -35,9 +41,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--socket", type=Path, required=True, help="path of the hub's socket")
     parser.add_argument("--nodes", type=int, nargs="+", default=[1, 2], help="node ids")
+    parser.add_argument("--protocol", choices=DRIVES, default="cia402", help="default: cia402")
+    parser.add_argument("--bitrate", type=int, default=DEFAULT_BITRATE, help="default: %(default)s")
+    parser.add_argument("--timed", action="store_true", help="frames take the time of their bits")
     arguments = parser.parse_args()
-    wheels = [FreeWheel(WheelDrive(node_id)) for node_id in arguments.nodes]
-    wire = CanWire([wheel.drive for wheel in wheels])
+    drive = DRIVES[arguments.protocol]
+    wheels = [FreeWheel(drive(node_id)) for node_id in arguments.nodes]
+    wire = CanWire(
+        [wheel.drive for wheel in wheels], bitrate=arguments.bitrate, timed=arguments.timed
+    )
     hub = CanHub(wire, arguments.socket)
     try:
         serve(hub, wire, wheels, MonotonicClock())

@@ -35,7 +35,8 @@ def is_near(drive: BaseNode402, target: int) -> bool:
 @pytest.fixture
 def network(tmp_path: Path) -> Iterator[canopen.Network]:
     path = tmp_path / "can"
-    command = [sys.executable, "-m", "sim_twin.can", "--socket", str(path), "--nodes", str(NODE_ID)]
+    options = ["--socket", str(path), "--nodes", str(NODE_ID), "--timed", "--bitrate", "500000"]
+    command = [sys.executable, "-m", "sim_twin.can", *options]
     with subprocess.Popen(command) as hub:
         try:
             assert eventually(path.is_socket, within_s=20.0)
