@@ -101,8 +101,8 @@ class ErrorBudget:
 class BusBudget:
     """Keep a budget for each member of a bus and one for the bus itself.
 
-    The bus counts the cycles in which a member failed that is not lost yet: one dead member does
-    not speak for the bus, scattered failures of many do.
+    The bus counts the cycles in which a member failed that is not lost yet, or all members: one
+    dead member does not speak for the bus, scattered failures of many do.
     """
 
     def __init__(
@@ -128,7 +128,8 @@ class BusBudget:
         """
         if not failed and self.quiet:
             return
-        if any(self.members[index] is not BudgetState.LOST for index in failed):
+        everyone = len(failed) == len(self.names)
+        if everyone or any(self.members[index] is not BudgetState.LOST for index in failed):
             self._bus_budget.note_failure(now_ns)
         for index in failed:
             self._budgets[index].note_failure(now_ns)

@@ -114,6 +114,13 @@ def test_a_bus_recovers_when_cycles_are_good_again() -> None:
     assert budgets.members == [OK] * 4
 
 
+def test_a_bus_without_any_answer_stays_lost() -> None:
+    budgets = bus()
+    for n in range(3000):
+        budgets.note_cycle([0, 1, 2, 3], n * 4 * MS)
+    assert budgets.bus is LOST
+
+
 def test_a_member_that_was_exchanged_starts_afresh() -> None:
     budgets = bus()
     for n in range(8):
