@@ -1,5 +1,7 @@
 """Build two small worlds in lock-step: CiA 402 drives and ODrive axes, each with free wheels."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ class Bench:
 
     over_temperature: int
     short_circuit: int
-    world: FreeWheelWorld
+    world: FreeWheelWorld[Any]
     bus: DriveBus
 
     def run(self, duration_s: float, velocity: tuple[float, float] | None = None) -> DriveState:
@@ -72,15 +74,12 @@ class ODriveBench(Bench):
     short_circuit = int(AxisError.DRV_FAULT)
 
     def __init__(self) -> None:
-        self.world = FreeWheelWorld([FreeWheel(ODriveAxis(0)), FreeWheel(ODriveAxis(1, sign=-1))])
+        self.axes = [ODriveAxis(0), ODriveAxis(1, sign=-1)]
+        self.world = FreeWheelWorld([FreeWheel(axis) for axis in self.axes])
         specs = [AxisSpec(node_id=0, joint="left"), AxisSpec(node_id=1, joint="right", sign=-1)]
         self.bus = ODriveBus(
             MemoryBus(self.world.wire), self.world, specs, EMULATED_ENDPOINTS, HEARTBEAT_S
         )
-
-    @property
-    def axes(self) -> list[ODriveAxis]:
-        return [wheel.drive for wheel in self.world.wheels if isinstance(wheel.drive, ODriveAxis)]
 
 
 @pytest.fixture
