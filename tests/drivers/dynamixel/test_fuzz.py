@@ -50,7 +50,9 @@ def flip_bits(random: Random, data: bytearray) -> None:
 
 
 def burst(random: Random, data: bytearray) -> None:
-    at = random.randrange(len(data) - 1)
+    # not across the border of data and CRC: the CRC goes out low byte first, so that what are
+    # neighbours on the wire are far apart in the polynomial
+    at = random.randrange(len(data) - 3)
     data[at] ^= random.randint(1, 255)
     data[at + 1] ^= random.randint(0, 255)
 
