@@ -2,51 +2,73 @@
 
 import time
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import Any, Final, ParamSpec, TypeVar
 
 from sim_twin.twin import Twin
+
+_RUN_STEPS: Final = 7
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 class Stopwatch:
-    """Wrap the methods of one twin; the sums are nanoseconds of this thread's CPU time."""
+    """Wrap the methods of one twin; the sums are nanoseconds of this thread's CPU time.
+
+    Runs of steps are timed as a whole and by their physics in turns: reading the clock is a system
+    call, which must not count as the twin's own work. So `physics_ns` and `step_ns` are each of one
+    half of the steps, and the runs are odd, so that no half gets all the steps after a bus cycle.
+    """
 
     def __init__(self, twin: Twin) -> None:
-        self._spent_ns = {"physics": 0, "step": 0, "answer": 0}
-        watched = (
-            ("physics", twin.engine, "step"),
-            ("step", twin, "step"),
-            ("answer", twin.can_wire, "send"),
-            *(("answer", device, "receive") for device in twin.serial_devices.values()),
-            *(("answer", device, "transmit") for device in twin.serial_devices.values()),
-        )
-        for account, owner, name in watched:
-            setattr(owner, name, self._timed(account, getattr(owner, name)))
+        self.physics_ns = 0
+        self.step_ns = 0
+        self.answer_ns = 0
+        self._steps = 0
+        self._whole = False
+        self._twin_step = twin.step
+        self._physics_step = twin.engine.step
+        setattr(twin, "step", self._step)  # noqa: B010 - a method of this one twin
+        setattr(twin.engine, "step", self._physics)  # noqa: B010
+        answering: list[tuple[Any, str]] = [(twin.can_wire, "send")]
+        for device in twin.serial_devices.values():
+            answering += [(device, "receive"), (device, "transmit")]
+        for owner, name in answering:
+            setattr(owner, name, self._timed(getattr(owner, name)))
 
     @property
-    def physics_ns(self) -> int:
-        """Return what `mj_step` took."""
-        return self._spent_ns["physics"]
+    def physics_ratio(self) -> float:
+        """Return the share of the physics in the twin's steps."""
+        return self.physics_ns / self.step_ns
 
     @property
-    def step_ns(self) -> int:
-        """Return what the twin's steps took, physics included."""
-        return self._spent_ns["step"]
+    def physics_ratio_with_answers(self) -> float:
+        """Return the share of the physics in what the twin does in steps and between them."""
+        return self.physics_ns / (self.step_ns + self.answer_ns / 2)
 
-    @property
-    def answer_ns(self) -> int:
-        """Return what the devices took to answer, outside the steps."""
-        return self._spent_ns["answer"]
+    def _step(self) -> None:
+        self._whole = self._steps // _RUN_STEPS % 2 == 0
+        self._steps += 1
+        if not self._whole:
+            self._twin_step()
+            return
+        started_ns = time.thread_time_ns()
+        self._twin_step()
+        self.step_ns += time.thread_time_ns() - started_ns
 
-    def _timed(self, account: str, call: Callable[P, R]) -> Callable[P, R]:
-        spent_ns = self._spent_ns
+    def _physics(self) -> None:
+        if self._whole:
+            self._physics_step()
+            return
+        started_ns = time.thread_time_ns()
+        self._physics_step()
+        self.physics_ns += time.thread_time_ns() - started_ns
 
+    def _timed(self, call: Callable[P, R]) -> Callable[P, R]:
         def timed(*args: P.args, **kwargs: P.kwargs) -> R:
             started_ns = time.thread_time_ns()
             result = call(*args, **kwargs)
-            spent_ns[account] += time.thread_time_ns() - started_ns
+            self.answer_ns += time.thread_time_ns() - started_ns
             return result
 
         return timed
