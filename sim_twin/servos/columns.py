@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from drivers.dynamixel.control_table import MODELS, Register
-from sim_twin.servos.registers import RegisterFile
+from sim_twin.servos.register_file import RegisterFile
 
 IntColumn = NDArray[np.int32]
 

@@ -34,7 +34,7 @@ from sim_twin.servos.motion import Motion
 from sim_twin.servos.profile import Floats
 from sim_twin.servos.protection import CHECK_PERIOD_S, Protection
 from sim_twin.servos.rail import Rail
-from sim_twin.servos.registers import RegisterFile
+from sim_twin.servos.register_file import RegisterFile
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
 from sim_twin.servos.watchdog import BusWatchdog
 

@@ -21,7 +21,8 @@ from drivers.dynamixel.codec import (
 from sim_twin.servos.audience import Audience
 from sim_twin.servos.firmware import Firmware
 from sim_twin.servos.params import GROUP_WRITES, READ_REQUESTS, Request, range_of
-from sim_twin.servos.registers import LOWEST_SLOT, Refused
+from sim_twin.servos.register_file import LOWEST_SLOT
+from sim_twin.servos.registers import Refused
 from sim_twin.servos.speaker import Speaker, Store
 from sim_twin.servos.spec import FirmwareOptions
 from sim_twin.servos.timing import Reply

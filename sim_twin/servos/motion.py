@@ -22,7 +22,7 @@ from drivers.dynamixel.model import (
 from drivers.dynamixel.models import X330_CURRENT_UNIT_A
 from sim_twin.servos.columns import Columns
 from sim_twin.servos.profile import PULSES_S2_PER_UNIT, PULSES_S_PER_UNIT, Floats, Profile
-from sim_twin.servos.registers import RegisterFile
+from sim_twin.servos.register_file import RegisterFile
 
 CENTRE_PULSES: Final = PULSES_PER_REV // 2
 _REVERSE: Final = 0x01
