@@ -4,8 +4,10 @@
 - `twin_stack`: the real processes on the wall clock, armed
 - `faults`: the fault injector of the one that the test uses
 - `lockstep`, `make_lockstep`: a twin without nodes, for tests of single parts
+- `hardware`: the devices of a real robot, where `--hardware` names its file
 
 `@pytest.mark.twin(seed=7)` chooses robot, world, seed and profile of the first two.
+`pytest --hardware robot.toml` alone runs the device contracts on that robot.
 """
 
 from __future__ import annotations
@@ -17,17 +19,45 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from sim_twin.contracts.hardware import Hardware
     from sim_twin.lockstep import Lockstep
     from sim_twin.process_stack import ProcessStack
     from sim_twin.stack import LockstepStack
 
-MARKER = "twin(robot, world, seed, profile): choose what `twin` and `twin_stack` start with"
+MARKERS = (
+    "twin(robot, world, seed, profile): choose what `twin` and `twin_stack` start with",
+    "energises: switches motors of a real robot on; runs only with --energise",
+)
 _CHOICES = ("robot", "world", "seed", "profile")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add what a real robot needs."""
+    group = parser.getgroup("robot", "a real robot")
+    group.addoption("--hardware", type=Path, metavar="ROBOT_TOML", help="test this robot's devices")
+    group.addoption("--devices-dir", type=Path, help="take every device from here instead")
+    group.addoption("--hardware-profile", default="desktop", help="its platform profile")
+    group.addoption(
+        "--energise",
+        action="store_true",
+        help="let tests switch motors on: they hold where they are; keep clear",
+    )
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker."""
-    config.addinivalue_line("markers", MARKER)
+    """Declare the markers, and choose the contracts where only a robot is named."""
+    for marker in MARKERS:
+        config.addinivalue_line("markers", marker)
+    if config.option.hardware and config.args_source is not config.ArgsSource.ARGS:
+        from sim_twin.contracts.hardware import CONTRACTS
+
+        config.args = [str(CONTRACTS)]
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Leave out what would switch motors on without leave."""
+    if item.get_closest_marker("energises") and not item.config.option.energise:
+        pytest.skip("switches motors on: keep clear of the robot and add --energise")
 
 
 @pytest.fixture
@@ -81,6 +111,21 @@ def twin_stack(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Proce
         yield stack
     finally:
         stack.close()
+
+
+@pytest.fixture(scope="session")
+def hardware(request: pytest.FixtureRequest) -> Hardware:
+    """Give the robot that `--hardware` names."""
+    from sim_twin.contracts.hardware import Hardware
+    from vla_deploy.robots import RobotFileError
+
+    option = request.config.option
+    if option.hardware is None:
+        pytest.skip("needs a real robot: add --hardware robot.toml")
+    try:
+        return Hardware(option.hardware, option.devices_dir, option.hardware_profile)
+    except RobotFileError as error:
+        pytest.fail(str(error), pytrace=False)
 
 
 def _chosen(request: pytest.FixtureRequest) -> dict[str, Any]:

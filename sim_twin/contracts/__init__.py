@@ -6,5 +6,5 @@ assertions are explained there as in any test.
 
 import pytest
 
-for _name in ("sensors", "lidar", "imu", "camera", "estop", "audio", "servo_bus"):
+for _name in ("sensors", "lidar", "imu", "camera", "estop", "audio", "servo_bus", "drive_bus"):
     pytest.register_assert_rewrite(f"{__name__}.{_name}")

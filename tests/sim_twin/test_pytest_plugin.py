@@ -2,9 +2,15 @@
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+import vla_deploy.robots
+from drivers.clock import MonotonicClock
+
+ROBOT_FILE = Path(vla_deploy.robots.__file__).parent / "butler/robot.toml"
 
 EXAMPLE = """
 import pytest
@@ -35,7 +41,7 @@ def run_pytest(folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=170,
         check=False,
     )
 
@@ -52,3 +58,39 @@ def test_an_unknown_choice_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "test_mine.py").write_text(MISTAKEN)
     done = run_pytest(tmp_path)
     assert "expected robot, world, seed, profile by name, got 'sed'" in done.stdout
+
+
+@pytest.fixture
+def devices_dir(tmp_path: Path) -> Iterator[Path]:
+    """A twin's devices, which nobody can tell from real ones."""
+    run_dir = tmp_path / "run"
+    run_dir.mkdir()
+    clock = MonotonicClock()
+    with subprocess.Popen([sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir)]) as twin:
+        while not (run_dir / "dev/ready").exists():
+            assert twin.poll() is None
+            clock.sleep_until(clock.now_ns() + 50_000_000)
+        yield run_dir / "dev"
+        twin.terminate()
+
+
+@pytest.mark.gl
+@pytest.mark.stack
+@pytest.mark.timeout(240)
+def test_naming_a_robot_runs_the_contracts_on_its_devices(
+    tmp_path: Path, devices_dir: Path
+) -> None:
+    words = ("--hardware", str(ROBOT_FILE), "--devices-dir", str(devices_dir))
+    done = run_pytest(tmp_path, *words, "--energise")
+    assert done.returncode == 0, done.stdout
+    assert "28 passed" in done.stdout
+    without_leave = run_pytest(tmp_path, *words, "-rs", "-k", "Torque or Power")
+    assert "3 skipped" in without_leave.stdout
+    assert "keep clear of the robot and add --energise" in without_leave.stdout
+
+
+def test_a_robot_file_that_is_not_there_is_one_clear_line(tmp_path: Path) -> None:
+    done = run_pytest(tmp_path, "--hardware", "nobody.toml", "-x", "-k", "Lidar")
+    assert done.returncode == 1
+    assert "nobody" in done.stdout
+    assert "Traceback" not in done.stdout

@@ -63,8 +63,12 @@ class Cia402Bench(Bench):
 
     def __init__(self) -> None:
         self.world = FreeWheelWorld([FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, sign=-1))])
+        self.bus = self.on(self.world)
+
+    @staticmethod
+    def on(world: FreeWheelWorld) -> DriveBus:
         specs = [DriveSpec(node_id=1, joint="left"), DriveSpec(node_id=2, joint="right", sign=-1)]
-        self.bus = WheelDriveBus(MemoryBus(self.world.wire), self.world, specs, HEARTBEAT_S)
+        return WheelDriveBus(MemoryBus(world.wire), world, specs, HEARTBEAT_S)
 
 
 class ODriveBench(Bench):
@@ -76,10 +80,12 @@ class ODriveBench(Bench):
     def __init__(self) -> None:
         self.axes = [ODriveAxis(0), ODriveAxis(1, sign=-1)]
         self.world = FreeWheelWorld([FreeWheel(axis) for axis in self.axes])
+        self.bus = self.on(self.world)
+
+    @staticmethod
+    def on(world: FreeWheelWorld) -> DriveBus:
         specs = [AxisSpec(node_id=0, joint="left"), AxisSpec(node_id=1, joint="right", sign=-1)]
-        self.bus = ODriveBus(
-            MemoryBus(self.world.wire), self.world, specs, EMULATED_ENDPOINTS, HEARTBEAT_S
-        )
+        return ODriveBus(MemoryBus(world.wire), world, specs, EMULATED_ENDPOINTS, HEARTBEAT_S)
 
 
 @pytest.fixture
