@@ -26,7 +26,7 @@ from drivers.odrive.codec import MESSAGES, AxisError, AxisState, Command, can_id
 
 LISTEN_NS: Final = NS_PER_S // 2
 ANSWER_NS: Final = 200_000_000
-NODES_AT_ONCE: Final = 16
+NODES_AT_ONCE: Final = 8  # a SocketCAN transmit queue holds ten frames
 MAX_CANOPEN_NODE: Final = 127
 _HEARTBEAT_SIZES: Final = (MESSAGES[Command.HEARTBEAT].wire.size, 8)
 

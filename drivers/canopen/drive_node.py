@@ -1,17 +1,27 @@
 """Configure one drive: its EDS file, its SDO channel and the steps from boot to operational."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from drivers.canopen.configure import configure_drive, read_rated_torque, set_mode, verify_drive
 from drivers.canopen.drive_port import DrivePort
 from drivers.canopen.eds import read_dictionary
-from drivers.canopen.objects import RPDO1, TPDO1, TPDO2, TPDO2_WITHOUT_TORQUE
+from drivers.canopen.objects import (
+    EMERGENCY_COB,
+    HEARTBEAT_COB,
+    RPDO1,
+    SDO_REPLY_COB,
+    TPDO1,
+    TPDO2,
+    TPDO2_WITHOUT_TORQUE,
+)
 from drivers.canopen.parameters import DriveParameters
 from drivers.canopen.pdo_setup import lay_out_pdos
 from drivers.canopen.requirements import check_dictionary, torque_is_told
 from drivers.canopen.sdo import SdoClient, Writing
 from drivers.clock import Clock
+
+Handler = Callable[[bytes, int], None]
 
 
 class DriveNode:
@@ -36,6 +46,15 @@ class DriveNode:
         self._host_node_id = host_node_id
         self._heartbeat_ms = heartbeat_ms
         self._cycle_ms = cycle_ms
+
+    def handlers(self) -> Iterator[tuple[int, Handler]]:
+        """List the drive's identifiers and who takes their frames."""
+        node_id = self.port.spec.node_id
+        yield TPDO1.cob_base + node_id, self.port.on_status
+        yield TPDO2.cob_base + node_id, self.port.on_position
+        yield HEARTBEAT_COB + node_id, self.port.on_heartbeat
+        yield EMERGENCY_COB + node_id, self.port.on_emergency
+        yield SDO_REPLY_COB + node_id, self.client.take_reply
 
     def read_dictionary(self) -> None:
         """Read the EDS file and name what the drive lacks.

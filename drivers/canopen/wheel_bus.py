@@ -16,14 +16,10 @@ from drivers.canopen.drive_node import DriveNode
 from drivers.canopen.drive_port import DrivePort
 from drivers.canopen.objects import (
     EDS_PATH,
-    EMERGENCY_COB,
     HEARTBEAT_COB,
     NMT_COB,
     RPDO1,
-    SDO_REPLY_COB,
     SYNC_COB,
-    TPDO1,
-    TPDO2,
     NmtCommand,
     NmtState,
 )
@@ -48,8 +44,6 @@ BOOT_TIMEOUT_NS: Final = 5 * NS_PER_S // 2
 ANSWER_TIMEOUT_NS: Final = 300_000_000
 FAULT_RESET_NS: Final = 500_000_000
 _INT32_MAX: Final = 2**31 - 1
-
-Handler = Callable[[bytes, int], None]
 
 
 class WheelDriveBus:
@@ -94,7 +88,7 @@ class WheelDriveBus:
             )
             for port in self._ports
         )
-        self._handlers = _handlers(self._nodes)
+        self._handlers = {key: take for node in self._nodes for key, take in node.handlers()}
         self._budget = NodeBudget([spec.joint for spec in drives])
         self._goal = Goal.DISABLED
         self._was_enabled = False
@@ -313,16 +307,3 @@ class WheelDriveBus:
             # Nobody can be told any more: the drives stop for want of our heartbeat.
             self._link.frames_dropped += len(self._ports)
         self._link.close()
-
-
-def _handlers(nodes: Sequence[DriveNode]) -> dict[int, Handler]:
-    handlers: dict[int, Handler] = {}
-    for node in nodes:
-        port = node.port
-        node_id = port.spec.node_id
-        handlers[TPDO1.cob_base + node_id] = port.on_status
-        handlers[TPDO2.cob_base + node_id] = port.on_position
-        handlers[HEARTBEAT_COB + node_id] = port.on_heartbeat
-        handlers[EMERGENCY_COB + node_id] = port.on_emergency
-        handlers[SDO_REPLY_COB + node_id] = node.client.take_reply
-    return handlers

@@ -1,5 +1,6 @@
 """Keep the wheel drives: open, lose and reopen their bus, drive the base, tell where it went."""
 
+import logging
 from collections.abc import Generator
 
 import numpy as np
@@ -17,6 +18,7 @@ from vla_deploy.safety import DriveSample
 REOPEN_NS = NS_PER_S
 _STILL_RAD_S = 0.02
 _UNKNOWN_FAULT = 0xFFFF
+_LOG = logging.getLogger(__name__)
 
 
 class Wheels:
@@ -90,6 +92,8 @@ class Wheels:
         except (DriverError, GeneratorExit):
             bus.close()
             raise
+        for note in bus.notes:
+            _LOG.warning("%s: %s", self.name, note)
         self._bus = bus
         self.lost = False
         self.odometry.forget_wheels()
