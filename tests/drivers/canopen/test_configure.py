@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import can
 import numpy as np
 import pytest
 
@@ -195,3 +196,19 @@ def test_an_unlisted_code_is_told_by_its_group() -> None:
     assert code_text(0x2399) == "0x2399 current at the motor"
     assert code_text(0x7999) == "0x7999 additional modules"
     assert code_text(0xE000) == "0xE000 reserved code"
+
+
+@pytest.mark.parametrize(("code", "stays"), [(0x8140, False), (0x4310, True)])
+def test_only_a_communication_fault_found_at_connect_is_reset_without_the_operator(
+    code: int, stays: bool
+) -> None:
+    setup = Setup()
+
+    def fail_at_start(frame: can.Message) -> None:
+        if frame.arbitration_id == 0 and frame.data[0] == 0x01:
+            setup.drive.raise_fault(code)
+
+    setup.world.wire.attach(fail_at_start)
+    setup.bus.connect()
+    assert setup.run(20, 0.0).faulted == (stays,)
+    setup.bus.close()

@@ -24,6 +24,7 @@ from drivers.odrive.endpoints import (
     ENABLE_WATCHDOG,
     ENCODER_RATE,
     RAMP_RATE,
+    VELOCITY_LIMIT,
     WATCHDOG_TIMEOUT,
     read_endpoints,
 )
@@ -125,6 +126,16 @@ def test_an_axis_without_an_sdo_answer_is_never_enabled(
     with pytest.raises(NoReply, match="the watchdog cannot be verified"):
         odrive.bus.connect()
     odrive.bus.close()
+
+
+def test_limits_are_written_where_the_robot_file_gives_a_current(odrive: Any) -> None:
+    specs = [AxisSpec(node_id=0, joint="left", current_limit_a=7.5, velocity_limit_rad_s=12.0)]
+    bus = ODriveBus(MemoryBus(odrive.world.wire), odrive.world, specs, EMULATED_ENDPOINTS)
+    bus.connect()
+    axis = odrive.axes[0]
+    assert axis._read_property(VELOCITY_LIMIT) == pytest.approx(12.0 / math.tau)
+    assert axis._stage.current_limit_a == pytest.approx(7.5)
+    bus.close()
 
 
 def test_an_error_that_is_the_operators_outlives_a_new_connection(odrive: Any) -> None:
