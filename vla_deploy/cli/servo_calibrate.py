@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+from drivers.dynamixel.control_table import PULSES_PER_REV
 from drivers.dynamixel.servo import ServoSpec
 from drivers.dynamixel.tools import BenchLink
 from drivers.dynamixel.tools.bench_link import ONE_TRY
@@ -123,6 +124,7 @@ def calibrate(
         failures = []
     else:
         failures = _one_by_one(arguments, guide, joints, results, person)
+    _tell_counted_turns(link, joints, person)
     if arguments.json:
         print(json.dumps(results.document(failures), indent=2))
     if failures:
@@ -197,6 +199,17 @@ def _change(joint: GuidedJoint, after: Mounting) -> dict[str, Any]:
         "offset_before": joint.present.offset,
         "offset": round(after.offset, 6),
     }
+
+
+def _tell_counted_turns(link: BenchLink, joints: Sequence[GuidedJoint], person: Person) -> None:
+    """Name the servos that were turned by hand out of the range in which they take goals."""
+    for joint in joints:
+        position = link.read(joint.servo, "present_position")
+        if not 0 <= position < PULSES_PER_REV:
+            person.tell(
+                f"{joint.servo} counts {position} pulses, beyond one turn; restart it before the "
+                f"robot runs: vla-deploy servo reboot {joint.servo.id}"
+            )
 
 
 def _answering(robot: RobotDescription, link: BenchLink, names: Sequence[str]) -> list[ServoSpec]:
