@@ -13,7 +13,7 @@ from drivers.clock import NS_PER_S, Clock
 from sim_twin.can import CanHub
 from sim_twin.drawing import start_camera, start_viewer
 from sim_twin.engine import STEP_NS
-from sim_twin.errors import RefereeRefusal
+from sim_twin.errors import RefereeRefusal, TwinError
 from sim_twin.faults.camera_relay import faults_in_force
 from sim_twin.faults.desk import FaultDesk
 from sim_twin.faults.plug import Carrier
@@ -30,6 +30,8 @@ from sim_twin.twin import Twin
 from vla_deploy.robots import load_robot
 
 READY_FILE = "ready"
+MOST_PATH_BYTES = 90
+"""A Unix socket's path holds 107 bytes; the device's name needs the rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +63,7 @@ class TwinProcess:
                 for a viewer.
             DeviceBusy: another twin serves the same folder.
         """
-        devices = options.devices_dir
+        devices = _short_enough(options.devices_dir)
         devices.mkdir(parents=True, exist_ok=True)
         self._ready = devices / READY_FILE
         self._ready.unlink(missing_ok=True)
@@ -214,3 +216,13 @@ def _start_drawings(options: TwinOptions) -> list[MirrorLink]:
             drawing.close()
         raise
     return drawings
+
+
+def _short_enough(devices_dir: Path) -> Path:
+    length = len(os.fsencode(devices_dir))
+    if length > MOST_PATH_BYTES:
+        raise TwinError(
+            f"{devices_dir}: a path to sockets may have {MOST_PATH_BYTES} bytes, this one has "
+            f"{length}; choose a shorter one, for a run with vla-deploy --runtime-base DIR"
+        )
+    return devices_dir

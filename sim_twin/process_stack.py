@@ -12,6 +12,7 @@ from typing import Any, Final
 import psutil
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.faults.remote import RemoteFaults
 from sim_twin.referee import ask
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
@@ -119,6 +120,11 @@ class ProcessStack:
             KeyError: there is no such process.
         """
         os.kill(self.row(name)["pid"], signal.SIGKILL)
+
+    @property
+    def faults(self) -> RemoteFaults:
+        """Return the way to make the twin's devices fail."""
+        return RemoteFaults(self.run_dir)
 
     # --- as the judge -------------------------------------------------------------------------
 

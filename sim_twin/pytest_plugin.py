@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,8 @@ import pytest
 
 if TYPE_CHECKING:
     from sim_twin.contracts.hardware import Hardware
+    from sim_twin.faults import FaultInjector
+    from sim_twin.faults.remote import RemoteFaults
     from sim_twin.lockstep import Lockstep
     from sim_twin.process_stack import ProcessStack
     from sim_twin.stack import LockstepStack
@@ -100,17 +103,27 @@ def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepSta
 
 
 @pytest.fixture
-def twin_stack(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ProcessStack]:
+def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
     """Give the real processes on the wall clock, armed."""
     from sim_twin.process_stack import ProcessStack
 
     options = (f"--{name}={value}" for name, value in _chosen(request).items())
-    stack = ProcessStack(tmp_path / "twin_stack", *options)
-    try:
-        stack.wait_until_armed()
-        yield stack
-    finally:
-        stack.close()
+    # Sockets want a short path, which pytest's own folders are not.
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
+        stack = ProcessStack(Path(folder) / "base", *options)
+        try:
+            stack.wait_until_armed()
+            yield stack
+        finally:
+            stack.close()
+
+
+@pytest.fixture
+def faults(request: pytest.FixtureRequest) -> FaultInjector | RemoteFaults:
+    """Give the fault injector of the test's `twin_stack`, `lockstep` or else `twin`."""
+    names = (name for name in ("twin_stack", "lockstep") if name in request.fixturenames)
+    robot: ProcessStack | Lockstep | LockstepStack = request.getfixturevalue(next(names, "twin"))
+    return robot.faults
 
 
 @pytest.fixture(scope="session")

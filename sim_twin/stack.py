@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from platforms import load_profile
+from sim_twin.faults import FaultInjector
 from sim_twin.lockstep import Lockstep
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
@@ -41,6 +42,11 @@ class LockstepControl:
         self._status = self.space.cell_reader("control_status")
         self.control: Node = self._new_control()
         self.lockstep.add(self.control)
+
+    @property
+    def faults(self) -> FaultInjector:
+        """Return the way to make the twin's devices fail."""
+        return self.lockstep.faults
 
     def restart_control(self) -> None:
         """Start control anew, as the supervisor does after it died."""

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -29,11 +30,17 @@ class Run(ProcessStack):
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[[], Run]]:
+def base() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
+        yield Path(folder) / "base"
+
+
+@pytest.fixture
+def start(base: Path) -> Iterator[Callable[[], Run]]:
     runs: list[Run] = []
 
     def begin() -> Run:
-        runs.append(Run(tmp_path / "base"))
+        runs.append(Run(base))
         runs[-1].wait_until_armed()
         return runs[-1]
 
@@ -149,8 +156,7 @@ def test_kill_9_of_the_supervisor_ends_everything_and_a_new_run_starts(
     assert not shared_memory.exists()
 
 
-def test_without_opengl_the_run_says_what_to_install_and_stops_again(tmp_path: Path) -> None:
-    base = tmp_path / "base"
+def test_without_opengl_the_run_says_what_to_install_and_stops_again(base: Path) -> None:
     done = subprocess.run(
         [*VLA_DEPLOY, "--runtime-base", str(base), "run", "--twin"],
         env={**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "MUJOCO_GL": "bogus"},
@@ -163,8 +169,7 @@ def test_without_opengl_the_run_says_what_to_install_and_stops_again(tmp_path: P
     assert [path.name for path in base.iterdir()] == ["lock"]
 
 
-def test_without_hardware_the_run_names_the_device_and_the_robot_file(tmp_path: Path) -> None:
-    base = tmp_path / "base"
+def test_without_hardware_the_run_names_the_device_and_the_robot_file(base: Path) -> None:
     done = subprocess.run(
         [*VLA_DEPLOY, "--runtime-base", str(base), "run"],
         capture_output=True,

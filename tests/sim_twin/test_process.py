@@ -225,3 +225,18 @@ def test_the_button_and_the_room_are_served(devices: PathOpener) -> None:
     await_that("button released", lambda: not again.poll().pressed, 5.0)
     again.close()
     microphone.close()
+
+
+def test_a_path_too_long_for_sockets_is_refused_with_a_remedy(tmp_path: Path) -> None:
+    run_dir = tmp_path / ("long" * 20)
+    run_dir.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir)],
+        capture_output=True,
+        text=True,
+        timeout=START_TIMEOUT_S,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "choose a shorter one" in done.stderr

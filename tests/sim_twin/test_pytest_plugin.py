@@ -25,6 +25,25 @@ def test_the_robot_turns_by_what_it_was_told(twin):
     assert turned == pytest.approx(0.349, abs=0.05)
 """
 
+FAULTY = """
+import pytest
+
+
+def test_the_processes_stop_without_their_servo_bus(twin_stack, faults):
+    fault = faults.inject("servo_bus", None, "unplug")
+    assert twin_stack.wait_until(lambda: twin_stack.state() == "stopped", 10.0)
+    assert fault.is_on
+    assert twin_stack.status()["control"]["cause"] == "servo_bus_lost"
+    fault.clear()
+    assert not fault.is_on
+
+
+def test_the_robot_in_lock_step_stops_without_its_servo_bus(twin, faults):
+    faults.inject("servo_bus", None, "unplug")
+    twin.lockstep.run_for(1.0)
+    assert twin.status()["cause"] == "servo_bus_lost"
+"""
+
 MISTAKEN = """
 import pytest
 
@@ -52,6 +71,15 @@ def test_a_test_of_a_users_own_finds_the_fixtures(tmp_path: Path) -> None:
     (tmp_path / "test_mine.py").write_text(EXAMPLE)
     done = run_pytest(tmp_path, "--strict-markers")
     assert "1 passed" in done.stdout, done.stdout
+
+
+@pytest.mark.gl
+@pytest.mark.stack
+@pytest.mark.timeout(240)
+def test_faults_reach_the_twin_that_the_test_uses(tmp_path: Path) -> None:
+    (tmp_path / "test_mine.py").write_text(FAULTY)
+    done = run_pytest(tmp_path)
+    assert "2 passed" in done.stdout, done.stdout
 
 
 def test_an_unknown_choice_is_refused_by_name(tmp_path: Path) -> None:
