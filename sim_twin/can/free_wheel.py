@@ -14,14 +14,14 @@ from sim_twin.can.wire import CanWire
 STEP_NS: Final = 2_000_000
 
 
-D = TypeVar("D", bound=EmulatedDrive, default=WheelDrive)
+D_co = TypeVar("D_co", bound=EmulatedDrive, default=WheelDrive, covariant=True)
 
 
 @dataclass(slots=True)
-class FreeWheel(Generic[D]):
+class FreeWheel(Generic[D_co]):
     """Turn one wheel with nothing but inertia and viscous friction."""
 
-    drive: D
+    drive: D_co
     inertia_kg_m2: float = 0.05
     friction_nm_s: float = 0.05
     position_rad: float = 0.0
@@ -35,10 +35,10 @@ class FreeWheel(Generic[D]):
         self.position_rad += self.velocity_rad_s * dt_s
 
 
-class FreeWheelWorld(Generic[D]):
+class FreeWheelWorld(Generic[D_co]):
     """Be the smallest lock-step world: a clock whose waiting turns the wheels."""
 
-    def __init__(self, wheels: Sequence[FreeWheel[D]], start_ns: int = NS_PER_S) -> None:
+    def __init__(self, wheels: Sequence[FreeWheel[D_co]], start_ns: int = NS_PER_S) -> None:
         self.wheels = tuple(wheels)
         self.wire = CanWire([wheel.drive for wheel in wheels])
         self._now_ns = start_ns
