@@ -1,9 +1,5 @@
-"""Write goals for all servos, converted from the joint side and clamped to the servo's range.
+"""Write goals for all servos, converted from the joint side and clamped to the servo's range."""
 
-Plain numbers and `struct` on purpose, as in `block`: after a wait numpy's calls cost more.
-"""
-
-import struct
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Final
@@ -26,8 +22,7 @@ from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.servo import ServoSpec
 from drivers.errors import DriverError, LinkLost
 
-_PULSE_BYTES: Final = 4
-_ENTRY_BYTES: Final = 1 + _PULSE_BYTES  # id, pulse
+_GOAL: Final = np.dtype([("id", "u1"), ("pulse", "<i4")])
 _GOAL_POSITION_HEAD: Final = b"\x74\x00\x04\x00"  # address 116, 4 bytes
 _FRAME_HEAD_BYTES: Final = 12  # header .. instruction, address, length
 _FRAME_CRC_BYTES: Final = 2
@@ -51,15 +46,13 @@ class GoalWriter:
         self._registers = registers
         self._servos = {servo.id: servo for servo in servos}
         self._joints = [servo.joint for servo in servos]
-        self._shape = (len(servos),)
         self._patience = Patience(margin_s=margin_s, attempts=2)
-        per_pulse = [servo.joint_per_pulse for servo in servos]
-        at_pulse_zero = [servo.to_joint(0) for servo in servos]
-        self._to_pulse = [
-            (1.0 / unit, -zero * (1.0 / unit), setup.minimum_pulse, setup.maximum_pulse)
-            for unit, zero, setup in zip(per_pulse, at_pulse_zero, setups, strict=True)
-        ]
-        self._to_joint = list(zip(per_pulse, at_pulse_zero, strict=True))
+        self._per_pulse = np.array([servo.joint_per_pulse for servo in servos])
+        self._pulses_per = 1.0 / self._per_pulse
+        self._at_pulse_zero = np.array([servo.to_joint(0) for servo in servos])
+        self._pulse_at_zero = -self._at_pulse_zero * self._pulses_per
+        self._minimum = np.array([float(setup.minimum_pulse) for setup in setups])
+        self._maximum = np.array([float(setup.maximum_pulse) for setup in setups])
         self._pwm_limit = {
             servo.id: setup.pwm_limit for servo, setup in zip(servos, setups, strict=True)
         }
@@ -74,19 +67,17 @@ class GoalWriter:
             LinkLost: the adapter is gone.
         """
         goals = position_rad.tolist()
-        if position_rad.shape != self._shape or not all(map(isfinite, goals)):
+        if len(goals) != len(self._joints) or not all(map(isfinite, goals)):
             self._refuse(position_rad)
-        pulses = [
-            min(max(round(goal * per_unit + zero), lowest), highest)
-            for goal, (per_unit, zero, lowest, highest) in zip(goals, self._to_pulse, strict=True)
-        ]
+        pulses = position_rad * self._pulses_per
+        np.add(pulses, self._pulse_at_zero, pulses)
+        np.rint(pulses, pulses)
+        np.maximum(pulses, self._minimum, out=pulses)
+        np.minimum(pulses, self._maximum, out=pulses)
         self._link.send(self._frame.of(pulses))
-        return np.array(
-            [
-                pulse * unit + zero
-                for pulse, (unit, zero) in zip(pulses, self._to_joint, strict=True)
-            ]
-        )
+        np.multiply(pulses, self._per_pulse, pulses)
+        np.add(pulses, self._at_pulse_zero, pulses)
+        return pulses
 
     def write_pwm(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit the PWM of servos, where it changed; return those that did not take it.
@@ -123,7 +114,7 @@ class GoalWriter:
         return min(round(ratio * PWM_FULL), self._pwm_limit[servo_id])
 
     def _refuse(self, position_rad: Floats) -> None:
-        if position_rad.shape != self._shape:
+        if position_rad.shape != (len(self._joints),):
             raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
         finite = np.isfinite(position_rad)
         bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
@@ -134,22 +125,19 @@ class GoalFrame:
     """Hold the sync write of all goal positions; only pulses and CRC change."""
 
     def __init__(self, ids: Sequence[int]) -> None:
-        params = _GOAL_POSITION_HEAD + b"".join(bytes((servo_id, 0, 0, 0, 0)) for servo_id in ids)
+        records = np.zeros(len(ids), dtype=_GOAL)
+        records["id"] = ids
+        params = _GOAL_POSITION_HEAD + records.tobytes()
         self._frame = bytearray(encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, params))
+        body = np.frombuffer(self._frame, _GOAL, len(ids), _FRAME_HEAD_BYTES)
+        self._pulses = body["pulse"]
         self._end = len(self._frame) - _FRAME_CRC_BYTES
         self._body = memoryview(self._frame)[: self._end]
-        self._pulses = struct.Struct(f"<{len(ids)}i")
-        self._places = [
-            slice(_FRAME_HEAD_BYTES + 1 + byte, self._end, _ENTRY_BYTES)
-            for byte in range(_PULSE_BYTES)
-        ]
 
-    def of(self, pulses: Sequence[int]) -> bytes:
+    def of(self, pulses: Floats) -> bytes:
         """Return the packet that sends these pulses, stuffed where it must be."""
-        packed = self._pulses.pack(*pulses)
+        self._pulses[:] = pulses
         frame = self._frame
-        for byte, places in enumerate(self._places):
-            frame[places] = packed[byte::_PULSE_BYTES]
         if frame.find(STUFFED_PATTERN, len(HEADER)) >= 0:
             params = bytes(frame[_FRAME_HEAD_BYTES - len(_GOAL_POSITION_HEAD) : self._end])
             return encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, params)
