@@ -68,6 +68,7 @@ class CanWire(FrameCarrier):
     ) -> None:
         """Build the wire; a controller that goes bus-off by itself restarts after `restart_s`."""
         super().__init__(bitrate=bitrate, timed=timed, restart_s=restart_s)
+        self._ports_held = False
         self._running = True  # all nodes are there before the first of them speaks
         for node in nodes:
             self.add_node(node)
@@ -80,9 +81,14 @@ class CanWire(FrameCarrier):
         node.connect(lambda frame: self._send_for(node, frame))
 
     def attach(self, port: Port, *, report_bus_errors: bool = False) -> None:
-        """Hand every further frame to `port`; SocketCAN calls the option `berr-reporting`."""
+        """Hand every further frame to `port`; SocketCAN calls the option `berr-reporting`.
+
+        While all ports are held off the bus, so is a new one: it is the same interface.
+        """
         station = self._stations.add(port, port, lambda: True, is_node=False)
         station.report_bus_errors = report_bus_errors
+        if self._ports_held:
+            station.go_bus_off()
         for unheard in self._stations.waiting():
             unheard.ready_ns = min(unheard.ready_ns, self._now_ns)
         self._run(self._now_ns)
@@ -131,12 +137,14 @@ class CanWire(FrameCarrier):
     def set_bus_off(self, owner: Hashable | None = None) -> None:
         """Take a node or port, or None: every port, off the bus until `restart`."""
         self._sound = False
+        self._ports_held = self._ports_held or owner is None
         for station in self._stations.chosen(owner):
             self._abandon(station)
             station.go_bus_off()
 
     def restart(self, owner: Hashable | None = None) -> None:
         """Let a controller recover: it is back after 128 times 11 recessive bits."""
+        self._ports_held = self._ports_held and owner is not None
         for station in self._stations.chosen(owner):
             if station.bus_off:
                 station.restart_ns = self._now_ns + self._bits_ns(RECOVERY_BITS)

@@ -163,6 +163,21 @@ def test_a_forced_bus_off_lasts_until_the_restart_and_128_times_11_bits(bench: B
     assert bench.state() is ErrorState.ACTIVE
 
 
+def test_opening_the_interface_anew_does_not_end_a_forced_bus_off(bench: Bench) -> None:
+    bench.wire.set_bus_off()
+    with MemoryBus(bench.wire) as second:
+        frame = second.recv()
+        assert frame is not None
+        assert frame.arbitration_id & BUS_OFF
+        with pytest.raises(can.CanOperationError):
+            second.send(message())
+        bench.wire.restart()
+        bench.pass_time(0.004)
+        second.send(message())
+        bench.pass_time(0.002)
+    assert bench.node.heard == [0x123]
+
+
 def test_a_node_can_be_taken_off_the_bus(bench: Bench) -> None:
     bench.wire.set_bus_off(bench.node)
     bench.bus.send(message())
