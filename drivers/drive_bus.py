@@ -226,7 +226,7 @@ def until(done: Callable[[], bool], clock: Clock, timeout_ns: int) -> Iterator[N
         yield
 
 
-FRAMES_BEFORE_YIELD: Final = 16
+FRAMES_BEFORE_YIELD: Final = 4
 
 
 def listening(steps: Iterator[None], take_frames: Callable[[], bool]) -> Iterator[None]:
