@@ -59,6 +59,7 @@ class HealthPoll:
         self._asked[list(asked)] = True
         self._cycle = 0
         self._turn = 0
+        self._probes = 0
         self._seen_alert: NDArray[np.bool_] = np.zeros(len(servos), dtype=np.bool_)
         self._urgent: deque[int] = deque()
 
@@ -80,8 +81,9 @@ class HealthPoll:
         return self._take_turn()
 
     def expect(self, index: int) -> None:
-        """Set a suspended servo up again that is known to answer."""
-        self._returns[index] = self._bring_back(index)
+        """Set a suspended servo up again that is known to answer; one that is at it goes on."""
+        if index not in self._returns:
+            self._returns[index] = self._bring_back(index)
 
     def ask_soon(self, index: int) -> None:
         """Read a servo's status in one of the next cycles."""
@@ -110,8 +112,10 @@ class HealthPoll:
     def _take_turn(self) -> bool:
         self._turn += 1
         suspended = self._roster.suspended
-        if suspended and self._turn % _PROBE_EVERY_TURNS == 0:
-            self._probe(suspended[self._turn // _PROBE_EVERY_TURNS % len(suspended)])
+        mostly_away = len(suspended) > len(self._roster.polled)
+        if suspended and (mostly_away or self._turn % _PROBE_EVERY_TURNS == 0):
+            self._probes += 1
+            self._probe(suspended[self._probes % len(suspended)])
             return True
         polled = [index for index in self._roster.polled if self._asked[index]]
         if not polled:
