@@ -1,8 +1,12 @@
+import numpy as np
 import pytest
 
+from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES, Intrinsics
+from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.imu.bno085_rvc import FRAME_BYTES, Bno085Rvc
 from sim_twin.faults.line_tamper import Garbage, Latency, LineTamper, Silence, Stuck
 from sim_twin.lines import MemoryLine
+from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 
 STEP_NS = 2_000_000
@@ -98,3 +102,26 @@ def test_a_bus_repeats_its_last_answer_of_the_same_length() -> None:
     assert [line.transmit(), line.transmit()] == [b"state1", b"ok"]
     line.add(Stuck(line))
     assert [line.transmit(), line.transmit()] == [b"state1", b"ok"]
+
+
+def test_a_stuck_camera_shows_nothing_new(host: Host) -> None:
+    image = np.zeros((1, 2, 3), np.uint8), np.ones((1, 2), np.float32)
+    intrinsics = Intrinsics(width=2, height=1, fx=1.0, fy=1.0, cx=0.5, cy=0.0)
+    device = CameraDevice(lambda: image, intrinsics, depth_sigma_per_m=0.0)
+    line = LineTamper(device, host.now_ns, HEADER_BYTES + 2 * BYTES_PER_PIXEL + CRC.size)
+    camera = RgbdCamera(MemoryLine(line, host), host)
+    camera.start(10.0)
+
+    def frames(count: int) -> int:
+        seen = 0
+        for _ in range(count):
+            host.time_ns += 100_000_000
+            device.step(host.time_ns)
+            seen += camera.poll() is not None
+        return seen
+
+    assert frames(5) == 5
+    line.add(Stuck(line))
+    assert frames(15) == 0
+    assert camera.counters.repeated_frames == 15
+    assert camera.counters.crc_errors == 0
