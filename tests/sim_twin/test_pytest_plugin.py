@@ -10,20 +10,8 @@ import pytest
 import vla_deploy.robots
 from drivers.clock import MonotonicClock
 
+PAGE = Path(__file__).parents[2] / "docs/testing.md"
 ROBOT_FILE = Path(vla_deploy.robots.__file__).parent / "butler/robot.toml"
-
-EXAMPLE = """
-import pytest
-
-
-@pytest.mark.twin(seed=7)
-def test_the_robot_turns_by_what_it_was_told(twin):
-    before = twin.lockstep.truth()["robot"]["yaw_rad"]
-    outcome = twin.say("turn left 20 degrees")
-    assert outcome["success"], outcome["error"]
-    turned = twin.lockstep.truth()["robot"]["yaw_rad"] - before
-    assert turned == pytest.approx(0.349, abs=0.05)
-"""
 
 FAULTY = """
 import pytest
@@ -67,10 +55,11 @@ def run_pytest(folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
 
 @pytest.mark.gl
 @pytest.mark.timeout(120)
-def test_a_test_of_a_users_own_finds_the_fixtures(tmp_path: Path) -> None:
-    (tmp_path / "test_mine.py").write_text(EXAMPLE)
+def test_the_example_of_the_page_runs_as_it_stands(tmp_path: Path) -> None:
+    example = PAGE.read_text().split("```python\n")[1].split("```")[0]
+    (tmp_path / "test_mine.py").write_text(example)
     done = run_pytest(tmp_path, "--strict-markers")
-    assert "1 passed" in done.stdout, done.stdout
+    assert "2 passed" in done.stdout, done.stdout
 
 
 @pytest.mark.gl
