@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 help:
 	@echo "make demo      install what is needed, then pick up the red cup on the twin"
 	@echo "make test      install what is needed, then format, lint, types, import rules and all tests"
-	@echo "make campaign  the long tests: ten seeds of pick and place"
+	@echo "make campaign  the long tests: ten seeds of pick and place, every fault, a million streams into every parser"
 	@echo "make lock      pin every dependency afresh"
 
 $(STAMP): pyproject.toml requirements-dev.lock scripts/install
