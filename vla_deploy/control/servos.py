@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.dynamixel import BusState, DynamixelBus, ServoSpec
+from drivers.error_budget import BudgetState
 from drivers.errors import DriverError, LinkLost, NoReply
 from drivers.opener import DeviceOpener
 from platforms import Profile
@@ -100,6 +101,21 @@ class ServoLine:
     def counters(self) -> dict[str, Any]:
         """Return what the bus tells of itself; empty while it is not open."""
         return {} if self._bus is None else {**self._bus.telemetry(), "faults": self.faults.newest}
+
+    @property
+    def lost_parts(self) -> tuple[str, ...]:
+        """Name what cannot be relied on: the line, or servos whose error budget is used up."""
+        if self.lost:
+            return (self.name,)
+        if self._bus is None or self._bus.journal.budget.quiet:
+            return ()
+        budget = self._bus.journal.budget
+        judged = [(self.name, budget.bus), *zip(budget.names, budget.members, strict=True)]
+        return tuple(
+            f"{name}: too many answers missing or damaged"
+            for name, state in judged
+            if state is BudgetState.LOST
+        )
 
     @property
     def watchdog_tripped(self) -> NDArray[np.bool_]:

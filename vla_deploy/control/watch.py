@@ -97,7 +97,7 @@ class Watch:
             sample_age_s=state.age_s,
             hardware_error=state.error,
             watchdog_tripped=self._servos.watchdog_tripped if guarded else self._quiet,
-            lost_servo_buses=(self._servos.name,) if self._servos.lost else (),
+            lost_servo_buses=self._servos.lost_parts,
             lost_can_buses=(self._wheels.name,) if self._wheels.lost else (),
             drives=self._wheels.samples() if energised else (),
             base_moving=energised and commanded,
