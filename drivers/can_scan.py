@@ -20,9 +20,9 @@ from drivers.canopen.objects import (
 )
 from drivers.canopen.sdo import SdoClient
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import side_by_side, until
 from drivers.errors import NoReply, ProtocolError, WrongDevice
 from drivers.odrive.codec import MESSAGES, AxisError, AxisState, Command, can_id, decode, split_id
+from drivers.stepping import side_by_side, until
 
 LISTEN_NS: Final = NS_PER_S // 2
 ANSWER_NS: Final = 200_000_000

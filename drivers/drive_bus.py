@@ -1,19 +1,12 @@
 """Declare the contract that every bus of wheel drives keeps, whatever protocol it speaks."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from drivers.clock import Clock
-from drivers.error_budget import BudgetLimits, BudgetState, BusBudget
-
-NODE_LIMITS: Final = BudgetLimits(window_s=1.0, degraded_at=10, lost_at=125, recover_at=2)
-"""At 250 Hz, 4 % of a second's answers missing degrade a node, half of them lose it."""
-CONNECT_POLL_NS: Final = 500_000
 
 
 class PowerState(Enum):
@@ -46,6 +39,14 @@ class ResetRule(Enum):
     OPERATOR = "by the operator's reset"
     NEVER = "only after repair, by switching the supply off and on"
 
+    @property
+    def gravity(self) -> int:
+        """Return how strict the rule is; more is stricter."""
+        return _GRAVITY[self]
+
+
+_GRAVITY: Final = {rule: gravity for gravity, rule in enumerate(ResetRule)}
+
 
 class DriveFault(Protocol):
     """Tell what a drive complains about."""
@@ -71,7 +72,7 @@ class DriveState:
     """Hold what is known of all drives at one tick, in the order of their specs.
 
     `age_s` is the time since the values were sampled. `lost` marks a drive that has gone silent,
-    rebooted or left its operational state; `faulted` one in a fault state; `fault` is the latest
+    rebooted or left its operational state; `faulted` one in a fault state; `fault` is the gravest
     complaint that was not taken back. A torque that the drive does not tell is NaN.
     """
 
@@ -153,6 +154,16 @@ class DriveBus(Protocol):
         """Take the power off all drives."""
         ...
 
+    def cut_power(self) -> None:
+        """Take the power off all drives at once, as a stop of category 0 asks.
+
+        Where the protocol can, the drives then refuse power until `reset_fault`.
+
+        Raises:
+            LinkLost: the bus has gone.
+        """
+        ...
+
     def quick_stop(self) -> None:
         """Let all drives brake on their ramp and then take their power off."""
         ...
@@ -164,91 +175,3 @@ class DriveBus(Protocol):
     def close(self) -> None:
         """Leave the drives without power and leave the bus; closing twice is allowed."""
         ...
-
-
-class NodeBudget:
-    """Count the cycles in which a node's answer was missing, and judge node and bus by them."""
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._budget = BusBudget(names, member=NODE_LIMITS)
-
-    @property
-    def lost(self) -> tuple[bool, ...]:
-        """Tell of each node whether it answers too seldom to be driven."""
-        return tuple(state is BudgetState.LOST for state in self._budget.members)
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Return how many nodes are in trouble, and 1 where the bus itself is."""
-        members = self._budget.members
-        return {
-            "degraded_nodes": members.count(BudgetState.DEGRADED),
-            "lost_nodes": members.count(BudgetState.LOST),
-            "bus_degraded": int(self._budget.bus is not BudgetState.OK),
-        }
-
-    def note_cycle(self, missing: Sequence[int], now_ns: int) -> None:
-        """Note which nodes, by row, did not answer in the last cycle."""
-        self._budget.note_cycle(missing, now_ns)
-
-    def forget(self) -> None:
-        """Start over, as with a new connection."""
-        for row in range(len(self._budget.names)):
-            self._budget.reset(row)
-
-
-def wait_for(steps: Iterator[None], clock: Clock) -> None:
-    """Run steps to their end, waiting a little between them."""
-    for _ in steps:
-        clock.sleep_until(clock.now_ns() + CONNECT_POLL_NS)
-
-
-def side_by_side(runs: Sequence[Iterator[None]]) -> Iterator[None]:
-    """Step several runs in turn until all have ended."""
-    going = list(runs)
-    while going:
-        going = [run for run in going if _goes_on(run)]
-        if going:
-            yield
-
-
-def _goes_on(run: Iterator[None]) -> bool:
-    return next(run, _ENDED) is not _ENDED
-
-
-_ENDED: Final = object()
-
-
-def until(done: Callable[[], bool], clock: Clock, timeout_ns: int) -> Iterator[None]:
-    """Yield until `done()` or the time is up; the caller judges which."""
-    deadline_ns = clock.now_ns() + timeout_ns
-    while not done() and clock.now_ns() <= deadline_ns:
-        yield
-
-
-FRAMES_BEFORE_YIELD: Final = 4
-
-
-def listening(steps: Iterator[None], take_frames: Callable[[], bool]) -> Iterator[None]:
-    """Hand steps what has arrived between any two of them; yield where nothing has.
-
-    It yields now and then anyway, so that a chattering bus does not hold the caller up.
-    """
-    in_a_row = 0
-    for _ in steps:
-        in_a_row += 1
-        if not take_frames() or in_a_row >= FRAMES_BEFORE_YIELD:
-            in_a_row = 0
-            yield
-            take_frames()
-
-
-def finite(velocity_rad_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the velocities.
-
-    Raises:
-        ValueError: one of them is NaN or infinite.
-    """
-    if not np.isfinite(velocity_rad_s).all():
-        raise ValueError(f"velocities {velocity_rad_s.tolist()} rad/s: NaN or infinite")
-    return velocity_rad_s

@@ -11,6 +11,7 @@ from drivers.canopen.objects import (
     DEVICE_TYPE,
     ENCODER_RESOLUTION,
     ERROR_CODE,
+    ERROR_FIELD,
     FAULT_REACTION_OPTION,
     GEAR_RATIO,
     HEARTBEAT_CONSUMER,
@@ -41,6 +42,7 @@ SLOW_DOWN_THEN_DISABLE: Final = 2
 HEARTBEATS_PER_LIMIT: Final = 4
 MODE_TIMEOUT_NS: Final = 300_000_000
 MILLISECONDS: Final = -3
+CODE_MASK: Final = 0xFFFF  # the upper half of an entry is the vendor's
 
 Step = tuple[int, int, int]
 
@@ -57,13 +59,30 @@ def refuse_unrepaired(parameters: DriveParameters) -> Writing:
         status = yield from parameters.read(STATUSWORD)
         if decode_statusword(status) not in FAULT_STATES:
             return
-        code = yield from parameters.read(ERROR_CODE)
+        codes = [(yield from parameters.read(ERROR_CODE))]
+        codes += yield from _earlier_codes(parameters)
     except (NoReply, WrongDevice, ProtocolError):
         return
-    if reset_rule(code) is ResetRule.NEVER:
-        raise DeviceFault(
-            f"{parameters.name}: {code_text(code)}; it is reset {ResetRule.NEVER.value}"
-        )
+    for code in codes:
+        if reset_rule(code) is ResetRule.NEVER:
+            raise DeviceFault(
+                f"{parameters.name}: {code_text(code)}; it is reset {ResetRule.NEVER.value}"
+            )
+
+
+def _earlier_codes(parameters: DriveParameters) -> Generator[None, None, list[int]]:
+    """Return the codes of the error field: a heartbeat lost later hides what came first."""
+    codes: list[int] = []
+    if not parameters.dictionary.has(ERROR_FIELD):
+        return codes
+    try:
+        count = yield from parameters.read(ERROR_FIELD)
+        while len(codes) < count:
+            entry = yield from parameters.read(ERROR_FIELD, len(codes) + 1)
+            codes.append(entry & CODE_MASK)
+    except (NoReply, WrongDevice, ProtocolError):
+        return codes
+    return codes
 
 
 def verify_drive(parameters: DriveParameters, spec: DriveSpec) -> Writing:

@@ -39,16 +39,20 @@ class DrivePort:
 
     def forget(self) -> None:
         """Start over, as before the drive's first message."""
-        self.power_state = PowerState.UNKNOWN
-        self.velocity_rad_s = 0.0
-        self.torque_nm = math.nan
-        self.emergency: Emergency | None = None
+        self.fault: Emergency | None = None
         self.booted = False
         self.rebooted = False
         self.nmt_state: int | None = None
         self._counts: int | None = None
         self._travel_counts = 0
         self._heard_ns: int | None = None
+        self.forget_samples()
+
+    def forget_samples(self) -> None:
+        """Forget all process data, as before they are started."""
+        self.power_state = PowerState.UNKNOWN
+        self.velocity_rad_s = 0.0
+        self.torque_nm = math.nan
         self._sample_ns: dict[int, int] = {}
         self._sync_ns = 0
         self._awaited = 0
@@ -65,6 +69,11 @@ class DrivePort:
         return len(self._sample_ns) == 2
 
     @property
+    def operational(self) -> bool:
+        """Tell whether process data have arrived, and a heartbeat that fits them."""
+        return self.complete and self.nmt_state == NmtState.OPERATIONAL
+
+    @property
     def faulted(self) -> bool:
         """Tell whether the drive is in one of its fault states."""
         return self.power_state in FAULT_STATES
@@ -77,7 +86,7 @@ class DrivePort:
     @property
     def reset_rule(self) -> ResetRule:
         """Return who may reset the drive's fault; a fault without a code is the operator's."""
-        return ResetRule.OPERATOR if self.emergency is None else self.emergency.rule
+        return ResetRule.OPERATOR if self.fault is None else self.fault.rule
 
     def age_s(self, now_ns: int) -> float:
         """Return the time since the older of both samples was taken; infinite before the first."""
@@ -108,6 +117,8 @@ class DrivePort:
     def on_position(self, data: bytes, now_ns: int) -> None:
         """Take TPDO2."""
         counts, *torque_steps = _unpacked(self.position_wire, data)
+        if self.rebooted:
+            return  # its counter began anew somewhere else
         if torque_steps:
             torque_ratio = torque_steps[0] / TORQUE_STEPS_PER_RATED
             motor_nm = torque_ratio * self.rated_torque_nm
@@ -135,10 +146,18 @@ class DrivePort:
             self.booted = True
 
     def on_emergency(self, data: bytes, now_ns: int) -> None:
-        """Take an emergency message; "error reset" takes the last one back."""
+        """Take an emergency message; keep the gravest until none is left, the newest of equals.
+
+        Otherwise a lost heartbeat, told after a short circuit, would make that one harmless.
+        """
         emergency = decode_emergency(data, now_ns)
-        self.emergency = None if emergency.is_reset else emergency
         self._heard_ns = now_ns
+        if emergency.takes_all_back:
+            self.fault = None
+        elif not emergency.is_reset and (
+            self.fault is None or emergency.rule.gravity >= self.fault.rule.gravity
+        ):
+            self.fault = emergency
 
 
 def _unpacked(wire: struct.Struct, data: bytes) -> tuple[int, ...]:

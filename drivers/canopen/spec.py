@@ -2,8 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from drivers.canopen.objects import OperatingMode
+
+HOST_NODE_ID: Final = 0x7F
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +30,7 @@ class DriveSpec:
 
     def __post_init__(self) -> None:
         checks = (
-            ("node_id", 1 <= self.node_id <= 127, "1..127"),
+            ("node_id", 1 <= self.node_id < HOST_NODE_ID, "1..126 (127 is the host's)"),
             ("sign", self.sign in (-1, 1), "-1 or 1"),
             ("counts_per_rev", self.counts_per_rev > 0, "above 0"),
             ("gear_ratio", self.gear_ratio > 0.0, "above 0"),

@@ -24,6 +24,7 @@ class AxisPort:
 
     def __init__(self, spec: AxisSpec, limit_ns: int) -> None:
         self.spec = spec
+        self.watchdog_endpoint: int | None = None
         self._limit_ns = limit_ns
         self.forget()
 
@@ -46,6 +47,8 @@ class AxisPort:
         self.without_estimate = False
         self.heartbeats = 0
         self.values: dict[int, bytes] = {}
+        self.watchdog_confirmed = False
+        self._gone = False
         self._heartbeat_ns: int | None = None
         self._sample_ns: int | None = None
 
@@ -61,6 +64,11 @@ class AxisPort:
         return AxisFault(code=code) if code else None
 
     @property
+    def faulted(self) -> bool:
+        """Tell whether an error disarmed the axis or keeps it disarmed."""
+        return self.fault is not None
+
+    @property
     def power_state(self) -> PowerState:
         """Return the axis' state in the words that all drives share."""
         if self.fault is not None:
@@ -72,7 +80,14 @@ class AxisPort:
         return math.inf if self._sample_ns is None else (now_ns - self._sample_ns) / NS_PER_S
 
     def lost(self, now_ns: int) -> bool:
-        """Tell whether heartbeats or estimates have stopped."""
+        """Tell whether the axis fell silent or rebooted; only connecting anew ends that.
+
+        An axis that rebooted has forgotten its watchdog and its limits.
+        """
+        self._gone = self._gone or self._silent(now_ns)
+        return self._gone
+
+    def _silent(self, now_ns: int) -> bool:
         if self._heartbeat_ns is None or self._sample_ns is None:
             return True
         silent = now_ns - self._heartbeat_ns > max(HEARTBEAT_LIMIT_NS, self._limit_ns)
@@ -135,6 +150,9 @@ class AxisPort:
         number, value = decode(Command.TX_SDO, data)
         assert isinstance(value, bytes)
         self.values[int(number)] = value
+        if number == self.watchdog_endpoint:
+            self.watchdog_confirmed = bool(value[0])
+            self._gone = self._gone or not self.watchdog_confirmed
 
 
 _HANDLERS: Final[dict[int, Callable[[AxisPort, bytes, int], None]]] = {

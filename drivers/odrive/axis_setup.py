@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Iterator
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import ResetRule, until
+from drivers.drive_bus import ResetRule
 from drivers.errors import DeviceFault, NoReply, WrongDevice
 from drivers.odrive.axis_port import AxisPort
 from drivers.odrive.codec import (
@@ -27,6 +27,7 @@ from drivers.odrive.endpoints import (
     Endpoint,
     EndpointTable,
 )
+from drivers.stepping import until
 
 HEARTBEAT_TIMEOUT_NS: Final = 3 * NS_PER_S // 2
 ANSWER_TIMEOUT_NS: Final = 100_000_000
@@ -71,6 +72,7 @@ class AxisSetup:
             DeviceFault: it has an error that only repair may end.
         """
         port = self._port
+        port.watchdog_endpoint = None
         yield from self._await("heartbeat", lambda: port.heartbeats > 0, HEARTBEAT_TIMEOUT_NS)
         yield from self._check_firmware(table)
         yield from self._refuse_unrepaired()
@@ -81,6 +83,11 @@ class AxisSetup:
         self._choose_velocity_mode()
         yield from self._clear()
         yield from self._first_estimate()
+        port.watchdog_endpoint = table.endpoints[ENABLE_WATCHDOG].number
+
+    def ask_watchdog(self) -> None:
+        """Ask whether the watchdog is still armed; an axis that rebooted has forgotten it."""
+        self.tell(Command.RX_SDO, SdoOpcode.READ, self._port.watchdog_endpoint or 0, bytes(4))
 
     def _settings(self) -> Iterator[tuple[str, float]]:
         """List the properties to write; the watchdog comes last, for from then on it is fed."""

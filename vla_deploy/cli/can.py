@@ -14,8 +14,8 @@ from drivers.can_link import CanLink
 from drivers.can_scan import BusScan, FoundAxis, FoundNode, ScanReport
 from drivers.can_words import Words, describe_canopen, describe_odrive
 from drivers.clock import NS_PER_S, MonotonicClock
-from drivers.drive_bus import wait_for
 from drivers.errors import ProtocolError
+from drivers.stepping import wait_for
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_command
 from vla_deploy.robots import load_robot

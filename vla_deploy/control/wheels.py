@@ -6,9 +6,10 @@ from collections.abc import Generator
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveBus, DriveState, PowerState, wait_for
+from drivers.drive_bus import DriveBus, DriveState, PowerState
 from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
+from drivers.stepping import wait_for
 from platforms import Profile
 from vla_deploy.control.drive_buses import drive_bus
 from vla_deploy.control.odometry import DifferentialDrive, Odometry
