@@ -37,4 +37,6 @@ class StopPlan:
 
     def base_category(self, reaction: Reaction) -> StopCategory:
         """Return how the base stops."""
+        if reaction is Reaction.BASE_OFF:
+            return min(self.base, StopCategory.STOP_THEN_REMOVE_POWER)
         return self.base if reaction is Reaction.GROUP_STOP else StopCategory.STOP_KEEP_POWER

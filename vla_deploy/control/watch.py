@@ -14,12 +14,17 @@ _RANGE_MARGIN = 0.02
 _OUTWARD_SHARE = 0.05
 _OVERSPEED = 2.0
 _FOLLOWING_ERROR_RAD = 0.4
+_WHEEL_ERROR_OF_TOP = 0.05
+_WHEEL_ERROR_OF_COMMAND = 0.5
 
 
 def safety_limits(robot: RobotDescription) -> SafetyLimits:
     """Return the thresholds of the safety rules for a robot.
 
-    A gripper has no following error: closed on an object it is blocked by intent.
+    A gripper has no following error: closed on an object it is blocked by intent. A wheel may be
+    off by a twentieth of its top speed, at which the base creeps, and by half of what it is told:
+    it lags while it speeds up, and strains on a carpet's edge. One that stands or runs away is
+    beyond that.
     """
     margin = _RANGE_MARGIN * (robot.position_max - robot.position_min)
     grippers = {
@@ -36,6 +41,10 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         outward_velocity=_OUTWARD_SHARE * robot.velocity_max,
         velocity=_OVERSPEED * robot.velocity_max,
         following_error=np.array(following),
+        wheel_error_rad_s=_WHEEL_ERROR_OF_TOP
+        * robot.base.max_speed_m_s
+        / robot.base.wheel_radius_m,
+        wheel_error_ratio=_WHEEL_ERROR_OF_COMMAND,
         servo_age_s=BY_NAME["joint_state"].deadline_s,
         base_command_age_s=BY_NAME["base_command"].deadline_s,
         supervisor_age_s=BY_NAME["process_table"].deadline_s,

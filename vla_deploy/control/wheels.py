@@ -11,12 +11,15 @@ from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from drivers.stepping import wait_for
 from platforms import Profile
+from vla_deploy.control.axes import Floats
 from vla_deploy.control.drive_buses import drive_bus
 from vla_deploy.control.odometry import DifferentialDrive, Odometry
+from vla_deploy.control.wheel_tracking import WheelTracking
 from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import DriveSample
 
 REOPEN_NS = NS_PER_S
+BRAKE_NS = NS_PER_S
 _STILL_RAD_S = 0.02
 _UNKNOWN_FAULT = 0xFFFF
 _LOG = logging.getLogger(__name__)
@@ -40,11 +43,13 @@ class Wheels:
             wheel_radius_m=robot.base.wheel_radius_m, track_m=robot.base.track_m
         )
         self.odometry = Odometry(self._geometry)
+        self._tracking = WheelTracking(len(self._wiring.drives))
         self.v_m_s = 0.0
         self.w_rad_s = 0.0
         self._bus: DriveBus | None = None
         self._next_open_ns = 0
         self._followed = False
+        self._off_at_ns: int | None = None
         self._reopening: Generator[None, None, None] | None = None
 
     def open(self) -> None:
@@ -98,6 +103,7 @@ class Wheels:
         self._bus = bus
         self.lost = False
         self.odometry.forget_wheels()
+        self._tracking.forget()
 
     @property
     def enabled(self) -> bool:
@@ -132,6 +138,8 @@ class Wheels:
                 lost=state.lost[row],
                 age_s=float(state.age_s[row]),
                 fault_code=_fault_code(state, row, dropped_out=self._dropped_out),
+                commanded_rad_s=float(self._tracking.commanded_rad_s[row]),
+                measured_rad_s=float(self._tracking.measured_rad_s[row]),
             )
             for row, drive in enumerate(self._wiring.drives)
         )
@@ -140,6 +148,8 @@ class Wheels:
         """Command a base velocity, take in the drives' state and move the odometry on."""
         if self._bus is None or self.lost:
             return
+        if self._off_at_ns is not None and self._clock.now_ns() >= self._off_at_ns:
+            self.disable()
         try:
             wanted = np.array(self._geometry.wheel_speeds(v_m_s, w_rad_s))
             state = self._bus.cycle(wanted)
@@ -152,8 +162,15 @@ class Wheels:
         self._followed = self._followed or self._bus.enabled
         if any(state.lost):
             self._note_loss()
+        self._track(wanted, state)
         self.odometry.update(*state.position_rad.tolist())
         self.v_m_s, self.w_rad_s = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
+
+    def _track(self, wanted_rad_s: Floats, state: DriveState) -> None:
+        if state.enabled:
+            self._tracking.note(self._clock.now_ns(), wanted_rad_s, state.position_rad)
+        else:
+            self._tracking.forget()
 
     @property
     def _dropped_out(self) -> bool:
@@ -168,18 +185,24 @@ class Wheels:
     def enable(self) -> None:
         """Begin to power the drives; `enabled` tells when they follow."""
         self._followed = False
+        self._off_at_ns = None
         if self._bus is not None:
             self._bus.enable()
 
     def disable(self) -> None:
         """Take the power off both drives."""
         self._followed = False
+        self._off_at_ns = None
         if self._bus is not None:
             self._bus.disable()
 
     def quick_stop(self) -> None:
-        """Let the drives brake on their own ramp and then take their power off."""
+        """Let the drives brake on their own ramp and then take their power off.
+
+        A drive that does not come to rest within a second loses its power all the same.
+        """
         self._followed = False
+        self._off_at_ns = self._clock.now_ns() + BRAKE_NS
         if self._bus is not None:
             self._bus.quick_stop()
 

@@ -15,14 +15,16 @@ class Reaction(IntEnum):
     """Order what may be done about a cause, the most restrictive last.
 
     BASE_RAMP brings the base to rest and leaves the joints alone. HOLD is stop category 2
-    everywhere: a controlled stop, power kept. GROUP_STOP stops every joint group by the
-    category that the robot file gives it.
+    everywhere: a controlled stop, power kept. BASE_OFF is HOLD for the joints, while the wheels
+    brake by themselves and lose power, for they do not do as they are told. GROUP_STOP stops every
+    joint group by the category that the robot file gives it.
     """
 
     NONE = 0
     BASE_RAMP = 1
     HOLD = 2
-    GROUP_STOP = 3
+    BASE_OFF = 3
+    GROUP_STOP = 4
 
 
 class Cause(Enum):
@@ -38,6 +40,7 @@ class Cause(Enum):
     JOINT_POSITION_LIMIT = "joint_position_limit"
     JOINT_VELOCITY_LIMIT = "joint_velocity_limit"
     FOLLOWING_ERROR = "following_error"
+    WHEEL_FOLLOWING_ERROR = "wheel_following_error"
     SUPERVISOR_LOST = "supervisor_lost"
     STALE_COMMAND = "stale_command"
 
@@ -95,6 +98,8 @@ RULES: tuple[Rule, ...] = (
          probes.joint_velocity_limit, "something drives the joint: look for a collision or a drop"),
     Rule(Cause.FOLLOWING_ERROR,         Reaction.HOLD,       Latch.ENERGISED, 50,
          probes.following_error, "the joint is blocked or overloaded: disarm, then free it"),
+    Rule(Cause.WHEEL_FOLLOWING_ERROR,   Reaction.BASE_OFF,   Latch.ENERGISED, 50,
+         probes.wheel_following_error, "look for a blocked wheel, then at its encoder's cable"),
     Rule(Cause.SUPERVISOR_LOST,         Reaction.HOLD,       Latch.ENERGISED, 1,
          probes.supervisor_lost, "start the supervisor"),
     Rule(Cause.STALE_COMMAND,           Reaction.BASE_RAMP,  Latch.NEVER,     1,

@@ -11,12 +11,17 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveSample:
-    """Describe one wheel drive; its driver judges whether it is `lost`, `fault_code` 0 is none."""
+    """Describe one wheel drive; its driver judges whether it is `lost`, `fault_code` 0 is none.
+
+    Both speeds are means over the same short time; they are equal where the drive need not follow.
+    """
 
     name: str
     lost: bool
     age_s: float
     fault_code: int
+    commanded_rad_s: float
+    measured_rad_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +55,8 @@ class SafetyLimits:
     """Carry the thresholds; an infinite entry switches one joint's check off.
 
     `outward_velocity` is the speed above which a joint beyond its range counts as still
-    leaving it, so that the way back stays open.
+    leaving it, so that the way back stays open. A wheel may be off its commanded speed by
+    `wheel_error_rad_s`, and by `wheel_error_ratio` of that speed on top.
     """
 
     joint_names: tuple[str, ...]
@@ -59,6 +65,8 @@ class SafetyLimits:
     outward_velocity: Floats
     velocity: Floats
     following_error: Floats
+    wheel_error_rad_s: float
+    wheel_error_ratio: float
     servo_age_s: float
     base_command_age_s: float
     supervisor_age_s: float

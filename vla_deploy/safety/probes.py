@@ -54,6 +54,16 @@ def following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | Non
     )
 
 
+def wheel_following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a wheel that turns slower, faster or the other way than commanded."""
+    for drive in inputs.drives:
+        error = abs(drive.measured_rad_s - drive.commanded_rad_s)
+        allowed = limits.wheel_error_rad_s + limits.wheel_error_ratio * abs(drive.commanded_rad_s)
+        if error > allowed:
+            return Finding(subject=drive.name, measured=error, limit=allowed)
+    return None
+
+
 def servo_hardware_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a servo that reports a hardware error of its own."""
     if not inputs.hardware_error.any():

@@ -54,6 +54,21 @@ def test_a_protective_stop_keeps_all_power(robot: RobotDescription) -> None:
     assert plan.base_category(Reaction.HOLD) is StopCategory.STOP_KEEP_POWER
 
 
+@pytest.mark.parametrize("category", StopCategory)
+def test_wheels_that_do_not_obey_lose_power_whatever_their_category(
+    robot: RobotDescription, category: StopCategory
+) -> None:
+    base = {
+        name: replace(group, stop_category=category)
+        for name, group in robot.groups.items()
+        if robot.can_bus.drives[0].joint in group.joints
+    }
+    plan = StopPlan(replace(robot, groups={**robot.groups, **base}))
+    assert plan.base_category(Reaction.BASE_OFF) is not StopCategory.STOP_KEEP_POWER
+    assert len(plan.unpowered_at_once(Reaction.BASE_OFF)) == 0
+    assert len(plan.unpowered_at_rest(Reaction.BASE_OFF)) == 0
+
+
 def test_a_servo_gives_its_stall_torque_at_its_full_duty_error(robot: RobotDescription) -> None:
     by_joint = dict(zip(robot.joint_names, stiffness(robot), strict=True))
     assert by_joint["left_shoulder_yaw"] == pytest.approx(10.6 / 0.1086, rel=1e-3)

@@ -146,3 +146,36 @@ def test_other_motor_counts_than_declared_are_refused() -> None:
     wheels = Wheels(robot, load_profile("desktop"), bench, bench.world)  # type: ignore[arg-type]
     with pytest.raises(WrongDevice, match="encoder increments"):
         wheels.open()
+
+
+def test_wheels_are_told_by_their_counts_beside_what_was_commanded(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(400, 0.3)
+    for sample in bench.wheels.samples():
+        assert sample.commanded_rad_s == pytest.approx(0.3 / 0.08)
+        assert sample.measured_rad_s == pytest.approx(0.3 / 0.08, abs=0.05)
+    bench.world.wheels[1].drive.freeze(True)
+    bench.run(30, 0.3)
+    left, right = bench.wheels.samples()
+    assert left.measured_rad_s == pytest.approx(0.3 / 0.08, abs=0.05)
+    assert right.measured_rad_s == 0.0
+    bench.wheels.disable()
+    bench.run(5)
+    assert {sample.commanded_rad_s for sample in bench.wheels.samples()} == {0.0}
+    bench.wheels.close()
+
+
+def test_a_quick_stop_that_does_not_end_ends_in_no_power(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(100, 0.2)
+    wheel = bench.world.wheels[0]
+    bench.wheels.quick_stop()
+    for _ in range(240):
+        wheel.velocity_rad_s = 3.0
+        bench.run(1)
+    assert wheel.drive.armed
+    bench.run(20)
+    assert not wheel.drive.armed
+    bench.wheels.close()

@@ -33,11 +33,20 @@ LIMITS = SafetyLimits(
     outward_velocity=np.array([0.05, 0.05]),
     velocity=np.array([2.0, 3.0]),
     following_error=np.array([0.25, np.inf]),
+    wheel_error_rad_s=0.25,
+    wheel_error_ratio=0.5,
     servo_age_s=0.02,
     base_command_age_s=0.25,
     supervisor_age_s=3.0,
 )
-LEFT = DriveSample(name="left_wheel", lost=False, age_s=0.0, fault_code=0)
+LEFT = DriveSample(
+    name="left_wheel",
+    lost=False,
+    age_s=0.0,
+    fault_code=0,
+    commanded_rad_s=0.0,
+    measured_rad_s=0.0,
+)
 HEALTHY = SafetyInputs(
     energised=True,
     estop_source=None,
@@ -61,6 +70,10 @@ ULP = 1e-12
 
 def right(**changes: Any) -> dict[str, Any]:
     return {"drives": (LEFT, replace(LEFT, name="right_wheel", **changes))}
+
+
+def turning(commanded_rad_s: float, measured_rad_s: float) -> dict[str, Any]:
+    return right(commanded_rad_s=commanded_rad_s, measured_rad_s=measured_rad_s)
 
 
 def at(position: float, velocity: float) -> dict[str, Any]:
@@ -115,6 +128,12 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         {"setpoint": np.array([0.0, 9.0])},
         "shoulder",
     ),
+    (Cause.WHEEL_FOLLOWING_ERROR, turning(0.0, 0.25 + ULP), turning(0.0, 0.25), "right_wheel"),
+    (Cause.WHEEL_FOLLOWING_ERROR, turning(0.0, -0.25 - ULP), turning(0.0, -0.25), "right_wheel"),
+    (Cause.WHEEL_FOLLOWING_ERROR, turning(2.0, 0.75 - ULP), turning(2.0, 0.75), "right_wheel"),
+    (Cause.WHEEL_FOLLOWING_ERROR, turning(2.0, 3.25 + ULP), turning(2.0, 3.25), "right_wheel"),
+    (Cause.WHEEL_FOLLOWING_ERROR, turning(-2.0, -0.75 + ULP), turning(-2.0, -0.75), "right_wheel"),
+    (Cause.WHEEL_FOLLOWING_ERROR, turning(2.0, -2.0), turning(2.0, 2.0), "right_wheel"),
     (
         Cause.SUPERVISOR_LOST,
         {"supervisor_age_s": 3.0 + ULP},
