@@ -26,6 +26,7 @@ class EmulatedDrive(ABC):
         self._now_ns: int | None = None
         self._supplied = True
         self._silent = False
+        self._runaway_rad_s = 0.0
         self._tripped: Trip | None = None
 
     @property
@@ -84,7 +85,8 @@ class EmulatedDrive(ABC):
             return 0.0
         velocity_rad_s *= sign
         self._encoder.measure(sign * position_rad, velocity_rad_s)
-        torque_nm = self._act(now_ns, dt_s, velocity_rad_s)
+        runaway_rad_s = sign * self._runaway_rad_s if self.armed else 0.0
+        torque_nm = self._act(now_ns, dt_s, velocity_rad_s - runaway_rad_s)
         if torque_nm or not stage.at_rest:
             stage.load(torque_nm, velocity_rad_s, dt_s)
         if self.armed or not stage.at_rest:
@@ -125,6 +127,10 @@ class EmulatedDrive(ABC):
     def silence(self, on: bool) -> None:
         """Send nothing, or speak again; the drive goes on listening and acting."""
         self._silent = on
+
+    def run_away(self, velocity_rad_s: float) -> None:
+        """Turn the joint this much faster than told while power is on; 0 ends it."""
+        self._runaway_rad_s = velocity_rad_s
 
     def overheat(self) -> None:
         """Heat the motor beyond its limit; it trips, and cools down by itself."""
