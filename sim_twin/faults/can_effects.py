@@ -74,6 +74,18 @@ def _off(target: Target) -> Ending:
     return lambda: drive.set_supply(True)
 
 
+def _stick(target: Target) -> Ending:
+    drive = _drive(target)
+    drive.freeze(True)
+    return lambda: drive.freeze(False)
+
+
+def _run_away(target: Target) -> Ending:
+    drive = _drive(target)
+    drive.run_away(target.values["speed_rad_s"])
+    return lambda: drive.run_away(0.0)
+
+
 def _clash(target: Target) -> Ending:
     other = next(drive for drive in target.twin.drives if drive.node_id != target.number)
     own_id = other.node_id
@@ -103,6 +115,9 @@ _DAMAGED: Final = Parameter(
     name="ratio", default=1.0, low=0.001, high=1.0, meaning="share of the frames that are destroyed"
 )
 
+_SPEED: Final = Parameter(
+    name="speed_rad_s", default=2.0, low=-20.0, high=20.0, meaning="wheel speed beyond what is told"
+)
 _VOLTS: Final = Parameter(
     name="volts_v", default=12.0, low=0.0, high=60.0, meaning="voltage it drops to"
 )
@@ -125,6 +140,12 @@ CAN_ROWS: Final[Rows] = {
         summary="a babbling node wins every arbitration", begin=_babble
     ),
     (Component.DRIVE, Fault.OFF): Effect(summary="without supply", begin=_off),
+    (Component.DRIVE, Fault.STUCK): Effect(
+        summary="tells for ever what its encoder told last; its own loop goes on", begin=_stick
+    ),
+    (Component.DRIVE, Fault.WRONG): Effect(
+        summary="turns although nobody told it to", begin=_run_away, parameters=(_SPEED,)
+    ),
     (Component.DRIVE, Fault.BROWN_OUT): Effect(
         summary="its supply sags", begin=_brown_out, parameters=(_VOLTS,)
     ),
