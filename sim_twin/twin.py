@@ -5,7 +5,7 @@ from typing import TypeVar
 from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.imu import bno085_rvc
 from drivers.lidar import ld19
-from sim_twin.can import DRIVES, CanWire
+from sim_twin.can import CanWire, robot_drives
 from sim_twin.device import WireDevice
 from sim_twin.errors import ModelMismatch
 from sim_twin.faults.injector import FaultInjector
@@ -47,10 +47,7 @@ class Twin:
         self.robot = robot
         self.engine = load_engine(robot, world, seed)
         self.servos = ServoBank(_servo_specs(robot), timing=servo_timing)
-        self.drives = tuple(
-            DRIVES[robot.can_bus.protocol](drive.node_id, sign=drive.sign)
-            for drive in robot.can_bus.drives
-        )
+        self.drives = robot_drives(robot.can_bus)
         self.can_wire = CanWire(self.drives, bitrate=robot.can_bus.bitrate)
         self.lidar = LidarDevice(self.engine.lidar.cast, seed=seed)
         self.imu = ImuDevice(self.engine.imu.read, seed=seed)

@@ -1,8 +1,8 @@
 """Emulate a CAN bus, and wheel drives on it: CiA 402 over CANopen, and ODrive axes."""
 
 from sim_twin.can.drive import WheelDrive
-from sim_twin.can.drives import DRIVES
-from sim_twin.can.emulated_drive import EmulatedDrive
+from sim_twin.can.drives import DRIVES, robot_drives
+from sim_twin.can.emulated_drive import EmulatedDrive, Mounting
 from sim_twin.can.hub import CanHub
 from sim_twin.can.memory_bus import MemoryBus
 from sim_twin.can.odrive import ODriveAxis
@@ -15,6 +15,8 @@ __all__ = [
     "CanWire",
     "EmulatedDrive",
     "MemoryBus",
+    "Mounting",
     "ODriveAxis",
     "WheelDrive",
+    "robot_drives",
 ]

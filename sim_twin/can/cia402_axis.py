@@ -199,9 +199,13 @@ class Cia402Axis:
     def _next_demand(self, dt_s: float) -> float:
         values, state = self._objects.values, self._machine.state
         if state is PowerState.FAULT_REACTION_ACTIVE:
-            return self._braked(FAULT_RAMPS[values[FAULT_REACTION_OPTION, 0]], dt_s)
+            return self._braked(
+                FAULT_RAMPS.get(values[FAULT_REACTION_OPTION, 0], QUICK_STOP_DECELERATION), dt_s
+            )
         if state is PowerState.QUICK_STOP_ACTIVE:
-            return self._braked(QUICK_STOP_RAMPS[values[QUICK_STOP_OPTION, 0]], dt_s)
+            return self._braked(
+                QUICK_STOP_RAMPS.get(values[QUICK_STOP_OPTION, 0], QUICK_STOP_DECELERATION), dt_s
+            )
         if values[CONTROLWORD, 0] & HALT_BIT:
             return self._braked(PROFILE_DECELERATION, dt_s)
         counts_per_rad = self._encoder.counts_per_rad

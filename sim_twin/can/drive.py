@@ -1,5 +1,6 @@
 """Emulate one CiA 402 wheel drive as a CANopen node: NMT, heartbeats, SDO, PDO, EMCY."""
 
+from pathlib import Path
 from typing import Final
 
 import can
@@ -7,6 +8,7 @@ import can
 from drivers.canopen.cia402 import PowerState
 from drivers.canopen.objects import (
     CONTROLWORD,
+    EDS_PATH,
     EMERGENCY_COB,
     EMERGENCY_WIRE,
     ERROR_CODE,
@@ -25,12 +27,12 @@ from drivers.canopen.objects import (
     NmtState,
 )
 from sim_twin.can.cia402_axis import Cia402Axis
-from sim_twin.can.emulated_drive import EmulatedDrive
+from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, Mounting
 from sim_twin.can.error_frames import is_restart
 from sim_twin.can.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from sim_twin.can.object_dictionary import VALUE_RANGE, Key, ObjectDictionary, SdoAbort
 from sim_twin.can.pdo_server import PdoServer
-from sim_twin.can.power_stage import MotorSpec, Trip
+from sim_twin.can.power_stage import Trip
 from sim_twin.can.sdo_server import SdoServer
 from sim_twin.can.velocity_loop import VelocityLoop
 
@@ -51,22 +53,16 @@ MAX_NODE_ID: Final = 127
 class WheelDrive(EmulatedDrive):
     """Answer CAN frames at once; physics asks for torque with `advance`.
 
-    The loop is stable where kv · step < 2 · (wheel inertia + armature).
+    It shows the objects, types, ranges and defaults of its EDS file.
     """
 
     def __init__(
-        self,
-        node_id: int,
-        *,
-        sign: int = 1,
-        counts_per_rev: int = 16384,
-        kv: float = 8.0,
-        ki: float = 20.0,
-        motor: MotorSpec | None = None,
+        self, node_id: int, mounting: Mounting = HUB_MOTOR, eds_path: Path = EDS_PATH
     ) -> None:
-        super().__init__(node_id, sign=sign, counts_per_rev=counts_per_rev, motor=motor)
-        self._objects = ObjectDictionary(node_id)
-        self._axis = Cia402Axis(self._objects, VelocityLoop(kv, ki), self._stage, self._encoder)
+        super().__init__(node_id, mounting)
+        self._objects = ObjectDictionary(node_id, eds_path)
+        loop = VelocityLoop(*mounting.motor_gains)
+        self._axis = Cia402Axis(self._objects, loop, self._stage, self._encoder)
         self._sdo = SdoServer(self._objects)
         self._producer = HeartbeatProducer(self._objects)
         self._consumer = HeartbeatConsumer(self._objects)

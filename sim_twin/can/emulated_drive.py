@@ -2,6 +2,8 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
 
 import can
 
@@ -9,19 +11,43 @@ from drivers.clock import NS_PER_S
 from sim_twin.can.power_stage import Encoder, MotorSpec, PowerStage, Trip
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mounting:
+    """Say how a motor turns its joint.
+
+    `sign` is -1 where its positive direction turns the joint backwards, `gear_ratio` motor turns
+    per joint turn, `counts_per_rev` its encoder's. Without a motor it is that of a hub, or the
+    faster one that does the same by the gear. `kv` and `ki` are the velocity loop's gains as the
+    joint feels them, in N·m·s/rad and N·m/rad.
+    """
+
+    sign: int = 1
+    counts_per_rev: int = 16384
+    gear_ratio: float = 1.0
+    motor: MotorSpec | None = None
+    kv: float = 8.0
+    ki: float = 20.0
+
+    @property
+    def motor_gains(self) -> tuple[float, float]:
+        """Return the loop's gains as the motor's shaft has them."""
+        return self.kv / self.gear_ratio**2, self.ki / self.gear_ratio**2
+
+
+HUB_MOTOR: Final = Mounting()
+
+
 class EmulatedDrive(ABC):
     """Turn one joint; a subclass speaks the protocol and decides on the torque.
 
-    `sign` is -1 for a drive mounted so that its positive direction turns the joint backwards.
+    The joint's loop is stable where kv · step < 2 · (wheel inertia + armature).
     """
 
-    def __init__(
-        self, node_id: int, *, sign: int, counts_per_rev: int, motor: MotorSpec | None
-    ) -> None:
+    def __init__(self, node_id: int, mounting: Mounting) -> None:
         self.node_id = node_id
-        self._sign = sign
-        self._stage = PowerStage(motor or MotorSpec())
-        self._encoder = Encoder(counts_per_rev)
+        self._per_joint = mounting.sign * mounting.gear_ratio
+        self._stage = PowerStage(mounting.motor or MotorSpec().behind_gear(mounting.gear_ratio))
+        self._encoder = Encoder(mounting.counts_per_rev)
         self._send_frame: Callable[[can.Message], None] = lambda frame: None
         self._now_ns: int | None = None
         self._supplied = True
@@ -78,20 +104,20 @@ class EmulatedDrive(ABC):
         """Take the joint's state at `now_ns` and return the torque on the joint in N·m."""
         dt_s = 0.0 if self._now_ns is None else (now_ns - self._now_ns) / NS_PER_S
         self._now_ns = now_ns
-        stage, sign = self._stage, self._sign
+        stage, per_joint = self._stage, self._per_joint
         if not self._supplied:
             if not stage.at_rest:
                 stage.load(0.0, 0.0, dt_s)
             return 0.0
-        velocity_rad_s *= sign
-        self._encoder.measure(sign * position_rad, velocity_rad_s)
-        runaway_rad_s = sign * self._runaway_rad_s if self.armed else 0.0
+        velocity_rad_s *= per_joint
+        self._encoder.measure(per_joint * position_rad, velocity_rad_s)
+        runaway_rad_s = per_joint * self._runaway_rad_s if self.armed else 0.0
         torque_nm = self._act(now_ns, dt_s, velocity_rad_s - runaway_rad_s)
         if torque_nm or not stage.at_rest:
             stage.load(torque_nm, velocity_rad_s, dt_s)
         if self.armed or not stage.at_rest:
             self._protect()
-        return sign * torque_nm
+        return per_joint * torque_nm
 
     def _protect(self) -> None:
         """Trip on a new cause, and on a lasting one where the fault was reset."""

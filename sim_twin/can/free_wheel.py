@@ -2,19 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Generic
-
-from typing_extensions import TypeVar
+from typing import Final, Generic, TypeVar
 
 from drivers.clock import NS_PER_S
-from sim_twin.can.drive import WheelDrive
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.wire import CanWire
 
 STEP_NS: Final = 2_000_000
 
 
-D_co = TypeVar("D_co", bound=EmulatedDrive, default=WheelDrive, covariant=True)
+D_co = TypeVar("D_co", bound=EmulatedDrive, covariant=True)
 
 
 @dataclass(slots=True)

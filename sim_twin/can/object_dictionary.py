@@ -1,11 +1,13 @@
 """Hold the emulated drive's objects, with types, defaults and access rights from the EDS file."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
 import canopen
 
+from drivers.canopen.eds import canopen_integers
 from drivers.canopen.objects import EDS_PATH
 
 # CiA 301, SDO abort codes
@@ -31,14 +33,16 @@ class SdoAbort(Exception):
 class ObjectDictionary:
     """Read and write objects as numbers inside and as bytes for the SDO server.
 
+    From outside only the EDS file's objects can be seen. Inside there are those of the stack's own
+    EDS file too, for the firmware works with them whether they are shown or not.
+
     `values` are those stored; `live` computes an object when it is read; `on_write` sees a new
     value before it is stored and may refuse it by raising SdoAbort; `after_write` sees it stored.
     """
 
     def __init__(self, node_id: int, eds_path: Path = EDS_PATH) -> None:
         self._eds_path = eds_path
-        self._od = canopen.import_od(str(eds_path), node_id)
-        self._variables = _by_key(self._od)
+        self.readdress(node_id)
         self.values: dict[Key, Any] = {}
         self.live: dict[Key, Callable[[], int]] = {}
         self.on_write: dict[Key, Callable[[int], object]] = {}
@@ -47,9 +51,9 @@ class ObjectDictionary:
 
     def reset(self, *, communication_only: bool = False) -> None:
         """Return all objects, or those below 2000, to the EDS file's defaults."""
-        for key, variable in self._variables.items():
+        for key, default in self._defaults.items():
             if key[0] <= LAST_COMMUNICATION_INDEX or not communication_only:
-                self.values[key] = variable.default
+                self.values[key] = default
         for follow in dict.fromkeys(self.after_write.values()):
             follow()
 
@@ -116,7 +120,12 @@ class ObjectDictionary:
 
     def readdress(self, node_id: int) -> None:
         """Take the defaults of another node id, with the next reset."""
-        self._variables = _by_key(canopen.import_od(str(self._eds_path), node_id))
+        self._variables = _by_key(str(self._eds_path), node_id)
+        own = _by_key(str(EDS_PATH), node_id)
+        self._defaults = {
+            key: _default(self._variables.get(key), own.get(key))
+            for key in dict.fromkeys((*own, *self._variables))
+        }
 
     def reader(self, key: Key) -> Callable[[], int]:
         """Return what reads a numeric object again and again."""
@@ -128,7 +137,7 @@ class ObjectDictionary:
 
     def highest_subindex(self, index: int) -> int:
         """Return the highest sub-index of a record."""
-        return max(subindex for known, subindex in self._variables if known == index)
+        return max(subindex for known, subindex in self._defaults if known == index)
 
     def mappable(self, key: Key, bits: int, *, transmits: bool) -> bool:
         """Tell whether an object of that length may be part of a PDO."""
@@ -145,11 +154,23 @@ class ObjectDictionary:
         variable = self._variables.get((index, subindex))
         if variable is not None:
             return variable
-        raise SdoAbort(NO_SUBINDEX if index in self._od else NO_OBJECT)
+        known = any(index == each for each, _ in self._variables)
+        raise SdoAbort(NO_SUBINDEX if known else NO_OBJECT)
 
 
-def _by_key(od: canopen.ObjectDictionary) -> dict[Key, Any]:
+@lru_cache(maxsize=32)
+def _by_key(eds_path: str, node_id: int) -> dict[Key, Any]:
+    od = canopen.import_od(eds_path, node_id)
     return {(variable.index, variable.subindex): variable for variable in _variables(od)}
+
+
+def _default(shown: Any, own: Any) -> Any:
+    """Return the file's default; where it gives none, that of our own file, else nothing."""
+    known = [variable for variable in (shown, own) if variable is not None]
+    for variable in known:
+        if variable.default is not None:
+            return variable.default
+    return 0 if known[0].data_type in canopen_integers() else b""
 
 
 def _variables(od: canopen.ObjectDictionary) -> list[Any]:

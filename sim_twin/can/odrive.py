@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, Final
 
 import can
@@ -31,20 +32,16 @@ from drivers.odrive.endpoints import (
     WATCHDOG_TIMEOUT,
     read_endpoints,
 )
-from sim_twin.can.emulated_drive import EmulatedDrive
+from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, Mounting
 from sim_twin.can.odrive_controller import ODriveController
-from sim_twin.can.power_stage import MotorSpec, Trip
+from sim_twin.can.odrive_properties import LiveProperty, ODriveProperties, firmware_numbers
+from sim_twin.can.power_stage import Trip
 
 NS_PER_MS: Final = 1_000_000
 SERIAL_NUMBER: Final = 0x3946_3153_0000
-# Protocol 2, an emulated board, firmware 0.0.0: its endpoint numbers are those of our own file.
-VERSION: Final = (2, 0, 0, 0, 0, 0, 0, 1)
-DEFAULTS: Final = {
-    HEARTBEAT_RATE: 100.0,
-    ENCODER_RATE: 10.0,
-    ENABLE_WATCHDOG: 0.0,
-    WATCHDOG_TIMEOUT: 0.0,
-}
+PROTOCOL_VERSION: Final = 2
+EMULATED_BOARD: Final = (0, 0, 0)
+UNRELEASED: Final = 1
 TRIP_ERRORS: Final = {
     Trip.UNDER_VOLTAGE: AxisError.DC_BUS_UNDER_VOLTAGE,
     Trip.OVER_VOLTAGE: AxisError.DC_BUS_OVER_VOLTAGE,
@@ -52,37 +49,55 @@ TRIP_ERRORS: Final = {
     Trip.OVERLOAD: AxisError.CURRENT_LIMIT_VIOLATION,
 }
 SUCCESS, CANCELLED, DISARMED = 0, 2, 3
-FLOAT_LAYOUT: Final = "<f"
 RESTART, SAVE_CONFIGURATION, ERASE_CONFIGURATION = range(3)
 
 
 class ODriveAxis(EmulatedDrive):
     """Answer CAN frames at once; physics asks for torque with `advance`.
 
-    The gains are those of the joint, in N·m·s/rad and N·m/rad, as for `WheelDrive`.
+    It has the firmware that its endpoint file is of; the one beside the driver is 0.0.0.
     """
 
     def __init__(
         self,
         node_id: int,
-        *,
-        sign: int = 1,
-        counts_per_rev: int = 16384,
-        kv: float = 8.0,
-        ki: float = 20.0,
-        motor: MotorSpec | None = None,
+        mounting: Mounting = HUB_MOTOR,
+        endpoints_path: Path = EMULATED_ENDPOINTS,
     ) -> None:
-        super().__init__(node_id, sign=sign, counts_per_rev=counts_per_rev, motor=motor)
-        self._controller = ODriveController(self._stage, kv * math.tau, ki * math.tau)
+        """Build the axis as its integrator left it: calibrated, its limit fit for the gear.
+
+        Raises:
+            WrongDevice: the endpoint file is none.
+            ValueError: its firmware's version is not three numbers.
+        """
+        super().__init__(node_id, mounting)
+        kv, ki = mounting.motor_gains
+        self._controller = ODriveController(
+            self._stage, kv * math.tau, ki * math.tau, mounting.gear_ratio
+        )
         self._serial = SERIAL_NUMBER + node_id
-        self._endpoints = {
-            each.number: each for each in read_endpoints(EMULATED_ENDPOINTS).endpoints.values()
-        }
-        self._saved: dict[str, float] = dict(DEFAULTS)
+        table = read_endpoints(endpoints_path)
+        numbers = firmware_numbers(table.firmware)
+        self._version = (PROTOCOL_VERSION, *EMULATED_BOARD, *numbers, UNRELEASED)
+        self.properties = ODriveProperties(table, self._live_properties())
         self._forget()
 
+    def _live_properties(self) -> dict[str, LiveProperty]:
+        control = self._controller
+
+        def set_limit(value: float) -> None:
+            control.velocity_limit_rev_s = value
+
+        def set_ramp(value: float) -> None:
+            control.ramp_rev_s2 = value
+
+        return {
+            VELOCITY_LIMIT: LiveProperty(lambda: control.velocity_limit_rev_s, set_limit),
+            RAMP_RATE: LiveProperty(lambda: control.ramp_rev_s2, set_ramp),
+        }
+
     def _forget(self) -> None:
-        self._properties = dict(self._saved)
+        self.properties.load()
         self._controller.reset()
         self._stage.forget_load()
         self._state = AxisState.IDLE
@@ -151,9 +166,9 @@ class ODriveAxis(EmulatedDrive):
         return torque_nm
 
     def _watch(self, now_ns: int) -> None:
-        if not self._properties[ENABLE_WATCHDOG]:
+        if not self.properties.read(ENABLE_WATCHDOG):
             return
-        limit_ns = self._properties[WATCHDOG_TIMEOUT] * NS_PER_S
+        limit_ns = self.properties.read(WATCHDOG_TIMEOUT) * NS_PER_S
         expired = now_ns - self._fed_ns > limit_ns
         if expired and AxisError.WATCHDOG_TIMER_EXPIRED not in self._errors:
             self.raise_fault(AxisError.WATCHDOG_TIMER_EXPIRED)
@@ -161,7 +176,7 @@ class ODriveAxis(EmulatedDrive):
     def _speak(self, now_ns: int) -> None:
         """Send what is due by itself; a rate of 0 ms is off."""
         for name, command in _CYCLIC.items():
-            period_ns = int(self._properties[name]) * NS_PER_MS
+            period_ns = int(self.properties.read(name)) * NS_PER_MS
             if period_ns and now_ns >= self._due_ns[name]:
                 self._due_ns[name] = max(self._due_ns[name] + period_ns, now_ns)
                 self._tell(command)
@@ -229,9 +244,9 @@ class ODriveAxis(EmulatedDrive):
 
     def _on_reboot(self, action: int) -> None:
         if action == SAVE_CONFIGURATION:
-            self._saved = dict(self._properties)
+            self.properties.save()
         elif action == ERASE_CONFIGURATION:
-            self._saved = dict(DEFAULTS)
+            self.properties.erase()
         self._encoder.lose_supply()
         self._boot()
 
@@ -277,31 +292,13 @@ class ODriveAxis(EmulatedDrive):
             self._tell(Command.ADDRESS)
 
     def _on_sdo(self, opcode: int, number: int, data: bytes) -> None:
-        endpoint = self._endpoints.get(number)
-        if endpoint is None:
-            return
         if opcode == SdoOpcode.WRITE:
-            value = endpoint.decode(data)
-            _refuse_nan(value)
-            self._write_property(endpoint.name, value)
-        elif opcode == SdoOpcode.READ:
-            value = self._read_property(endpoint.name)
-            told = endpoint.encode(value if endpoint.layout.format == FLOAT_LAYOUT else int(value))
+            self.properties.write_number(number, data)
+            return
+        told = self.properties.read_number(number) if opcode == SdoOpcode.READ else None
+        if told is not None:
             answer = encode(Command.TX_SDO, number, told)
             self._transmit(can_id(self.node_id, Command.TX_SDO), answer)
-
-    def _read_property(self, name: str) -> float:
-        if name == VELOCITY_LIMIT:
-            return self._controller.velocity_limit_rev_s
-        return self._controller.ramp_rev_s2 if name == RAMP_RATE else self._properties[name]
-
-    def _write_property(self, name: str, value: float) -> None:
-        if name == VELOCITY_LIMIT:
-            self._controller.velocity_limit_rev_s = value
-        elif name == RAMP_RATE:
-            self._controller.ramp_rev_s2 = value
-        else:
-            self._properties[name] = value
 
     def _heartbeat(self) -> tuple[int, ...]:
         arrived = 1  # velocity and torque inputs have no trajectory to wait for
@@ -345,7 +342,7 @@ _REACTIONS: Final[Mapping[Command, Callable[..., None]]] = {
 }
 # A board's transistors are not modelled: they are as warm as the room.
 _TOLD: Final[Mapping[Command, Callable[[ODriveAxis], tuple[Any, ...]]]] = {
-    Command.GET_VERSION: lambda axis: VERSION,
+    Command.GET_VERSION: lambda axis: axis._version,
     Command.HEARTBEAT: ODriveAxis._heartbeat,
     Command.GET_ERROR: lambda axis: (axis._errors, axis._disarm_reason),
     Command.ADDRESS: lambda axis: (axis.node_id, axis._serial.to_bytes(6, "little"), 0),

@@ -25,8 +25,15 @@ OVERSPEED_RATIO: Final = 1.2
 class ODriveController:
     """Hold modes, inputs and gains in the protocol's units: rev, rev/s, N·m."""
 
-    def __init__(self, stage: PowerStage, velocity_gain: float, integrator_gain: float) -> None:
+    def __init__(
+        self,
+        stage: PowerStage,
+        velocity_gain: float,
+        integrator_gain: float,
+        gear_ratio: float = 1.0,
+    ) -> None:
         self._stage = stage
+        self._default_limit_rev_s = DEFAULT_VELOCITY_LIMIT_REV_S * gear_ratio
         self._default_gains = velocity_gain, integrator_gain
         self._loop = VelocityLoop(velocity_gain, integrator_gain)
         self.reset()
@@ -36,7 +43,7 @@ class ODriveController:
         self._loop.kv, self._loop.ki = self._default_gains
         self.control_mode = ControlMode.VELOCITY
         self.input_mode = InputMode.PASSTHROUGH
-        self.velocity_limit_rev_s = DEFAULT_VELOCITY_LIMIT_REV_S
+        self.velocity_limit_rev_s = self._default_limit_rev_s
         self.ramp_rev_s2 = DEFAULT_RAMP_REV_S2
         self.position_gain = DEFAULT_POSITION_GAIN
         self.input_rev = 0.0

@@ -70,6 +70,8 @@ class PdoServer:
         count = self._objects.get(self._mapping, 0)
         rows = [self._objects.get(self._mapping, row) for row in range(1, count + 1)]
         self.keys = tuple((entry >> 16, entry >> 8 & 0xFF) for entry in rows)
+        if not all(map(self._objects.has, self.keys)):
+            self.keys, self.cob_id = (), None  # as delivered it maps what this drive does not have
         self._wire = struct.Struct("<" + "".join(map(self._objects.wire_format, self.keys)))
         self._readers = [self._objects.reader(key) for key in self.keys]
         self._syncs = 0
@@ -77,7 +79,7 @@ class PdoServer:
 
     def due_on_sync(self) -> bool:
         """Count a SYNC and tell whether it asks for this PDO."""
-        if self.cob_id is None:
+        if self.cob_id is None or not self.synchronous:
             return False
         self._syncs += 1
         if self._syncs < self._every_syncs:

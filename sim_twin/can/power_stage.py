@@ -1,9 +1,9 @@
 """Model a wheel motor and its power stage: limits, back-EMF, supply, heat, encoder."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Final
+from typing import Final, Self
 
 # No edge for this long reads as standstill.
 EDGE_TIMEOUT_S: Final = 0.05
@@ -47,6 +47,14 @@ class MotorSpec:
     def current_limit_a(self) -> float:
         """Return the largest current that the power stage gives."""
         return self.torque_limit_nm / self.torque_nm_per_a
+
+    def behind_gear(self, ratio: float) -> Self:
+        """Return the faster motor that gives the wheel the same torque and speed by a gear."""
+        return replace(
+            self,
+            torque_limit_nm=self.torque_limit_nm / ratio,
+            torque_nm_per_a=self.torque_nm_per_a / ratio,
+        )
 
 
 class PowerStage:

@@ -9,7 +9,7 @@ from drivers.canopen import DriveSpec, WheelDriveBus
 from drivers.drive_bus import DriveBus, DriveState
 from drivers.odrive import EMULATED_ENDPOINTS, AxisSpec, ODriveBus
 from drivers.odrive.codec import AxisError
-from sim_twin.can import MemoryBus, WheelDrive
+from sim_twin.can import MemoryBus, Mounting, WheelDrive
 from sim_twin.can.free_wheel import FreeWheel, FreeWheelWorld
 from sim_twin.can.odrive import ODriveAxis
 
@@ -62,11 +62,13 @@ class Cia402Bench(Bench):
     short_circuit = 0x2340
 
     def __init__(self) -> None:
-        self.world = FreeWheelWorld([FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, sign=-1))])
+        self.world = FreeWheelWorld(
+            [FreeWheel(WheelDrive(1)), FreeWheel(WheelDrive(2, Mounting(sign=-1)))]
+        )
         self.bus = self.on(self.world)
 
     @staticmethod
-    def on(world: FreeWheelWorld) -> DriveBus:
+    def on(world: FreeWheelWorld[Any]) -> DriveBus:
         specs = [DriveSpec(node_id=1, joint="left"), DriveSpec(node_id=2, joint="right", sign=-1)]
         return WheelDriveBus(MemoryBus(world.wire), world, specs, HEARTBEAT_S)
 
@@ -78,12 +80,12 @@ class ODriveBench(Bench):
     short_circuit = int(AxisError.DRV_FAULT)
 
     def __init__(self) -> None:
-        self.axes = [ODriveAxis(0), ODriveAxis(1, sign=-1)]
+        self.axes = [ODriveAxis(0), ODriveAxis(1, Mounting(sign=-1))]
         self.world = FreeWheelWorld([FreeWheel(axis) for axis in self.axes])
         self.bus = self.on(self.world)
 
     @staticmethod
-    def on(world: FreeWheelWorld) -> DriveBus:
+    def on(world: FreeWheelWorld[Any]) -> DriveBus:
         specs = [AxisSpec(node_id=0, joint="left"), AxisSpec(node_id=1, joint="right", sign=-1)]
         return ODriveBus(MemoryBus(world.wire), world, specs, EMULATED_ENDPOINTS, HEARTBEAT_S)
 

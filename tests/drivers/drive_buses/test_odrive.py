@@ -50,15 +50,15 @@ def written(tmp_path: Path, change: Any) -> Path:
 def test_the_watchdog_is_armed_with_the_heartbeat_time(odrive: Any) -> None:
     odrive.bus.connect()
     for axis in odrive.axes:
-        assert axis._read_property(ENABLE_WATCHDOG)
-        assert axis._read_property(WATCHDOG_TIMEOUT) == pytest.approx(0.1)
-        assert axis._read_property(RAMP_RATE) == pytest.approx(20.0 / 6.2831853, rel=1e-6)
+        assert axis.properties.read(ENABLE_WATCHDOG)
+        assert axis.properties.read(WATCHDOG_TIMEOUT) == pytest.approx(0.1)
+        assert axis.properties.read(RAMP_RATE) == pytest.approx(20.0 / 6.2831853, rel=1e-6)
     odrive.bus.close()
 
 
 def test_a_watchdog_that_does_not_arm_is_refused(odrive: Any) -> None:
-    write = odrive.axes[1]._write_property
-    odrive.axes[1]._write_property = lambda name, value: write(
+    write = odrive.axes[1].properties.write
+    odrive.axes[1].properties.write = lambda name, value: write(
         name, 0.0 if name == ENABLE_WATCHDOG else value
     )
     with pytest.raises(WrongDevice, match=r"right .*enable_watchdog is 0 after 1 was written"):
@@ -69,10 +69,10 @@ def test_a_watchdog_that_does_not_arm_is_refused(odrive: Any) -> None:
 def test_a_file_of_another_firmware_is_refused_before_anything_is_written(
     odrive: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim_twin.can.odrive.VERSION", (2, 4, 4, 58, 0, 6, 10, 0))
+    monkeypatch.setattr(odrive.axes[0], "_version", (2, 4, 4, 58, 0, 6, 10, 0))
     with pytest.raises(WrongDevice, match=r"firmware 0\.6\.10, but .* is of 0\.0\.0"):
         odrive.bus.connect()
-    assert not odrive.axes[0]._read_property(ENABLE_WATCHDOG)
+    assert not odrive.axes[0].properties.read(ENABLE_WATCHDOG)
     odrive.bus.close()
 
 
@@ -96,7 +96,7 @@ def test_a_file_without_the_watchdog_is_refused(odrive: Any, tmp_path: Path) -> 
 
 
 def test_without_the_rate_endpoint_estimates_are_asked_for(odrive: Any, tmp_path: Path) -> None:
-    odrive.axes[0]._write_property(ENCODER_RATE, 0.0)
+    odrive.axes[0].properties.write(ENCODER_RATE, 0.0)
     bus = with_endpoints(
         odrive, written(tmp_path, lambda document: document["endpoints"].pop(ENCODER_RATE))
     )
@@ -133,7 +133,7 @@ def test_limits_are_written_where_the_robot_file_gives_a_current(odrive: Any) ->
     bus = ODriveBus(MemoryBus(odrive.world.wire), odrive.world, specs, EMULATED_ENDPOINTS)
     bus.connect()
     axis = odrive.axes[0]
-    assert axis._read_property(VELOCITY_LIMIT) == pytest.approx(12.0 / math.tau)
+    assert axis.properties.read(VELOCITY_LIMIT) == pytest.approx(12.0 / math.tau)
     assert axis._stage.current_limit_a == pytest.approx(7.5)
     bus.close()
 
