@@ -55,10 +55,11 @@ class AudioBlock:
 
 @dataclass(slots=True)
 class AudioCounters:
-    """Count rows of samples, and what was lost of them."""
+    """Count rows of samples, what was lost of them, and blocks that came a second time."""
 
     samples: int = 0
     lost_samples: int = 0
+    repeated_blocks: int = 0
     blocks: int = 0
     crc_errors: int = 0
     discarded_bytes: int = 0

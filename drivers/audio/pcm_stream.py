@@ -32,17 +32,19 @@ class PcmInput:
     def poll(self) -> AudioBlock | None:
         """Return the samples since the last call as one block, or None; never waits.
 
-        Rows that were lost under way are silence in the block, so that its times stay true.
+        Rows that were lost under way are silence in the block, so that its times stay true; what
+        was told before is not told again.
 
         Raises:
             LinkLost: the stream has gone.
             WrongDevice: the stream has another rate or other channels than declared.
         """
-        blocks = self._blocks()
+        arrived = self._blocks()
+        for block in arrived:
+            self._check(block)
+        blocks = self._new(arrived)
         if not blocks:
             return None
-        for block in blocks:
-            self._check(block)
         now_ns = self._clock.now_ns()
         stamps = [self._device_clock.to_host_ns(block.stamp_ns, now_ns) for block in blocks]
         self._last_stamp_ns = max(stamps[0], self._last_stamp_ns + 1)
@@ -64,6 +66,18 @@ class PcmInput:
         self.counters.crc_errors = self._parser.crc_errors
         self.counters.discarded_bytes = self._parser.discarded_bytes
         return blocks
+
+    def _new(self, blocks: list[PcmBlock]) -> list[PcmBlock]:
+        """Drop repeated blocks; rows from long ago are those of a stream that began anew."""
+        new: list[PcmBlock] = []
+        next_row = self._next_row
+        for block in blocks:
+            if next_row is not None and 0 < next_row - block.first_row <= self.format.rate_hz:
+                self.counters.repeated_blocks += 1
+                continue
+            new.append(block)
+            next_row = block.first_row + len(block.samples)
+        return new
 
     def _joined(self, blocks: list[PcmBlock]) -> Samples:
         parts: list[Samples] = []

@@ -122,6 +122,14 @@ def _microphone_plug(target: Target) -> Plug:
     return target.twin.plugs[_declared(target.twin.robot.microphone, "microphone").device]
 
 
+def _speaker_line(target: Target) -> LineTamper:
+    return target.twin.stream_lines[_declared(target.twin.robot.speaker, "speaker").device]
+
+
+def _speaker_plug(target: Target) -> Plug:
+    return target.twin.plugs[_declared(target.twin.robot.speaker, "speaker").device]
+
+
 def _declared(device: Declared | None, what: str) -> Declared:
     if device is None:
         raise FaultRefused(f"this robot's file declares no {what}")
@@ -173,4 +181,12 @@ SENSOR_ROWS: Final[Rows] = {
         summary="it tells that it is pressed though nobody presses it", begin=_press
     ),
     **line_rows(Component.MICROPHONE, _microphone_line, _microphone_plug),
+    # A speaker says nothing to its host, so nothing of that can be stuck, damaged or late.
+    (Component.SPEAKER, Fault.OFF): Effect(
+        summary="deaf; the sound is lost",
+        begin=lambda target: _tamper(_speaker_line(target), Silence()),
+    ),
+    (Component.SPEAKER, Fault.UNPLUG): Effect(
+        summary="the cable is out", begin=lambda target: _pull(_speaker_plug(target))
+    ),
 }

@@ -36,3 +36,4 @@ class Component(Enum):
     CAMERA = "camera"
     ESTOP = "estop"
     MICROPHONE = "microphone"
+    SPEAKER = "speaker"
