@@ -36,7 +36,10 @@ MOST_PATH_BYTES = 90
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwinOptions:
-    """Say which robot lives in which world, and where its devices are served."""
+    """Say which robot lives in which world, and where its devices are served.
+
+    `paced` gives bytes on the servo bus and frames on the CAN bus the time they take on the wire.
+    """
 
     robot: str
     world: str
@@ -44,7 +47,7 @@ class TwinOptions:
     run_dir: Path
     camera: bool = True
     viewer: bool = False
-    paced_servos: bool = False
+    paced: bool = False
 
     @property
     def devices_dir(self) -> Path:
@@ -69,8 +72,9 @@ class TwinProcess:
         self._ready.unlink(missing_ok=True)
         self._clock = clock
         robot = load_robot(options.robot)
-        timing = WireTiming(baud=robot.servo_bus.baud) if options.paced_servos else None
+        timing = WireTiming(baud=robot.servo_bus.baud) if options.paced else None
         self._twin = Twin(robot, options.world, options.seed, timing)
+        self._twin.can_wire.timed = options.paced
         self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
         self._drawings = _start_drawings(options)
         self._servo_line = PtyLine(
@@ -112,15 +116,10 @@ class TwinProcess:
             wall_ns = self._clock.now_ns()
             if self._pacer.due(wall_ns):
                 self._step(wall_ns)
-            reply_ns = self._twin.servos.next_due_ns()
-            wait_ns = self._pacer.wait_ns(self._clock.now_ns())
-            if reply_ns is not None:
-                wait_ns = min(wait_ns, max(0, reply_ns - self._now_ns()))
-            ready, _, _ = select.select(self._filenos(), [], [], wait_ns / NS_PER_S)
+            ready, _, _ = select.select(self._filenos(), [], [], self._wait_ns() / NS_PER_S)
             if ready:
                 self._serve(set(ready))
-            if reply_ns is not None and reply_ns <= self._now_ns() and self._servo_line.is_plugged:
-                self._servo_line.poll_once()
+            self._deliver()
 
     def close(self) -> None:
         """Take every device away."""
@@ -151,7 +150,32 @@ class TwinProcess:
         """Return simulated time, which passes between two steps too."""
         return self._twin.now_ns + self._pacer.since_step_ns(self._clock.now_ns())
 
+    def _wait_ns(self) -> int:
+        """Return how long nothing is due: no step, and nothing under way to a host."""
+        wait_ns = self._pacer.wait_ns(self._clock.now_ns())
+        wire = self._twin.can_wire
+        due = self._twin.servos.next_due_ns(), wire.next_due_ns() if wire.timed else None
+        arrivals = [due_ns for due_ns in due if due_ns is not None]
+        if not arrivals:
+            return wait_ns
+        return min(wait_ns, max(0, min(arrivals) - self._now_ns()))
+
+    def _deliver(self) -> None:
+        """Hand over what has arrived between two steps."""
+        reply_ns = self._twin.servos.next_due_ns()
+        if reply_ns is not None and reply_ns <= self._now_ns() and self._servo_line.is_plugged:
+            self._servo_line.poll_once()
+        if self._twin.can_wire.timed:
+            self._twin.can_wire.poll(self._now_ns())
+
+    def _hear_frames(self) -> None:
+        """Take what hosts have sent on CAN, as sent now."""
+        self._twin.can_wire.poll(self._now_ns())
+        self._hub.poll_once()
+
     def _step(self, wall_ns: int) -> None:
+        # What waits was sent before now: were it heard after the step, heartbeats would be missed.
+        self._hear_frames()
         self._twin.step()
         self._pacer.stepped()
         for line in self._plugged():
@@ -186,7 +210,7 @@ class TwinProcess:
             if not ready.isdisjoint(stream.filenos()):
                 stream.poll_once()
         if not ready.isdisjoint(self._hub.filenos()):
-            self._hub.poll_once()
+            self._hear_frames()
         if not ready.isdisjoint(self._referee.filenos()):
             self._referee.poll_once()
 

@@ -243,7 +243,7 @@ class ControlNode:
         self._telemetry.tell_results(self._motions.stop(verdict.text))
         match self._plan.base_category(verdict.reaction):
             case StopCategory.POWER_REMOVED:
-                self._wheels.disable()
+                self._wheels.cut_power()
                 self._base.halt()
             case StopCategory.STOP_THEN_REMOVE_POWER:
                 self._wheels.quick_stop()

@@ -146,7 +146,10 @@ class Wheels:
 
     def cycle(self, v_m_s: float, w_rad_s: float) -> None:
         """Command a base velocity, take in the drives' state and move the odometry on."""
-        if self._bus is None or self.lost:
+        if self._bus is None:
+            return
+        if self.lost:
+            self._attend(self._bus)
             return
         if self._off_at_ns is not None and self._clock.now_ns() >= self._off_at_ns:
             self.disable()
@@ -165,6 +168,17 @@ class Wheels:
         self._track(wanted, state)
         self.odometry.update(*state.position_rad.tolist())
         self.v_m_s, self.w_rad_s = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
+
+    def _attend(self, bus: DriveBus) -> None:
+        """Tell drives that were lost to stop for as long as nobody connects them anew.
+
+        A drive that was late, and the one that was never lost, then brake as they are told; without
+        our frames they would do so in a fault of their own that hides the cause.
+        """
+        try:
+            bus.cycle(None)
+        except LinkLost as error:
+            self.failure = str(error)
 
     def _track(self, wanted_rad_s: Floats, state: DriveState) -> None:
         if state.enabled:
@@ -186,7 +200,7 @@ class Wheels:
         """Begin to power the drives; `enabled` tells when they follow."""
         self._followed = False
         self._off_at_ns = None
-        if self._bus is not None:
+        if self._bus is not None and not self.lost:
             self._bus.enable()
 
     def disable(self) -> None:
@@ -195,6 +209,17 @@ class Wheels:
         self._off_at_ns = None
         if self._bus is not None:
             self._bus.disable()
+
+    def cut_power(self) -> None:
+        """Take the power off both drives at once, as a stop of category 0 asks."""
+        self.disable()
+        if self._bus is None:
+            return
+        try:
+            self._bus.cut_power()
+        except LinkLost as error:
+            self.failure = str(error)
+            self._note_loss()
 
     def quick_stop(self) -> None:
         """Let the drives brake on their own ramp and then take their power off.
