@@ -16,59 +16,82 @@ ACCELEROMETER = "imu_accelerometer"
 _WORLD_GROUPS = np.array([1, 1, 0, 0, 0, 0], np.uint8)
 _HIDDEN_GROUP = 5
 _ENDLESS_M = 1e6
+_SLACK_M = 1e-6
+_NOWHERE = (0.0, 0.0, 0.0)
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE.value
 
 
 class RangeProbe:
     """Cast rays in the base's plane from the lidar; they pass the robot itself by.
 
-    Rays stay in one plane, so geoms that the plane misses are hidden from them: they cannot be hit,
-    and MuJoCo would look at each of them for each ray. `data` must be up to date.
+    Rays stay in one plane and within a sector, so geoms that both miss are hidden from them: they
+    cannot be hit, and MuJoCo would look at each of them for each ray. `data` must be up to date.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, site: str = "lidar") -> None:
         self._data = data
-        site_id = model.site(site).id
-        self._origin = data.site_xpos[site_id]
+        self._origin = data.site_xpos[model.site(site).id]
         self._rotation = data.xmat[model.body(ROBOT_ROOT).id].reshape(3, 3)
         self._centres = data.geom_xpos
         self._view = copy.copy(model)
         self._view_groups = self._view.geom_group
         self._groups = model.geom_group.copy()
-        self._radius_m = np.where(model.geom_type == _PLANE, _ENDLESS_M, model.geom_rbound)
-        self._reach_m = _reach_from_level_plane(model, data, self._radius_m)
-        angles = np.radians(np.arange(BEAMS))
-        self._directions = np.stack([np.cos(angles), np.sin(angles), np.zeros(BEAMS)], axis=1)
+        radius_m = np.where(model.geom_type == _PLANE, _ENDLESS_M, model.geom_rbound)
+        self._radius_m = radius_m
+        self._reach_m = _reach_from_level_plane(model, data, radius_m) + _SLACK_M
+        self._bound_m = np.stack([radius_m, radius_m, radius_m]) + _SLACK_M
+        turn = np.tile(np.radians(np.arange(BEAMS)), 2)
+        cos, sin, flat = np.cos(turn), np.sin(turn), np.zeros(2 * BEAMS)
+        self._directions = np.stack([cos, sin, flat], axis=1)
+        self._leftwards = np.stack([-sin, cos, flat], axis=1)
+        self._rightwards = -self._leftwards
+        self._hit = np.empty(BEAMS, np.int32)
 
-    def cast(self, beams: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return ranges in metres, beam i at i degrees counter-clockwise; 0 is no return."""
-        self._show_what_the_plane_meets()
-        geoms = np.empty(beams.size, np.int32)
-        ranges_m = np.empty(beams.size)
+    def cast(self, beams: range) -> NDArray[np.float32]:
+        """Return the ranges in metres of a run of beams, at most one turn; 0 is no return.
+
+        Beam i looks i degrees counter-clockwise from the front; 360 is the front again.
+        """
+        count, first = len(beams), beams.start % BEAMS
+        self._hide_what_they_miss(first, count)
+        ranges_m, geoms = np.empty(count), self._hit[:count]
+        rays = self._directions[first : first + count] @ self._rotation.T
         mujoco.mj_multiRay(
             self._view,
             self._data,
             self._origin,
-            (self._directions[beams] @ self._rotation.T).ravel(),
+            rays.ravel(),
             _WORLD_GROUPS,
             True,
             -1,
             geoms,
             ranges_m,
             None,
-            beams.size,
+            count,
             RANGE_CUTOFF_M,
         )
         ranges_m[geoms < 0] = 0.0
         return ranges_m.astype(np.float32)
 
-    def _show_what_the_plane_meets(self) -> None:
-        normal = self._rotation[:, 2]
-        distance_m = self._centres @ normal
-        distance_m -= self._origin @ normal
-        np.abs(distance_m, out=distance_m)
-        distance_m -= math.hypot(normal[0], normal[1]) * self._radius_m
-        self._view_groups[:] = np.where(distance_m <= self._reach_m, self._groups, _HIDDEN_GROUP)
+    def _hide_what_they_miss(self, first: int, count: int) -> None:
+        """Hide geoms on one side of the plane, to the right of the first or left of the last."""
+        rotation, bound_m = self._rotation, self._bound_m
+        up = rotation[:, 2].tolist()
+        axes = [up, _NOWHERE, _NOWHERE]
+        if count <= BEAMS // 2:
+            left, right = self._leftwards[first], self._rightwards[first + count - 1]
+            axes[1:] = (rotation.dot(left), rotation.dot(right))
+        offsets_m = (self._centres - self._origin).T
+        inside_m = np.dot(axes, offsets_m)
+        level_m = inside_m[0]
+        np.abs(level_m, out=level_m)
+        np.subtract(self._reach_m, level_m, out=level_m)
+        np.multiply(self._radius_m, math.hypot(up[0], up[1]), out=bound_m[0])
+        inside_m += bound_m
+        np.minimum(level_m, inside_m[1], out=level_m)
+        np.minimum(level_m, inside_m[2], out=level_m)
+        self._view_groups[:] = self._groups
+        np.copyto(self._view_groups, _HIDDEN_GROUP, where=level_m < 0.0)
 
 
 def _reach_from_level_plane(

@@ -1,6 +1,6 @@
 """Translate between the robot's joints and the motor shafts that the emulated firmware knows."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sim_twin.errors import ModelMismatch
 
 Floats = NDArray[np.float64]
+_multiply, _subtract = np.multiply, np.subtract
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,66 +23,80 @@ class Shaft:
 
 
 class Shafts:
-    """Read shaft angle, speed and torque of all motors of one kind, and set their input."""
+    """Read shaft angle, speed and torque of all motors of one kind, and set their input.
+
+    An array that a method returns is overwritten by its next call.
+    """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, shafts: Sequence[Shaft]) -> None:
         joints = [_find(model.joint, "joint", shaft.joint) for shaft in shafts]
         actuators = [_find(model.actuator, "actuator", shaft.joint) for shaft in shafts]
+        qpos, qvel = model.jnt_qposadr[joints].tolist(), model.jnt_dofadr[joints].tolist()
         ratio = np.array([shaft.ratio for shaft in shafts])
-        # Views of the state's memory: asking MjData for them anew costs more than reading them.
-        self._all_qpos, self._all_qvel = data.qpos, data.qvel
-        self._all_force, self._all_ctrl = data.actuator_force, data.ctrl
-        self._actuator = _span(actuators)
-        self._qpos = _span(model.jnt_qposadr[joints].tolist())
-        self._qvel = _span(model.jnt_dofadr[joints].tolist())
         self._zero_rad = np.array([shaft.offset for shaft in shafts]) / ratio
         self._per_joint = 1.0 / ratio
         self._sign = np.sign(ratio)
-        self._rows = [
-            (int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint]), actuator, row)
-            for row, (joint, actuator) in enumerate(zip(joints, actuators, strict=True))
-        ]
-        self._per_joint_each: list[float] = self._per_joint.tolist()
-        self._sign_each: list[float] = self._sign.tolist()
+        # The state's memory is asked for once: asking MjData anew costs more than reading it.
+        self._read_qpos, self._read_qvel = _reader(data.qpos, qpos), _reader(data.qvel, qvel)
+        self._read_force = _reader(data.actuator_force, actuators)
+        self._all_ctrl, self._actuator = data.ctrl, _span(actuators)
+        self._angle, self._speed, self._effort, self._input = np.zeros((4, len(shafts)))
+        self._each_qpos, self._each_qvel = memoryview(data.qpos), memoryview(data.qvel)
+        self._each_ctrl = memoryview(data.ctrl)
+        self._rows = list(
+            zip(qpos, qvel, self._per_joint.tolist(), range(len(shafts)), strict=True)
+        )
+        self._actuator_signs = list(zip(actuators, self._sign.tolist(), strict=True))
 
     def position_rad(self) -> Floats:
         """Return shaft angles."""
-        angle: Floats = self._all_qpos[self._qpos] * self._per_joint
-        angle -= self._zero_rad
+        angle = self._angle
+        _multiply(self._read_qpos(), self._per_joint, angle)
+        _subtract(angle, self._zero_rad, angle)
         return angle
 
     def velocity_rad_s(self) -> Floats:
         """Return shaft speeds."""
-        speed: Floats = self._all_qvel[self._qvel] * self._per_joint
-        return speed
+        _multiply(self._read_qvel(), self._per_joint, self._speed)
+        return self._speed
 
     def motions(self) -> list[tuple[float, float]]:
         """Return each shaft's angle and speed as plain numbers, which is faster for a few."""
-        qpos, qvel, zero_rad = self._all_qpos.item, self._all_qvel.item, self._zero_rad.item
-        per_joint = self._per_joint_each
+        qpos, qvel, zero_rad = self._each_qpos, self._each_qvel, self._zero_rad.item
         return [
-            (qpos(angle) * per_joint[row] - zero_rad(row), qvel(speed) * per_joint[row])
-            for angle, speed, _, row in self._rows
+            (qpos[angle] * per_joint - zero_rad(row), qvel[speed] * per_joint)
+            for angle, speed, per_joint, row in self._rows
         ]
 
     def effort(self) -> Floats:
         """Return what the motors gave in the last step, in the shaft's direction."""
-        effort: Floats = self._all_force[self._actuator] * self._sign
-        return effort
+        _multiply(self._read_force(), self._sign, self._effort)
+        return self._effort
 
     def command(self, value: Floats) -> None:
         """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
-        self._all_ctrl[self._actuator] = value * self._sign
+        _multiply(value, self._sign, self._input)
+        self._all_ctrl[self._actuator] = self._input
 
     def command_each(self, values: Iterable[float]) -> None:
         """Set the motors' input from plain numbers."""
-        ctrl, signs = self._all_ctrl, self._sign_each
-        for value, (_, _, actuator, row) in zip(values, self._rows, strict=True):
-            ctrl[actuator] = value * signs[row]
+        ctrl = self._each_ctrl
+        for value, (actuator, sign) in zip(values, self._actuator_signs, strict=True):
+            ctrl[actuator] = value * sign
 
     def slip(self, row: int, angle_rad: float) -> None:
         """Measure a shaft further off than it is, as an encoder does after a blow."""
         self._zero_rad[row] -= angle_rad
+
+
+def _reader(state: Floats, addresses: list[int]) -> Callable[[], Floats]:
+    """Return what reads these addresses; where they follow each other nothing is copied."""
+    span = _span(addresses)
+    if isinstance(span, slice):
+        view = state[span]
+        return lambda: view
+    gathered = np.zeros(len(addresses))
+    return lambda: state.take(span, None, gathered, "clip")
 
 
 def _span(addresses: list[int]) -> slice | NDArray[np.intp]:

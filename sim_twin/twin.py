@@ -135,8 +135,10 @@ class Twin:
         self.engine.step()
         now_ns = self.engine.now_ns
         self.servos.step(now_ns)
-        self.lidar.step(now_ns)
-        self.imu.step(now_ns)
+        if now_ns >= self.lidar.due_ns:
+            self.lidar.step(now_ns)
+        if now_ns >= self.imu.due_ns:
+            self.imu.step(now_ns)
         self.can_wire.poll(now_ns)
         for device in self.streamed_devices.values():
             device.step(now_ns)

@@ -14,6 +14,10 @@ ANGLE_SIGMA_RAD = math.radians(0.02)
 ACCELERATION_SIGMA_M_S2 = 0.03
 YAW_DRIFT_RAD_S = math.radians(0.5) / 60.0
 _BODY = struct.Struct("<B6h3x")
+_CENTIDEGREES_PER_RAD = math.degrees(1.0) * 100.0
+_MILLI_G_PER_M_S2 = 1000.0 / STANDARD_GRAVITY_M_S2
+_HALF_TURN = 18_000
+_NOISY_FRAMES = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +45,9 @@ class ImuDevice:
         self.runaway_rad_s = 0.0
         self._random = np.random.default_rng(seed)
         self._drift_rad_s = float(self._random.uniform(-YAW_DRIFT_RAD_S, YAW_DRIFT_RAD_S))
-        self._due_ns: int | None = None
+        self._noise: list[list[float]] = []
+        self._started = False
+        self.due_ns = 0
         self._start_yaw_rad = 0.0
         self._drift_rad = 0.0
         self._drifted_ns = 0
@@ -58,13 +64,14 @@ class ImuDevice:
         return data
 
     def step(self, now_ns: int) -> None:
-        """Send a frame when one is due."""
-        if self._due_ns is None:
-            self._due_ns = self._drifted_ns = now_ns
+        """Send a frame when one is due, which is at `due_ns`."""
+        if not self._started:
+            self._started = True
+            self.due_ns = self._drifted_ns = now_ns
             self._start_yaw_rad = self._read().yaw_rad
-        if now_ns < self._due_ns:
+        if now_ns < self.due_ns:
             return
-        self._due_ns = max(self._due_ns + round(NS_PER_S / self.rate_hz), now_ns)
+        self.due_ns = max(self.due_ns + round(NS_PER_S / self.rate_hz), now_ns)
         self._drift(now_ns)
         self._out += self._frame(self._read())
         self._index = (self._index + 1) % 256
@@ -75,24 +82,32 @@ class ImuDevice:
         self._drifted_ns = now_ns
 
     def _frame(self, truth: ImuTruth) -> bytes:
-        yaw_rad = truth.yaw_rad - self._start_yaw_rad + self._drift_rad
-        noise = self._random.standard_normal(6).tolist()
-        angles = (yaw_rad, truth.pitch_rad, truth.roll_rad)
-        centidegrees = [
-            round(math.degrees(_wrapped(angle + ANGLE_SIGMA_RAD * wild)) * 100.0)
-            for angle, wild in zip(angles, noise[:3], strict=True)
-        ]
-        milli_g = [
-            _milli_g(force + ACCELERATION_SIGMA_M_S2 * wild)
-            for force, wild in zip(truth.acceleration_m_s2, noise[3:], strict=True)
-        ]
-        body = _BODY.pack(self._index, *centidegrees, *milli_g)
-        return HEADER + body + bytes([sum(body) & 0xFF])
+        yaw, pitch, roll, ahead, left, up = self._next_noise()
+        x_m_s2, y_m_s2, z_m_s2 = truth.acceleration_m_s2
+        body = _BODY.pack(
+            self._index,
+            _centidegrees(truth.yaw_rad - self._start_yaw_rad + self._drift_rad, yaw),
+            _centidegrees(truth.pitch_rad, pitch),
+            _centidegrees(truth.roll_rad, roll),
+            _milli_g(x_m_s2, ahead),
+            _milli_g(y_m_s2, left),
+            _milli_g(z_m_s2, up),
+        )
+        return HEADER + body + bytes((sum(body) & 0xFF,))
+
+    def _next_noise(self) -> list[float]:
+        """Return one standard normal number for each value of a frame."""
+        if not self._noise:
+            self._noise = self._random.standard_normal((_NOISY_FRAMES, 6)).tolist()
+            self._noise.reverse()
+        return self._noise.pop()
 
 
-def _wrapped(angle_rad: float) -> float:
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+def _centidegrees(angle_rad: float, noise: float) -> int:
+    turned = round((angle_rad + ANGLE_SIGMA_RAD * noise) * _CENTIDEGREES_PER_RAD)
+    return (turned + _HALF_TURN) % (2 * _HALF_TURN) - _HALF_TURN
 
 
-def _milli_g(acceleration_m_s2: float) -> int:
-    return min(max(round(acceleration_m_s2 / STANDARD_GRAVITY_M_S2 * 1000.0), -32_768), 32_767)
+def _milli_g(acceleration_m_s2: float, noise: float) -> int:
+    told = round((acceleration_m_s2 + ACCELERATION_SIGMA_M_S2 * noise) * _MILLI_G_PER_M_S2)
+    return min(max(told, -32_768), 32_767)

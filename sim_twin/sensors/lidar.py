@@ -16,6 +16,7 @@ MIN_RANGE_M = 0.02
 MAX_RANGE_M = 12.0
 INTENSITY = 200
 _NS_PER_MS = 1_000_000
+_TURN_CENTIDEG = 36_000
 _MM_PER_M = 1000.0
 _PACKETS_PER_S = POINTS_PER_S // POINTS_PER_PACKET
 _POINT = np.dtype([("distance_mm", "<u2"), ("intensity", "u1")])
@@ -33,6 +34,7 @@ _PACKET = np.dtype(
 _CHECKED_BYTES = _PACKET.itemsize - 1
 _PLACES = np.arange(_CHECKED_BYTES)
 _LAST_POINT = POINTS_PER_PACKET - 1
+_NOISY_POINTS = POINTS_PER_S
 
 
 def _crc_parts() -> NDArray[np.uint8]:
@@ -47,19 +49,45 @@ def _crc_parts() -> NDArray[np.uint8]:
 _CRC_PARTS = _crc_parts()
 
 
+class PacketBlock:
+    """Hold the memory of some packets, and their fields as arrays; what never changes is filled in.
+
+    Finding the fields of a packed record costs more than writing them.
+    """
+
+    def __init__(self, count: int) -> None:
+        packets = np.zeros(count, _PACKET)
+        packets["header"] = HEADER
+        points = packets["points"]
+        self._memory = packets
+        self._checked = packets.view(np.uint8).reshape(count, _PACKET.itemsize)[:, :_CHECKED_BYTES]
+        self._crc = packets["crc"]
+        self.speed_deg_s = packets["speed_deg_s"]
+        self.start = packets["start"]
+        self.end = packets["end"]
+        self.stamp_ms = packets["stamp_ms"]
+        self.distance_mm = points["distance_mm"]
+        self.intensity = points["intensity"]
+
+    def to_bytes(self) -> bytes:
+        """Return the packets as they go over the line."""
+        np.bitwise_xor.reduce(_CRC_PARTS[_PLACES, self._checked], axis=1, out=self._crc)
+        return self._memory.tobytes()
+
+
 class LidarDevice:
     """Turn casts of the world into the LD19's packets.
 
-    `cast` returns the ranges in metres of the beams it is given, beam i at i degrees
-    counter-clockwise from the robot's front, 0 for no return. It is called `casts_per_turn` times a
-    turn for the points up to the next cast, so that a moving robot distorts the scan as it does in
-    life, in steps of 33 ms. `rate_hz` and `range_ratio` (told over true range) may be changed at
-    any time.
+    `cast` returns the ranges in metres of a run of beams, beam i at i degrees counter-clockwise
+    from the robot's front (360 is the front again), 0 for no return. It is called `casts_per_turn`
+    times a turn for the points up to the next cast, so that a moving robot distorts the scan as it
+    does in life, in steps of 33 ms. `rate_hz` and `range_ratio` (told over true range) may be
+    changed at any time.
     """
 
     def __init__(
         self,
-        cast: Callable[[NDArray[np.int64]], NDArray[np.float32]],
+        cast: Callable[[range], NDArray[np.float32]],
         rate_hz: float = 10.0,
         *,
         sigma_m: float = 0.005,
@@ -72,17 +100,20 @@ class LidarDevice:
         self._cast = cast
         self._step_deg = rate_hz * 360.0 / POINTS_PER_S
         self._phase_deg = 0.0
-        self._sigma_m = sigma_m
+        self._sigma_mm = sigma_m * _MM_PER_M
         self._random = np.random.default_rng(seed)
+        self._noise_mm = np.empty(0)
+        self._points = np.empty(0)
         self._mounting_deg = math.degrees(mounting_yaw_rad)
         self._cast_every_ns = round(NS_PER_S / rate_hz / casts_per_turn)
         self._next_cast_ns = 0
         self._start_ns = 0
         self._started = False
         self._sent_packets = 0
-        self._due_ns: deque[int] = deque()
-        self._packets = b""
+        self._waiting: deque[tuple[int, bytes]] = deque()
+        self._blocks: dict[int, PacketBlock] = {}
         self._out = bytearray()
+        self.due_ns = 0
 
     def receive(self, data: bytes) -> None:
         """Ignore what the host sends: the LD19 only talks."""
@@ -94,7 +125,7 @@ class LidarDevice:
         return data
 
     def step(self, now_ns: int) -> None:
-        """Send every packet whose last point is due by `now_ns`."""
+        """Send every packet whose last point is due by `now_ns`; nothing is before `due_ns`."""
         if not self._started:
             self._started = True
             self._start_ns = self._next_cast_ns = now_ns
@@ -103,14 +134,11 @@ class LidarDevice:
             end = max(self._packets_due(self._next_cast_ns), self._packets_due(now_ns))
             if end > self._sent_packets:
                 self._measure(end)
-        while self._due_ns and self._due_ns[0] <= now_ns:
-            self._send()
-
-    def _send(self) -> None:
-        self._due_ns.popleft()
-        self._sent_packets += 1
-        self._out += self._packets[: _PACKET.itemsize]
-        self._packets = self._packets[_PACKET.itemsize :]
+        waiting = self._waiting
+        while waiting and waiting[0][0] <= now_ns:
+            self._out += waiting.popleft()[1]
+            self._sent_packets += 1
+        self.due_ns = min(waiting[0][0], self._next_cast_ns) if waiting else self._next_cast_ns
 
     def _packets_due(self, now_ns: int) -> int:
         """Return how many packets have been measured to their last point by `now_ns`."""
@@ -122,24 +150,26 @@ class LidarDevice:
         A packet's stamp is when its last point was measured, whenever the host reads it.
         """
         self._follow_rate()
-        first, count = self._sent_packets, end - self._sent_packets
-        points = np.arange(first * POINTS_PER_PACKET, end * POINTS_PER_PACKET, dtype=np.float64)
-        angles_deg = points.reshape(count, POINTS_PER_PACKET) * self._step_deg + self._phase_deg
-        hundredths = np.rint(angles_deg[:, ::_LAST_POINT] * 100.0) % 36_000.0
-        numbers = range(first + 1, end + 1)
-        due_ns = [self._start_ns - number * -NS_PER_S // _PACKETS_PER_S for number in numbers]
-        packets = np.empty(count, _PACKET)
-        packets["header"] = HEADER
-        packets["speed_deg_s"] = round(self.rate_hz * 360.0)
-        packets["start"], packets["end"] = hundredths.T
-        distances_mm, seen = self._look(angles_deg)
-        packets["points"]["distance_mm"] = distances_mm
-        packets["points"]["intensity"] = seen * INTENSITY
-        packets["stamp_ms"] = [due // _NS_PER_MS % STAMP_WRAP_MS for due in due_ns]
-        checked = packets.view(np.uint8).reshape(count, _PACKET.itemsize)[:, :_CHECKED_BYTES]
-        packets["crc"] = np.bitwise_xor.reduce(_CRC_PARTS[_PLACES, checked], axis=1)
-        self._due_ns = deque(due_ns)
-        self._packets = packets.tobytes()
+        first, step_deg, phase_deg = self._sent_packets, self._step_deg, self._phase_deg
+        packet_deg = POINTS_PER_PACKET * step_deg
+        numbers = range(first, end)
+        starts_deg = [number * packet_deg + phase_deg for number in numbers]
+        due_ns = [self._start_ns - (number + 1) * -NS_PER_S // _PACKETS_PER_S for number in numbers]
+        block = self._block(end - first)
+        last_deg = _LAST_POINT * step_deg
+        block.speed_deg_s.fill(round(self.rate_hz * 360.0))
+        block.start[:] = [round(deg * 100.0) % _TURN_CENTIDEG for deg in starts_deg]
+        block.end[:] = [round((deg + last_deg) * 100.0) % _TURN_CENTIDEG for deg in starts_deg]
+        block.stamp_ms[:] = [due // _NS_PER_MS % STAMP_WRAP_MS for due in due_ns]
+        self._look(starts_deg, block)
+        data, size = block.to_bytes(), _PACKET.itemsize
+        packets = [data[start : start + size] for start in range(0, len(data), size)]
+        self._waiting = deque(zip(due_ns, packets, strict=True))
+
+    def _block(self, count: int) -> PacketBlock:
+        if count not in self._blocks:
+            self._blocks[count] = PacketBlock(count)
+        return self._blocks[count]
 
     def _follow_rate(self) -> None:
         """Turn on from where the head is at another speed."""
@@ -148,15 +178,39 @@ class LidarDevice:
         self._phase_deg += first * (self._step_deg - step_deg)
         self._step_deg = step_deg
 
-    def _look(
-        self, angles_deg: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return distances in millimetres, 0 where nothing is in range, and where something is."""
-        beams = np.rint(self._mounting_deg - angles_deg).astype(np.int64)
-        first, last = beams[-1, -1], beams[0, 0]
-        true_m = self._cast(np.arange(first, last + 1) % BEAMS)[beams - first]
-        told_mm = self._random.standard_normal(beams.shape)
-        told_mm *= self._sigma_m * _MM_PER_M
+    def _look(self, starts_deg: list[float], block: PacketBlock) -> None:
+        """Measure distances: 0 where nothing is in range, at least a millimetre elsewhere."""
+        count = POINTS_PER_PACKET * len(starts_deg)
+        beams = self._beams(self._mounting_deg - starts_deg[0], count)
+        first, last = int(beams[-1]), int(beams[0])
+        run = range(first, last + 1) if last - first < BEAMS else range(first, first + BEAMS)
+        beams -= first
+        true_m = self._cast(run).take(beams, mode="wrap")
+        told_mm = self._next_noise_mm(count)
         told_mm += true_m * (self.range_ratio * _MM_PER_M)
-        seen = (true_m >= MIN_RANGE_M) & (true_m <= MAX_RANGE_M)
-        return np.rint(told_mm).clip(1.0, 65_535.0) * seen, seen
+        np.rint(told_mm, out=told_mm)
+        np.maximum(told_mm, 1.0, out=told_mm)
+        np.minimum(told_mm, 65_535.0, out=told_mm)
+        seen = true_m >= MIN_RANGE_M
+        seen &= true_m <= MAX_RANGE_M
+        told_mm *= seen
+        block.distance_mm[:] = told_mm.reshape(block.distance_mm.shape)
+        seen = seen.reshape(block.intensity.shape)
+        np.multiply(seen, INTENSITY, out=block.intensity, casting="unsafe")
+
+    def _beams(self, start_deg: float, count: int) -> NDArray[np.intp]:
+        """Return the beams that `count` points look along, clockwise from an angle."""
+        if count > self._points.size:
+            self._points = np.arange(count, dtype=np.float64)
+        angles_deg = self._points[:count] * -self._step_deg
+        angles_deg += start_deg
+        np.rint(angles_deg, out=angles_deg)
+        return angles_deg.astype(np.intp)
+
+    def _next_noise_mm(self, count: int) -> NDArray[np.float64]:
+        """Return the errors of the next points; drawing many at once costs less."""
+        if self._noise_mm.size < count:
+            fresh = self._random.standard_normal(max(_NOISY_POINTS, count))
+            self._noise_mm = fresh * self._sigma_mm
+        noise_mm, self._noise_mm = self._noise_mm[:count], self._noise_mm[count:]
+        return noise_mm

@@ -86,8 +86,9 @@ class Firmware:
     def set_time(self, now_ns: int) -> None:
         """Take over the time, and trip the watchdogs that ran out."""
         self.now_ns = now_ns
-        for row in self._watchdog.expired(now_ns):
-            self._trip(row)
+        if now_ns >= self._watchdog.earliest_ns:
+            for row in self._watchdog.expired(now_ns):
+                self._trip(row)
 
     def advance(
         self,

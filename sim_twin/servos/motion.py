@@ -37,6 +37,9 @@ _CURRENT_MODES: Final = (OperatingMode.CURRENT, OperatingMode.CURRENT_BASED_POSI
 
 Rows = NDArray[np.intp]
 
+_add, _subtract, _multiply = np.add, np.subtract, np.multiply
+_rint, _minimum, _maximum = np.rint, np.minimum, np.maximum
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motors:
@@ -75,11 +78,15 @@ class Motion:
         self.shaft_rad_s: Floats = np.zeros(count)
         self._pwm = np.zeros(count)
         self._scratch = np.zeros(count)
+        self._duty = np.zeros(count)
+        self._duty_per_pwm = np.zeros(count)
+        self._no_duty = np.zeros(count)
         self.goals_moved = True
         """Set this when goal positions have changed."""
         self._nominal_ratio: Floats = np.ones(count)
         self._turn_pulses = np.zeros(count)
         self._last_setpoint = np.zeros(count)
+        self._change = np.zeros(count)
         self._last_change = np.zeros(count)
         self._position_sum = np.zeros(count)
         self._velocity_sum = np.zeros(count)
@@ -97,7 +104,8 @@ class Motion:
         self._enabled = enabled.astype(np.float64)
         self._any_enabled = bool(enabled.any())
         self.goals_moved = True
-        self._scale_duty()
+        self._share_per_pwm = self._enabled * self.direction / PWM_FULL
+        self.set_voltage(self._nominal_ratio)
         self._p = columns.position_p_gain / 128.0
         self._i = columns.position_i_gain / 65536.0
         self._d = columns.position_d_gain / 16.0
@@ -120,20 +128,21 @@ class Motion:
         self._torque_rows = np.flatnonzero(mode == OperatingMode.CURRENT)
         self._limited_rows = np.flatnonzero(mode == OperatingMode.CURRENT_BASED_POSITION)
         self.in_position_mode = np.isin(mode, _POSITION_MODES)
+        others = (self._velocity_rows, self._pwm_rows, self._torque_rows, self._limited_rows)
+        self._all_by_position = not any(rows.size for rows in others)
 
     def set_voltage(self, nominal_ratio: Floats) -> None:
-        """Take over the supply's voltage, as a share of each motor's nominal one."""
-        self._nominal_ratio = nominal_ratio
-        self._scale_duty()
+        """Take over the supply's voltage, as a share of each motor's nominal one.
 
-    def _scale_duty(self) -> None:
-        """Count duty from the nominal voltage: a lower one does less with the same PWM."""
-        self._duty_per_pwm = self._enabled * self.direction * self._nominal_ratio / PWM_FULL
+        Duty counts from the nominal voltage: a lower one does less with the same PWM.
+        """
+        self._nominal_ratio = nominal_ratio
+        _multiply(self._share_per_pwm, nominal_ratio, self._duty_per_pwm)
 
     @property
     def duty(self) -> Floats:
         """Return the share of the supply that is put on the motors, in shaft coordinates."""
-        duty: Floats = self._pwm * self._enabled * self.direction / PWM_FULL
+        duty: Floats = self._pwm * self._share_per_pwm
         return duty
 
     @property
@@ -150,9 +159,10 @@ class Motion:
 
     def sense(self, position_rad: Floats, velocity_rad_s: Floats) -> None:
         """Read the encoders."""
-        np.multiply(position_rad, self._pulses_per_rad, out=self.pulses)
-        self.pulses += self._offset_pulses
-        np.rint(self.pulses, out=self.pulses)
+        pulses = self.pulses
+        _multiply(position_rad, self._pulses_per_rad, pulses)
+        _add(pulses, self._offset_pulses, pulses)
+        _rint(pulses, pulses)
         self.shaft_rad_s = velocity_rad_s
 
     def home(self, row: int) -> None:
@@ -178,18 +188,23 @@ class Motion:
         pwm = self._pwm
         if not self._any_enabled:
             pwm[:] = 0.0
-            return np.zeros_like(pwm)
+            return self._no_duty
         self._control_position(dt_s)
+        if not self._all_by_position:
+            self._control_other_modes(dt_s)
+        _minimum(pwm, self._pwm_limit, out=pwm)
+        _maximum(pwm, self._least_pwm, out=pwm)
+        _multiply(pwm, self._duty_per_pwm, self._duty)
+        return self._duty
+
+    def _control_other_modes(self, dt_s: float) -> None:
+        pwm = self._pwm
         if self._velocity_rows.size:
             pwm[self._velocity_rows] = self._velocity_pwm(self._velocity_rows, dt_s)
         if self._pwm_rows.size:
             pwm[self._pwm_rows] = self._columns.goal_pwm[self._pwm_rows]
         if self._torque_rows.size or self._limited_rows.size:
             self._limit_current(pwm)
-        np.minimum(pwm, self._pwm_limit, out=pwm)
-        np.maximum(pwm, self._least_pwm, out=pwm)
-        duty: Floats = pwm * self._duty_per_pwm
-        return duty
 
     def _control_position(self, dt_s: float) -> None:
         """Set `pwm` to what the position loops ask for, in place: every step comes here."""
@@ -198,13 +213,13 @@ class Motion:
         if moving:
             self.goals_moved = False
             self.profile.advance(dt_s)
-        np.subtract(self.profile.position, self.pulses, out=scratch)
-        np.multiply(scratch, self._p, out=pwm)
+        _subtract(self.profile.position, self.pulses, scratch)
+        _multiply(scratch, self._p, pwm)
         if self._has_i:
             self._integrate_position(scratch, dt_s)
         if self._has_rates:
-            np.multiply(self.shaft_rad_s, self._damping, out=scratch)
-            pwm -= scratch
+            _multiply(self.shaft_rad_s, self._damping, scratch)
+            _subtract(pwm, scratch, pwm)
         if moving:
             self._feed_forward(dt_s * _MS_PER_S)
 
@@ -216,13 +231,14 @@ class Motion:
 
     def _feed_forward(self, dt_ms: float) -> None:
         """Add what the setpoint's rates of change call for: of D, and of the feed-forward gains."""
-        change = self.profile.position - self._last_setpoint
-        np.copyto(self._last_setpoint, self.profile.position)
+        change, position = self._change, self.profile.position
+        _subtract(position, self._last_setpoint, change)
+        self._last_setpoint[:] = position
         if self._has_rates:
             self._pwm += change * (self._forward / dt_ms)
         if self._has_2nd:
             self._pwm += (change - self._last_change) * (self._forward_2nd / dt_ms**2)
-            self._last_change = change
+            self._last_change[:] = change
 
     def _velocity_pwm(self, rows: Rows, dt_s: float) -> Floats:
         columns = self._columns

@@ -66,7 +66,7 @@ class Profile:
     def advance(self, dt_s: float) -> None:
         """Move every setpoint on by one step."""
         if not self.active:
-            np.copyto(self.position, self._columns.goal_position)
+            self.position[:] = self._columns.goal_position
             return
         distance = self._columns.goal_position - self.position
         braking = np.sqrt(2.0 * self._acceleration * np.abs(distance))

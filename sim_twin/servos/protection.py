@@ -13,6 +13,7 @@ from sim_twin.servos.spec import FirmwareOptions
 from sim_twin.servos.thermal import Thermals
 
 CHECK_PERIOD_S: Final = 0.02
+_peak: Final = np.maximum.reduce
 
 
 class Protection:
@@ -25,6 +26,8 @@ class Protection:
         self._max_voltage = columns.named("max_voltage_limit")
         self._min_voltage = columns.named("min_voltage_limit")
         self._overload_s = np.zeros(count)
+        self._overload_runs = False
+        self._overload_is_forced = False
         self._none = np.zeros(count, np.int32)
         self._forced_overload = np.zeros(count, np.bool_)
         self.thermals = Thermals(models, options.ambient_c)
@@ -32,12 +35,16 @@ class Protection:
 
     def check(self, effort_ratio: Floats, supply_v: float, dt_s: float) -> IntColumn:
         """Return the hardware error bits that hold now, after `dt_s` of this effort."""
-        options = self._options
         self.thermals.advance(effort_ratio, dt_s)
-        overloaded = np.abs(effort_ratio) > options.overload_ratio
+        effort = np.abs(effort_ratio)
+        if self._overload_runs or float(_peak(effort)) > self._options.overload_ratio:
+            self._count_overload(effort > self._options.overload_ratio, dt_s)
+        return self._none if self._is_fine(supply_v) else self._bits(supply_v)
+
+    def _count_overload(self, overloaded: NDArray[np.bool_], dt_s: float) -> None:
         self._overload_s += dt_s
         self._overload_s *= overloaded
-        return self._none if self._is_fine(overloaded, supply_v) else self._bits(supply_v)
+        self._overload_runs = bool(overloaded.any())
 
     def reload(self) -> None:
         """Take over limits that the host changed."""
@@ -52,15 +59,16 @@ class Protection:
     def force_overload(self, row: int, *, on: bool) -> None:
         """Count a servo as overloaded whatever its effort, or no longer."""
         self._forced_overload[row] = on
+        self._overload_is_forced = bool(self._forced_overload.any())
 
-    def _is_fine(self, overloaded: NDArray[np.bool_], supply_v: float) -> bool:
+    def _is_fine(self, supply_v: float) -> bool:
         """Tell whether no servo can have an error, which is nearly always so."""
         supply = supply_v / VOLTAGE_UNIT_V
-        return bool(
-            self._lowest_supply <= supply <= self._highest_supply
-            and self.thermals.body_c.max() <= self._coolest_limit_c
-            and not overloaded.any()
-            and not self._forced_overload.any()
+        return (
+            not self._overload_runs
+            and not self._overload_is_forced
+            and self._lowest_supply <= supply <= self._highest_supply
+            and float(_peak(self.thermals.body_c)) <= self._coolest_limit_c
         )
 
     def _bits(self, supply_v: float) -> IntColumn:

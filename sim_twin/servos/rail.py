@@ -18,15 +18,17 @@ class Rail:
 
     def __init__(self, models: Sequence[Model], resistance_ohm: float) -> None:
         self._resistance_ohm = resistance_ohm
-        self._stall_a = np.array([model.stall_current_a for model in models])
+        stall_a = np.array([model.stall_current_a for model in models])
         self._per_volt = np.array([1.0 / model.voltage_v for model in models])
-        self._per_rad_s = np.array([1.0 / model.no_load_speed_rad_s for model in models])
+        self._a_per_volt = stall_a * self._per_volt
+        self._a_per_rad_s = np.array(
+            [model.stall_current_a / model.no_load_speed_rad_s for model in models]
+        )
 
     def volts(self, supply_v: float, duty: Floats, velocity_rad_s: Floats) -> float:
         """Return the voltage at the servos, where current and voltage agree."""
-        pull_a = duty * self._stall_a
-        back_a = float(pull_a @ (velocity_rad_s * self._per_rad_s))
-        per_volt_a = float(pull_a @ (duty * self._per_volt))
+        back_a = float(duty.dot(velocity_rad_s * self._a_per_rad_s))
+        per_volt_a = float(duty.dot(duty * self._a_per_volt))
         ohm = self._resistance_ohm
         return min(supply_v, max(0.0, (supply_v + ohm * back_a) / (1.0 + ohm * per_volt_a)))
 

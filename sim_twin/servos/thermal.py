@@ -86,16 +86,35 @@ class Thermals:
         self._body_j_k = capacity_j_k - self._winding_j_k
         self._bridge_w_k = self._winding_j_k / WINDING_TIME_CONSTANT_S
         self._cooling_w_k = np.array([body.cooling_w_k for body in bodies])
-        self.winding_c: Floats = np.full(len(models), ambient_c)
-        self.body_c: Floats = np.full(len(models), ambient_c)
+        self._celsius = np.full((2, len(models)), ambient_c)
+        self.winding_c, self.body_c = self._celsius
+        self._discretise(0.0)
+
+    def _discretise(self, dt_s: float) -> None:
+        """Write the exchange of heat over `dt_s` as factors: few operations on both rows at once.
+
+        What a row keeps, what it takes from the other row, and what comes from outside.
+        """
+        self._dt_s = dt_s
+        to_winding = self._bridge_w_k * dt_s / self._winding_j_k
+        to_body = self._bridge_w_k * dt_s / self._body_j_k
+        to_air = self._cooling_w_k * dt_s / self._body_j_k
+        self._kept = np.stack([1.0 - to_winding, 1.0 - to_body - to_air])
+        self._taken = np.stack([to_winding, to_body])
+        self._gained = np.stack([0.0 * to_air, to_air * self._ambient_c])
+        self._winding_k = self._stall_w * dt_s / self._winding_j_k
 
     def advance(self, effort_ratio: Floats, dt_s: float) -> None:
         """Let this share of the stall current flow for `dt_s`."""
-        inward_w = self._bridge_w_k * (self.winding_c - self.body_c)
-        outward_w = self._cooling_w_k * (self.body_c - self._ambient_c)
-        heating_w = self._stall_w * effort_ratio * effort_ratio
-        self.winding_c += (heating_w - inward_w) * (dt_s / self._winding_j_k)
-        self.body_c += (inward_w - outward_w) * (dt_s / self._body_j_k)
+        if dt_s != self._dt_s:
+            self._discretise(dt_s)
+        gained = self._gained
+        np.multiply(effort_ratio, effort_ratio, out=gained[0])
+        gained[0] *= self._winding_k
+        taken = self._celsius[::-1] * self._taken
+        self._celsius *= self._kept
+        self._celsius += taken
+        self._celsius += gained
 
     def heat(self, row: int, celsius: float) -> None:
         """Bring a motor to a temperature, as heat from outside does; it cools from there."""

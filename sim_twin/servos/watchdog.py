@@ -16,14 +16,15 @@ _NEVER: Final = 1 << 62
 
 
 class BusWatchdog:
-    """Hold one deadline per servo; a packet pushes it out."""
+    """Hold one deadline per servo; a packet pushes it out. None has passed before `earliest_ns`."""
 
     def __init__(self, columns: Columns) -> None:
         count = len(columns.bus_watchdog)
         self._columns = columns
         self._deadlines_ns = [_NEVER] * count
         self._timeouts_ns = [0] * count
-        self._earliest_ns = _NEVER
+        # Feeding only moves deadlines out, so the last known earliest one is a safe lower bound.
+        self.earliest_ns = _NEVER
 
     def reload(self, row: int, now_ns: int) -> None:
         """Start, restart or stop the timer after a change of bus_watchdog or torque_enable."""
@@ -31,7 +32,7 @@ class BusWatchdog:
         runs = value > 0 and bool(self._columns.torque_enable[row])
         self._timeouts_ns[row] = value * _UNIT_NS if runs else 0
         self._deadlines_ns[row] = now_ns + value * _UNIT_NS if runs else _NEVER
-        self._earliest_ns = min(self._deadlines_ns)
+        self.earliest_ns = min(self._deadlines_ns)
 
     def feed(self, rows: Iterable[int], now_ns: int) -> None:
         """Count a packet to these servos as communication."""
@@ -42,12 +43,11 @@ class BusWatchdog:
 
     def expired(self, now_ns: int) -> list[int]:
         """Return the servos whose time has run out, and stop their timers."""
-        # Feeding only moves deadlines out, so the last known earliest one is a safe lower bound.
-        if now_ns < self._earliest_ns:
+        if now_ns < self.earliest_ns:
             return []
         rows = [row for row, deadline in enumerate(self._deadlines_ns) if deadline <= now_ns]
         for row in rows:
             self._deadlines_ns[row] = _NEVER
             self._timeouts_ns[row] = 0
-        self._earliest_ns = min(self._deadlines_ns)
+        self.earliest_ns = min(self._deadlines_ns)
         return rows

@@ -9,7 +9,12 @@ from sim_twin.engine import Engine
 from sim_twin.load import load_engine
 from vla_deploy.robots import load_robot
 
-EVERY_BEAM = np.arange(360)
+EVERY_BEAM = range(360)
+
+
+@pytest.fixture(scope="module")
+def flat() -> Engine:
+    return load_engine(load_robot("butler"), "flat", seed=0)
 
 
 def test_the_lidar_sees_the_wall_at_its_distance(engine: Engine) -> None:
@@ -19,9 +24,16 @@ def test_the_lidar_sees_the_wall_at_its_distance(engine: Engine) -> None:
     assert ranges[30] == pytest.approx(2.0 / math.cos(math.radians(30)), rel=1e-5)
 
 
-def test_a_few_beams_see_what_they_see_among_all(engine: Engine) -> None:
-    few = np.array([350, 0, 30, 30])
-    assert np.array_equal(engine.lidar.cast(few), engine.lidar.cast(EVERY_BEAM)[few])
+@pytest.mark.parametrize("count", [1, 2, 120, 180, 181, 359])
+def test_a_run_of_beams_sees_what_it_sees_among_all(flat: Engine, count: int) -> None:
+    every = flat.lidar.cast(EVERY_BEAM)
+    for first in range(0, 360, 17):
+        some = range(first, first + count)
+        assert np.array_equal(flat.lidar.cast(some), every.take(some, mode="wrap"))
+
+
+def test_beams_may_be_counted_from_before_the_front(flat: Engine) -> None:
+    assert np.array_equal(flat.lidar.cast(range(-20, 20)), flat.lidar.cast(range(340, 380)))
 
 
 def test_beams_count_counter_clockwise_from_the_front(engine: Engine) -> None:

@@ -22,7 +22,7 @@ def connect(line: ByteTransport, clock: Clock) -> Lidar:
 
 
 def device() -> LidarDevice:
-    return LidarDevice(lambda beams: WORLD_M[beams], seed=1)
+    return LidarDevice(lambda beams: WORLD_M.take(beams, mode="wrap"), seed=1)
 
 
 class TestOnAWire(LidarContract, LidarUnplugContract, LidarWireFaultContract):

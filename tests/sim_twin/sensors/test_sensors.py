@@ -72,7 +72,9 @@ def test_the_lidar_shows_the_world_where_it_is_whatever_the_mounting(
 ) -> None:
     truth = np.linspace(1.0, 4.0, 360, dtype=np.float32)
     truth[40:50] = 0.0
-    device = LidarDevice(lambda beams: truth[beams], sigma_m=0.0, mounting_yaw_rad=mounting_yaw_rad)
+    device = LidarDevice(
+        lambda beams: truth.take(beams, mode="wrap"), sigma_m=0.0, mounting_yaw_rad=mounting_yaw_rad
+    )
     scans = scans_of(device, 0.5, mounting_yaw_rad)
     assert len(scans) == 4
     assert np.all(scans[-1].range_m[41:49] == 0.0)
@@ -85,7 +87,9 @@ def test_lidar_noise_has_the_declared_size_and_repeats_with_the_seed() -> None:
     truth = np.full(360, 2.0, dtype=np.float32)
 
     def run(seed: int) -> NDArray[np.float32]:
-        scans = scans_of(LidarDevice(lambda beams: truth[beams], sigma_m=0.005, seed=seed), 1.2)
+        scans = scans_of(
+            LidarDevice(lambda beams: truth.take(beams, mode="wrap"), sigma_m=0.005, seed=seed), 1.2
+        )
         return np.concatenate([s.range_m for s in scans])
 
     first = run(3)
@@ -97,8 +101,8 @@ def test_lidar_noise_has_the_declared_size_and_repeats_with_the_seed() -> None:
 def test_beams_carry_the_time_at_which_they_were_measured() -> None:
     started = 10**9
 
-    def cast(beams: NDArray[np.int64]) -> NDArray[np.float32]:
-        return np.full(beams.size, 1.0 + (line.now - started) / 1e9, dtype=np.float32)
+    def cast(beams: range) -> NDArray[np.float32]:
+        return np.full(len(beams), 1.0 + (line.now - started) / 1e9, dtype=np.float32)
 
     device = LidarDevice(cast, sigma_m=0.0)
     line = Line(device)
@@ -115,7 +119,8 @@ def test_beams_carry_the_time_at_which_they_were_measured() -> None:
 
 
 def test_a_lidar_that_was_held_up_goes_on_with_what_is_due() -> None:
-    device = LidarDevice(lambda beams: np.ones(beams.size, np.float32))
+    turn = np.ones(360, np.float32)
+    device = LidarDevice(lambda beams: turn[: len(beams)])
     for now_ns in (10**9, 2 * 10**9, 2 * 10**9 + STEP_NS, 2 * 10**9 + 2 * STEP_NS):
         device.step(now_ns)
     assert len(device.transmit()) == 376 * 47
