@@ -50,7 +50,7 @@ def _twin_options(options: argparse.Namespace) -> TwinOptions:
         run_dir=options.run_dir,
         camera=not options.no_camera,
         viewer=options.viewer,
-        paced_servos=options.paced_servos,
+        paced=options.paced,
     )
 
 
@@ -68,9 +68,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-camera", action="store_true", help="serve no camera: no OpenGL")
     parser.add_argument("--viewer", action="store_true", help="show the twin in a window")
     parser.add_argument(
-        "--paced-servos",
+        "--paced",
         action="store_true",
-        help="let bytes on the servo bus take their time, as at the robot's baud rate",
+        help="let bytes on the servo bus and frames on CAN take their time, at the robot's rates",
     )
     parser.add_argument("--parent-pid", type=int, help="process with which to end")
     return parser

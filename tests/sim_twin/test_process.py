@@ -99,7 +99,7 @@ def test_servos_answer_a_ping_between_two_steps(devices: PathOpener) -> None:
 
 
 def test_paced_servos_take_their_return_delay_and_their_bytes(tmp_path: Path) -> None:
-    twin = start(tmp_path, "--no-camera", "--paced-servos")
+    twin = start(tmp_path, "--no-camera", "--paced")
     robot = load_robot("butler")
     clock = MonotonicClock()
     line = PathOpener(device_links(robot, tmp_path / "dev"), clock).serial("servos")
@@ -121,6 +121,24 @@ def test_drives_send_heartbeats_and_answer(devices: PathOpener) -> None:
     bus.shutdown()
     assert answer is not None
     assert answer.arbitration_id == 0x582
+
+
+def test_paced_frames_take_the_time_of_their_bits(tmp_path: Path) -> None:
+    twin = start(tmp_path, "--no-camera", "--paced")
+    clock, exchanges, bits_at_least = MonotonicClock(), 60, 108
+    bus = PathOpener(device_links(load_robot("butler"), tmp_path / "dev"), clock).can("can")
+    asked_ns = clock.now_ns()
+    for _ in range(exchanges):
+        bus.send(can.Message(arbitration_id=0x602, data=bytes(8), is_extended_id=False))
+    answers = 0
+    while answers < exchanges:
+        frame = bus.recv(timeout=2.0)
+        assert frame is not None
+        answers += frame.arbitration_id == 0x582
+    took_ns = clock.now_ns() - asked_ns
+    bus.shutdown()
+    assert took_ns > 2 * exchanges * bits_at_least * 1_000
+    end(twin)
 
 
 @pytest.mark.parametrize(("name", "header"), [("lidar", b"\x54\x2c"), ("imu", b"\xaa\xaa")])

@@ -11,6 +11,7 @@ from vla_deploy.supervisor import RunOptions, Supervisor
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
   vla-deploy run --twin --seed 7        other places for the objects
   vla-deploy run --twin --viewer        the twin in a window
+  vla-deploy run --twin --paced         its buses as slow as the real ones
   vla-deploy run --robot butler         the real robot; arm it when it is safe: vla-deploy arm
 """
 
@@ -21,6 +22,11 @@ def register(commands: Any) -> None:
     add_robot_arguments(run)
     run.add_argument("--twin", action="store_true", help="replace the hardware by the twin")
     run.add_argument("--viewer", action="store_true", help="show the twin in a window")
+    run.add_argument(
+        "--paced",
+        action="store_true",
+        help="give what is on the twin's buses the time it takes on the wire",
+    )
     run.add_argument(
         "--arm",
         action=argparse.BooleanOptionalAction,
@@ -46,9 +52,10 @@ def _seed(text: str) -> int:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run until SIGINT or SIGTERM."""
-    if arguments.viewer and not arguments.twin:
-        sys.stderr.write("run: --viewer shows the twin; add --twin\n")
-        return 2
+    for option in ("viewer", "paced"):
+        if vars(arguments)[option] and not arguments.twin:
+            sys.stderr.write(f"run: --{option} is about the twin; add --twin\n")
+            return 2
     logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
     arm = arguments.twin if arguments.arm is None else arguments.arm
     options = RunOptions(
@@ -56,6 +63,7 @@ def main(arguments: argparse.Namespace) -> int:
         profile=arguments.profile,
         twin=arguments.twin,
         viewer=arguments.viewer,
+        paced=arguments.paced,
         seed=arguments.seed,
         world=arguments.world,
         runtime_base=arguments.runtime_base,

@@ -74,6 +74,7 @@ class Crew:
         spec = self._specs[name]
         command = spec.command + (spec.twin_command if self._options.twin else ())
         command += spec.viewer_command if self._options.viewer else ()
+        command += spec.paced_command if self._options.paced else ()
         self._children[name] = ChildProcess(
             self._options.fill(command, self._run_dir), self._environment, self._log_path(name)
         )

@@ -8,13 +8,14 @@ from pathlib import Path
 class RunOptions:
     """Choose robot, profile and world; `arm` arms the robot once everything is ready.
 
-    `viewer` shows the twin in a window.
+    `viewer` shows the twin in a window; `paced` gives what is on its buses the time it takes.
     """
 
     robot: str = "butler"
     profile: str = "desktop"
     twin: bool = False
     viewer: bool = False
+    paced: bool = False
     seed: int = 0
     world: str = "flat"
     runtime_base: Path | None = None

@@ -22,7 +22,8 @@ class ProcessSpec:
     """Declare one process.
 
     `command` follows the Python interpreter, `{...}` are filled from the run's options;
-    `twin_command` is added in twin mode, `viewer_command` with a viewer. It is ready when
+    `twin_command` is added in twin mode, `viewer_command` with a viewer, `paced_command` where
+    buses take their time. It is ready when
     `ready_topic` is fresh from its own pid and all `ready_files`, relative to the run directory,
     exist. Once ready it is killed, and so started again, when `alive_topic`, which it writes
     whatever its devices do, is older than `silence_limit_s`.
@@ -32,6 +33,7 @@ class ProcessSpec:
     command: tuple[str, ...]
     twin_command: tuple[str, ...] = ()
     viewer_command: tuple[str, ...] = ()
+    paced_command: tuple[str, ...] = ()
     needs_twin: bool = False
     ready_topic: str | None = None
     ready_files: tuple[str, ...] = ()
@@ -51,6 +53,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         name="twin",
         command=("-m", "sim_twin", *_TWIN),
         viewer_command=("--viewer",),
+        paced_command=("--paced",),
         needs_twin=True,
         ready_files=("dev/ready",),
         ready_timeout_s=60.0,

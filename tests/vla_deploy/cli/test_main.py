@@ -157,6 +157,9 @@ def test_a_runtime_directory_of_someone_else_is_one_line_and_exit_code_2(
     assert error.count("\n") == 1
 
 
-def test_a_viewer_without_a_twin_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "--viewer"]) == 2
+@pytest.mark.parametrize("option", ["--viewer", "--paced"])
+def test_what_is_about_the_twin_is_refused_without_one(
+    option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", option]) == 2
     assert "add --twin" in capsys.readouterr().err
