@@ -44,8 +44,8 @@ class _Attempt:
 class FrameCarrier:
     """Hold the state of one wire.
 
-    While it is sound, nobody has met an error, nothing is tampered with and no frame waits: unless
-    it is timed, each frame then reaches all others at once, and most of the model is not needed.
+    While it is sound, it is not timed or cut, nobody has met an error, nothing is tampered with and
+    no frame waits: each frame then reaches all others at once, and most of the model is not needed.
     """
 
     def __init__(self, *, bitrate: int, timed: bool, restart_s: float | None) -> None:
@@ -63,12 +63,12 @@ class FrameCarrier:
         self._now_ns = 0
         self._free_ns = 0
         self._until_ns = 0
-        self._sound = True
+        self._sound = not timed
         self._running = False
 
     def poll(self, now_ns: int) -> None:
         """Carry what is due at `now_ns`; time never goes back."""
-        if self._sound and not self.timed and not self._stations.cut:
+        if self._sound:
             self._now_ns = max(self._now_ns, now_ns)
             return
         self._recover(now_ns)
@@ -98,39 +98,32 @@ class FrameCarrier:
         self._running = True
         self._until_ns = until_ns
         try:
-            while self._carry_next(until_ns):
+            self._carry_at_once()
+            while not self._sound and self._finish(until_ns) and self._begin(until_ns):
                 pass
         finally:
             self._running = False
 
-    def _carry_next(self, until_ns: int) -> bool:
-        if self._sound and not self.timed and not self._stations.cut:
-            return self._carry_at_once()
-        return self._finish(until_ns) and self._begin(until_ns)
-
-    def _carry_at_once(self) -> bool:
-        """Carry one frame where nothing takes time and nobody has met an error.
+    def _carry_at_once(self) -> None:
+        """Carry all frames while nothing takes time and nobody has met an error.
 
         Everything else, such as two senders of one identifier, is left to the full model.
         """
-        waiting = self._stations.waiting()
-        if not waiting:
-            return False
-        senders = waiting if len(waiting) == 1 else arbitrate(waiting)
-        sender = senders[0]
-        others = self._stations.others(sender)
-        heard = any(station.supplied() for station in others)
-        if len(senders) > 1 or not heard or sender.queue[0].is_fd:
-            self._sound = False
-            return True
-        frame = sender.queue.popleft()
-        self.frames_carried += 1
-        for station in others:
-            station.receive(frame)
-        return True
+        while self._sound and (waiting := self._stations.waiting()):
+            senders = arbitrate(waiting)
+            sender = senders[0]
+            if len(senders) > 1 or not sender.is_heard or sender.queue[0].is_fd:
+                self._sound = False
+                return
+            frame = sender.queue.popleft()
+            self.frames_carried += 1
+            for station in sender.others:
+                station.receive(frame)
 
     def _inspect(self) -> None:
         """Find out whether the full model is needed any longer."""
+        if self.timed or self._stations.cut:
+            return
         idle = self._on_wire is None and self._babbler is None and not self._delayed
         self._sound = idle and self._tamper.idle and self._stations.sound()
 

@@ -194,8 +194,9 @@ class WheelDrive(EmulatedDrive):
     def _on_sync(self) -> None:
         if self._nmt_state is not NmtState.OPERATIONAL:
             return
-        setpoint, self._setpoint = self._setpoint, {}
-        self._follow(setpoint)
+        if self._setpoint:
+            setpoint, self._setpoint = self._setpoint, {}
+            self._follow(setpoint)
         for pdo in self._tpdos:
             if pdo.due_on_sync() and pdo.cob_id is not None:
                 self._transmit(pdo.cob_id, pdo.pack())

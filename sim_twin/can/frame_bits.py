@@ -101,9 +101,9 @@ def frame_bits(frame: can.Message) -> int:
     return length + stuff_bits(bits, length) + TRAILER_BITS
 
 
-def arbitration_key(frame: can.Message) -> tuple[int, int, int, int, int]:
-    """Return what arbitration compares bit by bit: the lowest wins."""
-    remote = int(frame.is_remote_frame)
+def arbitration_key(frame: can.Message) -> int:
+    """Return the bits of the arbitration field as they are compared: the lowest wins."""
     if frame.is_extended_id:
-        return frame.arbitration_id >> 18, 1, 1, frame.arbitration_id & 0x3FFFF, remote
-    return frame.arbitration_id, remote, 0, 0, 0
+        base, extension = frame.arbitration_id >> 18, frame.arbitration_id & 0x3FFFF
+        return base << 21 | 0b11 << 19 | extension << 1 | frame.is_remote_frame
+    return frame.arbitration_id << 21 | frame.is_remote_frame << 20

@@ -25,6 +25,7 @@ class Station:
         "counters",
         "frames_refused",
         "is_node",
+        "others",
         "queue",
         "ready_ns",
         "receive",
@@ -41,6 +42,7 @@ class Station:
         self.receive = receive
         self.supplied = supplied
         self.is_node = is_node
+        self.others: tuple[Station, ...] = ()
         self.queue: deque[can.Message] = deque()
         self.counters = ErrorCounters()
         self.told = ErrorState.ACTIVE
@@ -57,6 +59,14 @@ class Station:
         """Tell whether there is neither an error to remember nor a frame to send."""
         counters = self.counters
         return not (counters.tec or counters.rec or self.wrong_bitrate or self.queue)
+
+    @property
+    def is_heard(self) -> bool:
+        """Tell whether anybody else has power, and so acknowledges."""
+        for station in self.others:  # any() of a generator takes three times as long
+            if station.supplied():
+                return True
+        return False
 
     @property
     def error_active(self) -> bool:

@@ -28,8 +28,13 @@ class Stations:
         """Connect a controller."""
         station = Station(receive, supplied, is_node=is_node)
         self._by_owner[owner] = station
-        self._all = tuple(self._by_owner.values())
+        self._introduce()
         return station
+
+    def _introduce(self) -> None:
+        self._all = tuple(self._by_owner.values())
+        for station in self._all:
+            station.others = tuple(other for other in self._all if other is not station)
 
     def of(self, owner: Hashable) -> Station:
         """Return the controller of a node or of a port.
@@ -42,7 +47,7 @@ class Stations:
     def remove(self, owner: Hashable) -> Station:
         """Disconnect a controller."""
         station = self._by_owner.pop(owner)
-        self._all = tuple(self._by_owner.values())
+        self._introduce()
         return station
 
     def chosen(self, owner: Hashable | None) -> tuple[Station, ...]:
@@ -62,10 +67,6 @@ class Stations:
     def waiting(self) -> list[Station]:
         """Return who has something to send."""
         return [station for station in self._all if station.queue]
-
-    def others(self, sender: Station) -> list[Station]:
-        """Return all controllers but one."""
-        return [station for station in self._all if station is not sender]
 
     def listeners(self, senders: list[Station]) -> list[Station]:
         """Return the powered controllers that see what `senders` put on the wire."""

@@ -103,7 +103,8 @@ class CanWire(FrameCarrier):
         if not station.queue:
             station.ready_ns = max(station.ready_ns, self._now_ns)
         taken = station.enqueue(frame)
-        self._run(self._now_ns)
+        if not self._running:
+            self._run(self._now_ns)
         return taken
 
     def _send_for(self, node: CanNode, frame: can.Message) -> None:
