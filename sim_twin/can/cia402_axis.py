@@ -49,7 +49,11 @@ ARMED: Final = (
     PowerState.OPERATION_ENABLED,
     PowerState.QUICK_STOP_ACTIVE,
 )
+# Bound here because every step asks for them.
 _CYCLIC: Final = int(OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY)
+_ENABLED: Final = PowerState.OPERATION_ENABLED
+_CONTROLWORD, _TARGET, _MODE = (CONTROLWORD, 0), (TARGET_VELOCITY, 0), (MODE_OF_OPERATION, 0)
+_ACCELERATION, _DECELERATION = (PROFILE_ACCELERATION, 0), (PROFILE_DECELERATION, 0)
 RATED_CURRENT: Final = 0x6075
 CURRENT_ACTUAL: Final = 0x6078
 DC_LINK_VOLTAGE: Final = 0x6079
@@ -126,9 +130,9 @@ class Cia402Axis:
 
     def statusword(self) -> int:
         """Return the statusword (6041)."""
-        at_target = abs(self.velocity_counts_s - self._target_counts_s()) <= self._objects.get(
-            VELOCITY_WINDOW
-        )
+        values = self._objects.values
+        error_counts_s = self._encoder.counts_s - values[TARGET_VELOCITY, 0]
+        at_target = abs(error_counts_s) <= values[VELOCITY_WINDOW, 0]
         return (
             STATE_BITS[self.state]
             | _REMOTE * self.remote
@@ -197,39 +201,33 @@ class Cia402Axis:
         return self._torque_nm
 
     def _next_demand(self, dt_s: float) -> float:
-        values, state = self._objects.values, self._machine.state
-        if state is PowerState.FAULT_REACTION_ACTIVE:
-            return self._braked(
-                FAULT_RAMPS.get(values[FAULT_REACTION_OPTION, 0], QUICK_STOP_DECELERATION), dt_s
-            )
-        if state is PowerState.QUICK_STOP_ACTIVE:
-            return self._braked(
-                QUICK_STOP_RAMPS.get(values[QUICK_STOP_OPTION, 0], QUICK_STOP_DECELERATION), dt_s
-            )
-        if values[CONTROLWORD, 0] & HALT_BIT:
-            return self._braked(PROFILE_DECELERATION, dt_s)
+        values = self._objects.values
+        if self._machine.state is not _ENABLED or values[_CONTROLWORD] & HALT_BIT:
+            return self._braked(self._braking_ramp(), dt_s)
         counts_per_rad = self._encoder.counts_per_rad
-        target_rad_s = values[TARGET_VELOCITY, 0] / counts_per_rad
-        if values[MODE_OF_OPERATION, 0] == _CYCLIC or target_rad_s == self._demand_rad_s:
-            return float(target_rad_s)
+        target_rad_s: float = values[_TARGET] / counts_per_rad
+        if values[_MODE] == _CYCLIC or target_rad_s == self._demand_rad_s:
+            return target_rad_s
         step_s = dt_s / counts_per_rad
-        up, down = (
-            values[PROFILE_ACCELERATION, 0] * step_s,
-            values[PROFILE_DECELERATION, 0] * step_s,
-        )
+        up, down = values[_ACCELERATION] * step_s, values[_DECELERATION] * step_s
         return ramp_towards(self._demand_rad_s, target_rad_s, up, down)
+
+    def _braking_ramp(self) -> int:
+        objects, state = self._objects, self._machine.state
+        if state is PowerState.FAULT_REACTION_ACTIVE:
+            return FAULT_RAMPS.get(objects.get(FAULT_REACTION_OPTION), QUICK_STOP_DECELERATION)
+        if state is PowerState.QUICK_STOP_ACTIVE:
+            return QUICK_STOP_RAMPS.get(objects.get(QUICK_STOP_OPTION), QUICK_STOP_DECELERATION)
+        return PROFILE_DECELERATION
 
     def _braked(self, deceleration: int, dt_s: float) -> float:
         step = self._objects.get(deceleration) / self._encoder.counts_per_rad * dt_s
         return ramp_towards(self._demand_rad_s, 0.0, step, step)
 
-    def _target_counts_s(self) -> int:
-        return self._objects.get(TARGET_VELOCITY)
-
     def _stands(self) -> bool:
         # The control loop measures finer than the counts of a few steps tell.
         counts_s = self._velocity_rad_s * self._encoder.counts_per_rad
-        return abs(counts_s) <= self._objects.get(VELOCITY_THRESHOLD)
+        return abs(counts_s) <= int(self._objects.values[VELOCITY_THRESHOLD, 0])
 
 
 def _one_of(allowed: tuple[int, ...]) -> Callable[[int], None]:

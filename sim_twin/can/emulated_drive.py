@@ -111,11 +111,13 @@ class EmulatedDrive(ABC):
             return 0.0
         velocity_rad_s *= per_joint
         self._encoder.measure(per_joint * position_rad, velocity_rad_s)
-        runaway_rad_s = per_joint * self._runaway_rad_s if self.armed else 0.0
-        torque_nm = self._act(now_ns, dt_s, velocity_rad_s - runaway_rad_s)
+        felt_rad_s = velocity_rad_s
+        if self._runaway_rad_s and self.armed:
+            felt_rad_s -= per_joint * self._runaway_rad_s
+        torque_nm = self._act(now_ns, dt_s, felt_rad_s)
         if torque_nm or not stage.at_rest:
             stage.load(torque_nm, velocity_rad_s, dt_s)
-        if self.armed or not stage.at_rest:
+        if not stage.at_rest or self.armed:
             self._protect()
         return per_joint * torque_nm
 

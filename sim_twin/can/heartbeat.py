@@ -4,6 +4,7 @@ from drivers.canopen.objects import HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER
 from sim_twin.can.object_dictionary import ObjectDictionary
 
 NS_PER_MS = 1_000_000
+_NEVER = 1 << 62
 
 
 class HeartbeatProducer:
@@ -30,6 +31,8 @@ class HeartbeatConsumer:
     def __init__(self, objects: ObjectDictionary) -> None:
         self._objects = objects
         self._heard_ns: int | None = None
+        self._deadline_ns = _NEVER
+        objects.after_write[HEARTBEAT_CONSUMER, 1] = self._plan
 
     @property
     def node_id(self) -> int:
@@ -39,17 +42,21 @@ class HeartbeatConsumer:
     def hear(self, now_ns: int) -> None:
         """Note a heartbeat of the watched node."""
         self._heard_ns = now_ns
+        self._plan()
 
     def forget(self) -> None:
         """Watch again only after the next heartbeat."""
         self._heard_ns = None
+        self._plan()
 
     def expired(self, now_ns: int) -> bool:
         """Tell once that the producer has gone silent."""
-        if self._heard_ns is None:
-            return False
-        limit_ns = (self._objects.get(HEARTBEAT_CONSUMER, 1) & 0xFFFF) * NS_PER_MS
-        if not limit_ns or now_ns - self._heard_ns <= limit_ns:
+        if now_ns <= self._deadline_ns:
             return False
         self.forget()
         return True
+
+    def _plan(self) -> None:
+        limit_ns = (self._objects.get(HEARTBEAT_CONSUMER, 1) & 0xFFFF) * NS_PER_MS
+        heard_ns = self._heard_ns if limit_ns else None
+        self._deadline_ns = _NEVER if heard_ns is None else heard_ns + limit_ns

@@ -80,6 +80,9 @@ class PowerStage:
         """Return the torques that current limit and back-EMF allow, the lowest first."""
         spec, limit_a = self.spec, self.current_limit_a
         emf_v = spec.torque_nm_per_a * velocity_rad_s
+        if abs(emf_v) + limit_a * spec.resistance_ohm <= self.bus_v:
+            limit_nm = limit_a * spec.torque_nm_per_a
+            return -limit_nm, limit_nm
         low_a = min(max((-self.bus_v - emf_v) / spec.resistance_ohm, -limit_a), limit_a)
         high_a = max(min((self.bus_v - emf_v) / spec.resistance_ohm, limit_a), -limit_a)
         return low_a * spec.torque_nm_per_a, high_a * spec.torque_nm_per_a

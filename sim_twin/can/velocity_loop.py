@@ -29,8 +29,9 @@ class VelocityLoop:
     ) -> float:
         """Return the torque for the next `dt_s` within what is possible."""
         wanted_nm = self.kv * error_rad_s + self._integral_nm + ahead_nm
-        torque_nm = min(max(wanted_nm, low_nm), high_nm)
-        self.saturated = torque_nm != wanted_nm
-        if not self.saturated:
+        if low_nm <= wanted_nm <= high_nm:
+            self.saturated = False
             self._integral_nm += self.ki * error_rad_s * dt_s
-        return torque_nm
+            return wanted_nm
+        self.saturated = True
+        return min(max(wanted_nm, low_nm), high_nm)
