@@ -110,7 +110,7 @@ class FrameCarrier:
         Everything else, such as two senders of one identifier, is left to the full model.
         """
         while self._sound and (waiting := self._stations.waiting()):
-            senders = arbitrate(waiting)
+            senders = arbitrate(waiting) if len(waiting) > 1 else waiting
             sender = senders[0]
             if len(senders) > 1 or not sender.is_heard or sender.queue[0].is_fd:
                 self._sound = False

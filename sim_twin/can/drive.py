@@ -134,16 +134,16 @@ class WheelDrive(EmulatedDrive):
 
     def receive(self, frame: can.Message) -> None:
         """Take one frame from the wire."""
+        can_id = frame.arbitration_id
         if frame.is_error_frame:
             if is_restart(frame):
                 self._report(RECOVERED_FROM_BUS_OFF, COMMUNICATION_ERROR)
             return
-        if frame.arbitration_id not in self._heeded:
+        if can_id not in self._heeded or not self._supplied:
             return
-        ordinary = not (frame.is_extended_id or frame.is_remote_frame)
-        if not (self._supplied and ordinary):
+        if frame.is_extended_id or frame.is_remote_frame:
             return
-        can_id, data = frame.arbitration_id, bytes(frame.data)
+        data = bytes(frame.data)
         if can_id == NMT_COB:
             self._on_nmt(data)
         elif can_id == SYNC_COB:

@@ -120,7 +120,7 @@ class ObjectDictionary:
 
     def readdress(self, node_id: int) -> None:
         """Take the defaults of another node id, with the next reset."""
-        self._variables = _by_key(str(self._eds_path), node_id)
+        self._variables = dict(_by_key(str(self._eds_path), node_id))
         own = _by_key(str(EDS_PATH), node_id)
         self._defaults = {
             key: _default(self._variables.get(key), own.get(key))

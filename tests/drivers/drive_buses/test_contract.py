@@ -88,6 +88,13 @@ class DriveBusContract:
         enabled.run(0.2, FORWARD)
         assert enabled.powered() == [False, False]
 
+    def test_cutting_the_power_takes_it_off_within_a_tick(self, enabled: Any) -> None:
+        enabled.run(0.5, FORWARD)
+        enabled.bus.cut_power()
+        enabled.run(0.004, FORWARD)
+        assert enabled.powered() == [False, False]
+        assert not enabled.run(0.1, FORWARD).enabled
+
     def test_closing_leaves_no_wheel_energised(self, enabled: Any) -> None:
         enabled.run(0.5, FORWARD)
         enabled.bus.close()

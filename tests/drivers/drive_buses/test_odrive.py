@@ -189,3 +189,64 @@ def test_errors_are_told_in_words() -> None:
 
 def test_the_shipped_endpoints_are_of_no_real_firmware() -> None:
     assert read_endpoints(EMULATED_ENDPOINTS).firmware == "0.0.0"
+
+
+def test_an_axis_that_rebooted_in_between_is_lost_until_connected_anew(odrive: Any) -> None:
+    odrive.bus.connect()
+    odrive.bus.enable()
+    assert odrive.run(0.3).enabled
+    odrive.axes[0].set_supply(on=False)
+    odrive.axes[0].set_supply(on=True)
+    assert not odrive.axes[0].properties.read(ENABLE_WATCHDOG)
+    state = odrive.run(0.3)
+    assert state.lost == (True, False)
+    odrive.bus.enable()
+    assert not odrive.run(0.3, (1.0, 1.0)).enabled
+    assert odrive.powered() == [False, False]
+    odrive.bus.connect()
+    assert odrive.run(0.2).healthy
+    odrive.bus.close()
+
+
+def test_no_axis_is_powered_before_its_watchdog_is_confirmed(odrive: Any) -> None:
+    odrive.bus.connect()
+    odrive.run(0.1)
+    odrive.axes[1].properties.write(ENABLE_WATCHDOG, 0.0)
+    odrive.bus.enable()
+    powered = False
+    for _ in range(75):
+        odrive.run(0.0)
+        odrive.pause(0.004)
+        powered = powered or odrive.powered()[1]
+    assert not powered
+    assert odrive.run(0.0).lost == (False, True)
+    odrive.bus.close()
+
+
+def test_an_axis_that_was_silent_too_long_stays_lost(odrive: Any) -> None:
+    odrive.bus.connect()
+    odrive.run(0.1)
+    odrive.axes[0].silence(on=True)
+    odrive.run(0.2)
+    odrive.axes[0].silence(on=False)
+    assert odrive.run(0.2).lost == (True, False)
+    odrive.bus.close()
+
+
+def test_cutting_the_power_sends_the_emergency_stop_which_holds_until_a_reset(odrive: Any) -> None:
+    odrive.bus.connect()
+    odrive.bus.enable()
+    odrive.run(0.5, (5.0, 5.0))
+    odrive.bus.cut_power()
+    assert odrive.powered() == [False, False]
+    assert all(axis.errors & AxisError.ESTOP_REQUESTED for axis in odrive.axes)
+    state = odrive.run(0.1)
+    assert state.faulted == (True, True)
+    assert "estop requested" in state.fault[0].text
+    odrive.bus.enable()
+    assert not odrive.run(0.2).enabled
+    assert odrive.bus.reset_fault() == ()
+    odrive.run(0.1)
+    odrive.bus.enable()
+    assert odrive.run(0.3).enabled
+    odrive.bus.close()
