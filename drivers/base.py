@@ -37,8 +37,10 @@ class ByteTransport(Protocol):
 class BurstTransport(Protocol):
     """Offer, on top of a `ByteTransport`, to wait for many bytes with few wake-ups."""
 
-    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+    def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
         """Return `count` bytes, or what of them has arrived by `deadline_ns`.
+
+        At `due_ns` all of them should have arrived, so that nobody need look before.
 
         Raises:
             LinkLost: the other end has gone.

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
 from drivers.errors import DeviceBusy, DeviceMissing, LinkLost
 
 _SPEEDS: Final = {
@@ -27,9 +27,10 @@ _SPEEDS: Final = {
     4_000_000: termios.B4000000,
 }
 _WRITE_PATIENCE_MS: Final = 50
-_BITS_PER_BYTE: Final = 10
-_WAKE_EARLY_NS: Final = 150_000
-"""How long before the last byte is due a sleep ends: a timer may be late by as much."""
+_WAKE_EARLY_NS: Final = 20_000
+"""How long before the last byte is due a sleep ends: timers are late by some 60 us."""
+_NAPS: Final = 50
+"""How often a line that was slow is slept through before it is watched again."""
 _MOST_LATENCY_MS: Final = 1
 _GONE: Final = frozenset({errno.EIO, errno.ENXIO, errno.ENODEV, errno.EBADF})
 _OPEN_ERRORS: Final = {
@@ -79,7 +80,7 @@ class SerialPort:
         speed = self._speed(baud)
         self._clock = clock
         self._sysfs_root = sysfs_root
-        self._ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
+        self._naps = 0
         with _mapped_open_errors(path):
             self._fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
             try:
@@ -100,7 +101,10 @@ class SerialPort:
         """
         while data:
             try:
-                data = data[os.write(self._fd, data) :]
+                taken = os.write(self._fd, data)
+                if taken == len(data):
+                    return
+                data = data[taken:]
             except BlockingIOError:
                 self._wait_writable()
             except OSError as error:
@@ -114,36 +118,29 @@ class SerialPort:
         """
         while True:
             remaining_ns = deadline_ns - self._clock.now_ns()
-            if not self._poll.poll(max(0.0, remaining_ns / 1e6)):
+            if not self._poll.poll(remaining_ns / 1e6 if remaining_ns > 0 else 0):
                 return b""
-            try:
-                data = os.read(self._fd, max_bytes)
-            except BlockingIOError:
-                continue
-            except OSError as error:
-                raise self._lost(error) from error
-            if not data:
-                raise LinkLost(f"{self._path}: hung up; plug it in again, then reconnect")
-            return data
+            data = self._read_now(max_bytes)
+            if data:
+                return data
 
-    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+    def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
         """Return `count` bytes, or what of them has arrived by `deadline_ns`, with few wake-ups.
 
-        Once the first have come, the others need their time on the wire: it is slept through.
+        Where bytes have been seen to take their time on the wire, it is slept until `due_ns`.
 
         Raises:
             LinkLost: the adapter is gone.
         """
-        data = self.read(count, deadline_ns)
-        while data and len(data) < count:
-            now_ns = self._clock.now_ns()
-            due_ns = now_ns + (count - len(data)) * self._ns_per_byte - _WAKE_EARLY_NS
-            if due_ns > now_ns:
-                self._clock.sleep_until(min(due_ns, deadline_ns))
+        data = self._nap(count, due_ns) if self._naps else b""
+        while len(data) < count:
             more = self.read(count - len(data), deadline_ns)
             if not more:
                 break
             data += more
+            if len(data) < count:
+                self._naps = _NAPS
+                data += self._nap(count - len(data), due_ns)
         return data
 
     @property
@@ -163,7 +160,6 @@ class SerialPort:
             _make_raw(self._fd, speed)
         except termios.error as error:
             raise self._lost(OSError(*error.args)) from error
-        self._ns_per_byte = _BITS_PER_BYTE * NS_PER_S // baud
 
     def adapter_fault(self) -> str:
         """Return what makes the adapter hold back bytes and how to mend it, or "" if nothing does.
@@ -208,6 +204,26 @@ class SerialPort:
         if baud not in _SPEEDS:
             raise ValueError(f"{self._path}: baud must be one of {sorted(_SPEEDS)}, got {baud}")
         return _SPEEDS[baud]
+
+    def _read_now(self, max_bytes: int) -> bytes:
+        try:
+            data = os.read(self._fd, max_bytes)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise self._lost(error) from error
+        if not data:
+            raise LinkLost(f"{self._path}: hung up; plug it in again, then reconnect")
+        return data
+
+    def _nap(self, max_bytes: int, due_ns: int) -> bytes:
+        """Sleep until the bytes should be there and return those that are."""
+        self._naps -= 1
+        wake_ns = due_ns - _WAKE_EARLY_NS
+        if wake_ns <= self._clock.now_ns():
+            return b""
+        self._clock.sleep_until(wake_ns)
+        return self._read_now(max_bytes)
 
     def _wait_writable(self) -> None:
         poll = select.poll()

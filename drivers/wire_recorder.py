@@ -125,7 +125,7 @@ class RecordingTransport:
             data = self._transport.read(max_bytes, deadline_ns)
         return self._recorded(data)
 
-    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+    def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
         """Return `count` bytes, or what of them has arrived by `deadline_ns`.
 
         Raises:
@@ -133,7 +133,7 @@ class RecordingTransport:
         """
         if isinstance(self._transport, BurstTransport):
             with self._recorded_loss():
-                return self._recorded(self._transport.read_burst(count, deadline_ns))
+                return self._recorded(self._transport.read_burst(count, due_ns, deadline_ns))
         data = b""
         while len(data) < count:
             more = self.read(count - len(data), deadline_ns)

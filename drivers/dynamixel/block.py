@@ -3,86 +3,95 @@
 The usual reply has a known length and known headers. Anything else - byte stuffing is an everyday
 event here, see `ReplyCollector` - takes the slow path to the same values.
 
-After a wait the caches are cold. Then a call of numpy costs ten times what it does in a loop, and
-`struct` with plain numbers is the faster way for the few servos that a bus has.
+After a wait the caches are cold, and then a call costs several times what it does in a loop. So a
+reply is copied over the one before, and all views of it are made once: its headers are compared by
+one call, its CRCs by another, and `columns` hand out the fields as they lie there.
 """
 
 import struct
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
-from drivers.dynamixel.codec import BROADCAST_ID, HEADER, Instruction, crc16
-from drivers.dynamixel.layout import Block
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.dynamixel.codec import crc16, encode_fast_status, encode_status
+from drivers.dynamixel.layout import Block, Field
 from drivers.dynamixel.sync_read import STATUS_OVERHEAD_BYTES, Entry, SyncRead
 
-_CODES: Final = {1: "B", 2: "H", 4: "I"}
-"""The struct code of an unsigned value by its bytes; a signed one has the small letter."""
+_HEAD_BYTES: Final = 8
+"""Header, id, length and instruction; in a plain reply each servo sends them."""
+_CRC_BYTES: Final = 2
 _FAST_OVERHEAD_BYTES: Final = 4
 
-Columns = dict[str, tuple[int, ...]]
-"""Raw values by the names of the block's fields, in the order of the servos."""
+Columns = NDArray[Any]
+"""Raw values: a row per field, in it a value per servo."""
 
 
 class BlockRead:
     """Hold the request for one block of many servos, and the exact look of its usual reply.
 
-    `columns` and `errors`, the status packets' error bytes, are those of the last reply taken.
+    `errors` are the status packets' error bytes in the reply taken last.
     """
 
     def __init__(self, ids: Sequence[int], block: Block, *, fast: bool) -> None:
         self.block = block
         self.fast = fast
         self.sync_read = SyncRead(ids, block.address, block.size, fast=fast)
-        self.columns: Columns = {}
-        self.errors: tuple[int, ...] = ()
-        names = sorted(block.fields, key=lambda name: block.fields[name].start)
-        codes = "".join(_code(block, name) for name in names)
-        self._names = names
-        self._one = struct.Struct("<" + codes)
-        self._stride = len(names) + 3  # error, id or head, fields, CRC
+        self._count = count = len(ids)
+        self._reply_bytes = total = self.sync_read.reply_bytes
+        self._buffer = bytearray(total)
+        self.errors = b""
+        view = memoryview(self._buffer)
         if fast:
-            self._all = struct.Struct("<8x" + f"BB{codes}H" * len(ids))
-            self._keys: tuple[object, ...] = tuple(ids)
-            self._key, self._error = 1, 0
-            self._head = _head(BROADCAST_ID, len(ids) * (block.size + _FAST_OVERHEAD_BYTES) + 1)
-            self._checked = [slice(0, -2)]
-            self._crcs = slice(-1, None)
+            self._stride = stride = block.size + _FAST_OVERHEAD_BYTES
+            self._data_at = _HEAD_BYTES + 2
+            heads, crcs = "<Q" + f"xB{stride - 2}x" * count, f"<{total - _CRC_BYTES}xH"
+            # the last CRC covers all that comes before, the other servos' CRCs too
+            self._checked = [view[:-_CRC_BYTES]]
+            usual = encode_fast_status([(0, id_, bytes(block.size)) for id_ in ids])
         else:
-            self._all = struct.Struct("<" + f"8sB{codes}H" * len(ids))
-            self._keys = tuple(_head(servo_id, block.size + 4) for servo_id in ids)
-            self._key, self._error = 0, 1
-            self._head = HEADER
-            size = block.size + STATUS_OVERHEAD_BYTES
-            self._checked = [slice(n * size, (n + 1) * size - 2) for n in range(len(ids))]
-            self._crcs = slice(self._stride - 1, None, self._stride)
+            self._stride = stride = block.size + STATUS_OVERHEAD_BYTES
+            self._data_at = _HEAD_BYTES + 1
+            heads, crcs = "<" + f"Q{stride - _HEAD_BYTES}x" * count, "<" + f"{stride - 2}xH" * count
+            ends = range(stride, total + 1, stride)
+            self._checked = [view[end - stride : end - _CRC_BYTES] for end in ends]
+            usual = b"".join(encode_status(id_, 0, bytes(block.size)) for id_ in ids)
+        self._errors = slice(_HEAD_BYTES, None, stride)
+        self._heads_of = struct.Struct(heads).unpack_from
+        self._crcs_of = struct.Struct(crcs).unpack_from
+        self._usual_heads = self._heads_of(usual)
 
     def take(self, reply: bytes) -> bool:
-        """Decode a reply and tell so, unless it is not exactly the usual one."""
-        if len(reply) != self.sync_read.reply_bytes or not reply.startswith(self._head):
+        """Keep a reply and tell so, unless it is not exactly the usual one."""
+        if len(reply) != self._reply_bytes:
             return False
-        values, stride = self._all.unpack(reply), self._stride
-        if values[self._key :: stride] != self._keys:
+        buffer = self._buffer
+        buffer[:] = reply
+        if self._heads_of(buffer) != self._usual_heads:
             return False
-        # in a fast reply the last CRC covers all that comes before, the other servos' CRCs too
-        if [crc16(reply[part]) for part in self._checked] != list(values[self._crcs]):
+        if tuple(map(crc16, self._checked)) != self._crcs_of(buffer):
             return False
-        self.errors = values[self._error :: stride]
-        self.columns = {
-            name: values[place::stride] for place, name in enumerate(self._names, start=2)
-        }
+        self.errors = reply[self._errors]
         return True
 
-    def decode(self, entries: Sequence[Entry]) -> tuple[Columns, tuple[int, ...]]:
-        """Return the columns and error bytes of re-framed entries."""
-        rows = [self._one.unpack(entry.data) for entry in entries]
-        columns = dict(zip(self._names, zip(*rows, strict=True), strict=True)) if rows else {}
-        return columns, tuple(entry.error for entry in entries)
+    def columns(self, names: Sequence[str]) -> Columns:
+        """Return a view of fields of one type at equal distances, in the reply taken last."""
+        fields = [self.block.fields[name] for name in names]
+        return np.ndarray(
+            (len(names), self._count),
+            _dtype(fields[0]),
+            self._buffer,
+            self._data_at + fields[0].start,
+            (fields[-1].start - fields[-2].start if len(fields) > 1 else 0, self._stride),
+        )
 
 
-def _code(block: Block, name: str) -> str:
-    field = block.fields[name]
-    return _CODES[field.size].lower() if field.signed else _CODES[field.size]
+def decode(field: Field, entries: Sequence[Entry]) -> list[int]:
+    """Return a field's raw values in re-framed entries."""
+    place = slice(field.start, field.start + field.size)
+    return [int.from_bytes(entry.data[place], "little", signed=field.signed) for entry in entries]
 
 
-def _head(servo_id: int, length: int) -> bytes:
-    return HEADER + bytes((servo_id, length & 0xFF, length >> 8, Instruction.STATUS))
+def _dtype(field: Field) -> str:
+    return f"<{'i' if field.signed else 'u'}{field.size}"

@@ -1,37 +1,32 @@
 """Drive all servos of one Dynamixel bus: one block read and one sync write per cycle."""
 
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base import ByteTransport
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
 from drivers.dynamixel.control_table import WATCHDOG_TRIPPED
 from drivers.dynamixel.counters import BusCounters
+from drivers.dynamixel.cycle import ServoCycle
 from drivers.dynamixel.fault_policy import FaultPolicy
-from drivers.dynamixel.goals import GoalWriter
-from drivers.dynamixel.group import ServoRead
 from drivers.dynamixel.handshake import ServoSetup, shake_hands
-from drivers.dynamixel.health import HealthPoll
 from drivers.dynamixel.journal import BusJournal
-from drivers.dynamixel.layout import DIRECT, Layout
-from drivers.dynamixel.link import Link, Patience
-from drivers.dynamixel.reader import StateReader
+from drivers.dynamixel.layout import Layout
+from drivers.dynamixel.link import Link
 from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.roster import Roster
 from drivers.dynamixel.servo import ServoSpec
-from drivers.dynamixel.settings import bring_back
 from drivers.dynamixel.state import BusState
 from drivers.dynamixel.torque import disable_torque, enable_torque, write_kept
-from drivers.dynamixel.watchdog import WatchdogEvent, WatchdogState, next_state, watchdog_units
-from drivers.errors import DriverError, LinkLost
-
-_GAP_WARNING_RATIO: Final = 0.8
-_MOST_NOTICES: Final = 64
-Part = TypeVar("Part")
+from drivers.dynamixel.watchdog import (
+    WatchdogEvent,
+    WatchdogGuard,
+    WatchdogState,
+    watchdog_units,
+)
+from drivers.errors import DriverError
 
 
 class DynamixelBus:
@@ -69,22 +64,17 @@ class DynamixelBus:
         self.counters = BusCounters()
         self.state = BusState.of(len(servos))
         self.journal = BusJournal(self.servos, self.state, fault_policy or FaultPolicy())
-        self.watchdog = WatchdogState.OFF
+        self._guard = WatchdogGuard()
         self._by_id = {servo.id: index for index, servo in enumerate(servos)}
+        self._watchdog_s = watchdog_s
         self._watchdog_units = watchdog_units(watchdog_s)
-        self._gap_ns = round(watchdog_s * _GAP_WARNING_RATIO * NS_PER_S)
         self._fast_sync = fast_sync
         self._layout = layout
         self._margin_s = reply_margin_s
         self._health_every_cycles = health_every_cycles
         self._link = Link(transport, clock, baud, self.counters)
         self._registers = Registers(self._link)
-        self._roster = Roster(len(servos))
-        self._setups: list[ServoSetup] = []
-        self._reader: StateReader | None = None
-        self._health: HealthPoll | None = None
-        self._goals: GoalWriter | None = None
-        self._notices: deque[str] = deque(maxlen=_MOST_NOTICES)
+        self._cycle: ServoCycle | None = None
 
     # --- before the first cycle ---------------------------------------------------------------
 
@@ -101,14 +91,20 @@ class DynamixelBus:
         setups = shake_hands(
             self._registers, self.servos, fast_sync=self._fast_sync, layout=self._layout
         )
-        self._setups = setups
-        self._make_parts(setups)
-        for servo, setup in zip(self.servos, setups, strict=True):
-            self._notices += [f"{servo}: set {text}" for text in setup.written]
         self.state.torque_on[:] = [setup.torque_on for setup in setups]
         self.state.error[:] = [setup.error for setup in setups]
         self.state.watchdog[:] = [setup.watchdog for setup in setups]
-        self._note_watchdogs()
+        self._cycle = ServoCycle(
+            self._registers,
+            self.servos,
+            setups,
+            self.state,
+            self.journal,
+            self._guard,
+            watchdog_s=self._watchdog_s,
+            margin_s=self._margin_s,
+            health_every_cycles=self._health_every_cycles,
+        )
         return setups
 
     def close(self) -> None:
@@ -127,14 +123,9 @@ class DynamixelBus:
             DriverError: the bus is not connected.
             LinkLost: the adapter is gone; all values go on growing old with each call.
         """
-        reader = self._connected(self._reader)
-        silent_ns = self._link.now_ns() - self._link.last_sent_ns
-        try:
-            reader.read()
-        except LinkLost:
-            reader.note_silence()
-            raise
-        return self._look_after(silent_ns)
+        cycle = self._cycle or self._connected()
+        cycle.read()
+        return self.state
 
     def read_in_turns(self) -> Iterator[None]:
         """Do as `read_state`, but pause whenever a request is on its way; see `BusGroup`.
@@ -143,24 +134,27 @@ class DynamixelBus:
             DriverError: the bus is not connected.
             LinkLost: the adapter is gone; all values go on growing old with each call.
         """
-        reader = self._connected(self._reader)
-        silent_ns = self._link.now_ns() - self._link.last_sent_ns
-        try:
-            yield from reader.read_in_turns()
-        except LinkLost:
-            reader.note_silence()
-            raise
-        self._look_after(silent_ns)
+        return self._connected().read_in_turns()
 
-    def write_goals(self, position_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Send a goal to every servo; return what was sent after rounding and clamping.
+    def write_goals(self, position_rad: NDArray[np.float64]) -> None:
+        """Send a goal to every servo, rounded to pulses and clamped; see `sent_goals`.
 
         Raises:
             ValueError: a goal is not finite, or there is not one per servo.
             DriverError: the bus is not connected.
             LinkLost: the adapter is gone.
         """
-        return self._connected(self._goals).write(position_rad)
+        cycle = self._cycle or self._connected()
+        cycle.goals.write(position_rad)
+
+    @property
+    def sent_goals(self) -> NDArray[np.float64]:
+        """Return the goals sent last, after rounding and clamping.
+
+        Raises:
+            DriverError: the bus is not connected.
+        """
+        return self._connected().goals.sent
 
     def write_goal_pwm(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit servos (by id) to a ratio of full PWM; return those that did not take it.
@@ -172,7 +166,7 @@ class DynamixelBus:
             DriverError: the bus is not connected.
             LinkLost: the adapter is gone.
         """
-        return self._connected(self._goals).write_pwm(ratios)
+        return self._connected().goals.write_pwm(ratios)
 
     # --- torque -------------------------------------------------------------------------------
 
@@ -191,9 +185,11 @@ class DynamixelBus:
         for index in chosen:
             self.state.torque_on[index] = True
             self.state.watchdog[index] = self._watchdog_units
-            self._forget_pwm(index)
+        if self._cycle is not None:
+            for index in chosen:
+                self._cycle.goals.forget_pwm(self.servos[index].id)
         self._forget_status()
-        self.watchdog = next_state(self.watchdog, WatchdogEvent.ARM)
+        self._guard.note(WatchdogEvent.ARM)
 
     def disable_torque(self, ids: Sequence[int] | None = None) -> dict[int, DriverError]:
         """Switch servos (all by default) off; every one is tried, failures are returned by id.
@@ -207,8 +203,13 @@ class DynamixelBus:
             self.state.torque_on[index] = self.servos[index].id in failures
         self._forget_status()
         if not self.state.torque_on.any():
-            self.watchdog = next_state(self.watchdog, WatchdogEvent.TORQUE_OFF)
+            self._guard.note(WatchdogEvent.TORQUE_OFF)
         return failures
+
+    @property
+    def watchdog(self) -> WatchdogState:
+        """Return the state of the servos' watchdogs."""
+        return self._guard.state
 
     @property
     def watchdog_tripped(self) -> tuple[str, ...]:
@@ -227,7 +228,7 @@ class DynamixelBus:
         write_kept(self._registers, "bus_watchdog", self.servos, dict.fromkeys(self._by_id, 0))
         self.state.watchdog[:] = 0
         self._forget_status()
-        self.watchdog = next_state(self.watchdog, WatchdogEvent.CLEAR)
+        self._guard.note(WatchdogEvent.CLEAR)
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo and return at once; it rejoins, without torque, when it answers again.
@@ -241,7 +242,8 @@ class DynamixelBus:
         self._registers.reboot(self.servos[index])
         self.state.torque_on[index] = False
         self.state.watchdog[index] = 0
-        self._suspend(index)
+        if self._cycle is not None:
+            self._cycle.suspend(index)
 
     def telemetry(self) -> dict[str, Any]:
         """Return counters, cycle times and error budgets by name."""
@@ -250,7 +252,7 @@ class DynamixelBus:
     @property
     def notices(self) -> tuple[str, ...]:
         """Return what was written to servos and which have come back, the newest last."""
-        return tuple(self._notices)
+        return () if self._cycle is None else tuple(self._cycle.notices)
 
     # --- any register -------------------------------------------------------------------------
 
@@ -282,51 +284,10 @@ class DynamixelBus:
 
     # --- inside -------------------------------------------------------------------------------
 
-    def _make_parts(self, setups: Sequence[ServoSetup]) -> None:
-        reads = [
-            ServoRead(spec=servo, block=setup.block, fast=setup.fast_sync)
-            for servo, setup in zip(self.servos, setups, strict=True)
-        ]
-        self._roster = Roster(len(self.servos))
-        self._reader = StateReader(
-            self._link,
-            reads,
-            self._roster,
-            self.state,
-            self.journal,
-            margin_s=self._margin_s,
-            on_lost_map=self._take_back,
-        )
-        self._health = HealthPoll(
-            self._registers,
-            self.servos,
-            self._roster,
-            self.state,
-            asked=[n for n, setup in enumerate(setups) if setup.block is DIRECT],
-            every_cycles=self._health_every_cycles,
-            margin_s=self._margin_s,
-            bring_back=self._bring_back,
-        )
-        self._goals = GoalWriter(
-            self._link, self._registers, self.servos, setups, margin_s=self._margin_s
-        )
-
-    def _connected(self, part: Part | None) -> Part:
-        if part is None:
+    def _connected(self) -> ServoCycle:
+        if self._cycle is None:
             raise DriverError("the servo bus is not connected; call connect() first")
-        return part
-
-    def _look_after(self, silent_ns: int) -> BusState:
-        if self.watchdog is WatchdogState.ARMED and silent_ns > self._gap_ns:
-            self._read_watchdogs()
-        health = self._connected(self._health)
-        errors, status = self._connected(self._reader).take_news()
-        if errors:
-            health.note_alerts()
-        if health.step() or status or errors:
-            self._note_watchdogs()
-            self.journal.note_errors()
-        return self.state
+        return self._cycle
 
     def _chosen(self, ids: Sequence[int] | None) -> list[int]:
         if ids is None:
@@ -336,51 +297,9 @@ class DynamixelBus:
             raise ValueError(f"no servo {unknown} on this bus; it has {sorted(self._by_id)}")
         return [self._by_id[servo_id] for servo_id in ids]
 
-    def _read_watchdogs(self) -> None:
-        values = self._registers.read_many("bus_watchdog", self.servos)
-        for servo_id, value in values.items():
-            self.state.watchdog[self._by_id[servo_id]] = value
-        self._note_watchdogs()
-
-    def _note_watchdogs(self) -> None:
-        if (self.state.watchdog == WATCHDOG_TRIPPED).any():
-            self.watchdog = next_state(self.watchdog, WatchdogEvent.TRIP)
-
-    def _suspend(self, index: int) -> None:
-        self._roster.suspend(index)
-        if self._reader is not None:
-            self._reader.rebuild()
-
-    def _take_back(self, index: int) -> None:
-        """Set up a servo that answers but has forgotten its setup."""
-        self._suspend(index)
-        self.state.torque_on[index] = False
-        self._connected(self._health).expect(index)
-
-    def _bring_back(self, index: int) -> Iterator[None]:
-        servo, setup = self.servos[index], self._setups[index]
-        patience = Patience(margin_s=self._margin_s, attempts=2)
-        told = []
-        for text in bring_back(self._registers, servo, setup.block, patience):
-            told += [text] if text else []
-            yield
-        self._resume(index)
-        self.counters.returns += 1
-        self._notices.append("; ".join([f"{servo}: answers again", *told]))
-
-    def _resume(self, index: int) -> None:
-        self._roster.resume(index)
-        self._connected(self._reader).rebuild()
-        self._forget_pwm(index)
-        self._connected(self._health).ask_soon(index)
-
     def _forget_status(self) -> None:
-        if self._reader is not None:
-            self._reader.forget_status()
-
-    def _forget_pwm(self, index: int) -> None:
-        if self._goals is not None:
-            self._goals.forget_pwm(self.servos[index].id)
+        if self._cycle is not None:
+            self._cycle.forget_status()
 
 
 def _check_servos(servos: Sequence[ServoSpec]) -> None:

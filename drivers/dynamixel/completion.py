@@ -14,7 +14,7 @@ _LEAST_MARGIN_RATIO: Final = 0.1
 
 
 def complete(
-    link: Link, read: SyncRead, reply: bytes, deadline_ns: int, margin_s: float
+    link: Link, read: SyncRead, reply: bytes, deadline_ns: int, margin_ns: int
 ) -> tuple[dict[int, Entry], list[int]]:
     """Frame a reply anew, wait for the rest of it, and return entries and blamed servos by id.
 
@@ -27,11 +27,11 @@ def complete(
     if not read.fast or len(missing) < 2:
         return entries, missing
     again = SyncRead(missing[1:], read.address, read.size, fast=True)
-    spare_s = margin_s * _LEAST_MARGIN_RATIO
-    if link.now_ns() + link.wire_ns(again, spare_s) > deadline_ns:
+    spare_ns = round(margin_ns * _LEAST_MARGIN_RATIO)
+    if link.now_ns() + link.wire_ns(again) + spare_ns > deadline_ns:
         return entries, missing[:1]
-    link.send(again.request)
-    answer = link.receive_chained(again, deadline_ns, margin_s)
+    link.ask(again.request, again.reply_bytes, margin_ns)
+    answer = link.receive_chained(again, deadline_ns, margin_ns)
     more = link.collect(again, answer, deadline_ns)
     still = [servo_id for servo_id in again.ids if servo_id not in more]
     return entries | more, missing[:1] + still[:1]

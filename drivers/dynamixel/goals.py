@@ -1,7 +1,7 @@
 """Write goals for all servos, converted from the joint side and clamped to the servo's range."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from operator import le
 from typing import Final
 
 import numpy as np
@@ -53,31 +53,42 @@ class GoalWriter:
         self._pulse_at_zero = -self._at_pulse_zero * self._pulses_per
         self._minimum = np.array([float(setup.minimum_pulse) for setup in setups])
         self._maximum = np.array([float(setup.maximum_pulse) for setup in setups])
+        ends = [
+            (servo.to_joint(setup.minimum_pulse), servo.to_joint(setup.maximum_pulse))
+            for servo, setup in zip(servos, setups, strict=True)
+        ]
+        self._lowest = [min(one) for one in ends]
+        self._highest = [max(one) for one in ends]
         self._pwm_limit = {
             servo.id: setup.pwm_limit for servo, setup in zip(servos, setups, strict=True)
         }
         self._pwm: dict[int, int] = {}
         self._frame = GoalFrame([servo.id for servo in servos])
 
-    def write(self, position_rad: Floats) -> Floats:
-        """Send a goal to every servo and return what was sent, on the joint side.
+    @property
+    def sent(self) -> Floats:
+        """Return the goals sent last, on the joint side."""
+        return self._frame.pulses * self._per_pulse + self._at_pulse_zero
+
+    def write(self, position_rad: Floats) -> None:
+        """Send a goal to every servo.
 
         Raises:
             ValueError: a goal is not finite, or there is not one per servo.
             LinkLost: the adapter is gone.
         """
         goals = position_rad.tolist()
-        if len(goals) != len(self._joints) or not all(map(isfinite, goals)):
+        if len(goals) != len(self._lowest):
+            self._refuse(position_rad)
+        within = all(map(le, self._lowest, goals)) and all(map(le, goals, self._highest))
+        if not within and not np.isfinite(position_rad).all():
             self._refuse(position_rad)
         pulses = position_rad * self._pulses_per
         np.add(pulses, self._pulse_at_zero, pulses)
         np.rint(pulses, pulses)
-        np.maximum(pulses, self._minimum, out=pulses)
-        np.minimum(pulses, self._maximum, out=pulses)
+        if not within:
+            np.clip(pulses, self._minimum, self._maximum, out=pulses)
         self._link.send(self._frame.of(pulses))
-        np.multiply(pulses, self._per_pulse, pulses)
-        np.add(pulses, self._at_pulse_zero, pulses)
-        return pulses
 
     def write_pwm(self, ratios: Mapping[int, float]) -> dict[int, DriverError]:
         """Limit the PWM of servos, where it changed; return those that did not take it.
@@ -122,7 +133,7 @@ class GoalWriter:
 
 
 class GoalFrame:
-    """Hold the sync write of all goal positions; only pulses and CRC change."""
+    """Hold the sync write of all goal positions; only `pulses` and CRC change."""
 
     def __init__(self, ids: Sequence[int]) -> None:
         records = np.zeros(len(ids), dtype=_GOAL)
@@ -130,13 +141,13 @@ class GoalFrame:
         params = _GOAL_POSITION_HEAD + records.tobytes()
         self._frame = bytearray(encode_instruction(BROADCAST_ID, Instruction.SYNC_WRITE, params))
         body = np.frombuffer(self._frame, _GOAL, len(ids), _FRAME_HEAD_BYTES)
-        self._pulses = body["pulse"]
+        self.pulses = body["pulse"]
         self._end = len(self._frame) - _FRAME_CRC_BYTES
         self._body = memoryview(self._frame)[: self._end]
 
     def of(self, pulses: Floats) -> bytes:
         """Return the packet that sends these pulses, stuffed where it must be."""
-        self._pulses[:] = pulses
+        self.pulses[...] = pulses
         frame = self._frame
         if frame.find(STUFFED_PATTERN, len(HEADER)) >= 0:
             params = bytes(frame[_FRAME_HEAD_BYTES - len(_GOAL_POSITION_HEAD) : self._end])

@@ -1,11 +1,13 @@
 """Hold the servos whose block is read by one request, and store their values in the state."""
 
-import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
-from drivers.dynamixel.block import BlockRead, Columns
+import numpy as np
+
+from drivers.dynamixel.block import BlockRead, decode
 from drivers.dynamixel.codec import ALERT
 from drivers.dynamixel.control_table import VOLTAGE_UNIT_V
 from drivers.dynamixel.layout import CLIMATE, MOTION, STATUS, Block
@@ -33,6 +35,14 @@ class ServoRead:
         return self.block.address, self.block.size, self.fast
 
 
+@dataclass(slots=True)
+class News:
+    """Tell what may differ from the last cycle; whoever looks at it sets it back."""
+
+    errors: bool = False
+    status: bool = False
+
+
 class Group:
     """Turn one request's raw values into the state's, on the joint side.
 
@@ -40,7 +50,13 @@ class Group:
     and of those that are to blame for values that did not come.
     """
 
-    def __init__(self, members: Sequence[int], reads: Sequence[ServoRead], state: BusState) -> None:
+    def __init__(
+        self,
+        members: Sequence[int],
+        reads: Sequence[ServoRead],
+        state: BusState,
+        news: News,
+    ) -> None:
         self.members = tuple(members)
         specs = [reads[index].spec for index in members]
         first = reads[members[0]]
@@ -48,35 +64,52 @@ class Group:
         self.read = BlockRead(self.ids, first.block, fast=first.fast)
         self.answered: Sequence[int] = self.members
         self.blamed: Sequence[int] = ()
-        self.error_news = False
-        self.status_news = False
+        self._news = news
         self._state = state
-        self._rows = [name for name in _ROWS if name in first.block.fields]
-        self._status_names = [name for name in STATUS if name in first.block.fields]
-        self._units = [[_units(spec)[name] for spec in specs] for name in self._rows]
-        self._zeros = [spec.to_joint(0) for spec in specs]
+        self._fields = first.block.fields
+        self._rows = [name for name in _ROWS if name in self._fields]
+        self._units = np.array([[_units(spec)[name] for spec in specs] for name in self._rows])
+        self._zeros = np.array([spec.to_joint(0) for spec in specs])
         self._fills_rows = len(members) == len(reads)
-        self._doubles = struct.Struct(f"{len(members) * len(self._rows)}d")
-        self._memory = state.readings.data
-        self._errors: tuple[int, ...] = ()
-        self._status: list[tuple[int, ...]] = []
+        rows = state.readings[: len(self._rows)]
+        self._values = rows if self._fills_rows else np.empty_like(self._units)
+        self._positions = self._values[0]
+        self._copies = [
+            (self._values[start:end], self.read.columns(self._rows[start:end]))
+            for start, end in _alike(first.block, self._rows)
+        ]
+        self._voltages = self.read.columns([_SIGN_OF_LIFE])[0] if self._has_map else None
+        self._status_columns = [self.read.columns([name])[0] for name in self._status_names]
+        self._errors = b""
+        self._status: list[bytes] = []
+
+    @property
+    def _has_map(self) -> bool:
+        return _SIGN_OF_LIFE in self._fields
+
+    @property
+    def _status_names(self) -> list[str]:
+        return [name for name in STATUS if name in self._fields]
 
     def store(self) -> bool:
         """Store the reply that `read` has taken; False, and nothing is stored, if a map is lost."""
-        columns, errors = self.read.columns, self.read.errors
-        if 0 in columns.get(_SIGN_OF_LIFE, ()):
+        if self._voltages is not None and 0 in self._voltages.tolist():
             return False
-        self._store_readings(columns)
+        values = self._values
+        for rows, columns in self._copies:
+            rows[...] = columns
+        np.multiply(values, self._units, values)
+        np.add(self._positions, self._zeros, self._positions)
+        if not self._fills_rows:
+            self._state.readings[: len(values), self.members] = values
+        errors = self.read.errors
         if errors != self._errors:
             self._errors = errors
             self._store_errors(errors, self.members)
-        if self._status_names:
-            status = [columns[name] for name in self._status_names]
-            if status != self._status:
-                self._status = status
-                self._store_status(status, self.members)
         self.answered = self.members
         self.blamed = ()
+        if self._status_columns:
+            self._note_status()
         return True
 
     def store_entries(self, entries: Mapping[int, Entry]) -> list[int]:
@@ -85,66 +118,67 @@ class Group:
         A servo without a map answers zeros, its voltage too: none of it is taken.
         """
         places = [n for n, servo_id in enumerate(self.ids) if servo_id in entries]
-        columns, errors = self.read.decode([entries[self.ids[n]] for n in places])
-        signs = columns.get(_SIGN_OF_LIFE, (1,) * len(places))
-        lost = [self.members[n] for n, sign in zip(places, signs, strict=True) if not sign]
+        found = [entries[self.ids[n]] for n in places]
+        lost = self._without_map(places, found)
         if lost:
             kept = {id_: entry for id_, entry in entries.items() if self._index(id_) not in lost}
             self.store_entries(kept)
             return lost
-        self.answered = [self.members[n] for n in places]
-        self._store_some_readings(columns, places)
-        self._store_errors(errors, self.answered)
-        self._store_status([columns.get(name, ()) for name in self._status_names], self.answered)
+        self.answered = answered = [self.members[n] for n in places]
+        for row, name in enumerate(self._rows):
+            values = decode(self._fields[name], found) * self._units[row, places]
+            self._state.readings[row, answered] = values if row else values + self._zeros[places]
+        self._store_errors([entry.error for entry in found], answered)
+        self._store_status([decode(self._fields[name], found) for name in self._status_names])
         self.forget_status()
         return []
 
     def forget_status(self) -> None:
         """Store the status of the next reply even if it is that of the last."""
-        self._errors = ()
+        self._errors = b""
         self._status = []
 
     def _index(self, servo_id: int) -> int:
         return self.members[self.ids.index(servo_id)]
 
-    def _store_readings(self, columns: Columns) -> None:
-        position, *others = self._rows
-        units, zeros = self._units[0], self._zeros
-        values = [
-            raw * unit + zero
-            for raw, unit, zero in zip(columns[position], units, zeros, strict=True)
-        ]
-        for name, units in zip(others, self._units[1:], strict=True):
-            values += [raw * unit for raw, unit in zip(columns[name], units, strict=True)]
-        if self._fills_rows:
-            self._doubles.pack_into(self._memory, 0, *values)
-        else:
-            count = len(self.members)
-            for row in range(len(self._rows)):
-                first = row * count
-                self._state.readings[row, self.members] = values[first : first + count]
+    def _without_map(self, places: Sequence[int], entries: Sequence[Entry]) -> list[int]:
+        if not self._has_map:
+            return []
+        voltages = decode(self._fields[_SIGN_OF_LIFE], entries)
+        return [self.members[n] for n, volts in zip(places, voltages, strict=True) if not volts]
 
-    def _store_some_readings(self, columns: Columns, places: Sequence[int]) -> None:
-        readings = self._state.readings
-        for row, (name, units) in enumerate(zip(self._rows, self._units, strict=True)):
-            for place, raw in zip(places, columns.get(name, ()), strict=True):
-                zero = 0.0 if row else self._zeros[place]
-                readings[row, self.members[place]] = raw * units[place] + zero
+    def _note_status(self) -> None:
+        status = [column.tobytes() for column in self._status_columns]
+        if status != self._status:
+            self._status = status
+            self._store_status([column.tolist() for column in self._status_columns])
 
     def _store_errors(self, errors: Sequence[int], members: Sequence[int]) -> None:
-        self.error_news = True
+        self._news.errors = True
         for index, error in zip(members, errors, strict=True):
             self._state.alert[index] = error >= ALERT
 
-    def _store_status(self, status: Sequence[tuple[int, ...]], members: Sequence[int]) -> None:
-        if not status or not members:
+    def _store_status(self, status: Sequence[Sequence[int]]) -> None:
+        if not status or not self.answered:
             return
-        self.status_news = True
+        self._news.status = True
         torque, error, watchdog = status
-        rows = list(members)
+        rows = list(self.answered)
         self._state.torque_on[rows] = [value != 0 for value in torque]
         self._state.error[rows] = error
         self._state.watchdog[rows] = watchdog
+
+
+def _alike(block: Block, names: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """Cut names into runs of one type that are neighbours in the block; a run is copied at once."""
+    fields = [block.fields[name] for name in names]
+    cuts = [
+        place
+        for place, (one, other) in enumerate(pairwise(fields), start=1)
+        if (other.size, other.signed) != (one.size, one.signed)
+        or abs(other.start - one.start) != one.size
+    ]
+    yield from pairwise([0, *cuts, len(names)])
 
 
 def _units(spec: ServoSpec) -> dict[str, float]:

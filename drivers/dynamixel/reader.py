@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.completion import complete
-from drivers.dynamixel.group import Group, ServoRead
+from drivers.dynamixel.group import Group, News, ServoRead
 from drivers.dynamixel.journal import BusJournal
 from drivers.dynamixel.link import Link
 from drivers.dynamixel.roster import Roster
@@ -43,13 +43,14 @@ class StateReader:
         self._roster = roster
         self._state = state
         self._journal = journal
-        self._margin_s = margin_s
+        self._margin_ns = round(margin_s * NS_PER_S)
         self._on_lost_map = on_lost_map
         self._stamps_ns: NDArray[np.int64] = np.full(len(reads), _NEVER_NS, dtype=np.int64)
         self._all_fresh = False
         self._deadline_ns = 0
         self._unusual = 0
         self._lost: list[int] = []
+        self.news = News()
         self.groups: tuple[Group, ...] = ()
         self.rebuild()
 
@@ -58,7 +59,7 @@ class StateReader:
         polled = self._roster.polled
         keys = {index: self._reads[index].key for index in polled}
         self.groups = tuple(
-            Group([n for n in polled if keys[n] == key], self._reads, self._state)
+            Group([n for n in polled if keys[n] == key], self._reads, self._state, self.news)
             for key in dict.fromkeys(keys.values())
         )
 
@@ -68,7 +69,6 @@ class StateReader:
         Raises:
             LinkLost: the adapter is gone.
         """
-        self._begin()
         for group in self.groups:
             self._send(group)
             self._collect(group)
@@ -80,7 +80,6 @@ class StateReader:
         Raises:
             LinkLost: the adapter is gone.
         """
-        self._begin()
         for group in self.groups:
             self._send(group)
             yield
@@ -94,32 +93,19 @@ class StateReader:
         self._state.stamp_ns = self._link.now_ns()
         self._update_ages()
 
-    def take_news(self) -> tuple[bool, bool]:
-        """Tell whether errors, and whether the status, may differ since this was asked last."""
-        errors = status = False
-        for group in self.groups:
-            errors |= group.error_news
-            status |= group.status_news
-            group.error_news = group.status_news = False
-        return errors, status
-
     def forget_status(self) -> None:
         """Take the next status of every servo for news: the state was changed meanwhile."""
         for group in self.groups:
             group.forget_status()
 
-    def _begin(self) -> None:
-        self._link.counters.cycles += 1
-        self._unusual = 0
-
     def _send(self, group: Group) -> None:
         request = group.read.sync_read
-        self._deadline_ns = self._link.ask(request.request, request.reply_bytes, self._margin_s)
+        self._deadline_ns = self._link.ask(request.request, request.reply_bytes, self._margin_ns)
 
     def _collect(self, group: Group) -> None:
         read = group.read
         if read.fast:
-            reply = self._link.receive_chained(read.sync_read, self._deadline_ns, self._margin_s)
+            reply = self._link.receive_chained(read.sync_read, self._deadline_ns, self._margin_ns)
         else:
             reply = self._link.receive_all(read.sync_read.reply_bytes, self._deadline_ns)
         if not (read.take(reply) and group.store()):
@@ -127,22 +113,25 @@ class StateReader:
 
     def _finish(self) -> None:
         state = self._state
-        before_ns, state.stamp_ns = state.stamp_ns, self._link.now_ns()
-        self._journal.answer_times_ns.append(state.stamp_ns - self._link.last_sent_ns)
+        link = self._link
+        before_ns, state.stamp_ns = state.stamp_ns, link.now_ns()
+        link.counters.cycles += 1
+        self._journal.answer_times_ns.append(state.stamp_ns - link.last_sent_ns)
         if self._unusual or len(self._roster.polled) < len(self._reads):
             self._finish_partial(before_ns)
             self._journal.note_gaps()
+            self._unusual = 0
             return
         if not self._all_fresh:
             self._all_fresh = True
             state.valid.fill(True)
             state.age_s.fill(0.0)
-        self._roster.note_complete()
+            self._roster.note_complete()
 
     def _collect_anew(self, group: Group, reply: bytes) -> None:
         self._unusual += 1
         request = group.read.sync_read
-        entries, blamed = complete(self._link, request, reply, self._deadline_ns, self._margin_s)
+        entries, blamed = complete(self._link, request, reply, self._deadline_ns, self._margin_ns)
         group.blamed = [group.members[group.ids.index(servo_id)] for servo_id in blamed]
         self._lost += group.store_entries(entries)
 

@@ -1,6 +1,7 @@
 """Keep the Bus Watchdog's state: the servos stop by themselves when the bus falls silent."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import Enum
 from math import ceil
 from types import MappingProxyType
@@ -47,6 +48,17 @@ TRANSITIONS: Final[Mapping[tuple[WatchdogState, WatchdogEvent], WatchdogState]] 
 def next_state(state: WatchdogState, event: WatchdogEvent) -> WatchdogState:
     """Return the state after an event."""
     return TRANSITIONS.get((state, event), state)
+
+
+@dataclass(slots=True)
+class WatchdogGuard:
+    """Hold the state of the watchdogs of one bus."""
+
+    state: WatchdogState = WatchdogState.OFF
+
+    def note(self, event: WatchdogEvent) -> None:
+        """Go on to the state after an event."""
+        self.state = next_state(self.state, event)
 
 
 def watchdog_units(timeout_s: float) -> int:

@@ -155,9 +155,9 @@ def test_a_burst_is_the_bytes_asked_for_or_what_came_of_them(pty: tuple[int, Pat
     master, path = pty
     port = SerialPort(path, 1_000_000, CLOCK)
     os.write(master, b"0123456789")
-    assert port.read_burst(4, soon(1.0)) == b"0123"
-    assert port.read_burst(10, soon(0.05)) == b"456789"
-    assert port.read_burst(10, soon(0.0)) == b""
+    assert port.read_burst(4, 0, soon(1.0)) == b"0123"
+    assert port.read_burst(10, 0, soon(0.05)) == b"456789"
+    assert port.read_burst(10, 0, soon(0.0)) == b""
     port.close()
 
 

@@ -109,7 +109,7 @@ class FullLine(EchoLine):
         super().__init__()
         self.baud = 9_600
 
-    def read_burst(self, count: int, deadline_ns: int) -> bytes:
+    def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
         return self.read(count, deadline_ns)
 
     def set_baud(self, baud: int) -> None:
@@ -125,7 +125,7 @@ def test_what_a_line_offers_beyond_bytes_is_offered_through_the_recorder(
     line = FullLine()
     wire = RecordingTransport(line, WireRecorder(file, clock))
     wire.write(b"abcdef")
-    assert wire.read_burst(6, 0) == b"fedcba"
+    assert wire.read_burst(6, 0, 0) == b"fedcba"
     assert wire.bauds == (9_600, 57_600)
     wire.set_baud(57_600)
     assert line.baud == 57_600
@@ -143,8 +143,8 @@ def test_a_line_that_offers_only_bytes_does_not_pretend_more(
     wire = RecordingTransport(EchoLine(), WireRecorder(file, clock))
     wire.write(b"abc")
     wire.write(b"de")
-    assert wire.read_burst(4, 0) == b"cbae"
-    assert wire.read_burst(4, 0) == b"d"
+    assert wire.read_burst(4, 0, 0) == b"cbae"
+    assert wire.read_burst(4, 0, 0) == b"d"
     assert wire.bauds == ()
     assert wire.adapter_fault() == ""
     with pytest.raises(ValueError, match="this line has one speed only, got 57600"):
@@ -152,7 +152,7 @@ def test_a_line_that_offers_only_bytes_does_not_pretend_more(
 
 
 @pytest.mark.parametrize(
-    "act", [lambda w: w.write(b"x"), lambda w: w.read(1, 0), lambda w: w.read_burst(1, 0)]
+    "act", [lambda w: w.write(b"x"), lambda w: w.read(1, 0), lambda w: w.read_burst(1, 0, 0)]
 )
 def test_a_lost_link_is_recorded_and_raised(
     act: Callable[[RecordingTransport], object], file: Path, clock: SteppedClock

@@ -135,8 +135,8 @@ def test_only_values_that_were_sent_come_out_of_a_block_read(streams: int, fast:
         assert all(entry in sent for entry in got.values())
         if read.take(bytes(reply)):
             taken += 1
-            assert read.columns["position"] == tuple(
+            assert read.columns(["position"])[0].tolist() == [
                 int.from_bytes(e.data[6:], "little", signed=True) for e in sent
-            )
-            assert read.errors == tuple(e.error for e in sent)
+            ]
+            assert list(read.errors) == [e.error for e in sent]
     assert taken > streams / 20
