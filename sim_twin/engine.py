@@ -29,15 +29,11 @@ class Engine:
         self.drives = Shafts(model, self.data, drives)
         self.imu = MotionProbe(model, self.data)
         self.referee = Referee(model, self.data)
-        self._steps = 0
+        self.now_ns = START_NS
+        """Simulated time in nanoseconds."""
         self._move_joints_into_range()
         mujoco.mj_forward(model, self.data)
         self.lidar = RangeProbe(model, self.data)
-
-    @property
-    def now_ns(self) -> int:
-        """Return simulated time in nanoseconds."""
-        return START_NS + self._steps * STEP_NS
 
     def place(self, body: str, x_m: float, y_m: float, z_m: float, yaw_rad: float) -> None:
         """Put a free body somewhere before the simulation runs.
@@ -68,7 +64,7 @@ class Engine:
     def step(self) -> None:
         """Advance the physics by one step."""
         mujoco.mj_step(self.model, self.data)
-        self._steps += 1
+        self.now_ns += STEP_NS
 
     def _free_address(self, body: str) -> int:
         found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, body)

@@ -76,7 +76,7 @@ class HeadCamera:
 def camera_line(head: HeadCamera, camera: Camera, now_ns: Callable[[], int]) -> LineTamper:
     """Return the camera's line, on which faults may act."""
     frame_bytes = HEADER_BYTES + camera.width * camera.height * BYTES_PER_PIXEL + CRC.size
-    return LineTamper(head.device, now_ns, frame_bytes)
+    return LineTamper(head.device, now_ns, frame_bytes, tells_time=False)
 
 
 def _intrinsics(camera: Camera) -> Intrinsics:

@@ -72,7 +72,7 @@ class MemoryOpener:
         if name not in lines:
             raise DeviceMissing(f"the twin has no stream {name!r}; it has {list(lines)}")
         line = self._plugged(name, lines[name])
-        self._twin.streamed_devices[name].announce()
+        self._twin.announce(name)
         return line
 
     def gpio_contact(self, name: str, offset: int) -> Contact:

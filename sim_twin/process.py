@@ -6,6 +6,7 @@ import os
 import select
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,7 @@ class TwinProcess:
             for name, line in self._twin.lines.items()
         }
         self._streams = {
-            name: StreamLine(line, devices / name, self._twin.streamed_devices[name].announce)
+            name: StreamLine(line, devices / name, partial(self._twin.announce, name))
             for name, line in self._twin.stream_lines.items()
         }
         served: dict[str, Carrier] = {**self._lines, **self._streams}

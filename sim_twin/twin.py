@@ -19,10 +19,10 @@ from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
 from sim_twin.servos import EmulatedServoSpec, ServoBank, WireTiming
-from sim_twin.streams import streamed_devices
+from sim_twin.streams import StreamedDevice, streamed_devices
 from vla_deploy.robots import RobotDescription
 
-S = TypeVar("S")
+S = TypeVar("S", bound=StreamedDevice)
 
 
 class Twin:
@@ -48,6 +48,7 @@ class Twin:
         self.engine = load_engine(robot, world, seed)
         self.servos = ServoBank(_servo_specs(robot), timing=servo_timing)
         self.drives = robot_drives(robot.can_bus)
+        self._drive_laws = [drive.advance for drive in self.drives]
         self.can_wire = CanWire(self.drives, bitrate=robot.can_bus.bitrate)
         self.lidar = LidarDevice(self.engine.lidar.cast, seed=seed)
         self.imu = ImuDevice(self.engine.imu.read, seed=seed)
@@ -123,25 +124,35 @@ class Twin:
             self._camera_line = camera_line(self.camera, self.robot.camera, self._now_ns)
         return self._camera_line
 
+    def announce(self, stream: str) -> None:
+        """Let a streamed device begin anew for its next host.
+
+        Raises:
+            KeyError: there is no such stream.
+        """
+        device = self.streamed_devices[stream]
+        device.step(self.now_ns)
+        device.announce()
+
     def slip_encoder(self, servo_id: int, offset_rad: float) -> None:
         """Let a servo measure its shaft further off than it does, as after a blow."""
         ids = [servo.id for servo in self.robot.servo_bus.servos]
         self.engine.servos.slip(ids.index(servo_id), offset_rad)
 
     def step(self) -> None:
-        """Let the firmware act, the physics follow and the sensors look."""
+        """Let the firmware act, the physics follow and the sensors look.
+
+        A device that only answers learns the time when it is talked to.
+        """
         self.faults.step()
         self._drive_motors()
         self.engine.step()
         now_ns = self.engine.now_ns
-        self.servos.step(now_ns)
         if now_ns >= self.lidar.due_ns:
             self.lidar.step(now_ns)
         if now_ns >= self.imu.due_ns:
             self.imu.step(now_ns)
         self.can_wire.poll(now_ns)
-        for device in self.streamed_devices.values():
-            device.step(now_ns)
         if self._camera is not None:
             self._camera.device.step(now_ns)
 
@@ -153,6 +164,7 @@ class Twin:
     def _streamed(self, kind: type[S], what: str) -> S:
         for device in self.streamed_devices.values():
             if isinstance(device, kind):
+                device.step(self.now_ns)
                 return device
         raise ModelMismatch(f"the twin of {self.robot.name} needs {what} in the robot file")
 
@@ -170,10 +182,7 @@ class Twin:
             self.servo_supply.volts(now_ns),
         )
         shafts.command(duty)
-        wheels = zip(self.drives, engine.drives.motions(), strict=True)
-        engine.drives.command_each(
-            [drive.advance(now_ns, angle, speed) for drive, (angle, speed) in wheels]
-        )
+        engine.drives.command_each(now_ns, self._drive_laws)
 
 
 def _servo_specs(robot: RobotDescription) -> list[EmulatedServoSpec]:

@@ -26,15 +26,22 @@ class LineTamper:
     """Be a device's line: pass everything on as it is, except through the tamperings in force.
 
     `frame_bytes` is the size of the frames that a talking sensor sends; None is for a bus, on which
-    each answer counts as one frame.
+    each answer counts as one frame. Whom the line `tells_time` learns it whenever it is talked to;
+    others are stepped by somebody else.
     """
 
     def __init__(
-        self, device: WireDevice, now_ns: Callable[[], int], frame_bytes: int | None = None
+        self,
+        device: WireDevice,
+        now_ns: Callable[[], int],
+        frame_bytes: int | None = None,
+        *,
+        tells_time: bool = True,
     ) -> None:
         self.device = device
         self._timed = device if isinstance(device, TimedDevice) else None
         self._now_ns = now_ns
+        self._tells_time = tells_time and self._timed is None
         self._frame_bytes = frame_bytes
         self._tamperings: list[Tampering] = []
         self._last_frames: dict[int, bytes] = {}
@@ -52,10 +59,12 @@ class LineTamper:
         for tampering in self._tamperings:
             data = tampering.heard(data, self._now_ns())
         if data:
+            self._tell_time()
             self.device.receive(data)
 
     def transmit(self) -> bytes:
         """Return and forget the bytes that are ready for the host."""
+        self._tell_time()
         data = self.device.transmit()
         if not self._tamperings:
             if data:
@@ -75,9 +84,13 @@ class LineTamper:
         return None if self._timed is None else self._timed.next_due_ns()
 
     def step(self, now_ns: int) -> None:
-        """Tell the time to a device whose bytes take time; the twin steps all others itself."""
+        """Tell the time to a device whose bytes take time."""
         if self._timed is not None:
             self._timed.step(now_ns)
+
+    def _tell_time(self) -> None:
+        if self._tells_time:
+            self.device.step(self._now_ns())
 
     def last_frame_like(self, data: bytes) -> bytes:
         """Return the newest whole frames from before any tampering, in place of `data`.

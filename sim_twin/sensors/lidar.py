@@ -106,7 +106,6 @@ class LidarDevice:
         self._points = np.empty(0)
         self._mounting_deg = math.degrees(mounting_yaw_rad)
         self._cast_every_ns = round(NS_PER_S / rate_hz / casts_per_turn)
-        self._next_cast_ns = 0
         self._start_ns = 0
         self._started = False
         self._sent_packets = 0
@@ -125,20 +124,23 @@ class LidarDevice:
         return data
 
     def step(self, now_ns: int) -> None:
-        """Send every packet whose last point is due by `now_ns`; nothing is before `due_ns`."""
+        """Send every packet whose last point is due by `now_ns`, and cast at `due_ns`."""
         if not self._started:
             self._started = True
-            self._start_ns = self._next_cast_ns = now_ns
-        if now_ns >= self._next_cast_ns:
-            self._next_cast_ns += self._cast_every_ns
-            end = max(self._packets_due(self._next_cast_ns), self._packets_due(now_ns))
+            self._start_ns = self.due_ns = now_ns
+        self._send(now_ns)
+        if now_ns >= self.due_ns:
+            self.due_ns += self._cast_every_ns
+            end = max(self._packets_due(self.due_ns), self._packets_due(now_ns))
             if end > self._sent_packets:
                 self._measure(end)
+            self._send(now_ns)
+
+    def _send(self, now_ns: int) -> None:
         waiting = self._waiting
         while waiting and waiting[0][0] <= now_ns:
             self._out += waiting.popleft()[1]
             self._sent_packets += 1
-        self.due_ns = min(waiting[0][0], self._next_cast_ns) if waiting else self._next_cast_ns
 
     def _packets_due(self, now_ns: int) -> int:
         """Return how many packets have been measured to their last point by `now_ns`."""

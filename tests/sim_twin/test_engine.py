@@ -67,9 +67,16 @@ def test_plain_numbers_tell_the_same_motion_as_arrays(engine: Engine) -> None:
     engine.data.joint("arm").qpos[0] = 0.8
     engine.data.joint("arm").qvel[0] = 0.1
     engine.servos.slip(0, 0.05)
-    ((angle_rad, speed_rad_s),) = engine.servos.motions()
+    told: list[tuple[int, float, float]] = []
+
+    def law(now_ns: int, angle_rad: float, speed_rad_s: float) -> float:
+        told.append((now_ns, angle_rad, speed_rad_s))
+        return 0.25
+
+    engine.servos.command_each(engine.now_ns, [law])
+    ((now_ns, angle_rad, speed_rad_s),) = told
+    assert now_ns == engine.now_ns
     assert engine.servos.position_rad() == pytest.approx([angle_rad])
     assert engine.servos.velocity_rad_s() == pytest.approx([speed_rad_s])
     assert angle_rad == pytest.approx(-0.25)
-    engine.servos.command_each([0.25])
     assert engine.data.ctrl[0] == -0.25
