@@ -78,8 +78,11 @@ class DynamixelBus:
 
     # --- before the first cycle ---------------------------------------------------------------
 
-    def connect(self) -> list[ServoSetup]:
+    def connect(self, *, thorough: bool = True) -> list[ServoSetup]:
         """Check that every servo is the declared one and set it up; torque is left as it is.
+
+        Unless `thorough` it ends with the first silent servo, within a tenth of a second: for those
+        who will try again, and have other things to do meanwhile.
 
         Raises:
             SlowAdapter: the adapter holds back what it receives.
@@ -89,7 +92,11 @@ class DynamixelBus:
             LinkLost: the adapter is gone.
         """
         setups = shake_hands(
-            self._registers, self.servos, fast_sync=self._fast_sync, layout=self._layout
+            self._registers,
+            self.servos,
+            fast_sync=self._fast_sync,
+            layout=self._layout,
+            thorough=thorough,
         )
         self.state.torque_on[:] = [setup.torque_on for setup in setups]
         self.state.error[:] = [setup.error for setup in setups]
