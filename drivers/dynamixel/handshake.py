@@ -49,7 +49,12 @@ class ServoSetup:
 
 
 def shake_hands(
-    registers: Registers, servos: Sequence[ServoSpec], *, fast_sync: bool | None, layout: Layout
+    registers: Registers,
+    servos: Sequence[ServoSpec],
+    *,
+    fast_sync: bool | None,
+    layout: Layout,
+    thorough: bool,
 ) -> list[ServoSetup]:
     """Check adapter and servos, write settings that differ, and return what was learned.
 
@@ -57,7 +62,8 @@ def shake_hands(
 
     Raises:
         SlowAdapter: the adapter holds back what it receives.
-        ServoSilent: names all servos that do not answer, and the speed at which they would.
+        ServoSilent: names all servos that do not answer, and the speed at which they would; the
+            first one only, unless `thorough`.
         WrongServo: names all that are not as declared, with expected and got.
         Rejected: a servo refuses a setting.
         LinkLost: the adapter is gone.
@@ -66,7 +72,7 @@ def shake_hands(
     if fault := link.adapter_fault:
         raise SlowAdapter(fault)
     link.detect_echo(servos[0].id, _ECHO_MARGIN_S)
-    identities = _ping_all(registers, servos)
+    identities = _ping_all(registers, servos, thorough=thorough)
     firmwares = [firmware for _, firmware in identities]
     faults = [
         fault
@@ -85,13 +91,17 @@ def shake_hands(
     ]
 
 
-def _ping_all(registers: Registers, servos: Sequence[ServoSpec]) -> list[tuple[int, int]]:
+def _ping_all(
+    registers: Registers, servos: Sequence[ServoSpec], *, thorough: bool
+) -> list[tuple[int, int]]:
     found: list[tuple[int, int]] = []
     silent: list[ServoSpec] = []
     for servo in servos:
         try:
             found.append(registers.ping(servo))
         except NoReply:
+            if not thorough:
+                raise
             silent.append(servo)
     if silent:
         names = ", ".join(str(servo) for servo in silent)

@@ -60,8 +60,10 @@ class ServoLine:
         self._next_open_ns = 0
         self.state = BusState.of(len(self._specs))
 
-    def open(self) -> None:
+    def open(self, *, thorough: bool = True) -> None:
         """Connect and read once; torque is left as the servos have it.
+
+        Unless `thorough` the first silent servo ends it, so that a tick is not held up for seconds.
 
         Raises:
             DriverError: the line is missing or busy, or a servo is silent or not as declared.
@@ -76,7 +78,7 @@ class ServoLine:
             fault_policy=self.faults.policy,
         )
         try:
-            bus.connect()
+            bus.connect(thorough=thorough)
             self.state = _first_state(bus)
         except DriverError:
             bus.close()
@@ -90,7 +92,7 @@ class ServoLine:
             return False
         self._next_open_ns = self._clock.now_ns() + REOPEN_NS
         try:
-            self.open()
+            self.open(thorough=False)
         except DriverError as error:
             self.failure = str(error)
             return False
