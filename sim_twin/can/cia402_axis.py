@@ -132,7 +132,7 @@ class Cia402Axis:
         """Return the statusword (6041)."""
         values = self._objects.values
         error_counts_s = self._encoder.counts_s - values[TARGET_VELOCITY, 0]
-        at_target = abs(error_counts_s) <= values[VELOCITY_WINDOW, 0]
+        at_target: bool = abs(error_counts_s) <= values[VELOCITY_WINDOW, 0]
         return (
             STATE_BITS[self.state]
             | _REMOTE * self.remote

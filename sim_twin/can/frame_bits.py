@@ -103,7 +103,8 @@ def frame_bits(frame: can.Message) -> int:
 
 def arbitration_key(frame: can.Message) -> int:
     """Return the bits of the arbitration field as they are compared: the lowest wins."""
+    can_id: int = frame.arbitration_id
+    remote: bool = frame.is_remote_frame
     if frame.is_extended_id:
-        base, extension = frame.arbitration_id >> 18, frame.arbitration_id & 0x3FFFF
-        return base << 21 | 0b11 << 19 | extension << 1 | frame.is_remote_frame
-    return frame.arbitration_id << 21 | frame.is_remote_frame << 20
+        return can_id >> 18 << 21 | 0b11 << 19 | (can_id & 0x3FFFF) << 1 | remote
+    return can_id << 21 | remote << 20

@@ -122,7 +122,7 @@ class ObjectDictionary:
         """Take the defaults of another node id, with the next reset."""
         self._variables = dict(_by_key(str(self._eds_path), node_id))
         own = _by_key(str(EDS_PATH), node_id)
-        self._defaults = {
+        self._defaults: dict[Key, Any] = {
             key: _default(self._variables.get(key), own.get(key))
             for key in dict.fromkeys((*own, *self._variables))
         }

@@ -14,8 +14,6 @@ from drivers.odrive.codec import (
     AxisError,
     AxisState,
     Command,
-    ControlMode,
-    InputMode,
     SdoOpcode,
     can_id,
     decode,
@@ -34,6 +32,8 @@ from drivers.odrive.endpoints import (
 )
 from sim_twin.can.emulated_drive import HUB_MOTOR, EmulatedDrive, Mounting
 from sim_twin.can.odrive_controller import ODriveController
+from sim_twin.can.odrive_inputs import INPUTS, refuse_nan
+from sim_twin.can.odrive_meters import METERS, ODriveMeters
 from sim_twin.can.odrive_properties import LiveProperty, ODriveProperties, firmware_numbers
 from sim_twin.can.power_stage import Trip
 
@@ -75,6 +75,7 @@ class ODriveAxis(EmulatedDrive):
         self._controller = ODriveController(
             self._stage, kv * math.tau, ki * math.tau, mounting.gear_ratio
         )
+        self._meters = ODriveMeters(self._stage, self._encoder, self._controller)
         self._serial = SERIAL_NUMBER + node_id
         table = read_endpoints(endpoints_path)
         numbers = firmware_numbers(table.firmware)
@@ -104,9 +105,7 @@ class ODriveAxis(EmulatedDrive):
         self._errors = AxisError(0)
         self._disarm_reason = AxisError(0)
         self._procedure_result = SUCCESS
-        self._offset_rev = 0.0
-        self._torque_nm = 0.0
-        self._told_nm = 0.0
+        self._meters.forget()
         self._fed_ns = self._now_ns or 0
         self._due_ns = {HEARTBEAT_RATE: 0, ENCODER_RATE: 0}
 
@@ -158,10 +157,8 @@ class ODriveAxis(EmulatedDrive):
             self.raise_fault(AxisError.VELOCITY_LIMIT_VIOLATION)
         torque_nm = 0.0
         if self.armed:
-            torque_nm = self._controller.torque_nm(dt_s, self._position_rev, velocity_rev_s)
-        self._torque_nm = torque_nm
-        if not self._encoder.frozen:
-            self._told_nm = torque_nm
+            torque_nm = self._controller.torque_nm(dt_s, self._meters.position_rev, velocity_rev_s)
+        self._meters.note_torque(torque_nm)
         self._speak(now_ns)
         return torque_nm
 
@@ -181,14 +178,6 @@ class ODriveAxis(EmulatedDrive):
                 self._due_ns[name] = max(self._due_ns[name] + period_ns, now_ns)
                 self._tell(command)
 
-    @property
-    def _position_rev(self) -> float:
-        return self._encoder.travelled / self._encoder.counts_per_rev + self._offset_rev
-
-    @property
-    def _velocity_rev_s(self) -> float:
-        return self._encoder.counts_s / self._encoder.counts_per_rev
-
     def receive(self, frame: can.Message) -> None:
         """Take one frame from the wire; any that is for this axis feeds its watchdog."""
         node_id, number = split_id(frame.arbitration_id)
@@ -201,16 +190,27 @@ class ODriveAxis(EmulatedDrive):
             command = Command(number)
             if frame.is_remote_frame:
                 self._tell(command)
-            elif command in _REACTIONS:
-                _REACTIONS[command](self, *decode(command, bytes(frame.data)))
+            else:
+                self._react(command, bytes(frame.data))
         except (ValueError, ProtocolError):
             # CANSimple has no way to refuse: what does not fit changes nothing.
             return
 
+    def _react(self, command: Command, data: bytes) -> None:
+        if command in INPUTS:
+            INPUTS[command](self._controller, *decode(command, data))
+        elif command in _REACTIONS:
+            _REACTIONS[command](self, *decode(command, data))
+
     def _tell(self, command: Command) -> None:
-        told = _TOLD.get(command)
-        if told is not None:
-            self._transmit(can_id(self.node_id, command), encode(command, *told(self)))
+        told: tuple[Any, ...]
+        if command in METERS:
+            told = METERS[command](self._meters)
+        elif command in _TOLD:
+            told = _TOLD[command](self)
+        else:
+            return
+        self._transmit(can_id(self.node_id, command), encode(command, *told))
 
     def _on_axis_state(self, wanted: int) -> None:
         if wanted == AxisState.IDLE:
@@ -232,7 +232,7 @@ class ODriveAxis(EmulatedDrive):
             return
         self._disarm_reason = AxisError(0)
         self._procedure_result = SUCCESS
-        self._controller.arm(self._position_rev, self._velocity_rev_s)
+        self._controller.arm(*self._meters.estimates())
         self._state = AxisState.CLOSED_LOOP_CONTROL
 
     def _on_estop(self) -> None:
@@ -250,41 +250,10 @@ class ODriveAxis(EmulatedDrive):
         self._encoder.lose_supply()
         self._boot()
 
-    def _on_controller_mode(self, control_mode: int, input_mode: int) -> None:
-        modes = ControlMode(control_mode), InputMode(input_mode)
-        self._controller.control_mode, self._controller.input_mode = modes
-
-    def _on_input_pos(self, position_rev: float, velocity: int, torque: int) -> None:
-        _refuse_nan(position_rev)
-        self._controller.input_rev = position_rev
-        self._controller.input_rev_s = velocity / 1000.0
-        self._controller.input_nm = torque / 1000.0
-
-    def _on_input_vel(self, velocity_rev_s: float, torque_nm: float) -> None:
-        _refuse_nan(velocity_rev_s, torque_nm)
-        self._controller.input_rev_s, self._controller.input_nm = velocity_rev_s, torque_nm
-
-    def _on_input_torque(self, torque_nm: float) -> None:
-        _refuse_nan(torque_nm)
-        self._controller.input_nm = torque_nm
-
-    def _on_limits(self, velocity_rev_s: float, current_a: float) -> None:
-        _refuse_nan(velocity_rev_s, current_a)
-        self._controller.velocity_limit_rev_s = velocity_rev_s
-        self._stage.current_limit_a = min(max(current_a, 0.0), self._stage.spec.current_limit_a)
-
     def _on_position(self, position_rev: float) -> None:
-        _refuse_nan(position_rev)
-        self._offset_rev += position_rev - self._position_rev
+        refuse_nan(position_rev)
+        self._meters.call_position(position_rev)
         self._controller.input_rev = position_rev
-
-    def _on_pos_gain(self, gain: float) -> None:
-        _refuse_nan(gain)
-        self._controller.position_gain = gain
-
-    def _on_vel_gains(self, gain: float, integrator_gain: float) -> None:
-        _refuse_nan(gain, integrator_gain)
-        self._controller.set_gains(gain, integrator_gain)
 
     def _on_address(self, node_id: int, serial: bytes, _connection: int) -> None:
         if int.from_bytes(serial, "little") == self._serial and node_id < BROADCAST_NODE_ID:
@@ -304,21 +273,6 @@ class ODriveAxis(EmulatedDrive):
         arrived = 1  # velocity and torque inputs have no trajectory to wait for
         return self._errors | self._disarm_reason, self._state, self._procedure_result, arrived
 
-    def _currents(self) -> tuple[float, ...]:
-        per_a = self._stage.spec.torque_nm_per_a
-        return self._controller.target_nm / per_a, self._told_nm / per_a
-
-    def _powers(self) -> tuple[float, ...]:
-        stage = self._stage
-        mechanical_w = self._told_nm * self._velocity_rev_s * math.tau
-        return stage.bus_v * stage.bus_current_a, mechanical_w
-
-
-def _refuse_nan(*values: float) -> None:
-    """Refuse what is no finite number."""
-    if not all(map(math.isfinite, values)):
-        raise ValueError(f"not finite: {values}")
-
 
 _CYCLIC: Final = {
     HEARTBEAT_RATE: Command.HEARTBEAT,
@@ -329,27 +283,13 @@ _REACTIONS: Final[Mapping[Command, Callable[..., None]]] = {
     Command.RX_SDO: ODriveAxis._on_sdo,
     Command.ADDRESS: ODriveAxis._on_address,
     Command.SET_AXIS_STATE: ODriveAxis._on_axis_state,
-    Command.SET_CONTROLLER_MODE: ODriveAxis._on_controller_mode,
-    Command.SET_INPUT_POS: ODriveAxis._on_input_pos,
-    Command.SET_INPUT_VEL: ODriveAxis._on_input_vel,
-    Command.SET_INPUT_TORQUE: ODriveAxis._on_input_torque,
-    Command.SET_LIMITS: ODriveAxis._on_limits,
     Command.REBOOT: ODriveAxis._on_reboot,
     Command.CLEAR_ERRORS: ODriveAxis._on_clear_errors,
     Command.SET_ABSOLUTE_POSITION: ODriveAxis._on_position,
-    Command.SET_POS_GAIN: ODriveAxis._on_pos_gain,
-    Command.SET_VEL_GAINS: ODriveAxis._on_vel_gains,
 }
-# A board's transistors are not modelled: they are as warm as the room.
 _TOLD: Final[Mapping[Command, Callable[[ODriveAxis], tuple[Any, ...]]]] = {
     Command.GET_VERSION: lambda axis: axis._version,
     Command.HEARTBEAT: ODriveAxis._heartbeat,
     Command.GET_ERROR: lambda axis: (axis._errors, axis._disarm_reason),
     Command.ADDRESS: lambda axis: (axis.node_id, axis._serial.to_bytes(6, "little"), 0),
-    Command.GET_ENCODER_ESTIMATES: lambda axis: (axis._position_rev, axis._velocity_rev_s),
-    Command.GET_IQ: ODriveAxis._currents,
-    Command.GET_TEMPERATURE: lambda axis: (axis._stage.spec.ambient_c, axis._stage.temperature_c),
-    Command.GET_BUS_VOLTAGE_CURRENT: lambda axis: (axis._stage.bus_v, axis._stage.bus_current_a),
-    Command.GET_TORQUES: lambda axis: (axis._controller.target_nm, axis._told_nm),
-    Command.GET_POWERS: ODriveAxis._powers,
 }

@@ -62,6 +62,11 @@ class ODriveController:
         """Set the velocity loop's gains in N·m per rev/s, and that per second."""
         self._loop.kv, self._loop.ki = velocity_gain, integrator_gain
 
+    def set_limits(self, velocity_rev_s: float, current_a: float) -> None:
+        """Set both limits; the current's is at most what the power stage gives."""
+        self.velocity_limit_rev_s = velocity_rev_s
+        self._stage.current_limit_a = min(max(current_a, 0.0), self._stage.spec.current_limit_a)
+
     def arm(self, position_rev: float, velocity_rev_s: float) -> None:
         """Start from where the shaft is."""
         self._loop.reset()

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from operator import methodcaller
 from typing import Final
 
 import can
@@ -11,6 +12,7 @@ from sim_twin.can.error_frames import bus_error_frame, restarted_frame, state_fr
 
 # A controller's mailboxes and the interface's queue in front of them.
 QUEUE_FRAMES: Final = 16
+_SUPPLIED: Final = methodcaller("supplied")
 
 
 class Station:
@@ -63,10 +65,7 @@ class Station:
     @property
     def is_heard(self) -> bool:
         """Tell whether anybody else has power, and so acknowledges."""
-        for station in self.others:  # any() of a generator takes three times as long
-            if station.supplied():
-                return True
-        return False
+        return any(map(_SUPPLIED, self.others))
 
     @property
     def error_active(self) -> bool:

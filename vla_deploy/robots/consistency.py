@@ -81,7 +81,7 @@ def nothing_used_twice(document: Document) -> Iterator[Fault]:
     yield from _repeats([(f"{d}.device", table(document, d).get("device")) for d in DEVICES])
 
 
-NODE_IDS: Mapping[str, range] = {"cia402": range(1, 128), "odrive": range(0x3F)}
+NODE_IDS: Mapping[str, range] = {"cia402": range(1, 127), "odrive": range(0x3F)}
 
 
 def drives_fit_protocol(document: Document) -> Iterator[Fault]:

@@ -30,7 +30,8 @@ from drivers.odrive.endpoints import (
 )
 from drivers.odrive.faults import AxisFault
 from sim_twin.can import MemoryBus
-from sim_twin.can.odrive import _REACTIONS, ODriveAxis
+from sim_twin.can.odrive import _REACTIONS
+from sim_twin.can.odrive_meters import ODriveMeters
 
 
 def with_endpoints(bench: Any, path: Path) -> ODriveBus:
@@ -113,7 +114,7 @@ def test_without_the_rate_endpoint_estimates_are_asked_for(odrive: Any, tmp_path
 def test_an_axis_that_was_never_calibrated_says_what_to_do(
     odrive: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ODriveAxis, "_position_rev", property(lambda axis: math.nan))
+    monkeypatch.setattr(ODriveMeters, "position_rev", property(lambda meters: math.nan))
     with pytest.raises(WrongDevice, match="calibrate"):
         odrive.bus.connect()
     odrive.bus.close()

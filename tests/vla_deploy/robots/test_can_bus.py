@@ -57,7 +57,7 @@ def test_odrive_needs_its_endpoints_and_its_own_node_ids(butler_copy: Path) -> N
 
 def test_a_cia402_drive_has_no_node_0(butler_copy: Path) -> None:
     edit(butler_copy, r"node_id = 1,", "node_id = 0,")
-    assert "got 0, expected an integer in 1..127, as cia402 has them" in faults_of(butler_copy)
+    assert "got 0, expected an integer in 1..126, as cia402 has them" in faults_of(butler_copy)
 
 
 def test_named_files_must_be_there_and_words_be_known(butler_copy: Path) -> None:
