@@ -119,7 +119,26 @@ class ProcessStack:
         Raises:
             KeyError: there is no such process.
         """
-        os.kill(self.row(name)["pid"], signal.SIGKILL)
+        self._signal(name, signal.SIGKILL)
+
+    def freeze(self, name: str) -> None:
+        """Let a process neither run nor end, as a machine that hangs would.
+
+        Raises:
+            KeyError: there is no such process.
+        """
+        self._signal(name, signal.SIGSTOP)
+
+    def thaw(self, name: str) -> None:
+        """Let a frozen process go on.
+
+        Raises:
+            KeyError: there is no such process.
+        """
+        self._signal(name, signal.SIGCONT)
+
+    def _signal(self, name: str, number: signal.Signals) -> None:
+        os.kill(self.row(name)["pid"], number)
 
     @property
     def faults(self) -> RemoteFaults:

@@ -140,6 +140,49 @@ def test_kill_9_of_the_executor_tells_the_command_as_lost(run: Run) -> None:
     assert run.ask("say", "turn left 20 degrees").returncode == 0
 
 
+def stops_with(run: Run, *causes: str) -> bool:
+    def is_stopped() -> bool:
+        control = run.status()["control"]
+        return bool(control) and control["state"] == "stopped" and control["cause"] in causes
+
+    return run.wait_until(is_stopped, 10.0)
+
+
+def drives_again(run: Run) -> bool:
+    # What a device says after its return may take a second to be believed.
+    assert run.wait_until(lambda: run.ask("reset").returncode == 0, 10.0)
+    assert run.ask("arm").returncode == 0
+    return run.ask("say", "turn left 20 degrees").returncode == 0
+
+
+def test_kill_9_of_the_twin_stops_control_until_another_twin_is_armed(run: Run) -> None:
+    saying = run.drive()
+    run.kill("twin")
+    assert stops_with(run, "estop", "servo_bus_lost", "can_bus_lost")
+    saying.communicate(timeout=30)
+    assert saying.returncode == 1
+    assert run.wait_until(lambda: run.row("twin")["state"] == "ready")
+    assert run.row("twin")["restarts"] == 1
+    assert run.row("control")["restarts"] == 0
+    assert run.state() == "stopped"
+    assert drives_again(run)
+
+
+@pytest.mark.slow
+def test_a_frozen_twin_is_told_by_its_silent_buses_and_control_does_not_hang(run: Run) -> None:
+    saying = run.drive()
+    run.freeze("twin")
+    assert stops_with(run, "servo_bus_lost")
+    assert "every servo" in run.status()["control"]["detail"]
+    saying.communicate(timeout=30)
+    assert saying.returncode == 1
+    assert not run.wait_until(lambda: run.row("control")["state"] != "ready", 8.0)
+    run.thaw("twin")
+    assert run.state() == "stopped"
+    assert drives_again(run)
+    assert run.row("control")["restarts"] == 0
+
+
 def test_kill_9_of_the_supervisor_ends_everything_and_a_new_run_starts(
     start: Callable[[], Run],
 ) -> None:

@@ -2,10 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from vla_deploy.safety.inputs import Flags, Floats, SafetyInputs, SafetyLimits
+
+EVERY_SERVO: Final = "every servo"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,15 +78,22 @@ def servo_hardware_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding 
 
 
 def servo_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
-    """Find a servo bus whose link is gone, or a servo that has been silent for too long."""
+    """Find a servo bus whose link is gone, or servos that have been silent for too long.
+
+    Where all are silent, the cause is not one of them.
+    """
     if inputs.lost_servo_buses:
         return Finding(subject=inputs.lost_servo_buses[0])
     joint = int(inputs.sample_age_s.argmax())
     age_s = float(inputs.sample_age_s[joint])
     if age_s <= limits.servo_age_s:
         return None
+    all_silent = inputs.sample_age_s.min() > limits.servo_age_s
     return Finding(
-        subject=limits.joint_names[joint], measured=age_s, limit=limits.servo_age_s, age_s=age_s
+        subject=EVERY_SERVO if all_silent else limits.joint_names[joint],
+        measured=age_s,
+        limit=limits.servo_age_s,
+        age_s=age_s,
     )
 
 

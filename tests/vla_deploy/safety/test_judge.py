@@ -94,6 +94,12 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         {"sample_age_s": np.array([0.0, 0.02])},
         "elbow",
     ),
+    (
+        Cause.SERVO_BUS_LOST,
+        {"sample_age_s": np.array([0.03, 0.02 + ULP])},
+        {"sample_age_s": np.array([0.02, 0.02])},
+        "every servo",
+    ),
     (Cause.CAN_BUS_LOST, {"lost_can_buses": ("can0",)}, {"lost_can_buses": ()}, "can0"),
     (Cause.CAN_BUS_LOST, right(lost=True), right(age_s=9.0), "right_wheel"),
     (
