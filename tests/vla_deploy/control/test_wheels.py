@@ -179,3 +179,50 @@ def test_a_quick_stop_that_does_not_end_ends_in_no_power(bench: Bench) -> None:
     bench.run(20)
     assert not wheel.drive.armed
     bench.wheels.close()
+
+
+def test_a_drive_that_was_only_late_brakes_without_a_fault_of_its_own(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(60)
+    bench.run(100, 0.3)
+    for wheel in bench.world.wheels:
+        wheel.drive.silence(on=True)
+    bench.run(40, 0.3)
+    assert bench.is_lost()
+    for wheel in bench.world.wheels:
+        wheel.drive.silence(on=False)
+    bench.run(190, 0.3)
+    assert not any(wheel.drive.faulted for wheel in bench.world.wheels)
+    assert [abs(wheel.velocity_rad_s) < 0.1 for wheel in bench.world.wheels] == [True, True]
+    bench.wheels.enable()
+    bench.run(20, 0.3)
+    assert not any(wheel.drive.armed for wheel in bench.world.wheels)
+    bench.wheels.close()
+
+
+def test_a_lost_link_stays_known_while_its_drives_are_still_told_to_stop(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.run(20)
+    bench.world.wire.set_bus_off()
+    bench.run(100)
+    assert bench.is_lost()
+    assert "bus-off" in bench.wheels.failure
+    bench.wheels.close()
+
+
+def test_a_stop_of_category_0_takes_the_power_within_a_tick(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(60)
+    bench.run(50, 0.3)
+    bench.wheels.cut_power()
+    bench.run(1, 0.3)
+    assert not any(wheel.drive.armed for wheel in bench.world.wheels)
+    bench.wheels.reset_fault()
+    bench.run(50)
+    assert not bench.wheels.faulted
+    bench.wheels.enable()
+    bench.run(60)
+    assert bench.wheels.enabled
+    bench.wheels.close()
