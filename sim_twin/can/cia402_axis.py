@@ -31,7 +31,7 @@ from drivers.canopen.objects import (
 )
 from sim_twin.can.object_dictionary import VALUE_RANGE, ObjectDictionary, SdoAbort
 from sim_twin.can.power_stage import Encoder, PowerStage
-from sim_twin.can.power_state_machine import RAMP_OPTIONS, STATE_BITS, PowerStateMachine
+from sim_twin.can.power_state_machine import POWERED, RAMP_OPTIONS, STATE_BITS, PowerStateMachine
 from sim_twin.can.velocity_loop import VelocityLoop, ramp_towards
 
 HALT_BIT: Final = 0x0100
@@ -187,12 +187,13 @@ class Cia402Axis:
     def advance(self, dt_s: float, velocity_rad_s: float) -> float:
         """Move the demand along its ramp and return the torque."""
         self._velocity_rad_s = velocity_rad_s
-        if not self._machine.powered:
+        state = self._machine.state
+        if state not in POWERED:
             self._demand_rad_s = velocity_rad_s
             self._loop.reset()
             self._torque_nm = 0.0
             return 0.0
-        self._demand_rad_s = demand_rad_s = self._next_demand(dt_s)
+        self._demand_rad_s = demand_rad_s = self._next_demand(state, dt_s)
         low_nm, high_nm = self._stage.torque_range_nm(velocity_rad_s)
         error_rad_s = demand_rad_s - velocity_rad_s
         self._torque_nm = self._loop.torque_nm(error_rad_s, dt_s, low_nm, high_nm)
@@ -200,9 +201,9 @@ class Cia402Axis:
             self._machine.at_standstill(self._objects.get(QUICK_STOP_OPTION))
         return self._torque_nm
 
-    def _next_demand(self, dt_s: float) -> float:
+    def _next_demand(self, state: PowerState, dt_s: float) -> float:
         values = self._objects.values
-        if self._machine.state is not _ENABLED or values[_CONTROLWORD] & HALT_BIT:
+        if state is not _ENABLED or values[_CONTROLWORD] & HALT_BIT:
             return self._braked(self._braking_ramp(), dt_s)
         counts_per_rad = self._encoder.counts_per_rad
         target_rad_s: float = values[_TARGET] / counts_per_rad

@@ -119,7 +119,8 @@ class WheelDrive(EmulatedDrive):
         self._report(code, error_register)
 
     def _act(self, now_ns: int, dt_s: float, velocity_rad_s: float) -> float:
-        self._beat(now_ns)
+        if now_ns >= self._producer.next_ns or now_ns > self._consumer.deadline_ns:
+            self._beat(now_ns)
         return self._axis.advance(dt_s, velocity_rad_s)
 
     def _trip(self, cause: Trip) -> None:

@@ -117,13 +117,16 @@ class EmulatedDrive(ABC):
         torque_nm = self._act(now_ns, dt_s, felt_rad_s)
         if torque_nm or not stage.at_rest:
             stage.load(torque_nm, velocity_rad_s, dt_s)
-        if not stage.at_rest or self.armed:
+        if stage.is_strained or self._tripped is not None:
             self._protect()
         return per_joint * torque_nm
 
     def _protect(self) -> None:
         """Trip on a new cause, and on a lasting one where the fault was reset."""
-        cause = self._stage.trip(self.armed)
+        armed = self.armed
+        if self._stage.at_rest and not armed:
+            return
+        cause = self._stage.trip(armed)
         if cause is not None and (cause is not self._tripped or not self.faulted):
             self._trip(cause)
         self._tripped = cause
@@ -139,7 +142,7 @@ class EmulatedDrive(ABC):
 
     def set_supply_v(self, volts: float) -> None:
         """Change the supply's voltage; below what the electronics need, the drive is off."""
-        self._stage.supply_v = self._stage.bus_v = volts
+        self._stage.supply(volts)
         self.set_supply(on=volts >= self._stage.spec.logic_v)
 
     def set_node_id(self, node_id: int) -> None:

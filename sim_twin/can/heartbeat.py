@@ -8,30 +8,33 @@ _NEVER = 1 << 62
 
 
 class HeartbeatProducer:
-    """Tell when the next heartbeat is due."""
+    """Tell when the next heartbeat is due, which is not before `next_ns`."""
 
     def __init__(self, objects: ObjectDictionary) -> None:
         self._objects = objects
-        self._next_ns = 0
+        self.next_ns = 0
 
     def due(self, now_ns: int) -> bool:
         """Tell whether to send one now, and plan the next."""
-        if now_ns < self._next_ns:
+        if now_ns < self.next_ns:
             return False
         period_ns = self._objects.get(HEARTBEAT_PRODUCER) * NS_PER_MS
         if not period_ns:
             return False
-        self._next_ns = max(self._next_ns + period_ns, now_ns)
+        self.next_ns = max(self.next_ns + period_ns, now_ns)
         return True
 
 
 class HeartbeatConsumer:
-    """Watch one producer from its first heartbeat on, as the standard has it."""
+    """Watch one producer from its first heartbeat on, as the standard has it.
+
+    It is not missed up to and including `deadline_ns`.
+    """
 
     def __init__(self, objects: ObjectDictionary) -> None:
         self._objects = objects
         self._heard_ns: int | None = None
-        self._deadline_ns = _NEVER
+        self.deadline_ns = _NEVER
         objects.after_write[HEARTBEAT_CONSUMER, 1] = self._plan
 
     @property
@@ -51,7 +54,7 @@ class HeartbeatConsumer:
 
     def expired(self, now_ns: int) -> bool:
         """Tell once that the producer has gone silent."""
-        if now_ns <= self._deadline_ns:
+        if now_ns <= self.deadline_ns:
             return False
         self.forget()
         return True
@@ -59,4 +62,4 @@ class HeartbeatConsumer:
     def _plan(self) -> None:
         limit_ns = (self._objects.get(HEARTBEAT_CONSUMER, 1) & 0xFFFF) * NS_PER_MS
         heard_ns = self._heard_ns if limit_ns else None
-        self._deadline_ns = _NEVER if heard_ns is None else heard_ns + limit_ns
+        self.deadline_ns = _NEVER if heard_ns is None else heard_ns + limit_ns

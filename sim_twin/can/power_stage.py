@@ -75,6 +75,9 @@ class PowerStage:
         )
         self._hot = False
         self.at_rest = True
+        self.is_strained = False
+        """Whether `trip` may find something; it cannot otherwise."""
+        self._cool_c = spec.temperature_limit_c - spec.temperature_hysteresis_c
 
     def torque_range_nm(self, velocity_rad_s: float) -> tuple[float, float]:
         """Return the torques that current limit and back-EMF allow, the lowest first."""
@@ -101,6 +104,16 @@ class PowerStage:
         self._i2t_a2s = max(0.0, self._i2t_a2s + surplus_a2 * dt_s)
         warm = self.temperature_c - spec.ambient_c > AT_REST_K
         self.at_rest = not (torque_nm or warm or self._i2t_a2s or self.jammed)
+        self.is_strained = not (
+            self.temperature_c <= self._cool_c
+            and spec.under_voltage_v <= self.bus_v <= spec.over_voltage_v
+            and self._i2t_a2s <= self._i2t_limit_a2s
+        )
+
+    def supply(self, volts: float) -> None:
+        """Change the supply's voltage."""
+        self.supply_v = self.bus_v = volts
+        self.is_strained = True
 
     def trip(self, armed: bool) -> Trip | None:
         """Return what forbids torque now; voltage and I²t count only where power is `armed`."""
@@ -122,6 +135,7 @@ class PowerStage:
         spec = self.spec
         self.temperature_c = spec.temperature_limit_c + spec.temperature_hysteresis_c
         self.at_rest = False
+        self.is_strained = True
 
     def jam(self, on: bool) -> None:
         """Let the I²t guard feel the full current, whatever flows."""
