@@ -21,9 +21,8 @@ class Clock(Protocol):
 class MonotonicClock:
     """Read CLOCK_MONOTONIC, the one clock that never jumps."""
 
-    def now_ns(self) -> int:
-        """Return CLOCK_MONOTONIC in nanoseconds."""
-        return time.monotonic_ns()
+    now_ns = staticmethod(time.monotonic_ns)
+    """Return CLOCK_MONOTONIC in nanoseconds; without a call in between, as it is asked often."""
 
     def sleep_until(self, deadline_ns: int) -> None:
         """Sleep to an absolute time, so that periods do not drift."""

@@ -1,8 +1,8 @@
 """Write goals for all servos, converted from the joint side and clamped to the servo's range."""
 
 from collections.abc import Mapping, Sequence
-from operator import le
-from typing import Final
+from math import isfinite
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,12 +53,9 @@ class GoalWriter:
         self._pulse_at_zero = -self._at_pulse_zero * self._pulses_per
         self._minimum = np.array([float(setup.minimum_pulse) for setup in setups])
         self._maximum = np.array([float(setup.maximum_pulse) for setup in setups])
-        ends = [
-            (servo.to_joint(setup.minimum_pulse), servo.to_joint(setup.maximum_pulse))
-            for servo, setup in zip(servos, setups, strict=True)
-        ]
-        self._lowest = [min(one) for one in ends]
-        self._highest = [max(one) for one in ends]
+        low, high = np.sort([self._to_joint(self._minimum), self._to_joint(self._maximum)], axis=0)
+        # goals within what all servos can do need no clamping
+        self._lowest, self._highest = float(low.max()), float(high.min())
         self._pwm_limit = {
             servo.id: setup.pwm_limit for servo, setup in zip(servos, setups, strict=True)
         }
@@ -68,7 +65,7 @@ class GoalWriter:
     @property
     def sent(self) -> Floats:
         """Return the goals sent last, on the joint side."""
-        return self._frame.pulses * self._per_pulse + self._at_pulse_zero
+        return self._to_joint(self._frame.pulses)
 
     def write(self, position_rad: Floats) -> None:
         """Send a goal to every servo.
@@ -78,15 +75,12 @@ class GoalWriter:
             LinkLost: the adapter is gone.
         """
         goals = position_rad.tolist()
-        if len(goals) != len(self._lowest):
-            self._refuse(position_rad)
-        within = all(map(le, self._lowest, goals)) and all(map(le, goals, self._highest))
-        if not within and not np.isfinite(position_rad).all():
-            self._refuse(position_rad)
+        if len(goals) != len(self._joints) or not isfinite(sum(goals)):
+            self._check(position_rad)
         pulses = position_rad * self._pulses_per
         np.add(pulses, self._pulse_at_zero, pulses)
         np.rint(pulses, pulses)
-        if not within:
+        if min(goals) < self._lowest or max(goals) > self._highest:
             np.clip(pulses, self._minimum, self._maximum, out=pulses)
         self._link.send(self._frame.of(pulses))
 
@@ -115,6 +109,10 @@ class GoalWriter:
         """Write the PWM limit anew the next time: the servo has lost it."""
         self._pwm.pop(servo_id, None)
 
+    def _to_joint(self, pulses: NDArray[Any]) -> Floats:
+        joint: Floats = pulses * self._per_pulse + self._at_pulse_zero
+        return joint
+
     def _pwm_value(self, servo_id: int, ratio: float) -> int:
         if servo_id not in self._servos:
             raise ValueError(f"no servo {servo_id} on this bus; it has {sorted(self._servos)}")
@@ -124,12 +122,13 @@ class GoalWriter:
             )
         return min(round(ratio * PWM_FULL), self._pwm_limit[servo_id])
 
-    def _refuse(self, position_rad: Floats) -> None:
+    def _check(self, position_rad: Floats) -> None:
         if position_rad.shape != (len(self._joints),):
             raise ValueError(f"expected {len(self._joints)} goals, got shape {position_rad.shape}")
         finite = np.isfinite(position_rad)
         bad = [joint for joint, good in zip(self._joints, finite, strict=True) if not good]
-        raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")
+        if bad:
+            raise ValueError(f"goals must be finite, got others for {', '.join(bad)}")
 
 
 class GoalFrame:
