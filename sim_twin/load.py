@@ -49,7 +49,5 @@ def servo_shafts(robot: RobotDescription) -> list[Shaft]:
 
 
 def drive_shafts(robot: RobotDescription) -> list[Shaft]:
-    """Return how each drive's gear turns its wheel; the emulated drive knows its own sign."""
-    return [
-        Shaft(joint=drive.joint, ratio=1.0 / drive.gear_ratio) for drive in robot.can_bus.drives
-    ]
+    """Return the wheels' shafts as they are: the emulated drives know their gear and sign."""
+    return [Shaft(joint=drive.joint) for drive in robot.can_bus.drives]
