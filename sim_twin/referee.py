@@ -5,18 +5,16 @@ Ground truth is for tests and for the demo's verdict; nothing on the robot may u
 
 import argparse
 import json
-import socket
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from sim_twin.errors import RefereeRefusal, TwinError, Unreachable
+from vla_deploy.json_line import ask_by_line
 
 REFEREE_SOCKET = "referee"
 FILM_SOCKET = "film"
-TIMEOUT_S = 10.0
-_CHUNK_BYTES = 65_536
 _EXAMPLES = """examples:
   python -m sim_twin.referee --run-dir /run/vla truth
   python -m sim_twin.referee --run-dir /run/vla inside --object red_cup --container box
@@ -42,13 +40,11 @@ def ask(run_dir: Path, op: str, **arguments: str) -> dict[str, Any]:
     if op not in _SOCKET_AND_ARGUMENTS:
         raise RefereeRefusal(f"no operation {op!r}; there are {', '.join(_SOCKET_AND_ARGUMENTS)}")
     path = run_dir / "dev" / _SOCKET_AND_ARGUMENTS[op][0]
-    line = json.dumps({"op": op, **arguments}).encode() + b"\n"
     try:
-        reply = _exchange(path, line)
+        answer = ask_by_line(path, {"op": op, **arguments})
     except OSError as error:
         reason = error.strerror or error
         raise Unreachable(f"{path}: {reason}; expected a running twin, start one") from error
-    answer: dict[str, Any] = json.loads(reply)
     if not answer.pop("ok"):
         raise RefereeRefusal(answer["error"])
     return answer
@@ -70,20 +66,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     sys.stdout.write(json.dumps(answer) + "\n")
     return 0
-
-
-def _exchange(path: Path, line: bytes) -> bytes:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-        client.settimeout(TIMEOUT_S)
-        client.connect(str(path))
-        client.sendall(line)
-        reply = bytearray()
-        while not reply.endswith(b"\n"):
-            data = client.recv(_CHUNK_BYTES)
-            if not data:
-                raise ConnectionError("the twin hung up")
-            reply += data
-    return bytes(reply)
 
 
 def _absolute(path: str) -> str:

@@ -1,15 +1,12 @@
 """Speak JSON lines to the twin of a run, where the run has one."""
 
-import json
-import socket
 from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.json_line import ask_by_line
 
 _SOCKET: Final = Path("dev") / "referee"
-_TIMEOUT_S: Final = 10.0
-_CHUNK_BYTES: Final = 65_536
 
 
 def ask_twin(run_dir: Path, op: str, **details: Any) -> dict[str, Any]:
@@ -25,25 +22,10 @@ def ask_twin(run_dir: Path, op: str, **details: Any) -> dict[str, Any]:
             f"this run has no twin ({path} is not there): faults are for the twin alone; "
             "start one: vla-deploy run --twin"
         )
-    request = json.dumps({"op": op, **details}).encode() + b"\n"
     try:
-        answer: dict[str, Any] = json.loads(_exchange(path, request))
+        answer = ask_by_line(path, {"op": op, **details})
     except OSError as error:
         raise CommandFailed(f"{path}: {error.strerror or error}; is the twin alive?") from error
     if not answer.pop("ok"):
         raise UsageError(f"the twin refuses: {answer['error']}")
     return answer
-
-
-def _exchange(path: Path, request: bytes) -> bytes:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-        client.settimeout(_TIMEOUT_S)
-        client.connect(str(path))
-        client.sendall(request)
-        reply = bytearray()
-        while not reply.endswith(b"\n"):
-            data = client.recv(_CHUNK_BYTES)
-            if not data:
-                raise ConnectionError("the twin hung up")
-            reply += data
-    return bytes(reply)
