@@ -16,10 +16,10 @@ EVERYDAY = (
     *("servo_bus_stuck", "servo_bus_garbage", "servo_bus_delayed", "servo_bus_intermittent"),
     *("servo_bus_unplug", "servo_bus_brown_out", "servo_bus_wrong_baud", "servo_bus_echo"),
     *("can_bus_unplug", "can_bus_bus_off", "can_bus_arbitration_loss"),
-    *("drive_off", "drive_id_clash", "estop_unplug", "estop_wrong"),
-    *("lidar_slow", "imu_stuck", "camera_stuck"),
+    *("drive_off", "drive_stuck", "drive_wrong", "drive_id_clash", "estop_unplug", "estop_wrong"),
+    "imu_slow",  # the only word that needs the whole stack, where it takes the least time
 )
-"""Every word of the vocabulary once; the campaign plays the rest."""
+"""Every word of the vocabulary at least once; the campaign plays the rest."""
 
 
 def marks(scenario: Scenario) -> list[pytest.MarkDecorator]:

@@ -36,11 +36,11 @@ def base() -> Iterator[Path]:
 
 
 @pytest.fixture
-def start(base: Path) -> Iterator[Callable[[], Run]]:
+def start(base: Path) -> Iterator[Callable[..., Run]]:
     runs: list[Run] = []
 
-    def begin() -> Run:
-        runs.append(Run(base))
+    def begin(*options: str) -> Run:
+        runs.append(Run(base, *options))
         runs[-1].wait_until_armed()
         return runs[-1]
 
@@ -50,7 +50,7 @@ def start(base: Path) -> Iterator[Callable[[], Run]]:
 
 
 @pytest.fixture
-def run(start: Callable[[], Run]) -> Run:
+def run(start: Callable[..., Run]) -> Run:
     return start()
 
 
@@ -184,7 +184,7 @@ def test_a_frozen_twin_is_told_by_its_silent_buses_and_control_does_not_hang(run
 
 
 def test_kill_9_of_the_supervisor_ends_everything_and_a_new_run_starts(
-    start: Callable[[], Run],
+    start: Callable[..., Run],
 ) -> None:
     run = start()
     shared_memory = (run.run_dir / "ipc").resolve()
@@ -197,6 +197,13 @@ def test_kill_9_of_the_supervisor_ends_everything_and_a_new_run_starts(
     assert start().ask("say", "turn left 20 degrees").returncode == 0
     assert not run.run_dir.exists()
     assert not shared_memory.exists()
+
+
+@pytest.mark.slow
+def test_a_robot_on_paced_buses_arms_and_drives(start: Callable[..., Run]) -> None:
+    run = start("--paced")
+    assert run.ask("say", "move forward 0.3 meters").returncode == 0
+    assert run.state() == "armed"
 
 
 def test_without_opengl_the_run_says_what_to_install_and_stops_again(base: Path) -> None:
