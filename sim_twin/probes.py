@@ -17,7 +17,7 @@ _WORLD_GROUPS = np.array([1, 1, 0, 0, 0, 0], np.uint8)
 _HIDDEN_GROUP = 5
 _ENDLESS_M = 1e6
 _SLACK_M = 1e-6
-_NOWHERE = (0.0, 0.0, 0.0)
+_NOWHERE = (0.0, 0.0)
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE.value
 
 
@@ -35,16 +35,17 @@ class RangeProbe:
         self._centres = data.geom_xpos
         self._view = copy.copy(model)
         self._view_groups = self._view.geom_group
+        # MuJoCo counts every group beyond the last one to it, as here where both are added.
         self._groups = model.geom_group.copy()
         radius_m = np.where(model.geom_type == _PLANE, _ENDLESS_M, model.geom_rbound)
         self._radius_m = radius_m
         self._reach_m = _reach_from_level_plane(model, data, radius_m) + _SLACK_M
         self._bound_m = np.stack([radius_m, radius_m, radius_m]) + _SLACK_M
         turn = np.tile(np.radians(np.arange(BEAMS)), 2)
-        cos, sin, flat = np.cos(turn), np.sin(turn), np.zeros(2 * BEAMS)
-        self._directions = np.stack([cos, sin, flat], axis=1)
-        self._leftwards = np.stack([-sin, cos, flat], axis=1)
-        self._rightwards = -self._leftwards
+        cos, sin = np.cos(turn), np.sin(turn)
+        self._directions = np.stack([cos, sin, np.zeros(2 * BEAMS)], axis=1)
+        self._heading = list(zip(cos.tolist(), sin.tolist(), strict=True))
+        self._offsets_m = np.empty_like(data.geom_xpos)
         self._hit = np.empty(BEAMS, np.int32)
 
     def cast(self, beams: range) -> NDArray[np.float32]:
@@ -75,23 +76,28 @@ class RangeProbe:
 
     def _hide_what_they_miss(self, first: int, count: int) -> None:
         """Hide geoms on one side of the plane, to the right of the first or left of the last."""
-        rotation, bound_m = self._rotation, self._bound_m
-        up = rotation[:, 2].tolist()
-        axes = [up, _NOWHERE, _NOWHERE]
-        if count <= BEAMS // 2:
-            left, right = self._leftwards[first], self._rightwards[first + count - 1]
-            axes[1:] = (rotation.dot(left), rotation.dot(right))
-        offsets_m = (self._centres - self._origin).T
-        inside_m = np.dot(axes, offsets_m)
-        level_m = inside_m[0]
+        bound_m = self._bound_m
+        (ax, bx, up_x), (ay, by, up_y), (az, bz, up_z) = self._rotation.tolist()
+        axes = [(up_x, up_y, up_z)]
+        for cos, sin in self._inwards(first, count):
+            axes.append((cos * ax + sin * bx, cos * ay + sin * by, cos * az + sin * bz))
+        inside_m = np.dot(axes, np.subtract(self._centres, self._origin, out=self._offsets_m).T)
+        level_m, right_m, left_m = inside_m
         np.abs(level_m, out=level_m)
         np.subtract(self._reach_m, level_m, out=level_m)
-        np.multiply(self._radius_m, math.hypot(up[0], up[1]), out=bound_m[0])
+        np.multiply(self._radius_m, math.hypot(up_x, up_y), out=bound_m[0])
         inside_m += bound_m
-        np.minimum(level_m, inside_m[1], out=level_m)
-        np.minimum(level_m, inside_m[2], out=level_m)
-        self._view_groups[:] = self._groups
-        np.copyto(self._view_groups, _HIDDEN_GROUP, where=level_m < 0.0)
+        np.minimum(level_m, right_m, out=level_m)
+        np.minimum(level_m, left_m, out=level_m)
+        np.multiply(level_m < 0.0, _HIDDEN_GROUP, out=self._view_groups)
+        self._view_groups += self._groups
+
+    def _inwards(self, first: int, count: int) -> tuple[tuple[float, float], ...]:
+        """Return, in the base's plane, what is at right angles to the first and last beam."""
+        if count > BEAMS // 2:
+            return _NOWHERE, _NOWHERE
+        (cos, sin), (last_cos, last_sin) = self._heading[first], self._heading[first + count - 1]
+        return (-sin, cos), (last_sin, -last_cos)
 
 
 def _reach_from_level_plane(

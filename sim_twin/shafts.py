@@ -42,7 +42,9 @@ class Shafts:
         self._read_qpos, self._read_qvel = _reader(data.qpos, qpos), _reader(data.qvel, qvel)
         self._read_force = _reader(data.actuator_force, actuators)
         self._all_ctrl, self._actuator = data.ctrl, _span(actuators)
-        self._angle, self._speed, self._effort, self._input = np.zeros((4, len(shafts)))
+        in_order = isinstance(self._actuator, slice)
+        self._some_ctrl = data.ctrl[self._actuator] if in_order else None
+        self._angle, self._speed, self._effort = np.zeros((3, len(shafts)))
         self._each_qpos, self._each_qvel = memoryview(data.qpos), memoryview(data.qvel)
         self._each_ctrl = memoryview(data.ctrl)
         factors = (self._per_joint.tolist(), self._sign.tolist())
@@ -67,8 +69,10 @@ class Shafts:
 
     def command(self, value: Floats) -> None:
         """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
-        _multiply(value, self._sign, self._input)
-        self._all_ctrl[self._actuator] = self._input
+        if self._some_ctrl is not None:
+            _multiply(value, self._sign, self._some_ctrl)
+        else:
+            self._all_ctrl[self._actuator] = value * self._sign
 
     def command_each(self, now_ns: int, laws: Sequence[ControlLaw]) -> None:
         """Set each motor's input by a law of its own, one by one, which is faster for a few."""

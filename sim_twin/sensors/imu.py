@@ -3,7 +3,7 @@
 import math
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ _HALF_TURN = 18_000
 _NOISY_FRAMES = 64
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ImuTruth:
+class ImuTruth(NamedTuple):
     """Hold what the world does to the sensor: attitude, and specific force in its own frame."""
 
     yaw_rad: float

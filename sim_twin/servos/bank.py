@@ -100,7 +100,8 @@ class ServoBank:
         Arrays are in the order of the servos and in shaft coordinates; 0 rad is 2048 pulses. Duty
         is zero without torque. A supply below `FirmwareOptions.brownout_v` switches the servos off.
         """
-        self._now_ns = max(self._now_ns, now_ns)
+        if now_ns > self._now_ns:
+            self._now_ns = now_ns
         return self._firmware.advance(now_ns, position_rad, velocity_rad_s, torque_nm, supply_v)
 
     def register(self, servo_id: int, name: str) -> int:

@@ -247,10 +247,10 @@ class Firmware:
         elapsed_s = (self.now_ns - self._checked_ns) / NS_PER_S
         self._checked_ns = self.now_ns
         effort_ratio = motion.effort_ratio(self._feedback.torque_nm)
-        bits = self._protection.check(effort_ratio, volts, elapsed_s)
-        if self._powered and bits.any():
-            for row in np.flatnonzero(bits):
-                self.raise_errors(int(row), int(bits[row]))
+        errors = self._protection.check(effort_ratio, volts, elapsed_s)
+        if self._powered:
+            for row, bits in errors:
+                self.raise_errors(row, bits)
 
     def _cut_torque(self, row: int) -> None:
         self._columns.torque_enable[row] = 0

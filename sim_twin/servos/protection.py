@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.dynamixel.model import VOLTAGE_UNIT_V, HardwareError, Model
-from sim_twin.servos.columns import Columns, IntColumn
+from sim_twin.servos.columns import Columns
 from sim_twin.servos.profile import Floats
 from sim_twin.servos.spec import FirmwareOptions
 from sim_twin.servos.thermal import Thermals
@@ -28,18 +28,19 @@ class Protection:
         self._overload_s = np.zeros(count)
         self._overload_runs = False
         self._overload_is_forced = False
-        self._none = np.zeros(count, np.int32)
         self._forced_overload = np.zeros(count, np.bool_)
         self.thermals = Thermals(models, options.ambient_c)
         self.reload()
 
-    def check(self, effort_ratio: Floats, supply_v: float, dt_s: float) -> IntColumn:
-        """Return the hardware error bits that hold now, after `dt_s` of this effort."""
+    def check(
+        self, effort_ratio: Floats, supply_v: float, dt_s: float
+    ) -> Sequence[tuple[int, int]]:
+        """Return rows and hardware error bits that hold now, after `dt_s` of this effort."""
         self.thermals.advance(effort_ratio, dt_s)
         effort = np.abs(effort_ratio)
         if self._overload_runs or float(_peak(effort)) > self._options.overload_ratio:
             self._count_overload(effort > self._options.overload_ratio, dt_s)
-        return self._none if self._is_fine(supply_v) else self._bits(supply_v)
+        return () if self._is_fine(supply_v) else self._errors(supply_v)
 
     def _count_overload(self, overloaded: NDArray[np.bool_], dt_s: float) -> None:
         self._overload_s += dt_s
@@ -71,13 +72,14 @@ class Protection:
             and float(_peak(self.thermals.body_c)) <= self._coolest_limit_c
         )
 
-    def _bits(self, supply_v: float) -> IntColumn:
+    def _errors(self, supply_v: float) -> list[tuple[int, int]]:
         supply = supply_v / VOLTAGE_UNIT_V
         voltage = (supply > self._max_voltage) | (supply < self._min_voltage)
         hot = self.thermals.body_c > self._temperature_limit
         overload = (self._overload_s > self._options.overload_time_s) | self._forced_overload
-        return (
+        bits = (
             voltage * int(HardwareError.INPUT_VOLTAGE)
             | hot * int(HardwareError.OVERHEATING)
             | overload * int(HardwareError.OVERLOAD)
-        ).astype(np.int32)
+        )
+        return [(row, found) for row, found in enumerate(bits.tolist()) if found]
