@@ -166,6 +166,21 @@ def test_wheels_are_told_by_their_counts_beside_what_was_commanded(bench: Bench)
     bench.wheels.close()
 
 
+def test_a_drive_that_runs_away_is_told_by_its_counts(bench: Bench) -> None:
+    bench.wheels.open()
+    bench.wheels.enable()
+    bench.run(60)
+    for wheel in bench.world.wheels:
+        wheel.drive.run_away(2.0)
+    bench.run(300)
+    turning = [sample.measured_rad_s for sample in bench.wheels.samples()]
+    assert turning == pytest.approx([2.0, 2.0], abs=0.05)
+    bench.wheels.disable()
+    bench.run(5)
+    assert not any(wheel.drive.armed for wheel in bench.world.wheels)
+    bench.wheels.close()
+
+
 def test_a_quick_stop_that_does_not_end_ends_in_no_power(bench: Bench) -> None:
     bench.wheels.open()
     bench.wheels.enable()
