@@ -3,18 +3,11 @@
 Events (a write, a fault, a trip) are handled servo by servo; the control loops run over all servos
 at once, because they run every physics step.
 
-What the firmware does at the edges:
-
-- torque on: the goal position becomes the present one, unless it was written since torque went off;
-- a hardware error that Shutdown (63) names cuts torque, and only a reboot lets it come back: until
-  then torque_enable takes a 1 without an error and stays 0;
-- a tripped bus watchdog makes the present position the goal (velocity mode brakes, current and PWM
-  mode go limp), clears the profile and refuses goals until 0 is written to it; position and
-  velocity modes brake with their own gains, so a heavy joint swings out first;
-- a reboot or loss of supply gives the RAM its defaults and forgets the turns counted.
+What the firmware does at the edges: `sim_twin/servos/reactions.py`. A reboot or loss of supply
+gives the RAM its defaults and forgets the turns counted.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -22,8 +15,6 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.control_table import (
-    WATCHDOG_TRIPPED,
-    OperatingMode,
     Register,
     StatusReturnLevel,
 )
@@ -34,14 +25,13 @@ from sim_twin.servos.motion import Motion
 from sim_twin.servos.profile import Floats
 from sim_twin.servos.protection import CHECK_PERIOD_S, Protection
 from sim_twin.servos.rail import Rail
+from sim_twin.servos.reactions import Reactions
 from sim_twin.servos.register_file import RegisterFile
 from sim_twin.servos.spec import EmulatedServoSpec, FirmwareOptions
-from sim_twin.servos.watchdog import BusWatchdog
 
 _CHECK_PERIOD_NS: Final = round(CHECK_PERIOD_S * NS_PER_S)
 _BROWNOUT_RATIO: Final = 0.6
 """No servo runs below this share of its nominal voltage (chosen: 3 V of a 5 V servo)."""
-_TORQUE_ON_BY_GOAL: Final = 0x08
 _TORQUE_ON_AT_START: Final = 0x01
 
 
@@ -60,35 +50,28 @@ class Firmware:
             min(options.brownout_v, _BROWNOUT_RATIO * model.voltage_v) for model in models
         )
         self._feedback = Feedback(self._columns, self._motion, self._protection)
-        self._watchdog = BusWatchdog(self._columns)
+        self._reactions = Reactions(
+            self.registers,
+            self._columns,
+            self._motion,
+            trip_holds_present=options.trip_holds_present,
+        )
         self._goal_window = GoalWindow(self._columns)
         self._boot_until_ns = [0] * len(specs)
-        self._goal_is_fresh = [False] * len(specs)
         self._powered = True
         self._pose_known = False
-        self._stale = True
         self._all_readable = False
         self._advanced_ns = 0
         self._checked_ns = 0
         self._supply_v = 0.0
         self.now_ns = 0
-        self._on_change: dict[str, Callable[[int], None]] = {
-            "torque_enable": self._on_torque,
-            "operating_mode": self._on_mode,
-        }
-        self._on_write: dict[str, Callable[[int], None]] = {
-            "bus_watchdog": self._on_watchdog,
-            "goal_position": self._on_goal_position,
-        }
         for row in range(len(specs)):
             self._boot(row)
 
     def set_time(self, now_ns: int) -> None:
         """Take over the time, and trip the watchdogs that ran out."""
         self.now_ns = now_ns
-        if now_ns >= self._watchdog.earliest_ns:
-            for row in self._watchdog.expired(now_ns):
-                self._trip(row)
+        self._reactions.set_time(now_ns)
 
     def advance(
         self,
@@ -102,7 +85,7 @@ class Firmware:
 
         The duty counts from the models' nominal voltage: what the rail lacks is taken off.
         """
-        if self._stale:
+        if self._reactions.stale:
             self._reload()
         self.set_time(now_ns)
         self._motion.sense(position_rad, velocity_rad_s)
@@ -114,7 +97,7 @@ class Firmware:
         if supply_v != self._supply_v or now_ns - self._checked_ns >= _CHECK_PERIOD_NS:
             self._supply_v = supply_v
             self._check()
-        if self._stale:
+        if self._reactions.stale:
             self._reload()
         return self._motion.advance(max(dt_s, 1e-6))
 
@@ -127,7 +110,7 @@ class Firmware:
 
     def feed_watchdog(self, rows: Sequence[int]) -> None:
         """Count a packet to these servos as communication."""
-        self._watchdog.feed(rows, self.now_ns)
+        self._reactions.watchdog.feed(rows, self.now_ns)
 
     def refresh(self, address: int, length: int) -> None:
         """Bring present values within this range up to date."""
@@ -140,16 +123,11 @@ class Firmware:
         for register, value in writes:
             changed = table.get(register.name) != value
             table.put(register.name, value)
-            if changed and register.name in self._on_change:
-                self._on_change[register.name](row)
-            if register.name in self._on_write:
-                self._on_write[register.name](row)
-            if changed and register.name != "goal_position":
-                self._stale = True
+            self._reactions.follow_write(row, register.name, changed=changed)
 
     def read_spans(self, rows: Sequence[int], address: int, length: int) -> list[bytes]:
         """Return up-to-date bytes of several servos, or none unless all of them answer reads."""
-        if self._stale or not (self._all_answer() and self._all_readable):
+        if self._reactions.stale or not (self._all_answer() and self._all_readable):
             return []
         self.refresh(address, length)
         return self.registers.spans(rows, address, length)
@@ -165,7 +143,9 @@ class Firmware:
         Return False, and do nothing, where more than storing is due: a refusal, or a servo whose
         torque is off, whose profile is timed, or that is booting.
         """
-        if self._stale or not (self._all_answer() and self._goal_window.admits(rows, goals)):
+        if self._reactions.stale or not (
+            self._all_answer() and self._goal_window.admits(rows, goals)
+        ):
             return False
         self._columns.goal_position[rows] = goals
         self._motion.goals_moved = True
@@ -191,15 +171,12 @@ class Firmware:
         if self.registers.tables[row].get("moving"):
             return False
         self._motion.home(row)
-        self._stale = True
+        self._reactions.stale = True
         return True
 
     def raise_errors(self, row: int, bits: int) -> None:
         """Set hardware error bits, and cut torque where Shutdown names one of them."""
-        columns = self._columns
-        columns.hardware_error[row] |= bits
-        if columns.hardware_error[row] & columns.shutdown[row] and columns.torque_enable[row]:
-            self._cut_torque(row)
+        self._reactions.raise_errors(row, bits)
 
     def heat(self, row: int, celsius: float) -> None:
         """Bring a servo to a temperature, as heat from outside does; it cools from there."""
@@ -214,19 +191,17 @@ class Firmware:
         table.power_on()
         self._feedback.booted_ns[row] = self.now_ns
         self._protection.clear_overload(row)
-        self._motion.home(row)
-        self._goal_is_fresh[row] = False
+        self._reactions.boot(row)
         if "startup_configuration" in table.model.registers:
             table.put("torque_enable", table.get("startup_configuration") & _TORQUE_ON_AT_START)
-        self._watchdog.reload(row, self.now_ns)
-        self._stale = True
+        self._reactions.start_watchdog(row)
 
     def _take_first_pose(self) -> None:
         self._pose_known = True
         self._advanced_ns = self._checked_ns = self.now_ns
         for row in range(len(self.registers)):
             self._motion.home(row)
-        self._stale = True
+        self._reactions.stale = True
 
     def _switch_power(self, *, on: bool) -> None:
         self._powered = on
@@ -234,7 +209,7 @@ class Firmware:
             if on:
                 self.reboot(row)
             else:
-                self._cut_torque(row)
+                self._reactions.cut_torque(row)
 
     def _check(self) -> None:
         """Look at voltage, current and temperature, which are slow beside the control loops."""
@@ -252,63 +227,8 @@ class Firmware:
             for row, bits in errors:
                 self.raise_errors(row, bits)
 
-    def _cut_torque(self, row: int) -> None:
-        self._columns.torque_enable[row] = 0
-        self._goal_is_fresh[row] = False
-        self._watchdog.reload(row, self.now_ns)
-        self._stale = True
-
-    def _trip(self, row: int) -> None:
-        columns = self._columns
-        columns.bus_watchdog[row] = WATCHDOG_TRIPPED
-        columns.profile_acceleration[row] = 0
-        columns.profile_velocity[row] = 0
-        if self._options.trip_holds_present:
-            columns.goal_position[row] = self._motion.pulses[row]
-            self._motion.restart(row)
-        else:
-            columns.goal_position[row] = round(float(self._motion.profile.position[row]))
-            self._motion.profile.restart(row, float(columns.goal_position[row]))
-        columns.goal_velocity[row] = 0
-        mode = columns.operating_mode[row]
-        if mode == OperatingMode.PWM:
-            columns.goal_pwm[row] = 0
-        if mode == OperatingMode.CURRENT:
-            columns.goal_current[row] = 0
-        self._stale = True
-
-    def _on_torque(self, row: int) -> None:
-        columns = self._columns
-        if not columns.torque_enable[row] or columns.hardware_error[row] & columns.shutdown[row]:
-            self._cut_torque(row)
-            return
-        if not self._goal_is_fresh[row]:
-            columns.goal_position[row] = self._motion.pulses[row]
-        self._motion.restart(row)
-        self._motion.profile.on_goal(row)
-        self._watchdog.reload(row, self.now_ns)
-
-    def _on_mode(self, row: int) -> None:
-        self.registers.tables[row].reset_motion_settings()
-        self._goal_is_fresh[row] = False
-        self._motion.home(row)
-
-    def _on_watchdog(self, row: int) -> None:
-        self._watchdog.reload(row, self.now_ns)
-
-    def _on_goal_position(self, row: int) -> None:
-        self._motion.goals_moved = True
-        self._motion.profile.on_goal(row)
-        if self._columns.torque_enable[row]:
-            return
-        self._goal_is_fresh[row] = True
-        if self._columns.drive_mode[row] & _TORQUE_ON_BY_GOAL:
-            self._columns.torque_enable[row] = 1
-            self._on_torque(row)
-            self._stale = True
-
     def _reload(self) -> None:
-        self._stale = False
+        self._reactions.stale = False
         self._motion.reload()
         self._goal_window.reload()
         self._protection.reload()

@@ -234,11 +234,13 @@ class Motion:
         change, position = self._change, self.profile.position
         _subtract(position, self._last_setpoint, change)
         self._last_setpoint[:] = position
-        if self._has_rates:
-            self._pwm += change * (self._forward / dt_ms)
         if self._has_2nd:
             self._pwm += (change - self._last_change) * (self._forward_2nd / dt_ms**2)
             self._last_change[:] = change
+        if self._has_rates:
+            change /= dt_ms
+            change *= self._forward
+            self._pwm += change
 
     def _velocity_pwm(self, rows: Rows, dt_s: float) -> Floats:
         columns = self._columns

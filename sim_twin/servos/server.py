@@ -26,6 +26,8 @@ _MAX_STEPS_BEHIND: Final = 50
 _MAX_STEPS_WAITING: Final = 5
 _STEP_COST_NS: Final = 300_000
 """A step does not begin this shortly before a reply is due."""
+_ANSWER_NS: Final = 500_000
+"""A host that has its reply may send at once; a step would make the bytes seem to come late."""
 _WATCH_NS: Final = 150_000
 """Sleep may end this late, so the rest of the time before a reply is spent watching the clock."""
 
@@ -98,6 +100,9 @@ def _turn(servos: FreeServos, line: PtyLine, clock: Clock) -> None:
     """Do what is due, then wait for bytes or for what is due next."""
     now_ns, due_ns = clock.now_ns(), servos.bank.next_due_ns()
     behind = now_ns - servos.now_ns > _MAX_STEPS_WAITING * _STEP_NS
+    if servos.bank.paced and due_ns is None and not behind and _readable(line, _ANSWER_NS):
+        line.poll_once()
+        return
     if due_ns is None or due_ns - now_ns > _STEP_COST_NS or behind:
         servos.advance_to(now_ns)
         step_ns = servos.now_ns + _STEP_NS

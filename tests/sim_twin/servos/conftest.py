@@ -12,7 +12,7 @@ from drivers.dynamixel.codec import (
     PacketParser,
     encode_instruction,
 )
-from drivers.dynamixel.control_table import MODELS
+from drivers.dynamixel.control_table import MODELS, OperatingMode
 from sim_twin.servos import EmulatedServoSpec, FirmwareOptions, ServoBank
 from sim_twin.servos.rotor import FreeRotors
 
@@ -68,6 +68,19 @@ class Bench:
         self.rotors.position_rad[:] = position_rad
         self.rotors.velocity_rad_s[:] = 0.0
         self._step()
+
+    def arm(self, mode: OperatingMode = OperatingMode.POSITION) -> None:
+        """Choose a mode and switch torque on."""
+        assert self.write("operating_mode", mode) == 0
+        assert self.write("torque_enable", 1) == 0
+
+    def samples(self, name: str, seconds: float, period_s: float = 0.01) -> list[int]:
+        """Read a register again and again."""
+        values = []
+        for _ in range(round(seconds / period_s)):
+            self.run(period_s)
+            values.append(self.read(name))
+        return values
 
     def send(self, servo_id: int, instruction: int, params: bytes = b"") -> list[Packet]:
         self.bank.receive(encode_instruction(servo_id, instruction, params))
