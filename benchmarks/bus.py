@@ -1,9 +1,10 @@
 """Measure the CPU of one 16-servo cycle against the peers, and our timing on a paced wire.
 
-A cycle reads 10 bytes of every servo (current, velocity, position), decodes them, and writes a
-4-byte goal to every servo. The bus is a pseudo-terminal served by another process. Without pacing,
-rounds of the clients take turns, so that a busy machine hits all of them; medians are compared,
-plain sync read with plain, fast with fast. With pacing, every byte takes its time.
+A cycle reads 10 bytes of every servo, decodes them into current, velocity and position, and writes
+a goal to every servo; what each client does for it is told in `bus_clients`. The bus is a pseudo-
+terminal served by another process. Without pacing, rounds of the clients take turns, so that a busy
+machine hits all of them; medians are compared, plain sync read with plain, fast with fast. With
+pacing, every byte takes its time: `bus_paced`.
 """
 
 import argparse
@@ -75,7 +76,7 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
             for _ in range(rounds):
                 for client in CLIENTS:
                     results[client.name].append(_run_round(client, link, seconds))
-        return _report(results) | measure_paced(Path(folder), rounds * seconds)
+        return _report(results) | measure_paced(Path(folder), rounds, seconds)
 
 
 def _report(results: dict[str, list[Round]]) -> dict[str, Any]:

@@ -1,13 +1,18 @@
 """Open each client of the bus comparison and hand out the function that runs one of its cycles.
 
-A cycle reads 10 bytes of each of 16 servos (current, velocity, position) and writes a 4-byte goal
-to each. Ours and dynamixel-sdk hand out numbers; rustypot's raw block hands out bytes.
+A cycle reads 10 bytes of each of 16 servos, turns them into current, velocity and position as
+signed numbers, and writes a goal, a number too, to each. Each client does as much of that as its
+library has a way for, and the least code does the rest: dynamixel-sdk gives unsigned numbers, and
+rustypot's raw block gives bytes, which one `struct` call per servo decodes. Both take a goal as
+four bytes. Ours does more: it gives and takes SI arrays on the joint side, checks the CRC of every
+reply, clamps goals and keeps count of what is missing; the peers do not have to.
 """
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from struct import Struct
 from typing import Any, Final
 
 import numpy as np
@@ -22,6 +27,8 @@ _REPLY_MARGIN_S: Final = 0.1  # the emulator shares the machine; this is no meas
 _NO_HEALTH_POLL: Final = 1_000_000  # the peers do not do it
 _BLOCK: Final = (126, 10)
 _GOAL: Final = (116, 4)
+_GOAL_PULSE: Final = 2048
+_unpack: Final = Struct("<hii").unpack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,8 +58,8 @@ def ours(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
     goals = np.zeros(SERVOS)
 
     def cycle() -> None:
-        state = bus.read_state()
-        if not state.valid.all():
+        bus.read_state()
+        if bus.counters.partial_cycles:
             raise RuntimeError("drivers.dynamixel: a servo gave no value; the bus is not in order")
         bus.write_goals(goals)
 
@@ -75,7 +82,7 @@ def _sdk(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
     ids = range(1, SERVOS + 1)
     for servo_id in ids:
         read.addParam(servo_id)
-        write.addParam(servo_id, [0, 8, 0, 0])
+        write.addParam(servo_id, _bytes_of(_GOAL_PULSE))
     transact = read.fastSyncRead if fast else read.txRxPacket
 
     def cycle() -> None:
@@ -85,7 +92,7 @@ def _sdk(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]:
             _signed(read.getData(servo_id, 126, 2), 16)
             _signed(read.getData(servo_id, 128, 4), 32)
             _signed(read.getData(servo_id, 132, 4), 32)
-            write.changeParam(servo_id, [0, 8, 0, 0])
+            write.changeParam(servo_id, _bytes_of(_GOAL_PULSE))
         write.txPacket()
 
     try:
@@ -101,16 +108,21 @@ def _rustypot(link: Path, baud: int, fast: bool) -> Iterator[Callable[[], None]]
     bus = rustypot.Xl430PyController(str(link), baud, _REPLY_MARGIN_S)
     bus.set_fast_sync_read(fast)
     ids = list(range(1, SERVOS + 1))
-    goals = [[0, 8, 0, 0] for _ in ids]
+    goals = [_GOAL_PULSE] * SERVOS
 
     def cycle() -> None:
-        bus.sync_read_raw_data(ids, *_BLOCK)
-        bus.sync_write_raw_data(ids, _GOAL[0], goals)
+        for data in bus.sync_read_raw_data(ids, *_BLOCK):
+            _unpack(data)
+        bus.sync_write_raw_data(ids, _GOAL[0], [_bytes_of(goal) for goal in goals])
 
     try:
         yield cycle
     finally:
         bus.close()
+
+
+def _bytes_of(goal: int) -> list[int]:
+    return list(goal.to_bytes(4, "little", signed=True))
 
 
 def _signed(value: int, bits: int) -> int:
