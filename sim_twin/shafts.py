@@ -36,6 +36,7 @@ class Shafts:
         qpos, qvel = model.jnt_qposadr[joints].tolist(), model.jnt_dofadr[joints].tolist()
         ratio = np.array([shaft.ratio for shaft in shafts])
         self._zero_rad = np.array([shaft.offset for shaft in shafts]) / ratio
+        self._each_zero_rad: list[float] = self._zero_rad.tolist()
         self._per_joint = 1.0 / ratio
         self._sign = np.sign(ratio)
         # The state's memory is asked for once: asking MjData anew costs more than reading it.
@@ -76,16 +77,16 @@ class Shafts:
 
     def command_each(self, now_ns: int, laws: Sequence[ControlLaw]) -> None:
         """Set each motor's input by a law of its own, one by one, which is faster for a few."""
-        qpos, qvel, zero_rad = self._each_qpos, self._each_qvel, self._zero_rad.item
-        ctrl = self._each_ctrl
+        qpos, qvel, ctrl = self._each_qpos, self._each_qvel, self._each_ctrl
         for law, row in zip(laws, self._rows, strict=True):
             number, angle, speed, actuator, per_joint, sign = row
-            angle_rad = qpos[angle] * per_joint - zero_rad(number)
+            angle_rad = qpos[angle] * per_joint - self._each_zero_rad[number]
             ctrl[actuator] = sign * law(now_ns, angle_rad, qvel[speed] * per_joint)
 
     def slip(self, row: int, angle_rad: float) -> None:
         """Measure a shaft further off than it is, as an encoder does after a blow."""
         self._zero_rad[row] -= angle_rad
+        self._each_zero_rad[row] -= angle_rad
 
 
 def _reader(state: Floats, addresses: list[int]) -> Callable[[], Floats]:

@@ -70,9 +70,8 @@ class PowerStage:
         self.current_limit_a = spec.current_limit_a
         self.jammed = False
         self._i2t_a2s = 0.0
-        self._i2t_limit_a2s = spec.overload_s * (
-            spec.current_limit_a**2 - spec.continuous_current_a**2
-        )
+        self._continuous_a2 = spec.continuous_current_a**2
+        self._i2t_limit_a2s = spec.overload_s * (spec.current_limit_a**2 - self._continuous_a2)
         self._hot = False
         self.at_rest = True
         self.is_strained = False
@@ -95,19 +94,20 @@ class PowerStage:
         spec = self.spec
         self.current_a = current_a = torque_nm / spec.torque_nm_per_a
         copper_w = spec.resistance_ohm * current_a * current_a
-        self.bus_current_a = (copper_w + torque_nm * velocity_rad_s) / max(self.bus_v, 1.0)
-        self.bus_v = self.supply_v - spec.supply_resistance_ohm * self.bus_current_a
+        power_w = copper_w + torque_nm * velocity_rad_s
+        self.bus_current_a = power_w / self.bus_v if self.bus_v > 1.0 else power_w
+        self.bus_v = bus_v = self.supply_v - spec.supply_resistance_ohm * self.bus_current_a
         cooling_w = (self.temperature_c - spec.ambient_c) / spec.thermal_resistance_k_w
         self.temperature_c += (copper_w - cooling_w) / spec.heat_capacity_j_k * dt_s
         felt_a = spec.current_limit_a if self.jammed else current_a
-        surplus_a2 = felt_a * felt_a - spec.continuous_current_a**2
-        self._i2t_a2s = max(0.0, self._i2t_a2s + surplus_a2 * dt_s)
+        i2t_a2s = self._i2t_a2s + (felt_a * felt_a - self._continuous_a2) * dt_s
+        self._i2t_a2s = i2t_a2s = i2t_a2s if i2t_a2s > 0.0 else 0.0
         warm = self.temperature_c - spec.ambient_c > AT_REST_K
-        self.at_rest = not (torque_nm or warm or self._i2t_a2s or self.jammed)
+        self.at_rest = not (torque_nm or warm or i2t_a2s or self.jammed)
         self.is_strained = not (
             self.temperature_c <= self._cool_c
-            and spec.under_voltage_v <= self.bus_v <= spec.over_voltage_v
-            and self._i2t_a2s <= self._i2t_limit_a2s
+            and spec.under_voltage_v <= bus_v <= spec.over_voltage_v
+            and i2t_a2s <= self._i2t_limit_a2s
         )
 
     def supply(self, volts: float) -> None:

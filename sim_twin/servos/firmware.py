@@ -87,7 +87,8 @@ class Firmware:
         """
         if self._reactions.stale:
             self._reload()
-        self.set_time(now_ns)
+        self.now_ns = now_ns
+        self._reactions.set_time(now_ns)
         self._motion.sense(position_rad, velocity_rad_s)
         if not self._pose_known:
             self._take_first_pose()
