@@ -79,9 +79,23 @@ def test_a_load_lets_the_supply_sag_and_braking_lifts_it() -> None:
 )
 def test_a_wrong_voltage_trips_an_armed_stage(supply_v: float, cause: Trip | None) -> None:
     stage = PowerStage(SPEC)
-    stage.bus_v = supply_v
+    stage.supply(supply_v)
+    assert stage.is_strained
     assert stage.trip(armed=True) is cause
     assert stage.trip(armed=False) is None
+
+
+@pytest.mark.parametrize("torque_nm", [-4.0, 0.0, 4.0])
+@pytest.mark.parametrize("supply_v", [15.0, 17.0, 24.0, 31.0, 33.0])
+def test_a_stage_that_is_not_strained_never_trips(supply_v: float, torque_nm: float) -> None:
+    stage = PowerStage(SPEC)
+    stage.supply(supply_v)
+    calm = 0
+    for _ in range(round(30.0 / STEP_S)):
+        stage.load(torque_nm, 0.0, STEP_S)
+        calm += not stage.is_strained
+        assert stage.is_strained or stage.trip(armed=True) is None
+    assert (calm > 0) == (SPEC.under_voltage_v < supply_v < SPEC.over_voltage_v)
 
 
 def test_the_encoder_counts_whole_steps_and_reads_zero_without_edges() -> None:

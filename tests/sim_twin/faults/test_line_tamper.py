@@ -104,6 +104,37 @@ def test_a_bus_repeats_its_last_answer_of_the_same_length() -> None:
     assert [line.transmit(), line.transmit()] == [b"state1", b"ok"]
 
 
+class Watch:
+    """Say what time it is."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+        self.asked_ns = 0
+
+    def receive(self, data: bytes) -> None:
+        self.asked_ns = self.now_ns
+
+    def transmit(self) -> bytes:
+        return str(self.now_ns).encode()
+
+    def step(self, now_ns: int) -> None:
+        self.now_ns = now_ns
+
+
+def test_a_device_learns_the_time_whenever_its_line_talks_to_it() -> None:
+    watch, times_ns = Watch(), iter([3, 8])
+    line = LineTamper(watch, lambda: next(times_ns))
+    line.receive(b"?")
+    assert (watch.asked_ns, line.transmit()) == (3, b"8")
+
+
+def test_a_line_leaves_the_time_alone_where_somebody_else_steps_the_device() -> None:
+    watch = Watch()
+    line = LineTamper(watch, lambda: 3, tells_time=False)
+    line.receive(b"?")
+    assert (watch.asked_ns, line.transmit()) == (0, b"0")
+
+
 def test_a_stuck_camera_shows_nothing_new(host: Host) -> None:
     image = np.zeros((1, 2, 3), np.uint8), np.ones((1, 2), np.float32)
     intrinsics = Intrinsics(width=2, height=1, fx=1.0, fy=1.0, cx=0.5, cy=0.0)

@@ -1,5 +1,6 @@
 """The emulated sensors against the real drivers, on a simulated clock."""
 
+import copy
 import math
 from dataclasses import dataclass, field
 
@@ -124,6 +125,35 @@ def test_a_lidar_that_was_held_up_goes_on_with_what_is_due() -> None:
     for now_ns in (10**9, 2 * 10**9, 2 * 10**9 + STEP_NS, 2 * 10**9 + 2 * STEP_NS):
         device.step(now_ns)
     assert len(device.transmit()) == 376 * 47
+
+
+@pytest.mark.parametrize(
+    "device",
+    [
+        LidarDevice(lambda beams: np.ones(len(beams), np.float32)),
+        ImuDevice(
+            lambda: ImuTruth(
+                yaw_rad=0.0, pitch_rad=0.0, roll_rad=0.0, acceleration_m_s2=(0.0, 0.0, 9.81)
+            )
+        ),
+    ],
+    ids=["lidar", "imu"],
+)
+def test_a_sensor_stepped_only_when_due_and_when_read_says_the_same(
+    device: LidarDevice | ImuDevice,
+) -> None:
+    always, now_ns = copy.deepcopy(device), 10**9
+    said: list[tuple[bytes, bytes]] = []
+    for number in range(500):
+        now_ns += STEP_NS
+        always.step(now_ns)
+        if now_ns >= device.due_ns:
+            device.step(now_ns)
+        if number % 7 == 0:
+            device.step(now_ns)
+            said.append((device.transmit(), always.transmit()))
+    assert all(rarely == often for rarely, often in said)
+    assert sum(len(rarely) for rarely, _ in said) > 1_500
 
 
 def imu_samples(device: ImuDevice, seconds: float) -> list[ImuSample]:
