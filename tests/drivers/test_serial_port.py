@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.clock import MonotonicClock
+from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.errors import DeviceBusy, DeviceMissing, LinkLost
 from drivers.serial_port import SerialPort
 
@@ -158,6 +158,51 @@ def test_a_burst_is_the_bytes_asked_for_or_what_came_of_them(pty: tuple[int, Pat
     assert port.read_burst(4, 0, soon(1.0)) == b"0123"
     assert port.read_burst(10, 0, soon(0.05)) == b"456789"
     assert port.read_burst(10, 0, soon(0.0)) == b""
+    port.close()
+
+
+class NapClock:
+    """Stand still; whoever sleeps finds that the other end has sent something meanwhile."""
+
+    def __init__(self, master: int) -> None:
+        self.naps_until_ns: list[int] = []
+        self.sent_meanwhile: list[bytes] = []
+        self._master = master
+
+    def now_ns(self) -> int:
+        return NS_PER_S
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.naps_until_ns.append(deadline_ns)
+        os.write(self._master, self.sent_meanwhile.pop(0))
+
+
+def test_a_line_whose_bytes_take_their_time_is_slept_through_until_the_last_is_due(
+    pty: tuple[int, Path],
+) -> None:
+    master, path = pty
+    clock = NapClock(master)
+    port = SerialPort(path, 1_000_000, clock)
+    due_ns, deadline_ns = NS_PER_S + 3_000_000, 3 * NS_PER_S
+    os.write(master, b"0123")
+    assert port.read_burst(4, due_ns, deadline_ns) == b"0123"
+    assert clock.naps_until_ns == []
+    clock.sent_meanwhile = [b"89", b"abcd"]
+    os.write(master, b"4567")
+    assert port.read_burst(6, due_ns, deadline_ns) == b"456789"
+    assert port.read_burst(4, due_ns, deadline_ns) == b"abcd"
+    assert len(clock.naps_until_ns) == 2
+    assert all(due_ns - 1_000_000 < nap_ns <= due_ns for nap_ns in clock.naps_until_ns)
+    port.close()
+
+
+def test_a_burst_that_is_overdue_is_not_slept_for(pty: tuple[int, Path]) -> None:
+    master, path = pty
+    clock = NapClock(master)
+    port = SerialPort(path, 1_000_000, clock)
+    os.write(master, b"01")
+    assert port.read_burst(4, NS_PER_S, NS_PER_S + 50_000_000) == b"01"
+    assert clock.naps_until_ns == []
     port.close()
 
 

@@ -1,8 +1,8 @@
 """Damaged streams never crash or hang a parser, and no frame comes out whose CRC does not hold.
 
-What a 16-bit CRC finds with certainty - up to three flipped bits, or a burst of up to 16 bits on
-one side of the border of data and CRC - never brings out anything that was not sent. Of what it
-finds all but once in 65,536 times - dropped or doubled bytes, bursts anywhere - only those come out
+What a 16-bit CRC finds with certainty - up to three flipped bits, or two damaged neighbours on one
+side of the border of data and CRC - never brings out anything that was not sent. Of what it finds
+all but once in some 65,536 times - dropped or doubled bytes, bursts anywhere - only those come out
 of which a second, plain implementation says that the CRC holds.
 """
 
