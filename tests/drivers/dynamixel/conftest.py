@@ -182,6 +182,20 @@ class PacedLine:
             raise LinkLost("test line: unplugged; plug it in again")
 
 
+class SleepingLine(PacedLine):
+    """Do not look at the line before all bytes should be there, as a serial port does."""
+
+    def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
+        self._clock.sleep_until(due_ns)
+        data = b""
+        while len(data) < count:
+            more = self.read(count - len(data), deadline_ns)
+            if not more:
+                break
+            data += more
+        return data
+
+
 class PacedBench:
     """A bus of one model at the speed of the wire."""
 
@@ -193,6 +207,7 @@ class PacedBench:
         eeprom: Mapping[str, int] | None = None,
         bauds: tuple[int, ...] = (),
         chunk_bytes: int = 14,
+        sleeping: bool = False,
         **options: Any,
     ) -> None:
         self.clock = clock or SimulatedTime()
@@ -205,7 +220,8 @@ class PacedBench:
             EmulatedServoSpec(id=spec.id, model_name=spec.model_name, eeprom=settings)
             for spec in self.specs
         ]
-        self.line = PacedLine(self.clock, emulated, bauds=bauds, chunk_bytes=chunk_bytes)
+        line = SleepingLine if sleeping else PacedLine
+        self.line = line(self.clock, emulated, bauds=bauds, chunk_bytes=chunk_bytes)
         self.bank = self.line.bank
         options = {"health_every_cycles": 1000, "layout": Layout.DIRECT} | options
         self.bus = DynamixelBus(self.line, self.clock, self.specs, baud=1_000_000, **options)

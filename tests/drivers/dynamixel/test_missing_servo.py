@@ -14,15 +14,17 @@ READ_BYTES = {False: 30 + 16 * 21, True: 30 + 8 + 16 * 14}
 MORE_BYTES = {Layout.DIRECT: 0, Layout.INDIRECT: 16 * 6}
 
 
+@pytest.mark.parametrize("sleeping", [False, True], ids=["watching", "sleeping"])
 @pytest.mark.parametrize("layout", [Layout.DIRECT, Layout.INDIRECT])
 @pytest.mark.parametrize("fast_sync", [False, True])
 @pytest.mark.parametrize("dead", [1, 2, 8, 15, 16])
 def test_the_other_fifteen_are_delivered_in_every_cycle_in_bounded_time(
-    make_paced: MakePaced, dead: int, fast_sync: bool, layout: Layout
+    make_paced: MakePaced, dead: int, fast_sync: bool, layout: Layout, sleeping: bool
 ) -> None:
-    bench = make_paced(fast_sync=fast_sync, layout=layout, health_every_cycles=5)
+    bench = make_paced(fast_sync=fast_sync, layout=layout, health_every_cycles=5, sleeping=sleeping)
     bench.bus.connect()
-    bench.bus.read_state()
+    for _ in range(10):  # learns what is in time
+        bench.bus.read_state()
     bench.bank.silence(dead)
     expected_ns = (READ_BYTES[fast_sync] + MORE_BYTES[layout]) * BYTE_NS
     others = np.arange(1, 17) != dead
