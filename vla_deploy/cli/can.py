@@ -54,11 +54,19 @@ def register(commands: Any) -> None:
         "monitor",
         "print the traffic in words",
         "  vla-deploy can monitor --robot butler --seconds 5\n"
+        "  vla-deploy can monitor --robot butler --node 2\n"
+        "  vla-deploy can monitor --robot butler --id 0x181 --id 0x201\n"
         "  vla-deploy can monitor --interface vla_hub --channel ./can --count 20 --json\n",
     )
     _add_bus_arguments(monitor)
     monitor.add_argument("--count", type=_positive(int), help="stop after so many frames")
     monitor.add_argument("--seconds", type=_positive(float), help="stop after this time")
+    monitor.add_argument(
+        "--id", type=_identifier, action="append", metavar="ID", help="only this id (repeat it)"
+    )
+    monitor.add_argument(
+        "--node", type=_identifier, action="append", metavar="N", help="only this node (repeat it)"
+    )
     monitor.set_defaults(run=run_monitor)
 
 
@@ -71,6 +79,16 @@ def _positive(kind: type[int] | type[float]) -> Callable[[str], float]:
 
     parse.__name__ = kind.__name__
     return parse
+
+
+def _identifier(text: str) -> int:
+    try:
+        number = int(text, 0)
+    except ValueError:
+        number = -1
+    if not 0 <= number < 1 << 29:
+        raise argparse.ArgumentTypeError(f"expected a number such as 385 or 0x181, got {text!r}")
+    return number
 
 
 def _add_bus_arguments(command: argparse.ArgumentParser) -> None:
@@ -133,7 +151,8 @@ def run_scan(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(_scan_document(channel, report), indent=2))
     else:
-        print("\n".join(_scan_lines(report)))
+        for line in _scan_lines(report):
+            print(line)
     if not report.nodes and not report.axes:
         reason = trouble or "check power, bit rate, wiring and termination"
         raise CommandFailed(f"{channel}: nobody answers at {bitrate} bit/s; {reason}")
@@ -198,11 +217,20 @@ def run_monitor(arguments: argparse.Namespace) -> int:
             if frame is None:
                 clock.sleep_until(clock.now_ns() + POLL_NS)
                 continue
+            words = describe(frame)
+            if not _is_wanted(arguments, frame, words):
+                continue
             seen += 1
             time_s = (clock.now_ns() - start_ns) / NS_PER_S
             tell = _frame_json if arguments.json else _frame_line
-            print(tell(time_s, frame, describe(frame)), flush=True)
+            print(tell(time_s, frame, words), flush=True)
     return 0
+
+
+def _is_wanted(arguments: argparse.Namespace, frame: can.Message, words: Words) -> bool:
+    if arguments.id is None and arguments.node is None:
+        return True
+    return frame.arbitration_id in (arguments.id or ()) or words.node in (arguments.node or ())
 
 
 def _next_frame(bus: can.BusABC) -> can.Message | None:

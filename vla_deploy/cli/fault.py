@@ -36,22 +36,43 @@ def register(commands: Any) -> None:
     """Add the command."""
     fault = add_command(commands, "fault", "make the twin's devices fail", _EXAMPLES)
     actions = fault.add_subparsers(dest="action", required=True, metavar="ACTION")
-    listing = actions.add_parser("list", help="what can fail, and what does now")
+    listing = _add(actions, "list", "what can fail, and what does now", "list --json")
     listing.set_defaults(run=run_list)
-    _register_inject(actions.add_parser("inject", help="add one fault"))
-    clear = actions.add_parser("clear", help="end one fault, or all")
+    _register_inject(
+        _add(
+            actions,
+            "inject",
+            "add one fault",
+            "inject servo off left_elbow --for 2",
+            "inject servo_bus brown_out --set volts_v=4",
+            "inject lidar intermittent --of off --period 1 --probability 0.2 --seed 7",
+        )
+    )
+    clear = _add(actions, "clear", "end one fault, or all", "clear", "clear 3")
     clear.add_argument("id", nargs="?", type=int, help="the number that inject gave (default: all)")
     clear.set_defaults(run=run_clear)
-    play = actions.add_parser("run", help="play a scenario and tell what the robot did")
+    play = _add(
+        actions,
+        "run",
+        "play a scenario and tell what the robot did",
+        "run servo_off",
+        "run ./mine.toml",
+    )
     play.add_argument("scenario", help="a TOML file, or the name of one that ships with the twin")
     play.set_defaults(run=run_scenario)
     for action in actions.choices.values():
         action.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
+def _add(actions: Any, name: str, summary: str, *examples: str) -> argparse.ArgumentParser:
+    return add_command(
+        actions, name, summary, "".join(f"  vla-deploy fault {one}\n" for one in examples)
+    )
+
+
 def _register_inject(inject: argparse.ArgumentParser) -> None:
     inject.add_argument("component", help="see: vla-deploy fault list")
-    inject.add_argument("fault")
+    inject.add_argument("fault", help="a word of the same list")
     inject.add_argument("instance", nargs="?", help="joint or id of a servo or drive")
     inject.add_argument("--of", metavar="FAULT", help="intermittent: the fault that comes and goes")
     for option, (_, meaning) in _TIMES.items():
@@ -115,12 +136,13 @@ def run_scenario(arguments: argparse.Namespace) -> int:
     """Play a scenario and tell what control said about it.
 
     Raises:
+        UsageError: the file cannot be read, or the robot is stopped already.
         CommandFailed: control named another cause than the scenario expects.
     """
+    scenario = _scenario(arguments.scenario)
     session = attach(arguments.runtime_base)
-    path = Path(arguments.scenario)
-    text = {"text": path.read_text(encoding="utf-8")} if path.is_file() else {}
-    played = ask_twin(session.run_dir, "fault_run", name=path.stem, **text)
+    _require_no_cause(session)
+    played = ask_twin(session.run_dir, "fault_run", **scenario)
     if not arguments.json:
         print(f"{played['scenario']}: {played['summary']} (robot meanwhile: {played['meanwhile']})")
     seen = _watch(session, played["end_s"] + _MARGIN_S)
@@ -134,6 +156,32 @@ def run_scenario(arguments: argparse.Namespace) -> int:
     if seen["cause"] != wanted:
         raise CommandFailed(f"{played['scenario']}: {told}; expected cause {wanted}")
     return 0
+
+
+def _scenario(word: str) -> dict[str, str]:
+    """Return what the twin is told: the name of a shipped scenario, or a file's text."""
+    path = Path(word)
+    if not path.is_file() and path.name == word and path.suffix != ".toml":
+        return {"name": word}
+    try:
+        return {"name": path.stem, "text": path.read_text(encoding="utf-8")}
+    except OSError as error:
+        raise UsageError(
+            f"{path}: {error.strerror}; expected a scenario's TOML file, or a name that "
+            "`vla-deploy fault list` shows"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: got {error}, expected a TOML document in UTF-8") from error
+
+
+def _require_no_cause(session: Session) -> None:
+    """Refuse to judge a robot by a cause that it told before."""
+    status = session.document("control_status", age_limit_s=1.0) or {}
+    if status.get("cause"):
+        raise UsageError(
+            f"control is {status['state']} already, cause {status['cause']}; end that first: "
+            "vla-deploy fault clear, reset, arm"
+        )
 
 
 def _watch(session: Session, duration_s: float) -> dict[str, Any]:

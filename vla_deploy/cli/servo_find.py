@@ -2,12 +2,13 @@
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel.tools import BenchLink, FoundServo, SpeedReport, scan_speed
+from drivers.errors import NoReply
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.servo_wire import (
@@ -64,21 +65,26 @@ def run_scan(arguments: argparse.Namespace) -> int:
     wire = wire_of(arguments)
     progress = ProgressLine(quiet=arguments.json)
     reports = []
-    for baud in _speeds(wire):
-        with wire.open(baud) as link:
-            reports.append(scan_speed(link, arguments.ids, progress))
-    progress.clear()
+    try:
+        for baud in _speeds(wire):
+            with wire.open(baud) as link:
+                reports.append(scan_speed(link, arguments.ids, progress))
+            if wire.is_pseudo_terminal and reports[-1].servos:
+                break  # servos without a speed answer at each
+    finally:
+        progress.clear()
     missing = _missing(wire, reports) if arguments.ids is None else []
     if arguments.json:
         print(json.dumps(_scan_document(wire, reports, missing), indent=2))
     else:
-        print("\n".join(_scan_lines(wire, reports)))
+        for line in _scan_lines(wire, reports):
+            print(line)
     _raise_findings(wire, reports, missing)
     return 0
 
 
 def _speeds(wire: ServoWire) -> Sequence[int]:
-    if wire.baud_given or wire.is_pseudo_terminal:
+    if wire.baud_given:
         return (wire.baud,)
     return (wire.baud, *(speed for speed in SPEEDS if speed != wire.baud))
 
@@ -193,21 +199,34 @@ def run_ping(arguments: argparse.Namespace) -> int:
     """Print who answers.
 
     Raises:
-        ServoSilent: one of them does not.
+        CommandFailed: one of them does not; the others are told all the same.
     """
     wire = wire_of(arguments)
+    rows, silent = [], []
     with wire.open() as link:
-        rows = [_pinged(link, wire, one) for one in arguments.ids]
+        for one in arguments.ids:
+            try:
+                rows.append(_pinged(link, wire, one))
+            except NoReply:
+                silent.append(wire.label(one))
+                continue
+            if not arguments.json:
+                print(_ping_line(wire, rows[-1]), flush=True)
     if arguments.json:
         print(json.dumps(rows, indent=2))
-        return 0
-    for row in rows:
-        joint = f" ({row['joint']})" if row["joint"] else ""
-        print(
-            f"servo {row['id']}{joint}: {row['model']}, firmware {row['firmware']}, "
-            f"{1e3 * row['round_trip_s']:.2f} ms"
+    if silent:
+        raise CommandFailed(
+            f"{wire.port} at {wire.baud} baud: no answer from {', '.join(silent)}; check power, "
+            "cable, id and speed; see: vla-deploy servo scan"
         )
     return 0
+
+
+def _ping_line(wire: ServoWire, row: Mapping[str, Any]) -> str:
+    return (
+        f"{wire.label(row['id'])}: {row['model']}, firmware {row['firmware']}, "
+        f"{1e3 * row['round_trip_s']:.2f} ms"
+    )
 
 
 def _pinged(link: BenchLink, wire: ServoWire, one: int) -> dict[str, Any]:

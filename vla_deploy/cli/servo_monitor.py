@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -51,9 +52,29 @@ def register(commands: Any) -> None:
     )
     add_wire_arguments(monitor)
     monitor.add_argument("ids", type=servo_id, nargs="*", metavar="ID", help="default: all")
-    monitor.add_argument("--count", type=int, default=0, help="stop after so many (default: never)")
-    monitor.add_argument("--rate", type=float, default=5.0, metavar="HZ", help="(default: 5)")
+    monitor.add_argument(
+        "--count", type=_count, default=0, metavar="N", help="stop after so many (default: never)"
+    )
+    monitor.add_argument(
+        "--rate", type=_rate, default=5.0, metavar="HZ", help="0.1 to 100 (default: 5)"
+    )
     monitor.set_defaults(run=run)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text!r}")
+    return int(text)
+
+
+def _rate(text: str) -> float:
+    try:
+        rate_hz = float(text)
+    except ValueError:
+        rate_hz = math.nan
+    if not 0.1 <= rate_hz <= 100.0:
+        raise argparse.ArgumentTypeError(f"expected 0.1 to 100, got {text!r}")
+    return rate_hz
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -64,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         LinkLost: the adapter is gone.
     """
     wire = wire_of(arguments)
-    period_ns = round(NS_PER_S / min(max(arguments.rate, 0.1), 100.0))
+    period_ns = round(NS_PER_S / arguments.rate)
     with wire.open() as link:
         servos = _servos(arguments.ids, link, wire)
         sample, due_ns = 0, wire.clock.now_ns()

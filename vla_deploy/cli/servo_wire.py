@@ -12,6 +12,7 @@ from drivers.clock import Clock, MonotonicClock
 from drivers.dynamixel.codec import MAX_SERVO_ID
 from drivers.dynamixel.control_table import BAUD_RATES
 from drivers.dynamixel.tools import BenchLink
+from drivers.errors import DeviceMissing
 from drivers.serial_port import SerialPort
 from drivers.wire_recorder import RecordingTransport, WireRecorder
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -21,6 +22,7 @@ SPEEDS = tuple(sorted(rate for rate in BAUD_RATES.values() if rate != 4_500_000)
 """The speeds of servos that a tty offers too."""
 DEFAULT_BAUD = 1_000_000
 FACTORY_BAUD = 57_600
+SERIAL_NAMES = ("ttyUSB*", "ttyACM*", "ttyTHS*")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +51,10 @@ class ServoWire:
             DeviceBusy: another process holds it.
         """
         baud = baud or self.baud
-        transport: ByteTransport = SerialPort(self.port, baud, self.clock)
+        try:
+            transport: ByteTransport = SerialPort(self.port, baud, self.clock)
+        except DeviceMissing as error:
+            raise DeviceMissing(f"{error}; choose one by --port: {_ports_here()}") from error
         if self.record is not None:
             transport = RecordingTransport(transport, self._recorder(self.record, baud))
         link = BenchLink(transport, self.clock, baud)
@@ -73,6 +78,14 @@ class ServoWire:
         """Return how messages name a servo."""
         joint = self.joint(servo_id)
         return f"servo {servo_id} ({joint})" if joint else f"servo {servo_id}"
+
+
+def _ports_here() -> str:
+    """Return the serial ports of this machine, those with a lasting name first."""
+    by_id = Path("/dev/serial/by-id")
+    found = sorted(by_id.iterdir()) if by_id.is_dir() else []
+    found += sorted(one for kind in SERIAL_NAMES for one in Path("/dev").glob(kind))
+    return ", ".join(map(str, found)) or "this machine has none"
 
 
 def add_wire_arguments(command: argparse.ArgumentParser) -> None:

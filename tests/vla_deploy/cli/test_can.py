@@ -124,6 +124,15 @@ def test_the_monitor_prints_canopen_traffic_in_words_and_ends_in_time(
     assert "EMCY 1  0x4310 drive over-temperature, error register 0x09" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("chosen", [["--node", "3"], ["--id", "0x61"], ["--id", "97"]])
+def test_the_monitor_prints_only_what_it_is_asked_for(
+    make_bus: Callable[..., ServedBus], capsys: pytest.CaptureFixture[str], chosen: list[str]
+) -> None:
+    bus = make_bus(ODriveAxis(2), ODriveAxis(3))
+    assert on(bus, "monitor", "--protocol", "odrive", "--count", "3", "--json", *chosen) == 0
+    assert {frame["node"] for frame in frames_of(capsys.readouterr().out)} == {3}
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -140,7 +149,15 @@ def test_what_cannot_be_opened_says_what_to_try(
     assert told in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", [["scan"], ["monitor", "--robot", "butler", "--count", "0"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["scan"],
+        ["monitor", "--robot", "butler", "--count", "0"],
+        ["monitor", "--robot", "butler", "--id", "0xyz"],
+        ["monitor", "--robot", "butler", "--node", "-1"],
+    ],
+)
 def test_bad_arguments_are_told_in_one_line(
     words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

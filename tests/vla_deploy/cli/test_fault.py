@@ -10,7 +10,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from drivers.clock import MonotonicClock
 from vla_deploy.cli.main import main
+from vla_deploy.ipc import SharedSpace
 
 
 class Twin:
@@ -170,6 +172,47 @@ def test_a_scenario_file_is_sent_as_text_and_its_cause_is_awaited(
     assert fault(base, "run", str(path)) == 1
     assert twin.asked == [{"op": "fault_run", "name": "mine", "text": "summary = 'x'"}]
     assert "cause none, state silent; expected cause servo_bus_lost" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("none.toml", "none.toml: No such file or directory; expected a scenario's TOML file"),
+        ("folder/none", "folder/none: No such file or directory"),
+        (".", "Is a directory; expected a scenario's TOML file"),
+        ("noise.toml", "noise.toml: got 'utf-8' codec can't decode byte"),
+    ],
+)
+def test_a_scenario_file_that_cannot_be_read_is_refused_in_one_line(
+    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str], name: str, complaint: str
+) -> None:
+    (base / "noise.toml").write_bytes(b"\xfe\xff\x00")
+    assert fault(base, "run", f"{base}/{name}") == 2
+    error = capsys.readouterr().err
+    assert complaint in error
+    assert error.count("\n") == 1
+    assert twin.asked == []
+
+
+def test_a_robot_that_is_stopped_already_is_not_judged_by_that_cause(
+    base: Path, twin: Twin, capsys: pytest.CaptureFixture[str]
+) -> None:
+    space = SharedSpace(base / "run" / "ipc", MonotonicClock())
+    status = {"state": "stopped", "cause": "servo_bus_lost"}
+    space.cell_writer("control_status").put_document(status)
+    assert fault(base, "run", "servo_off") == 2
+    space.close()
+    assert "control is stopped already, cause servo_bus_lost" in capsys.readouterr().err
+    assert twin.asked == []
+
+
+@pytest.mark.parametrize("action", ["list", "inject", "clear", "run"])
+def test_help_of_an_action_ends_with_an_example(
+    action: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["fault", action, "--help"])
+    assert f"examples:\n  vla-deploy fault {action}" in capsys.readouterr().out
 
 
 def test_help_ends_with_examples(capsys: pytest.CaptureFixture[str]) -> None:

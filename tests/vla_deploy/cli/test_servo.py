@@ -170,6 +170,23 @@ def test_scan_asks_at_every_speed_of_a_real_line_and_tells_of_servos_at_several(
     assert "servos at 2 speeds (1000000, 57600): on one bus all need the same" in said.out
 
 
+def test_scan_asks_a_pseudo_terminal_again_only_where_nobody_answers(bus, servo, monkeypatch):
+    asked = []
+
+    def found(link: object, ids: object, progress: object) -> SpeedReport:
+        asked.append(link.baud)
+        one = FoundServo(servo_id=1, model_number=1020, firmware=48)
+        return SpeedReport(baud=link.baud, servos=(one,) if link.baud == 57_600 else ())
+
+    monkeypatch.setattr(servo_find, "scan_speed", found)
+    assert "1     57600  XM430-W350" in servo(bus, "scan").out
+    assert asked == [1_000_000, 9_600, 57_600]
+
+
+def test_scan_that_finds_nothing_prints_no_empty_table(bus, servo):
+    assert servo(bus, "scan", "--ids", "8-8", "--baud", "57600").out == ""
+
+
 def test_ping_tells_who_answers(bus, servo):
     said = servo(bus, "ping", 1, 7)
     assert said.code == 0
@@ -178,8 +195,11 @@ def test_ping_tells_who_answers(bus, servo):
     assert rows[0]["model_number"] == 1020
 
 
-def test_ping_of_a_silent_id_fails(bus, servo):
-    fails(servo(bus, "ping", 9), "ping servo 9 at 1000000 baud: no answer in 3 attempts")
+def test_ping_of_a_silent_id_fails_and_tells_the_others(bus, servo):
+    said = servo(bus, "ping", 9, 1, 8)
+    fails(said, "bus0 at 1000000 baud: no answer from servo 9, servo 8; check power")
+    assert said.out.startswith("servo 1: XM430-W350")
+    assert [row["id"] for row in servo(bus, "ping", 9, 1, "--json").document] == [1]
 
 
 def test_info_prints_every_register_and_marks_what_is_not_factory(make_bus, servo):
@@ -325,6 +345,10 @@ def test_a_session_is_recorded_on_request(bus, servo, tmp_path):
         (["servo", "set-id", "253", "1"], "expected an id in 0..252, got '253'"),
         (["servo", "scan", "--baud", "12345"], "argument --baud: invalid choice: 12345"),
         (["servo", "scan", "--ids", "9-3"], "expected the smaller id first, got '9-3'"),
+        (["servo", "monitor", "--rate", "nan"], "--rate: expected 0.1 to 100, got 'nan'"),
+        (["servo", "monitor", "--rate", "0"], "--rate: expected 0.1 to 100, got '0'"),
+        (["servo", "monitor", "--rate", "fast"], "--rate: expected 0.1 to 100, got 'fast'"),
+        (["servo", "monitor", "--count", "-1"], "--count: expected a whole number from 1"),
     ],
 )
 def test_bad_arguments_are_one_line(words, complaint, capsys):
@@ -336,8 +360,11 @@ def test_bad_arguments_are_one_line(words, complaint, capsys):
     assert error.count("\n") == 1
 
 
-def test_a_port_that_is_not_there_is_one_line(servo):
-    fails(servo(None, "scan", "--port", "/nowhere/tty"), "/nowhere/tty: No such file or directory")
+def test_a_port_that_is_not_there_is_one_line_with_those_that_are(servo, monkeypatch):
+    monkeypatch.setattr(servo_wire, "SERIAL_NAMES", ("ptmx",))
+    said = servo(None, "scan", "--port", "/nowhere/tty")
+    fails(said, "/nowhere/tty: No such file or directory")
+    assert said.err.endswith("/dev/ptmx\n")
 
 
 def test_calibration_takes_the_pose_in_which_the_joints_stand(make_bus, servo, tmp_path):
