@@ -12,7 +12,7 @@ _BITS_PER_BYTE: Final = 10
 _STALE_BYTES: Final = 4096
 _STALE_READS: Final = 16
 _ECHO_PATIENCE_NS: Final = 5_000_000
-_STALL_RATIO: Final = 0.6
+_STALL_PERCENT: Final = 60
 """How much of the margin the next part of a chained reply may be late."""
 _LESSONS: Final = 8
 """From how many chained replies it is learned what is in time."""
@@ -126,7 +126,8 @@ class Wire:
             data = self._receive_in_parts(count, deadline_ns)
         else:
             try:
-                data = self._burst.read_burst(count, min(self._due_ns, deadline_ns), deadline_ns)
+                due_ns = self._due_ns if self._due_ns < deadline_ns else deadline_ns
+                data = self._burst.read_burst(count, due_ns, deadline_ns)
             except LinkLost as error:
                 raise self._note_loss(error) from error
         if len(data) == count:
@@ -200,8 +201,12 @@ class Wire:
         """Return when to take a chained reply for stopped."""
         if self._lateness_ns is None:
             return deadline_ns
-        patience_ns = max(round(margin_ns * _STALL_RATIO), 2 * self._lateness_ns)
-        return min(deadline_ns, self._part_ns(read, arrived) + patience_ns)
+        patience_ns = 2 * self._lateness_ns
+        least_ns = margin_ns * _STALL_PERCENT // 100
+        if patience_ns < least_ns:
+            patience_ns = least_ns
+        stall_ns = self._part_ns(read, arrived) + patience_ns
+        return stall_ns if stall_ns < deadline_ns else deadline_ns
 
     def _hear_echo(self, frame: bytes) -> None:
         wire_ns = len(frame) * self.ns_per_byte
