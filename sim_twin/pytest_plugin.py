@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -51,10 +52,36 @@ def pytest_configure(config: pytest.Config) -> None:
     """Declare the markers, and choose the contracts where only a robot is named."""
     for marker in MARKERS:
         config.addinivalue_line("markers", marker)
+    _require_a_robot(config.option)
     if config.option.hardware and config.args_source is not config.ArgsSource.ARGS:
         from sim_twin.contracts.hardware import CONTRACTS
 
         config.args = [str(CONTRACTS)]
+
+
+def _require_a_robot(option: argparse.Namespace) -> None:
+    """Refuse a robot that is not there, once and before every test asks for it.
+
+    Raises:
+        UsageError: `--hardware` is missing beside its companions, or names no robot.
+    """
+    from vla_deploy.robots import RobotFileError, load_robot
+
+    if option.hardware is None:
+        if option.energise or option.devices_dir is not None:
+            raise pytest.UsageError(
+                "--energise and --devices-dir choose how to test a robot: add --hardware robot.toml"
+            )
+        return
+    try:
+        load_robot(option.hardware)
+    except RobotFileError as error:
+        raise pytest.UsageError(f"--hardware: {error}") from error
+    if option.devices_dir is not None and not option.devices_dir.is_dir():
+        raise pytest.UsageError(
+            f"--devices-dir: {option.devices_dir} is no folder; start a twin: "
+            "python -m sim_twin --run-dir DIR, its devices are in DIR/dev"
+        )
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -106,8 +106,18 @@ def test_naming_a_robot_runs_the_contracts_on_its_devices(
     assert "keep clear of the robot and add --energise" in without_leave.stdout
 
 
-def test_a_robot_file_that_is_not_there_is_one_clear_line(tmp_path: Path) -> None:
-    done = run_pytest(tmp_path, "--hardware", "nobody.toml", "-x", "-k", "Lidar")
-    assert done.returncode == 1
-    assert "nobody" in done.stdout
-    assert "Traceback" not in done.stdout
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--hardware", "nobody.toml"), "nobody.toml: (file): got no such file"),
+        (("--hardware", str(ROBOT_FILE), "--devices-dir", "gone"), "gone is no folder; start a"),
+        (("--energise",), "add --hardware robot.toml"),
+    ],
+)
+def test_a_mistake_about_the_robot_is_one_clear_line_and_runs_no_test(
+    tmp_path: Path, words: tuple[str, ...], complaint: str
+) -> None:
+    done = run_pytest(tmp_path, *words)
+    assert done.returncode == pytest.ExitCode.USAGE_ERROR
+    assert complaint in done.stderr
+    assert done.stderr.strip().count("\n") == 0
