@@ -1,14 +1,16 @@
 """Measure what the emulated devices cost on top of the physics, and how fast lock-step runs.
 
-Four runs of the same robot in the same world take turns, so that a busy machine hits all of them.
+Five runs of the same robot in the same world take turns, so that a busy machine hits all of them.
 The fastest round of each in CPU time counts: neighbours on the machine only ever make it slower.
 
 - raw `mj_step`;
 - the twin alone, its servos without torque (16 servos, two drives, lidar, IMU; no camera);
-- the twin in lock-step with the real drivers: all servos hold torque and follow goals and the base
-  turns, 250 bus cycles a second; of this run comes `real_time_factor`, and `mj_step_cpu_ratio`, the
-  share of `mj_step` in the CPU time of the twin's own step. `mj_step_cpu_ratio_with_answers` counts
-  to the twin also what the devices do to answer the buses, in `receive` and `transmit`;
+- the twin in lock-step with the real drivers of servos, wheel drives and lidar: all servos hold
+  torque and follow goals and the base turns, 250 bus cycles a second; of this run comes
+  `real_time_factor`, and `mj_step_cpu_ratio`, the share of `mj_step` in the CPU time of the twin's
+  own step. `mj_step_cpu_ratio_with_answers` counts to the twin also what the devices do to answer
+  the buses, in `receive` and `transmit`;
+- the same with the IMU: `mj_step_cpu_ratio_with_imu`;
 - lock-step with the whole control node on the buses, disarmed, at the profile's rate.
 """
 
@@ -37,6 +39,7 @@ from vla_deploy.robots import RobotDescription, load_robot
 
 _SEED: Final = 0
 _WARM_UP_STEPS: Final = 200
+_NEVER_NS: Final = 1 << 62
 
 Runner = Callable[[int], None]
 
@@ -46,12 +49,17 @@ def measure(robot_name: str, world: str, rounds: int, steps: int) -> dict[str, A
     robot = load_robot(robot_name)
     engine = load_engine(robot, world, _SEED)
     twin = Twin(robot, world, _SEED)
-    with _busy_lockstep(robot_name, world) as busy, _controlled_lockstep(robot, world) as control:
-        watch = Stopwatch(busy.twin)
+    with (
+        _busy_lockstep(robot_name, world, imu=False) as busy,
+        _busy_lockstep(robot_name, world, imu=True) as busier,
+        _controlled_lockstep(robot, world) as control,
+    ):
+        watch, watch_with_imu = Stopwatch(busy.twin), Stopwatch(busier.twin)
         runners: dict[str, Runner] = {
             "raw": lambda count: _step_raw(engine, count),
             "twin": lambda count: _step_twin(twin, count),
             "busy": lambda count: busy.run_for(count * STEP_S),
+            "busier": lambda count: busier.run_for(count * STEP_S),
             "control": lambda count: control.run_for(count * STEP_S),
         }
         rates = _best_rates(runners, rounds, steps)
@@ -65,6 +73,7 @@ def measure(robot_name: str, world: str, rounds: int, steps: int) -> dict[str, A
         "step_rate_ratio_vs_raw": rates["twin"] / rates["raw"],
         "twin_real_time_factor": rates["twin"] * STEP_S,
         "mj_step_cpu_ratio": watch.physics_ratio,
+        "mj_step_cpu_ratio_with_imu": watch_with_imu.physics_ratio,
         "mj_step_cpu_ratio_with_answers": watch.physics_ratio_with_answers,
         "real_time_factor": rates["busy"] * STEP_S,
         "control_real_time_factor": rates["control"] * STEP_S,
@@ -91,10 +100,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _busy_lockstep(robot: str, world: str) -> Iterator[Lockstep]:
+def _busy_lockstep(robot: str, world: str, *, imu: bool) -> Iterator[Lockstep]:
     """Give a lock-step whose devices all work: torque on, goals followed, buses answered."""
     with tempfile.TemporaryDirectory() as folder:
         lockstep = Lockstep(robot, world, _SEED, tmp_path=Path(folder))
+        if not imu:
+            lockstep.twin.imu.due_ns = _NEVER_NS
         traffic = DeviceTraffic(lockstep)
         lockstep.add(traffic)
         traffic.await_motion(lockstep)

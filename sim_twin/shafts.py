@@ -35,45 +35,53 @@ class Shafts:
         actuators = [_find(model.actuator, "actuator", shaft.joint) for shaft in shafts]
         qpos, qvel = model.jnt_qposadr[joints].tolist(), model.jnt_dofadr[joints].tolist()
         ratio = np.array([shaft.ratio for shaft in shafts])
-        self._zero_rad = np.array([shaft.offset for shaft in shafts]) / ratio
-        self._each_zero_rad: list[float] = self._zero_rad.tolist()
-        self._per_joint = 1.0 / ratio
+        self.zero_rad = np.array([shaft.offset for shaft in shafts]) / ratio
+        """Shaft angle = rad_per_joint * joint - zero_rad."""
+        self._each_zero_rad: list[float] = self.zero_rad.tolist()
+        self.rad_per_joint = 1.0 / ratio
         self._sign = np.sign(ratio)
         # The state's memory is asked for once: asking MjData anew costs more than reading it.
         self._read_qpos, self._read_qvel = _reader(data.qpos, qpos), _reader(data.qvel, qvel)
         self._read_force = _reader(data.actuator_force, actuators)
         self._all_ctrl, self._actuator = data.ctrl, _span(actuators)
-        in_order = isinstance(self._actuator, slice)
-        self._some_ctrl = data.ctrl[self._actuator] if in_order else None
-        self._angle, self._speed, self._effort = np.zeros((3, len(shafts)))
+        self._angle, self._speed = np.zeros((2, len(shafts)))
         self._each_qpos, self._each_qvel = memoryview(data.qpos), memoryview(data.qvel)
         self._each_ctrl = memoryview(data.ctrl)
-        factors = (self._per_joint.tolist(), self._sign.tolist())
+        factors = (self.rad_per_joint.tolist(), self._sign.tolist())
         self._rows = list(zip(range(len(shafts)), qpos, qvel, actuators, *factors, strict=True))
+
+    def joint_position(self) -> Floats:
+        """Return what the joints stand at; the physics may write to it."""
+        return self._read_qpos()
 
     def position_rad(self) -> Floats:
         """Return shaft angles."""
         angle = self._angle
-        _multiply(self._read_qpos(), self._per_joint, angle)
-        _subtract(angle, self._zero_rad, angle)
+        _multiply(self._read_qpos(), self.rad_per_joint, angle)
+        _subtract(angle, self.zero_rad, angle)
         return angle
 
     def velocity_rad_s(self) -> Floats:
         """Return shaft speeds."""
-        _multiply(self._read_qvel(), self._per_joint, self._speed)
+        _multiply(self._read_qvel(), self.rad_per_joint, self._speed)
         return self._speed
+
+    def joint_effort(self) -> Floats:
+        """Return what the motors give, in the joint's direction; the physics may write to it."""
+        return self._read_force()
 
     def effort(self) -> Floats:
         """Return what the motors gave in the last step, in the shaft's direction."""
-        _multiply(self._read_force(), self._sign, self._effort)
-        return self._effort
+        effort: Floats = self._read_force() * self._sign
+        return effort
 
     def command(self, value: Floats) -> None:
         """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
-        if self._some_ctrl is not None:
-            _multiply(value, self._sign, self._some_ctrl)
-        else:
-            self._all_ctrl[self._actuator] = value * self._sign
+        self.command_joints(value * self._sign)
+
+    def command_joints(self, value: Floats) -> None:
+        """Set the motors' input, in the joint's direction."""
+        self._all_ctrl[self._actuator] = value
 
     def command_each(self, now_ns: int, laws: Sequence[ControlLaw]) -> None:
         """Set each motor's input by a law of its own, one by one, which is faster for a few."""
@@ -85,7 +93,7 @@ class Shafts:
 
     def slip(self, row: int, angle_rad: float) -> None:
         """Measure a shaft further off than it is, as an encoder does after a blow."""
-        self._zero_rad[row] -= angle_rad
+        self.zero_rad[row] -= angle_rad
         self._each_zero_rad[row] -= angle_rad
 
 

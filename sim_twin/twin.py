@@ -18,7 +18,7 @@ from sim_twin.sensors.estop import EstopButtonDevice
 from sim_twin.sensors.imu import ImuDevice
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.sensors.sound import MicrophoneDevice, SpeakerDevice
-from sim_twin.servos import EmulatedServoSpec, ServoBank, WireTiming
+from sim_twin.servos import Coupling, EmulatedServoSpec, ServoBank, WireTiming
 from sim_twin.streams import StreamedDevice, streamed_devices
 from vla_deploy.robots import RobotDescription
 
@@ -46,7 +46,9 @@ class Twin:
         """
         self.robot = robot
         self.engine = load_engine(robot, world, seed)
-        self.servos = ServoBank(_servo_specs(robot), timing=servo_timing)
+        shafts = self.engine.servos
+        coupling = Coupling(rad_per_joint=shafts.rad_per_joint, zero_rad=shafts.zero_rad)
+        self.servos = ServoBank(_servo_specs(robot), timing=servo_timing, coupling=coupling)
         self.drives = robot_drives(robot.can_bus)
         self._drive_laws = [drive.advance for drive in self.drives]
         self.can_wire = CanWire(self.drives, bitrate=robot.can_bus.bitrate)
@@ -138,6 +140,7 @@ class Twin:
         """Let a servo measure its shaft further off than it does, as after a blow."""
         ids = [servo.id for servo in self.robot.servo_bus.servos]
         self.engine.servos.slip(ids.index(servo_id), offset_rad)
+        self.servos.couple_anew()
 
     def step(self) -> None:
         """Let the firmware act, the physics follow and the sensors look.
@@ -176,12 +179,12 @@ class Twin:
         shafts = engine.servos
         duty = self.servos.advance(
             now_ns,
-            shafts.position_rad(),
+            shafts.joint_position(),
             shafts.velocity_rad_s(),
-            shafts.effort(),
+            shafts.joint_effort(),
             self.servo_supply.volts(now_ns),
         )
-        shafts.command(duty)
+        shafts.command_joints(duty)
         engine.drives.command_each(now_ns, self._drive_laws)
 
 

@@ -59,6 +59,7 @@ class PacketBlock:
         packets = np.zeros(count, _PACKET)
         packets["header"] = HEADER
         points = packets["points"]
+        self.numbers = np.arange(count)
         self._memory = packets
         self._checked = packets.view(np.uint8).reshape(count, _PACKET.itemsize)[:, :_CHECKED_BYTES]
         self._crc = packets["crc"]
@@ -154,19 +155,23 @@ class LidarDevice:
         self._follow_rate()
         first, step_deg, phase_deg = self._sent_packets, self._step_deg, self._phase_deg
         packet_deg = POINTS_PER_PACKET * step_deg
-        numbers = range(first, end)
-        starts_deg = [number * packet_deg + phase_deg for number in numbers]
-        due_ns = [self._start_ns - (number + 1) * -NS_PER_S // _PACKETS_PER_S for number in numbers]
         block = self._block(end - first)
-        last_deg = _LAST_POINT * step_deg
+        numbers = block.numbers + first
+        centideg = numbers * (100.0 * packet_deg)
+        centideg += 100.0 * phase_deg
+        due_ns = numbers * -NS_PER_S
+        due_ns -= NS_PER_S
+        due_ns //= -_PACKETS_PER_S
+        due_ns += self._start_ns
         block.speed_deg_s.fill(round(self.rate_hz * 360.0))
-        block.start[:] = [round(deg * 100.0) % _TURN_CENTIDEG for deg in starts_deg]
-        block.end[:] = [round((deg + last_deg) * 100.0) % _TURN_CENTIDEG for deg in starts_deg]
-        block.stamp_ms[:] = [due // _NS_PER_MS % STAMP_WRAP_MS for due in due_ns]
-        self._look(starts_deg, block)
+        block.start[:] = np.rint(centideg) % _TURN_CENTIDEG
+        centideg += 100.0 * _LAST_POINT * step_deg
+        block.end[:] = np.rint(centideg) % _TURN_CENTIDEG
+        block.stamp_ms[:] = due_ns // _NS_PER_MS % STAMP_WRAP_MS
+        self._look(first * packet_deg + phase_deg, block)
         data, size = block.to_bytes(), _PACKET.itemsize
         packets = [data[start : start + size] for start in range(0, len(data), size)]
-        self._waiting = deque(zip(due_ns, packets, strict=True))
+        self._waiting = deque(zip(due_ns.tolist(), packets, strict=True))
 
     def _block(self, count: int) -> PacketBlock:
         if count not in self._blocks:
@@ -180,10 +185,10 @@ class LidarDevice:
         self._phase_deg += first * (self._step_deg - step_deg)
         self._step_deg = step_deg
 
-    def _look(self, starts_deg: list[float], block: PacketBlock) -> None:
+    def _look(self, start_deg: float, block: PacketBlock) -> None:
         """Measure distances: 0 where nothing is in range, at least a millimetre elsewhere."""
-        count = POINTS_PER_PACKET * len(starts_deg)
-        beams = self._beams(self._mounting_deg - starts_deg[0], count)
+        count = block.distance_mm.size
+        beams = self._beams(self._mounting_deg - start_deg, count)
         first, last = int(beams[-1]), int(beams[0])
         run = range(first, last + 1) if last - first < BEAMS else range(first, first + BEAMS)
         beams -= first

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
+from sim_twin.servos.coupling import Coupling
 from sim_twin.servos.firmware import Firmware
 from sim_twin.servos.instructions import InstructionParser
 from sim_twin.servos.profile import Floats
@@ -20,7 +21,7 @@ class ServoBank:
 
     `advance` is called once per physics step. `step` only takes over the time, for a bus whose
     shafts nobody moves and for times between two physics steps. With `timing` bytes take their time
-    on the wire; without it a reply is there at once.
+    on the wire; without it a reply is there at once. Without `coupling` the joints are the shafts.
 
     Raises:
         ValueError: there are no servos, or two of them share an id.
@@ -31,12 +32,13 @@ class ServoBank:
         servos: Sequence[EmulatedServoSpec],
         options: FirmwareOptions | None = None,
         timing: WireTiming | None = None,
+        coupling: Coupling | None = None,
     ) -> None:
         ids = [servo.id for servo in servos]
         if not ids or len(set(ids)) < len(ids):
             raise ValueError(f"servo ids: expected one or more, all different, got {ids}")
         options = options or FirmwareOptions()
-        self._firmware = Firmware(servos, options)
+        self._firmware = Firmware(servos, options, coupling)
         self._protocol = BusProtocol(self._firmware, options)
         self._audience = self._protocol.audience
         self._faults = self._protocol.speaker.faults
@@ -90,19 +92,27 @@ class ServoBank:
     def advance(
         self,
         now_ns: int,
-        position_rad: Floats,
+        joint_position: Floats,
         velocity_rad_s: Floats,
-        torque_nm: Floats,
+        joint_effort: Floats,
         supply_v: float = 12.0,
     ) -> Floats:
-        """Tell what the shafts do; return each motor's duty, -1..1, until the next call.
+        """Tell what joints and shafts do; return each motor's duty, -1..1, until the next call.
 
-        Arrays are in the order of the servos and in shaft coordinates; 0 rad is 2048 pulses. Duty
-        is zero without torque. A supply below `FirmwareOptions.brownout_v` switches the servos off.
+        Arrays are in the order of the servos; a shaft at 0 rad is at 2048 pulses. Position, duty
+        and effort, which is the motor's torque in N m, are the joint's, and by default that is the
+        shaft; speed is the shaft's. `joint_effort` is looked at when it is asked for. Duty is zero
+        without torque. A supply below `FirmwareOptions.brownout_v` switches the servos off.
         """
         if now_ns > self._now_ns:
             self._now_ns = now_ns
-        return self._firmware.advance(now_ns, position_rad, velocity_rad_s, torque_nm, supply_v)
+        return self._firmware.advance(
+            now_ns, joint_position, velocity_rad_s, joint_effort, supply_v
+        )
+
+    def couple_anew(self) -> None:
+        """Take over a change of the coupling that was given."""
+        self._firmware.couple_anew()
 
     def register(self, servo_id: int, name: str) -> int:
         """Return a register's present value without using the bus."""

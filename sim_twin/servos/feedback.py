@@ -41,7 +41,7 @@ class Feedback:
         self._position_trajectory = columns.named("position_trajectory")
         self._voltage = columns.named("present_input_voltage")
         self._temperature = columns.named("present_temperature")
-        self.torque_nm: Floats = np.zeros(len(self._tick))
+        self.joint_effort: Floats = np.zeros(len(self._tick))
         self.supply_v = 12.0
         self.now_ns = 0
         self.booted_ns = np.zeros(len(self._tick), np.int64)
@@ -90,7 +90,7 @@ class Feedback:
         self._pwm[:] = np.rint(self._motion.pwm)
 
     def _write_effort(self) -> None:
-        self._effort[:] = np.rint(self._motion.present_effort(self.torque_nm))
+        self._effort[:] = np.rint(self._motion.present_effort(self.joint_effort))
 
     def _write_velocity(self) -> None:
         self._velocity[:] = np.rint(self._motion.present_velocity())

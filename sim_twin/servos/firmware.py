@@ -19,6 +19,7 @@ from drivers.dynamixel.control_table import (
     StatusReturnLevel,
 )
 from sim_twin.servos.columns import Columns
+from sim_twin.servos.coupling import Coupling
 from sim_twin.servos.feedback import Feedback
 from sim_twin.servos.goal_window import GoalWindow
 from sim_twin.servos.motion import Motion
@@ -38,11 +39,17 @@ _TORQUE_ON_AT_START: Final = 0x01
 class Firmware:
     """Own the control tables and everything that changes them from inside."""
 
-    def __init__(self, specs: Sequence[EmulatedServoSpec], options: FirmwareOptions) -> None:
+    def __init__(
+        self,
+        specs: Sequence[EmulatedServoSpec],
+        options: FirmwareOptions,
+        coupling: Coupling | None = None,
+    ) -> None:
         self.registers = RegisterFile(specs)
         self._columns = Columns(self.registers)
         self._options = options
-        self._motion = Motion(self.registers, self._columns)
+        joints = coupling or Coupling.direct(len(specs))
+        self._motion = Motion(self.registers, self._columns, joints)
         models = [table.model for table in self.registers.tables]
         self._protection = Protection(models, self._columns, options)
         self._rail = Rail(models, options.supply_ohm)
@@ -76,9 +83,9 @@ class Firmware:
     def advance(
         self,
         now_ns: int,
-        position_rad: Floats,
+        joint_position: Floats,
         velocity_rad_s: Floats,
-        torque_nm: Floats,
+        joint_effort: Floats,
         supply_v: float,
     ) -> Floats:
         """Sense, run the control loops and return the duty for the next step.
@@ -89,18 +96,22 @@ class Firmware:
             self._reload()
         self.now_ns = now_ns
         self._reactions.set_time(now_ns)
-        self._motion.sense(position_rad, velocity_rad_s)
+        self._motion.sense(joint_position, velocity_rad_s)
         if not self._pose_known:
             self._take_first_pose()
         dt_s = (now_ns - self._advanced_ns) / NS_PER_S
         self._advanced_ns = now_ns
-        self._feedback.torque_nm = torque_nm
+        self._feedback.joint_effort = joint_effort
         if supply_v != self._supply_v or now_ns - self._checked_ns >= _CHECK_PERIOD_NS:
             self._supply_v = supply_v
             self._check()
         if self._reactions.stale:
             self._reload()
         return self._motion.advance(max(dt_s, 1e-6))
+
+    def couple_anew(self) -> None:
+        """Take over a change of the coupling."""
+        self._reactions.stale = True
 
     def answers(self, row: int) -> bool:
         """Tell whether a servo is powered and has finished booting."""
@@ -222,7 +233,7 @@ class Firmware:
             self._switch_power(on=not self._powered)
         elapsed_s = (self.now_ns - self._checked_ns) / NS_PER_S
         self._checked_ns = self.now_ns
-        effort_ratio = motion.effort_ratio(self._feedback.torque_nm)
+        effort_ratio = motion.effort_ratio(self._feedback.joint_effort)
         errors = self._protection.check(effort_ratio, volts, elapsed_s)
         if self._powered:
             for row, bits in errors:

@@ -21,6 +21,7 @@ from drivers.dynamixel.model import (
 )
 from drivers.dynamixel.models import X330_CURRENT_UNIT_A
 from sim_twin.servos.columns import Columns
+from sim_twin.servos.coupling import Coupling
 from sim_twin.servos.profile import PULSES_S2_PER_UNIT, PULSES_S_PER_UNIT, Floats, Profile
 from sim_twin.servos.register_file import RegisterFile
 
@@ -67,12 +68,18 @@ class Motors:
 
 
 class Motion:
-    """Run the control loops; `pulses`, `velocity_rad_s` and `pwm` are the latest results."""
+    """Run the control loops; `pulses`, `velocity_rad_s` and `pwm` are the latest results.
 
-    def __init__(self, registers: RegisterFile, columns: Columns) -> None:
+    Positions and efforts come in, and duties go out, as the joints have them: the scales between
+    joint, shaft and register are multiplied beforehand, for every array operation of a step counts.
+    """
+
+    def __init__(self, registers: RegisterFile, columns: Columns, coupling: Coupling) -> None:
         count = len(registers)
         self._columns = columns
+        self._coupling = coupling
         self._motors = Motors.of(registers)
+        self._joint_stall_nm = self._motors.stall_nm * coupling.sign
         self.profile = Profile(columns)
         self.pulses = np.full(count, float(CENTRE_PULSES))
         self.shaft_rad_s: Floats = np.zeros(count)
@@ -98,8 +105,10 @@ class Motion:
         columns = self._columns
         self.profile.reload()
         self.direction = np.where(columns.drive_mode & _REVERSE, -1.0, 1.0)
-        self._pulses_per_rad = self.direction / PULSE_RAD
+        pulses_per_rad = self.direction / PULSE_RAD
+        self._pulses_per_joint = pulses_per_rad * self._coupling.rad_per_joint
         self._offset_pulses = CENTRE_PULSES + self._turn_pulses + columns.homing_offset
+        self._offset_pulses -= pulses_per_rad * self._coupling.zero_rad
         enabled = columns.torque_enable != 0
         self._enabled = enabled.astype(np.float64)
         self._any_enabled = bool(enabled.any())
@@ -138,6 +147,7 @@ class Motion:
         """
         self._nominal_ratio = nominal_ratio
         _multiply(self._share_per_pwm, nominal_ratio, self._duty_per_pwm)
+        self._duty_per_pwm *= self._coupling.sign
 
     @property
     def duty(self) -> Floats:
@@ -157,10 +167,10 @@ class Motion:
         pwm: Floats = self._pwm * self._enabled
         return pwm
 
-    def sense(self, position_rad: Floats, velocity_rad_s: Floats) -> None:
+    def sense(self, joint_position: Floats, velocity_rad_s: Floats) -> None:
         """Read the encoders."""
         pulses = self.pulses
-        _multiply(position_rad, self._pulses_per_rad, pulses)
+        _multiply(joint_position, self._pulses_per_joint, pulses)
         _add(pulses, self._offset_pulses, pulses)
         _rint(pulses, pulses)
         self.shaft_rad_s = velocity_rad_s
@@ -184,7 +194,7 @@ class Motion:
         self.ramped_velocity[row] = 0.0
 
     def advance(self, dt_s: float) -> Floats:
-        """Return the duty for the next `dt_s`, -1..1 of nominal voltage in shaft coordinates."""
+        """Return the duty for the next `dt_s`, -1..1 of nominal voltage, as the joints have it."""
         pwm = self._pwm
         if not self._any_enabled:
             pwm[:] = 0.0
@@ -270,17 +280,17 @@ class Motion:
         low, high = back_emf_pwm[rows] - allowed_pwm[rows], back_emf_pwm[rows] + allowed_pwm[rows]
         pwm[rows] = np.clip(pwm[rows], low, high)
 
-    def effort_ratio(self, torque_nm: Floats) -> Floats:
+    def effort_ratio(self, joint_effort: Floats) -> Floats:
         """Return the current behind a torque, as a share of the stall current."""
-        ratio: Floats = torque_nm / self._motors.stall_nm
+        ratio: Floats = joint_effort / self._joint_stall_nm
         return ratio
 
-    def present_effort(self, torque_nm: Floats) -> Floats:
+    def present_effort(self, joint_effort: Floats) -> Floats:
         """Return what address 126 shows: current, or load where the model senses none.
 
         An X330 senses what it draws from the supply: the motor's current by the bridge's duty.
         """
-        ratio = self.effort_ratio(torque_nm) * self.direction
+        ratio = self.effort_ratio(joint_effort) * self.direction
         drawn = ratio * (np.abs(self.pwm) / PWM_FULL)
         sensed = np.where(self._motors.senses_supply_current, drawn, ratio)
         return sensed / self._motors.effort_unit_ratio
