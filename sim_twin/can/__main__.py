@@ -7,15 +7,21 @@ bits, `--protocol odrive` serves ODrive axes.
 
 import argparse
 import select
+import sys
 from collections.abc import Sequence
+from contextlib import closing, suppress
 from pathlib import Path
+from typing import Final
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from drivers.errors import DeviceBusy
 from sim_twin.can.drives import DRIVES
 from sim_twin.can.emulated_drive import EmulatedDrive
 from sim_twin.can.free_wheel import STEP_NS, FreeWheel
 from sim_twin.can.hub import CanHub
 from sim_twin.can.wire import DEFAULT_BITRATE, CanWire
+
+_NODE_IDS: Final = {"cia402": (1, 126), "odrive": (0, 62)}
 
 
 def serve(
@@ -36,28 +42,42 @@ def serve(
             step_at_ns = max(step_at_ns + STEP_NS, clock.now_ns())
 
 
-def main() -> None:
-    """Serve until interrupted."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def main() -> int:
+    """Serve until interrupted; return 2 where the socket cannot be had."""
+    options = _parse()
+    drive = DRIVES[options.protocol]
+    wheels = [FreeWheel(drive(node_id)) for node_id in options.nodes]
+    wire = CanWire([wheel.drive for wheel in wheels], bitrate=options.bitrate, timed=options.timed)
+    try:
+        hub = CanHub(wire, options.socket)
+    except (DeviceBusy, OSError) as error:
+        sys.stderr.write(f"{options.socket}: {error}; choose another --socket\n")
+        return 2
+    sys.stdout.write(f"ready: {options.protocol} nodes {options.nodes} at {options.socket}\n")
+    sys.stdout.flush()
+    with closing(hub), suppress(KeyboardInterrupt):
+        serve(hub, wire, wheels, MonotonicClock())
+    return 0
+
+
+def _parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m sim_twin.can", description=__doc__)
     parser.add_argument("--socket", type=Path, required=True, help="path of the hub's socket")
     parser.add_argument("--nodes", type=int, nargs="+", default=[1, 2], help="node ids")
     parser.add_argument("--protocol", choices=DRIVES, default="cia402", help="default: cia402")
     parser.add_argument("--bitrate", type=int, default=DEFAULT_BITRATE, help="default: %(default)s")
     parser.add_argument("--timed", action="store_true", help="frames take the time of their bits")
-    arguments = parser.parse_args()
-    drive = DRIVES[arguments.protocol]
-    wheels = [FreeWheel(drive(node_id)) for node_id in arguments.nodes]
-    wire = CanWire(
-        [wheel.drive for wheel in wheels], bitrate=arguments.bitrate, timed=arguments.timed
-    )
-    hub = CanHub(wire, arguments.socket)
-    try:
-        serve(hub, wire, wheels, MonotonicClock())
-    except KeyboardInterrupt:
-        return
-    finally:
-        hub.close()
+    options = parser.parse_args()
+    lowest, highest = _NODE_IDS[options.protocol]
+    if len(set(options.nodes)) < len(options.nodes) or not all(
+        lowest <= node_id <= highest for node_id in options.nodes
+    ):
+        parser.error(
+            f"--nodes: expected different ids of {lowest}..{highest} for {options.protocol}, "
+            f"got {options.nodes}"
+        )
+    return options
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
