@@ -2,9 +2,10 @@
 
 A cycle reads 10 bytes of every servo, decodes them into current, velocity and position, and writes
 a goal to every servo; what each client does for it is told in `bus_clients`. The bus is a pseudo-
-terminal served by another process. Without pacing, rounds of the clients take turns, so that a busy
-machine hits all of them; medians are compared, plain sync read with plain, fast with fast. With
-pacing, every byte takes its time: `bus_paced`.
+terminal served by another process. Without pacing, client and servos have a core each where there
+are two, and rounds of the clients take turns, so that a busy machine hits all of them; medians are
+compared, plain sync read with plain, fast with fast. With pacing, every byte takes its time:
+`bus_paced`.
 """
 
 import argparse
@@ -21,6 +22,7 @@ from typing import Any, Final
 
 from benchmarks.bus_clients import CLIENTS, SERVOS, Client
 from benchmarks.bus_paced import measure_paced
+from benchmarks.core import own_core
 from benchmarks.emulated_bus import READ_BYTES, WRITE_BYTES, emulated_bus, wire_s
 from drivers.clock import NS_PER_S
 
@@ -83,7 +85,7 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
     """
     results: dict[str, list[Round]] = {client.name: [] for client in CLIENTS}
     with tempfile.TemporaryDirectory() as folder:
-        with emulated_bus(Path(folder)) as link:
+        with emulated_bus(Path(folder)) as link, own_core():
             for _ in range(rounds):
                 for client in CLIENTS:
                     results[client.name].append(_run_whole_round(client, link, seconds))

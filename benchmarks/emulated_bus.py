@@ -1,5 +1,6 @@
 """Run the emulated servos in a process of their own, and know what their wire takes."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from benchmarks.bus_clients import MODEL, SERVOS
+from benchmarks.core import hardware_cores
 from drivers.clock import NS_PER_S, MonotonicClock
 
 WRITE_BYTES: Final = 94
@@ -37,6 +39,8 @@ def emulated_bus(folder: Path, baud: int | None = None) -> Iterator[Path]:
     with subprocess.Popen(command) as server:
         try:
             _wait_for(link, server)
+            if baud is None:  # a client that spins must not share its core
+                os.sched_setaffinity(server.pid, hardware_cores())
             yield link
         finally:
             server.send_signal(signal.SIGTERM)

@@ -1,0 +1,42 @@
+"""Give client and emulated hardware a core each, so that neither waits for the other's."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+_PRIORITY: Final = 40
+"""Below the emulated servos': hardware waits for nobody."""
+
+
+def hardware_cores() -> set[int]:
+    """Return where the emulated hardware runs: the last core, or the only one."""
+    return {max(os.sched_getaffinity(0))}
+
+
+@contextmanager
+def own_core() -> Iterator[None]:
+    """Keep this process on the first core."""
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+@contextmanager
+def realtime() -> Iterator[bool]:
+    """Be scheduled as control is; tell whether that is permitted.
+
+    Not for a client that spins: it would starve the kernel's own carriers of a terminal's bytes.
+    """
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    except PermissionError:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
