@@ -50,7 +50,7 @@ class FrameCarrier:
 
     def __init__(self, *, bitrate: int, timed: bool, restart_s: float | None) -> None:
         self.bitrate = bitrate
-        self.timed = timed
+        self._timed = timed
         self.frames_carried = 0
         self.frames_destroyed = 0
         self.frames_lost = 0
@@ -65,6 +65,16 @@ class FrameCarrier:
         self._until_ns = 0
         self._sound = not timed
         self._running = False
+
+    @property
+    def timed(self) -> bool:
+        """Tell whether a frame takes the time of its bits."""
+        return self._timed
+
+    @timed.setter
+    def timed(self, timed: bool) -> None:
+        self._timed = timed
+        self._sound = False  # the next `poll` finds out whether it is
 
     def poll(self, now_ns: int) -> None:
         """Carry what is due at `now_ns`; time never goes back."""
@@ -122,7 +132,7 @@ class FrameCarrier:
 
     def _inspect(self) -> None:
         """Find out whether the full model is needed any longer."""
-        if self.timed or self._stations.cut:
+        if self._timed or self._stations.cut:
             return
         idle = self._on_wire is None and self._babbler is None and not self._delayed
         self._sound = idle and self._tamper.idle and self._stations.sound()
@@ -166,7 +176,7 @@ class FrameCarrier:
 
     def _time(self, attempt: _Attempt, start_ns: int) -> None:
         attempt.end_ns = attempt.free_ns = start_ns
-        if not self.timed and self._babbler is None:
+        if not self._timed and self._babbler is None:
             return
         bits = HEADER_BITS if attempt.fails_early else frame_bits(attempt.frame)
         bits += ERROR_FRAME_BITS if attempt.error_class else 0
@@ -224,12 +234,12 @@ class FrameCarrier:
     def _not_acknowledged(self, sender: Station) -> None:
         sender.not_acknowledged(NO_ACKNOWLEDGEMENT)
         self._suspend(sender)
-        if not self.timed or not sender.error_active:
+        if not self._timed or not sender.error_active:
             sender.ready_ns = self._until_ns + UNHEARD_RETRY_NS
 
     def _suspend(self, sender: Station) -> None:
         """Let an error passive sender wait before its next frame, as the standard asks."""
-        pause_ns = self._bits_ns(SUSPEND_BITS) if self.timed and not sender.error_active else 0
+        pause_ns = self._bits_ns(SUSPEND_BITS) if self._timed and not sender.error_active else 0
         sender.ready_ns = self._free_ns + pause_ns
 
     def _plan_restart(self, station: Station) -> None:

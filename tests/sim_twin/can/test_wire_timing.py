@@ -109,3 +109,20 @@ def test_a_babbler_of_low_priority_only_costs_time() -> None:
         bus.send(message(0x100))
         wire.poll(2_000_000)
     assert 0x100 in node.heard
+
+
+def test_a_wire_in_use_can_be_given_and_spared_the_time_of_its_bits() -> None:
+    heard: list[can.Message] = []
+    wire = CanWire()
+    wire.attach(heard.append)
+    wire.attach(sender := [].append)
+    wire.timed = True
+    wire.poll(0)
+    wire.send(can.Message(arbitration_id=1, is_extended_id=False, data=bytes(8)), sender)
+    assert heard == []
+    wire.poll(200_000)
+    assert len(heard) == 1
+    wire.timed = False
+    wire.poll(400_000)
+    wire.send(can.Message(arbitration_id=2, is_extended_id=False, data=bytes(8)), sender)
+    assert len(heard) == 2
