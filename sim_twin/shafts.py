@@ -12,7 +12,7 @@ from sim_twin.errors import ModelMismatch
 Floats = NDArray[np.float64]
 ControlLaw = Callable[[int, float, float], float]
 """Return a motor's input from simulated time, its shaft's angle and its shaft's speed."""
-_multiply, _subtract = np.multiply, np.subtract
+_multiply = np.multiply
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,27 +39,19 @@ class Shafts:
         """Shaft angle = rad_per_joint * joint - zero_rad."""
         self._each_zero_rad: list[float] = self.zero_rad.tolist()
         self.rad_per_joint = 1.0 / ratio
-        self._sign = np.sign(ratio)
         # The state's memory is asked for once: asking MjData anew costs more than reading it.
         self._read_qpos, self._read_qvel = _reader(data.qpos, qpos), _reader(data.qvel, qvel)
         self._read_force = _reader(data.actuator_force, actuators)
         self._all_ctrl, self._actuator = data.ctrl, _span(actuators)
-        self._angle, self._speed = np.zeros((2, len(shafts)))
+        self._speed = np.zeros(len(shafts))
         self._each_qpos, self._each_qvel = memoryview(data.qpos), memoryview(data.qvel)
         self._each_ctrl = memoryview(data.ctrl)
-        factors = (self.rad_per_joint.tolist(), self._sign.tolist())
+        factors = (self.rad_per_joint.tolist(), np.sign(ratio).tolist())
         self._rows = list(zip(range(len(shafts)), qpos, qvel, actuators, *factors, strict=True))
 
     def joint_position(self) -> Floats:
         """Return what the joints stand at; the physics may write to it."""
         return self._read_qpos()
-
-    def position_rad(self) -> Floats:
-        """Return shaft angles."""
-        angle = self._angle
-        _multiply(self._read_qpos(), self.rad_per_joint, angle)
-        _subtract(angle, self.zero_rad, angle)
-        return angle
 
     def velocity_rad_s(self) -> Floats:
         """Return shaft speeds."""
@@ -70,17 +62,8 @@ class Shafts:
         """Return what the motors give, in the joint's direction; the physics may write to it."""
         return self._read_force()
 
-    def effort(self) -> Floats:
-        """Return what the motors gave in the last step, in the shaft's direction."""
-        effort: Floats = self._read_force() * self._sign
-        return effort
-
     def command(self, value: Floats) -> None:
-        """Set the motors' input, in the shaft's direction: duty of a servo, torque of a drive."""
-        self.command_joints(value * self._sign)
-
-    def command_joints(self, value: Floats) -> None:
-        """Set the motors' input, in the joint's direction."""
+        """Set the motors' input, in the joint's direction: duty of a servo, torque of a drive."""
         self._all_ctrl[self._actuator] = value
 
     def command_each(self, now_ns: int, laws: Sequence[ControlLaw]) -> None:

@@ -184,7 +184,7 @@ class Twin:
             shafts.joint_effort(),
             self.servo_supply.volts(now_ns),
         )
-        shafts.command_joints(duty)
+        shafts.command(duty)
         engine.drives.command_each(now_ns, self._drive_laws)
 
 

@@ -15,11 +15,6 @@ class EstopButtonDevice:
         self._out = bytearray()
         self.announce()
 
-    @property
-    def is_pressed(self) -> bool:
-        """Tell whether the button is down."""
-        return self._down
-
     def press(self) -> None:
         """Push the button down; it stays there."""
         self._move(down=True)

@@ -3,10 +3,17 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from sim_twin.engine import START_NS, STEP_NS, Engine
 from sim_twin.errors import ModelMismatch
 from sim_twin.shafts import Shaft
+
+
+def angles(engine: Engine) -> NDArray[np.float64]:
+    """Return shaft angles as the emulated encoders have them."""
+    shafts = engine.servos
+    return shafts.rad_per_joint * shafts.joint_position() - shafts.zero_rad
 
 
 def test_time_goes_by_steps_of_two_milliseconds(engine: Engine) -> None:
@@ -22,23 +29,24 @@ def test_joints_start_inside_their_range(engine: Engine) -> None:
 def test_a_shaft_reads_its_joint_through_offset_and_sign(engine: Engine) -> None:
     engine.data.joint("arm").qpos[0] = 0.8
     engine.data.joint("arm").qvel[0] = 0.1
-    assert engine.servos.position_rad() == pytest.approx([-0.3])
+    assert angles(engine) == pytest.approx([-0.3])
     assert engine.servos.velocity_rad_s() == pytest.approx([-0.1])
 
 
 def test_a_shaft_of_a_finger_turns_travel_into_an_angle(room: mujoco.MjModel) -> None:
     engine = Engine(room, [Shaft(joint="finger", offset=0.02, ratio=0.02)], [])
     engine.data.joint("finger").qpos[0] = 0.03
-    assert engine.servos.position_rad() == pytest.approx([0.5])
+    assert angles(engine) == pytest.approx([0.5])
 
 
 def test_a_command_in_shaft_direction_moves_a_mirrored_joint_backwards(engine: Engine) -> None:
-    engine.servos.command(np.array([0.5]))
+    engine.servos.command(np.array([0.5]) * np.sign(engine.servos.rad_per_joint))
     for _ in range(50):
         engine.step()
     assert engine.data.joint("arm").qvel[0] < 0.0
     assert engine.servos.velocity_rad_s()[0] > 0.0
-    assert engine.servos.effort() == pytest.approx([0.5])
+    effort = engine.servos.joint_effort() * np.sign(engine.servos.rad_per_joint)
+    assert effort == pytest.approx([0.5])
 
 
 def test_a_joint_that_the_model_lacks_is_named(room: mujoco.MjModel) -> None:
@@ -76,7 +84,7 @@ def test_plain_numbers_tell_the_same_motion_as_arrays(engine: Engine) -> None:
     engine.servos.command_each(engine.now_ns, [law])
     ((now_ns, angle_rad, speed_rad_s),) = told
     assert now_ns == engine.now_ns
-    assert engine.servos.position_rad() == pytest.approx([angle_rad])
+    assert angles(engine) == pytest.approx([angle_rad])
     assert engine.servos.velocity_rad_s() == pytest.approx([speed_rad_s])
     assert angle_rad == pytest.approx(-0.25)
     assert engine.data.ctrl[0] == -0.25

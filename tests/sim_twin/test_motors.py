@@ -1,5 +1,6 @@
 import math
 
+import numpy as np
 import pytest
 
 from sim_twin.engine import Engine
@@ -34,12 +35,13 @@ def test_a_motor_at_full_duty_never_outruns_its_no_load_speed(
     robot: RobotDescription, engine: Engine, joint: str
 ) -> None:
     row = robot.joint_index[joint]
-    duty = engine.servos.position_rad() * 0.0
+    duty = np.zeros(len(robot.joint_names))
+    sign = np.sign(engine.servos.rad_per_joint)
     fastest = 0.0
     for reversal in range(REVERSALS):
         duty[row] = math.copysign(1.0, 0.5 - reversal % 2)
         for _ in range(STEPS_BETWEEN):
-            engine.servos.command(duty)
+            engine.servos.command(duty * sign)
             engine.step()
             fastest = max(fastest, abs(float(engine.servos.velocity_rad_s()[row])))
     assert 0.5 < fastest / robot.model_of(joint).no_load_speed_rad_s < OVERSHOOT_RATIO
