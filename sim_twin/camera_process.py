@@ -3,9 +3,7 @@
 It mirrors the physics' positions, serves the RGB-D camera's stream and shoots the film.
 """
 
-import argparse
 import select
-import signal
 import socket
 import sys
 from collections.abc import Sequence
@@ -13,14 +11,13 @@ from pathlib import Path
 
 import mujoco
 
-from sim_twin.errors import TwinError
+from sim_twin.drawing_process import drawing_parser, run_drawing, take_over
 from sim_twin.faults.camera_relay import CameraBench, CameraFaults
 from sim_twin.film_desk import FilmDesk
 from sim_twin.head_camera import HeadCamera, camera_line
 from sim_twin.json_line_server import JsonLineServer
-from sim_twin.lifetime import die_with_parent
 from sim_twin.load import load_model
-from sim_twin.mirror import READY, MirrorState, newest_state
+from sim_twin.mirror import MirrorState, newest_state
 from sim_twin.referee import FILM_SOCKET
 from sim_twin.stream_line import StreamLine
 from vla_deploy.robots import load_robot
@@ -79,10 +76,7 @@ class Studio:
         """Take over a state; stamp camera frames with wall time, which never slips."""
         self._shown_ns = state.wall_ns
         self._faults.follow(state.camera_faults)
-        self._data.qpos[:] = state.qpos
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_comPos(self._model, self._data)
-        mujoco.mj_camlight(self._model, self._data)
+        take_over(state, self._model, self._data)
         if not self._stream.is_backed_up:
             self._camera.device.step(state.wall_ns)
         self._desk.shoot_if_due(state.now_ns)
@@ -91,30 +85,11 @@ class Studio:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the studio until its parent ends; 2 when it cannot start."""
-    parser = argparse.ArgumentParser(prog="python -m sim_twin.camera_process")
-    parser.add_argument("--robot", required=True)
-    parser.add_argument("--world", required=True)
+    parser = drawing_parser("camera_process")
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--devices-dir", type=Path, required=True)
-    parser.add_argument("--mirror-fd", type=int, required=True)
-    parser.add_argument("--parent-pid", type=int, required=True)
-    options = parser.parse_args(argv)
-    die_with_parent(options.parent_pid, signal.SIGKILL)
-    # Both may reach the whole group; the twin ends this process by closing the mirror.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    mirror = socket.socket(fileno=options.mirror_fd)
-    try:
-        studio = Studio(options.robot, options.world, options.seed, options.devices_dir)
-    except TwinError as error:
-        mirror.send(str(error).encode())
-        return 2
-    mirror.send(READY)
-    try:
-        studio.run(mirror)
-    finally:
-        studio.close()
-    return 0
+    told = parser.parse_args(argv)
+    return run_drawing(told, lambda: Studio(told.robot, told.world, told.seed, told.devices_dir))
 
 
 if __name__ == "__main__":

@@ -3,23 +3,22 @@
 The window mirrors the positions; closing it leaves the twin running.
 """
 
-import argparse
 import select
-import signal
 import socket
 import sys
 import threading
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import mujoco
 
 from sim_twin.compose import ROBOT_ROOT
-from sim_twin.errors import DrawingFailed, TwinError
-from sim_twin.lifetime import die_with_parent
+from sim_twin.drawing_process import drawing_parser, run_drawing, take_over
+from sim_twin.errors import DrawingFailed
 from sim_twin.load import load_model
-from sim_twin.mirror import READY, newest_state
+from sim_twin.mirror import newest_state
 from sim_twin.renderer import VISIBLE_GROUPS
 from vla_deploy.robots import load_robot
 
@@ -109,40 +108,38 @@ def show(window: Window, model: mujoco.MjModel, data: mujoco.MjData, mirror: soc
         except EOFError:
             return
         if state is not None:
-            data.qpos[:] = state.qpos
             data.time = state.now_ns * 1e-9
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            mujoco.mj_camlight(model, data)
+            take_over(state, model, data)
             window.sync()
+
+
+@dataclass(frozen=True, slots=True)
+class _Exhibit:
+    """Hold a window and what it shows."""
+
+    window: Window
+    model: mujoco.MjModel
+    data: mujoco.MjData
+
+    def run(self, mirror: socket.socket) -> None:
+        """Show it until the window, or the mirror's other end, closes."""
+        show(self.window, self.model, self.data, mirror)
+
+    def close(self) -> None:
+        """Close the window."""
+        self.window.close()
+
+
+def _open_exhibit(robot: str, world: str) -> _Exhibit:
+    model = load_model(load_robot(robot), world)
+    data = mujoco.MjData(model)
+    return _Exhibit(PassiveViewer(model, data), model, data)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the window until its parent ends or somebody closes it; 2 when it cannot open."""
-    parser = argparse.ArgumentParser(prog="python -m sim_twin.viewer_process")
-    parser.add_argument("--robot", required=True)
-    parser.add_argument("--world", required=True)
-    parser.add_argument("--mirror-fd", type=int, required=True)
-    parser.add_argument("--parent-pid", type=int, required=True)
-    options = parser.parse_args(argv)
-    die_with_parent(options.parent_pid, signal.SIGKILL)
-    # Both may reach the whole group; the twin ends this process by closing the mirror.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    mirror = socket.socket(fileno=options.mirror_fd)
-    try:
-        model = load_model(load_robot(options.robot), options.world)
-        data = mujoco.MjData(model)
-        window = PassiveViewer(model, data)
-    except TwinError as error:
-        mirror.send(str(error).encode())
-        return 2
-    mirror.send(READY)
-    try:
-        show(window, model, data, mirror)
-    finally:
-        window.close()
-    return 0
+    told = drawing_parser("viewer_process").parse_args(argv)
+    return run_drawing(told, lambda: _open_exhibit(told.robot, told.world))
 
 
 if __name__ == "__main__":
