@@ -78,17 +78,11 @@ class TwinProcess:
         self._twin.can_wire.timed = options.paced
         self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
         self._drawings = _start_drawings(options)
-        self._servo_line = PtyLine(
-            self._twin.lines[robot.servo_bus.device],
-            devices / robot.servo_bus.device,
-            now_ns=self._now_ns,
-            on_baud=self._twin.servos.set_host_baud,
-        )
-        self._lines = {
-            name: self._servo_line
-            if name == robot.servo_bus.device
-            else PtyLine(line, devices / name)
+        self._servo_line = self._open_servo_line(devices / robot.servo_bus.device)
+        self._lines = {robot.servo_bus.device: self._servo_line} | {
+            name: PtyLine(line, devices / name)
             for name, line in self._twin.lines.items()
+            if name != robot.servo_bus.device
         }
         self._streams = {
             name: StreamLine(line, devices / name, partial(self._twin.announce, name))
@@ -146,6 +140,12 @@ class TwinProcess:
             known = ", ".join(self._operations)
             raise RefereeRefusal(f"no operation {request.get('op')!r}; there are {known}")
         return operation(request)
+
+    def _open_servo_line(self, path: Path) -> PtyLine:
+        """Serve the servo bus, whose bytes may take their time, at the speed that the host sets."""
+        twin = self._twin
+        line, on_baud = twin.lines[path.name], twin.servos.set_host_baud
+        return PtyLine(line, path, now_ns=self._now_ns, on_baud=on_baud)
 
     def _now_ns(self) -> int:
         """Return simulated time, which passes between two steps too."""

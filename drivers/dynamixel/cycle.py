@@ -59,13 +59,9 @@ class ServoCycle:
         self.notices: deque[str] = deque(maxlen=_MOST_NOTICES)
         for servo, setup in zip(servos, setups, strict=True):
             self.notices += [f"{servo}: set {text}" for text in setup.written]
-        reads = [
-            ServoRead(spec=servo, block=setup.block, fast=setup.fast_sync)
-            for servo, setup in zip(servos, setups, strict=True)
-        ]
         self._reader = StateReader(
             self._link,
-            reads,
+            _reads(servos, setups),
             self._roster,
             state,
             journal,
@@ -172,3 +168,10 @@ class ServoCycle:
         self._reader.rebuild()
         self.goals.forget_pwm(self._servos[index].id)
         self._health.ask_soon(index)
+
+
+def _reads(servos: Sequence[ServoSpec], setups: Sequence[ServoSetup]) -> list[ServoRead]:
+    return [
+        ServoRead(spec=servo, block=setup.block, fast=setup.fast_sync)
+        for servo, setup in zip(servos, setups, strict=True)
+    ]
