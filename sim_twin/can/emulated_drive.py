@@ -35,6 +35,8 @@ class Mounting:
 
 
 HUB_MOTOR: Final = Mounting()
+LOAD_PERIOD_S: Final = 0.01
+"""How often supply and heat are followed up, which are slow beside the velocity loop."""
 
 
 class EmulatedDrive(ABC):
@@ -50,6 +52,7 @@ class EmulatedDrive(ABC):
         self._encoder = Encoder(mounting.counts_per_rev)
         self._send_frame: Callable[[can.Message], None] = lambda frame: None
         self._now_ns: int | None = None
+        self._unfollowed_s = 0.0
         self._supplied = True
         self._silent = False
         self._runaway_rad_s = 0.0
@@ -115,8 +118,11 @@ class EmulatedDrive(ABC):
         if self._runaway_rad_s and self.armed:
             felt_rad_s -= per_joint * self._runaway_rad_s
         torque_nm = self._act(now_ns, dt_s, felt_rad_s)
-        if torque_nm or not stage.at_rest:
-            stage.load(torque_nm, velocity_rad_s, dt_s)
+        self._unfollowed_s += dt_s
+        if self._unfollowed_s >= LOAD_PERIOD_S:
+            if torque_nm or not stage.at_rest:
+                stage.load(torque_nm, velocity_rad_s, self._unfollowed_s)
+            self._unfollowed_s = 0.0
         if stage.is_strained or self._tripped is not None:
             self._protect()
         return per_joint * torque_nm
