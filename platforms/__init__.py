@@ -1,6 +1,18 @@
 """Describe the computers that the stack runs on."""
 
 from platforms.errors import ProfileError
-from platforms.profile import ProcessBudget, Profile, load_profile
+from platforms.ladder import LadderAction, LadderStep, LadderTiming, ProcessBudget, TotalBudget
+from platforms.profile import ModelChoice, ProcessSettings, Profile, load_profile
 
-__all__ = ["ProcessBudget", "Profile", "ProfileError", "load_profile"]
+__all__ = [
+    "LadderAction",
+    "LadderStep",
+    "LadderTiming",
+    "ModelChoice",
+    "ProcessBudget",
+    "ProcessSettings",
+    "Profile",
+    "ProfileError",
+    "TotalBudget",
+    "load_profile",
+]

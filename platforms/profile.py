@@ -1,24 +1,66 @@
-"""Load what one kind of computer can do: rates, watchdogs, priorities, declared budgets."""
+"""Declare how the stack runs on one kind of computer."""
 
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from platforms.errors import ProfileError
+from platforms.ladder import (
+    LadderAction,
+    LadderStep,
+    LadderTiming,
+    ProcessBudget,
+    TotalBudget,
+)
+from platforms.profile_check import cross_faults
+from platforms.profile_schema import schema_faults
+from platforms.profile_source import PROFILES, Source, Table, read_source
 
-PROFILES = Path(__file__).parent / "profiles"
-_PROCESSES = ("supervisor", "control", "perception", "planner", "executor", "twin")
-_MIN_WATCHDOG_PERIODS = 3
+__all__ = [
+    "PROFILES",
+    "BoardLimits",
+    "ModelChoice",
+    "ProcessSettings",
+    "Profile",
+    "load_profile",
+    "profile_from",
+    "profile_names",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ProcessBudget:
-    """Declare what one process may use; `cpu_ratio` counts in cores."""
+class BoardLimits:
+    """Declare what the computer has at least; a profile may not ask for more."""
 
+    cpu_count: int
     memory_mb: float
-    cpu_ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProcessSettings:
+    """Declare how the kernel runs one process; an empty `affinity` leaves every CPU.
+
+    `threads` is how many of its own a numeric library of that process may start.
+    """
+
+    affinity: tuple[int, ...]
+    nice: int
+    threads: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelChoice:
+    """Declare which models may play one role, the best first, and where they run.
+
+    `providers` are execution providers in order of preference. Running on the CPU where it is not
+    listed is an error unless `cpu_fallback`.
+    """
+
+    tiers: tuple[str, ...]
+    providers: tuple[str, ...]
+    precision: str
+    threads: int
+    cpu_fallback: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +69,7 @@ class Profile:
 
     `bus_watchdog_s` and `can_heartbeat_s` say how long servos and wheel drives carry on when
     control is silent. `realtime_priority` is the SCHED_FIFO priority of control, 0 for none.
+    `power_mode` is a name of the board's nvpmodel.conf; empty leaves the mode as it is.
     """
 
     name: str
@@ -37,41 +80,15 @@ class Profile:
     perception_rate_hz: float
     executor_rate_hz: float
     realtime_priority: int
+    memory_lock: bool
+    power_mode: str
+    board: BoardLimits
+    processes: Mapping[str, ProcessSettings]
+    models: Mapping[str, ModelChoice]
     budgets: Mapping[str, ProcessBudget]
-
-
-@dataclass(frozen=True, slots=True)
-class _Range:
-    """Allow numbers from `low` to `high`."""
-
-    low: float
-    high: float
-    unit: str
-    integer: bool = False
-
-    def __str__(self) -> str:
-        kind = "an integer" if self.integer else "a number"
-        return f"{kind} from {self.low:g} to {self.high:g} {self.unit}".rstrip()
-
-    def allows(self, value: object) -> bool:
-        """Tell whether a TOML value is such a number."""
-        numeric = isinstance(value, int if self.integer else int | float)
-        return numeric and not isinstance(value, bool) and self.low <= value <= self.high  # type: ignore[operator]
-
-
-_KEYS: Mapping[str, _Range] = {
-    "control_rate_hz": _Range(50, 1000, "Hz"),
-    "bus_watchdog_s": _Range(0.02, 2.54, "s"),  # the servos' register: 1..127 times 20 ms
-    "can_heartbeat_s": _Range(0.01, 2.0, "s"),
-    "camera_rate_hz": _Range(1, 60, "Hz"),
-    "perception_rate_hz": _Range(0.5, 60, "Hz"),
-    "executor_rate_hz": _Range(5, 200, "Hz"),
-    "realtime_priority": _Range(0, 80, "", integer=True),  # leaves the kernel's own threads ahead
-}
-_BUDGET_KEYS: Mapping[str, _Range] = {
-    "memory_mb": _Range(1, 131072, "MB"),
-    "cpu_ratio": _Range(0.01, 64, "cores"),
-}
+    total: TotalBudget
+    ladder: tuple[LadderStep, ...]
+    ladder_timing: LadderTiming
 
 
 def load_profile(name_or_path: str | Path) -> Profile:
@@ -80,69 +97,46 @@ def load_profile(name_or_path: str | Path) -> Profile:
     Raises:
         ProfileError: no such profile, or it has faults; every fault is reported.
     """
-    path = _locate(str(name_or_path))
-    try:
-        document = tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise ProfileError((f"{path}: expected a TOML file: {error}",)) from error
-    faults = tuple(f"{path}: {fault}" for fault in _faults(document))
+    return profile_from(read_source(name_or_path))
+
+
+def profile_from(source: Source) -> Profile:
+    """Validate what was read, completely.
+
+    Raises:
+        ProfileError: it has faults; every fault is reported with the file that it stands in.
+    """
+    faults = tuple(schema_faults(source.values)) or tuple(cross_faults(source.values))
     if faults:
-        raise ProfileError(faults)
-    return _build(path.stem, document)
+        raise ProfileError(tuple(f"{source.file_of(fault.key)}: {fault}" for fault in faults))
+    return _build(source.name, source.values)
 
 
-def _locate(name: str) -> Path:
-    if name.endswith(".toml"):
-        return Path(name)
-    path = PROFILES / f"{name}.toml"
-    if "/" in name or not path.is_file():
-        known = ", ".join(sorted(found.stem for found in PROFILES.glob("*.toml")))
-        raise ProfileError((f"no profile {name!r}: choose {known}, or give a path to a .toml",))
-    return path
+def profile_names() -> tuple[str, ...]:
+    """Return the names of the profiles that come with the software."""
+    return tuple(sorted(path.stem for path in PROFILES.glob("*.toml")))
 
 
-def _faults(document: Mapping[str, Any]) -> Iterator[str]:
-    scalars = {key: value for key, value in document.items() if key != "budgets"}
-    yield from _table_faults("", scalars, _KEYS)
-    budgets = document.get("budgets")
-    if not isinstance(budgets, dict):
-        yield f"budgets: expected a table for each of {', '.join(_PROCESSES)}, got {budgets!r}"
-        return
-    for name in sorted(budgets.keys() - set(_PROCESSES)):
-        yield f"budgets.{name}: unknown process, expected one of {', '.join(_PROCESSES)}"
-    for name in _PROCESSES:
-        yield from _table_faults(f"budgets.{name}", budgets.get(name), _BUDGET_KEYS)
-    yield from _cross_faults(document)
+def _build(name: str, values: Table) -> Profile:
+    budgets = dict(values["budgets"])
+    tables = {
+        "board": BoardLimits(**values["board"]),
+        "processes": {
+            process: ProcessSettings(**{**table, "affinity": tuple(table["affinity"])})
+            for process, table in values["processes"].items()
+        },
+        "models": {role: _model(table) for role, table in values.get("models", {}).items()},
+        "total": TotalBudget(**budgets.pop("total")),
+        "budgets": {process: ProcessBudget(**table) for process, table in budgets.items()},
+        "ladder": tuple(
+            LadderStep(**{**step, "action": LadderAction(step["action"])})
+            for step in values["ladder"]
+        ),
+        "ladder_timing": LadderTiming(**values["ladder_timing"]),
+    }
+    return Profile(**{**values, **tables, "name": name})
 
 
-def _table_faults(where: str, table: object, keys: Mapping[str, _Range]) -> Iterator[str]:
-    if not isinstance(table, dict):
-        yield f"{where}: expected a table with {', '.join(keys)}, got {table!r}"
-        return
-    prefix = f"{where}." if where else ""
-    for key in table.keys() - keys.keys():
-        yield f"{prefix}{key}: unknown key, expected {', '.join(keys)}"
-    for key, allowed in keys.items():
-        if key not in table:
-            yield f"{prefix}{key}: expected {allowed}, got nothing"
-        elif not allowed.allows(table[key]):
-            yield f"{prefix}{key}: expected {allowed}, got {table[key]!r}"
-
-
-def _cross_faults(document: Mapping[str, Any]) -> Iterator[str]:
-    rate_hz = document.get("control_rate_hz")
-    if not _KEYS["control_rate_hz"].allows(rate_hz):
-        return
-    shortest_s = _MIN_WATCHDOG_PERIODS / rate_hz  # type: ignore[operator]
-    for key in ("bus_watchdog_s", "can_heartbeat_s"):
-        value = document.get(key)
-        if _KEYS[key].allows(value) and value < shortest_s:  # type: ignore[operator]
-            yield (
-                f"{key}: expected at least {_MIN_WATCHDOG_PERIODS} control periods "
-                f"({shortest_s:g} s), got {value!r}"
-            )
-
-
-def _build(name: str, document: Mapping[str, Any]) -> Profile:
-    budgets = {process: ProcessBudget(**table) for process, table in document["budgets"].items()}
-    return Profile(**{**document, "name": name, "budgets": budgets})
+def _model(table: Table) -> ModelChoice:
+    lists = {key: tuple(table[key]) for key in ("tiers", "providers")}
+    return ModelChoice(**{**table, **lists})

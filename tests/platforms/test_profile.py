@@ -1,92 +1,181 @@
 import pytest
 
 from platforms import ProfileError, load_profile
-from platforms.profile import PROFILES
+from platforms.ladder import LadderAction, LadderStep
+from platforms.profile import PROFILES, profile_names
+from platforms.profile_schema import PROCESSES
 
-GOOD = (PROFILES / "desktop.toml").read_text()
 TEN_FAULTS = """
+inherits = "base"
 control_rate_hz = "fast"
 bus_watchdog_s = 3.0
 camera_rate_hz = true
 perception_rate_hz = 0
-executor_rate_hz = 50
 realtime_priority = 10.5
 colour = "blue"
 
 [budgets]
-supervisor = { memory_mb = 80, cpu_ratio = 0.1 }
-control = { memory_mb = -1, cpu_ratio = 0.8 }
-perception = { memory_mb = 400 }
+control = { memory_mb = -1 }
 planner = 7
-executor = { memory_mb = 250, cpu_ratio = 0.5 }
-twin = { memory_mb = 900, cpu_ratio = 1.5 }
+total = { power_w = 0 }
+
+[models.detector]
+tiers = []
+providers = ["CPUExecutionProvider"]
+precision = "fp16"
+threads = 1
+cpu_fallback = 1
 """
 
 
-def faults_of(tmp_path, text: str) -> tuple[str, ...]:
-    path = tmp_path / "mine.toml"
-    path.write_text(text)
-    with pytest.raises(ProfileError) as caught:
-        load_profile(path)
-    assert all(fault.startswith(f"{path}: ") for fault in caught.value.faults)
-    return tuple(fault.removeprefix(f"{path}: ") for fault in caught.value.faults)
+@pytest.fixture
+def write(tmp_path):
+    def write(text: str, name: str = "mine"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text)
+        return path
+
+    return write
 
 
-@pytest.mark.parametrize("path", sorted(PROFILES.glob("*.toml")), ids=lambda path: path.stem)
-def test_every_shipped_profile_loads_under_its_name(path):
-    assert load_profile(path.stem).name == path.stem
+@pytest.fixture
+def faults_of(write):
+    def faults_of(text: str) -> tuple[str, ...]:
+        path = write(text)
+        with pytest.raises(ProfileError) as caught:
+            load_profile(path)
+        assert all(fault.startswith(f"{path}: ") for fault in caught.value.faults)
+        return tuple(fault.removeprefix(f"{path}: ") for fault in caught.value.faults)
+
+    return faults_of
 
 
-def test_a_profile_is_loaded_by_path(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(GOOD.replace("control_rate_hz = 250", "control_rate_hz = 100"))
+def mine(text: str) -> str:
+    return f'inherits = "base"\n{text}'
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_every_shipped_profile_loads_under_its_name(name):
+    assert load_profile(name).name == name
+
+
+def test_a_profile_is_loaded_by_path(write):
+    path = write(mine("control_rate_hz = 100"))
     profile = load_profile(str(path))
     assert (profile.name, profile.control_rate_hz) == ("mine", 100)
     assert profile.budgets["control"].memory_mb == 250
 
 
-def test_ten_faults_are_reported_as_ten(tmp_path):
-    faults = faults_of(tmp_path, TEN_FAULTS)
+def test_ten_faults_are_reported_as_ten(faults_of):
+    faults = faults_of(TEN_FAULTS)
     assert sorted(faults) == sorted(
         [
             "colour: unknown key, expected control_rate_hz, bus_watchdog_s, can_heartbeat_s, "
-            "camera_rate_hz, perception_rate_hz, executor_rate_hz, realtime_priority",
+            "camera_rate_hz, perception_rate_hz, executor_rate_hz, realtime_priority, "
+            "memory_lock, power_mode",
             "control_rate_hz: expected a number from 50 to 1000 Hz, got 'fast'",
             "bus_watchdog_s: expected a number from 0.02 to 2.54 s, got 3.0",
-            "can_heartbeat_s: expected a number from 0.01 to 2 s, got nothing",
             "camera_rate_hz: expected a number from 1 to 60 Hz, got True",
             "perception_rate_hz: expected a number from 0.5 to 60 Hz, got 0",
             "realtime_priority: expected an integer from 0 to 80, got 10.5",
-            "budgets.control.memory_mb: expected a number from 1 to 131072 MB, got -1",
-            "budgets.perception.cpu_ratio: expected a number from 0.01 to 64 cores, got nothing",
+            "budgets.control.memory_mb: expected a number from 1 to 262144 MB, got -1",
             "budgets.planner: expected a table with memory_mb, cpu_ratio, got 7",
+            "budgets.total.power_w: expected a number from 1 to 1000 W, got 0",
+            "models.detector.tiers: expected a list, each a text, none twice, not empty, got []",
+            "models.detector.cpu_fallback: expected true or false, got 1",
         ]
     )
 
 
-def test_a_watchdog_shorter_than_three_control_periods_is_a_fault(tmp_path):
-    text = GOOD.replace("bus_watchdog_s = 0.3", "bus_watchdog_s = 0.025").replace(
-        "control_rate_hz = 250", "control_rate_hz = 100"
-    )
-    assert faults_of(tmp_path, text) == (
-        "bus_watchdog_s: expected at least 3 control periods (0.03 s), got 0.025",
-    )
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        (
+            "control_rate_hz = 100\nbus_watchdog_s = 0.025",
+            "bus_watchdog_s: expected at least 3 control periods (0.03 s), got 0.025",
+        ),
+        (
+            "camera_rate_hz = 5\nperception_rate_hz = 10",
+            "perception_rate_hz: expected at most camera_rate_hz (5 Hz), got 10",
+        ),
+        (
+            "board.cpu_count = 4\nprocesses.control.affinity = [3, 4]",
+            "processes.control.affinity: expected CPUs of the board, 0 to 3, got [4]",
+        ),
+        (
+            "budgets.total.memory_mb = 1129",
+            "budgets.total.memory_mb: expected at least the 1130 MB of all processes, got 1129",
+        ),
+        (
+            "budgets.total.cpu_ratio = 2.3",
+            "budgets.total.cpu_ratio: expected at least the 2.4 cores of all processes, got 2.3",
+        ),
+        (
+            "board.memory_mb = 2048\nbudgets.total.memory_mb = 2500",
+            "budgets.total.memory_mb: expected at most the 2048 that the board has, got 2500",
+        ),
+    ],
+)
+def test_a_contradiction_is_one_fault(faults_of, text, fault):
+    assert faults_of(mine(text)) == (fault,)
 
 
-def test_a_watchdog_of_exactly_three_control_periods_is_allowed(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(
-        GOOD.replace("bus_watchdog_s = 0.3", "bus_watchdog_s = 0.03").replace(
-            "control_rate_hz = 250", "control_rate_hz = 100"
-        )
-    )
+def step(action: str, **values: object) -> str:
+    lines = [f"{key} = {value if key == 'ratio' else repr(value)}" for key, value in values.items()]
+    return "\n".join(["[[ladder]]", f"action = '{action}'", *lines, ""])
+
+
+@pytest.mark.parametrize(
+    ("steps", "fault"),
+    [
+        (
+            step("suspend", process="planner") + step("slow", process="perception", ratio=0.5),
+            "ladder[1].action: expected the order slow -> smaller_model -> suspend -> restart -> "
+            "protective_stop, got slow after suspend",
+        ),
+        (
+            step("slow", process="control", ratio=0.5),
+            "ladder[0].process: expected one of perception, planner, executor, got 'control'",
+        ),
+        (
+            step("restart"),
+            "ladder[0].process: expected one of perception, planner, executor, got 'nothing'",
+        ),
+        (
+            step("protective_stop", process="planner"),
+            "ladder[0].process: expected nothing, a stop concerns the robot, got 'planner'",
+        ),
+        (
+            step("slow", process="planner"),
+            "ladder[0].ratio: expected a ratio below 1, got nothing",
+        ),
+        (
+            step("suspend", process="planner", ratio=0.5),
+            "ladder[0].ratio: expected nothing, only slow has a ratio, got 0.5",
+        ),
+    ],
+)
+def test_a_bad_ladder_is_one_fault(faults_of, steps, fault):
+    assert faults_of(mine(steps)) == (fault,)
+
+
+def test_a_ladder_replaces_the_inherited_one(write):
+    profile = load_profile(write(mine(step("suspend", process="planner"))))
+    assert profile.ladder == (LadderStep(action=LadderAction.SUSPEND, process="planner"),)
+
+
+def test_a_watchdog_of_exactly_three_control_periods_is_allowed(write):
+    path = write(mine("control_rate_hz = 100\nbus_watchdog_s = 0.03"))
     assert load_profile(path).bus_watchdog_s == 0.03
 
 
-def test_an_unknown_process_and_missing_budgets_are_faults(tmp_path):
-    text = GOOD + "radio = { memory_mb = 1, cpu_ratio = 1 }\n"
-    assert faults_of(tmp_path, text)[0].startswith("budgets.radio: unknown process")
-    assert faults_of(tmp_path, GOOD.partition("[budgets]")[0])[0].startswith("budgets: expected a")
+def test_an_unknown_process_and_missing_tables_are_faults(faults_of):
+    assert faults_of(mine("[budgets.radio]\nmemory_mb = 1\ncpu_ratio = 1")) == (
+        f"budgets.radio: unknown, expected one of {', '.join(PROCESSES)}",
+    )
+    missing = faults_of("control_rate_hz = 250")
+    assert "budgets: expected a table for each of supervisor, control" in "\n".join(missing)
+    assert "ladder: expected a list of steps with action, got nothing" in missing
 
 
 def test_an_unknown_name_lists_the_known_ones():
@@ -94,7 +183,13 @@ def test_an_unknown_name_lists_the_known_ones():
         load_profile("deskop")
 
 
-def test_broken_toml_and_missing_files_name_the_path(tmp_path):
-    assert "line 1" in faults_of(tmp_path, "control_rate_hz = = 3")[0]
+def test_broken_toml_and_missing_files_name_the_path(faults_of, tmp_path):
+    assert "line 1" in faults_of("control_rate_hz = = 3")[0]
     with pytest.raises(ProfileError, match=r"gone\.toml: expected a TOML file"):
         load_profile(tmp_path / "gone.toml")
+
+
+def test_every_shipped_profile_file_is_named(tmp_path):
+    assert {f"{name}.toml" for name in profile_names()} == {
+        path.name for path in PROFILES.iterdir() if path.suffix == ".toml"
+    }
