@@ -3,12 +3,27 @@
 from vla_deploy.safety.causes import RULES, Cause, Latch, Reaction, ResetBy, Rule
 from vla_deploy.safety.inputs import DriveSample, SafetyInputs, SafetyLimits
 from vla_deploy.safety.judge import CLEAR, ResetOutcome, SafetyState, Verdict, evaluate
+from vla_deploy.safety.surroundings import (
+    NOTHING_KNOWN,
+    Clearance,
+    Direction,
+    Excess,
+    KeepOut,
+    Surroundings,
+    ZoneFinding,
+    ZoneKind,
+)
 
 __all__ = [
     "CLEAR",
+    "NOTHING_KNOWN",
     "RULES",
     "Cause",
+    "Clearance",
+    "Direction",
     "DriveSample",
+    "Excess",
+    "KeepOut",
     "Latch",
     "Reaction",
     "ResetBy",
@@ -17,6 +32,9 @@ __all__ = [
     "SafetyInputs",
     "SafetyLimits",
     "SafetyState",
+    "Surroundings",
     "Verdict",
+    "ZoneFinding",
+    "ZoneKind",
     "evaluate",
 ]

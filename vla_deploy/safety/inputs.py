@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.safety.surroundings import NOTHING_KNOWN, Surroundings
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -48,6 +50,7 @@ class SafetyInputs:
     base_moving: bool
     base_command_age_s: float | None
     supervisor_age_s: float | None
+    surroundings: Surroundings = NOTHING_KNOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

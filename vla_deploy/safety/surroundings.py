@@ -1,0 +1,97 @@
+"""Declare what the judge is told of the robot's surroundings and of its own body: values only.
+
+Whoever computes these numbers says what is; `causes.py` and `SafetyLimits` say what is allowed.
+None means that nothing is known, 0 and () that it is known to be nothing.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Direction(StrEnum):
+    """Name the base's motions that may be forbidden one by one; left is counter-clockwise."""
+
+    FORWARD = "forward"
+    BACKWARD = "backward"
+    TURN_LEFT = "turn_left"
+    TURN_RIGHT = "turn_right"
+
+
+class ZoneKind(StrEnum):
+    """Name what a zone around the robot does while something is in it."""
+
+    STOP = "stop"
+    SLOW = "slow"
+    LIMIT = "limit"
+    APPROACH = "approach"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZoneFinding:
+    """Tell of one zone that something is in.
+
+    `speed_ratio` is of the base's top speeds, to which both speeds are then bounded together.
+    `blocked` are the motions that would bring the base nearer; the way out is not among them.
+    """
+
+    kind: ZoneKind
+    name: str
+    points: int
+    distance_m: float
+    speed_ratio: float = 1.0
+    blocked: tuple[Direction, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeepOut:
+    """Tell how deep the base's footprint is within a keep-out area, and what leads deeper."""
+
+    name: str
+    depth_m: float
+    blocked: tuple[Direction, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Excess:
+    """Tell which group is how far outside the workspace; the rate is positive on the way out."""
+
+    subject: str
+    excess_m: float
+    rate_m_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clearance:
+    """Tell the smallest distance of a pair of bodies; a positive rate closes the gap."""
+
+    first: str
+    second: str
+    distance_m: float
+    closing_m_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """Carry what one tick knows beyond joints and wheels.
+
+    `tip_margin_ratio` is 1 on level ground and 0 where the robot begins to tip.
+    `external_torque_nm` (N for a finger) is what no model of the robot itself explains, per joint.
+    An age of None means that such a measurement has never arrived.
+    """
+
+    zones: tuple[ZoneFinding, ...] = ()
+    keep_out: KeepOut | None = None
+    workspace: Excess | None = None
+    self_clearance: Clearance | None = None
+    environment_clearance: Clearance | None = None
+    tip_margin_ratio: float | None = None
+    external_torque_nm: NDArray[np.float64] | None = None
+    scan_age_s: float | None = None
+    depth_age_s: float | None = None
+
+
+NOTHING_KNOWN: Final = Surroundings()
