@@ -11,6 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.robots.protection import ZoneKind as ZoneKind
+
 
 class Direction(StrEnum):
     """Name the base's motions that may be forbidden one by one; left is counter-clockwise."""
@@ -19,15 +21,6 @@ class Direction(StrEnum):
     BACKWARD = "backward"
     TURN_LEFT = "turn_left"
     TURN_RIGHT = "turn_right"
-
-
-class ZoneKind(StrEnum):
-    """Name what a zone around the robot does while something is in it."""
-
-    STOP = "stop"
-    SLOW = "slow"
-    LIMIT = "limit"
-    APPROACH = "approach"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
