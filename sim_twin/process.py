@@ -28,6 +28,7 @@ from sim_twin.referee import REFEREE_SOCKET
 from sim_twin.servos import WireTiming
 from sim_twin.stream_line import StreamLine
 from sim_twin.twin import Twin
+from sim_twin.twin_status import TwinStatus
 from vla_deploy.robots import load_robot
 
 READY_FILE = "ready"
@@ -103,6 +104,7 @@ class TwinProcess:
         self._priority = claim_priority()
         self._pacer = Pacer(STEP_NS, now_ns)
         self._factor = RealTimeFactor(now_ns, self._twin.now_ns)
+        self._status = TwinStatus(options.run_dir, clock)
         self._ready.write_text(json.dumps({"pid": os.getpid()}), encoding="utf-8")
 
     def run(self, should_stop: Callable[[], bool]) -> None:
@@ -119,6 +121,7 @@ class TwinProcess:
     def close(self) -> None:
         """Take every device away."""
         self._ready.unlink(missing_ok=True)
+        self._status.close()
         self._referee.close()
         self._hub.close()
         for line in self._lines.values():
@@ -186,6 +189,7 @@ class TwinProcess:
                 stream.poll_once()
         now_ns = self._twin.now_ns
         self._factor.update(wall_ns, now_ns)
+        self._status.tell(wall_ns, now_ns, self._factor.value)
         state = MirrorState(
             now_ns=now_ns,
             wall_ns=wall_ns,

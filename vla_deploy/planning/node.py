@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import CellReader, Event, RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc import CellReader, CellWriter, Event, RingReader, RingWriter, SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.errors import NotReady, PlanningError
@@ -17,6 +17,7 @@ from vla_deploy.robots import RobotDescription
 
 STATUS_AGE_S = 2.0
 UTTERANCE_AGE_S = 5.0
+_STATUS_PERIOD_NS = NS_PER_S // 2
 
 
 class PlannerNode:
@@ -28,6 +29,10 @@ class PlannerNode:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
         self._robot = robot
+        self._counts = {"heard": 0, "planned": 0, "refused": 0}
+        self._status_due_ns = 0
+        self._status: CellWriter
+        self._table: CellReader
         self._utterances: RingReader
         self._plans: RingWriter
         self._events: RingWriter
@@ -43,17 +48,24 @@ class PlannerNode:
         self._pose = self._space.cell_reader("pose")
         self._executor = self._space.cell_reader("executor_status")
         self._control = self._space.cell_reader("control_status")
+        self._table = self._space.cell_reader("process_table")
+        self._status = self._space.cell_writer("planner_status")
 
     def step(self) -> None:
         """Answer every command that has come in."""
         for event in self._utterances.drain():
             self._answer(event)
+        now_ns = self._clock.now_ns()
+        if now_ns >= self._status_due_ns:
+            self._status_due_ns = now_ns + _STATUS_PERIOD_NS
+            self._status.put_document(self._counts)
 
     def stop(self) -> None:
         """Close the topics."""
         self._space.close()
 
     def _answer(self, event: Event) -> None:
+        self._counts["heard"] += 1
         utterance = event.payload
         command_id = str(utterance.get("command_id", ""))
         text = str(utterance.get("text", ""))
@@ -67,7 +79,9 @@ class PlannerNode:
         except PlanningError as error:
             refusal = {"command_id": command_id, "event": "rejected", "reason": str(error)}
             self._events.publish(refusal)
+            self._counts["refused"] += 1
             return
+        self._counts["planned"] += 1
         document = plan.model_dump(mode="json")
         self._events.publish({"command_id": command_id, "event": "accepted"})
         self._events.publish({"command_id": command_id, "event": "plan", "plan": document})
@@ -90,6 +104,9 @@ class PlannerNode:
             raise NotReady(f"the command is {age_s:.0f} s old, the planner was away; give it again")
 
     def _check_ready(self) -> None:
+        table = self._table.latest()
+        if table is not None and table.document().get("refusal"):
+            raise NotReady(str(table.document()["refusal"]))
         sample = self._control.latest()
         fresh = sample is not None and sample.age_s(self._clock.now_ns()) < STATUS_AGE_S
         refusal = refusal_of(sample.document() if sample is not None and fresh else None)
