@@ -36,15 +36,17 @@ class Engine:
         self.lidar = RangeProbe(model, self.data)
 
     def place(self, body: str, x_m: float, y_m: float, z_m: float, yaw_rad: float) -> None:
-        """Put a free body somewhere before the simulation runs.
+        """Put a free body somewhere, at rest.
 
         Raises:
             ModelMismatch: the model has no such body, or it is not free.
         """
-        address = self._free_address(body)
+        joint = self._free_joint(body)
+        place, speed = self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint]
         half = yaw_rad / 2.0
         pose = (x_m, y_m, z_m, math.cos(half), 0.0, 0.0, math.sin(half))
-        self.data.qpos[address : address + 7] = pose
+        self.data.qpos[place : place + 7] = pose
+        self.data.qvel[speed : speed + 6] = 0.0
         mujoco.mj_forward(self.model, self.data)
 
     def pose(self, joints: Mapping[str, float]) -> None:
@@ -66,12 +68,12 @@ class Engine:
         mujoco.mj_step(self.model, self.data)
         self.now_ns += STEP_NS
 
-    def _free_address(self, body: str) -> int:
+    def _free_joint(self, body: str) -> int:
         found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, body)
         joint = self.model.body_jntadr[found] if found >= 0 else -1
         if joint < 0 or self.model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
             raise ModelMismatch(f"expected a body {body!r} with a free joint, found none")
-        return int(self.model.jnt_qposadr[joint])
+        return int(joint)
 
     def _follow_couplings(self) -> None:
         """Move mimic joints to where their equality constraint wants them."""

@@ -96,6 +96,7 @@ class TwinProcess:
         self._operations: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "truth": self._truth,
             "inside": self._inside,
+            "hazards": self._hazards,
             **FaultDesk(self._twin.faults, robot).operations,
         }
         gc.collect()
@@ -226,6 +227,14 @@ class TwinProcess:
             "slipped_s": self._pacer.slipped_ns / NS_PER_S,
             "priority": self._priority.value,
         }
+
+    def _hazards(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Tell the hazards since the last time that somebody wanted to `begin`."""
+        watch = self._twin.hazards
+        found = watch.document()
+        if request.get("begin"):
+            watch.begin()
+        return {"hazards": found}
 
     def _inside(self, request: Mapping[str, Any]) -> dict[str, Any]:
         names = str(request.get("object")), str(request.get("container"))

@@ -24,6 +24,7 @@ _EXAMPLES = """examples:
 _SOCKET_AND_ARGUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "truth": (REFEREE_SOCKET, ()),
     "inside": (REFEREE_SOCKET, ("object", "container")),
+    "hazards": (REFEREE_SOCKET, ("begin",)),
     "film_start": (FILM_SOCKET, ("path",)),
     "film_stop": (FILM_SOCKET, ()),
     "caption": (FILM_SOCKET, ("text",)),
@@ -83,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--run-dir", type=Path, required=True)
     parser.add_argument("op", choices=tuple(_SOCKET_AND_ARGUMENTS))
     parser.add_argument("--path", type=_absolute, help="film to write: .webm, .mp4 or .avi")
-    for name in ("object", "container", "text"):
+    for name in ("object", "container", "text", "begin"):
         parser.add_argument(f"--{name}")
     return parser
 

@@ -12,6 +12,7 @@ from sim_twin.faults.injector import FaultInjector
 from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.faults.plug import Plug
 from sim_twin.faults.supply import Supply
+from sim_twin.hazards import HazardWatch
 from sim_twin.head_camera import HeadCamera, camera_line
 from sim_twin.load import load_engine
 from sim_twin.sensors.estop import EstopButtonDevice
@@ -75,6 +76,7 @@ class Twin:
         self.plugs = {name: Plug() for name in names}
         self.servo_supply = Supply()
         self.faults = FaultInjector(self)
+        self._hazards: HazardWatch | None = None
         self._camera: HeadCamera | None = None
         self._camera_line: LineTamper | None = None
         self._seed = seed
@@ -126,6 +128,13 @@ class Twin:
             self._camera_line = camera_line(self.camera, self.robot.camera, self._now_ns)
         return self._camera_line
 
+    @property
+    def hazards(self) -> HazardWatch:
+        """Return who looks for hazards, in every step from the first use on."""
+        if self._hazards is None:
+            self._hazards = HazardWatch(self.engine.model, self.engine.data, self.robot)
+        return self._hazards
+
     def announce(self, stream: str) -> None:
         """Let a streamed device begin anew for its next host.
 
@@ -158,6 +167,8 @@ class Twin:
         self.can_wire.poll(now_ns)
         if self._camera is not None:
             self._camera.device.step(now_ns)
+        if self._hazards is not None:
+            self._hazards.step(now_ns)
 
     def close(self) -> None:
         """Release OpenGL where the camera was used."""

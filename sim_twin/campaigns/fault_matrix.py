@@ -1,0 +1,189 @@
+"""Let everything fail in every phase of the work, and judge by physics whether that was safe."""
+
+import argparse
+import math
+import multiprocessing
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from sim_twin.campaigns.phases import PAYLOAD, Phase, Stage
+from sim_twin.campaigns.report import Case, Report
+from sim_twin.errors import FaultRefused
+from sim_twin.faults import Component, Fault
+from sim_twin.faults.request import FaultRequest, parse_request
+from sim_twin.faults.scenario import NO_CAUSE
+from sim_twin.faults.table import faults_of
+from sim_twin.faults.witness import Witness
+from sim_twin.hazards import Hazard
+from sim_twin.stack import LockstepControl, LockstepStack
+from vla_deploy.robots import RobotDescription, load_robot
+
+INSTANCES: Final = {
+    Component.SERVO: ("left_elbow", "left_gripper"),
+    Component.DRIVE: ("left_wheel",),
+}
+_SENSORS: Final = (
+    *(Component.LIDAR, Component.IMU, Component.CAMERA),
+    *(Component.MICROPHONE, Component.SPEAKER),
+)
+"""Their drivers are in perception and speech: these faults need the whole stack."""
+_FAULT_S: Final = 2.0
+_AFTER_S: Final = 1.5
+_LOOK_S: Final = 0.02
+_REST_S: Final = 1.5
+"""The longest stop: 0.5 m/s at 0.6 m/s² takes 0.83 s, a debounce and a lost bus come before it."""
+_STILL_S: Final = 0.3
+_STILL_RAD_S: Final = 0.05
+_STOPPED: Final = ("stopping", "stopped", "fault")
+_PARTS: Final = ("left_wheel", "right_wheel")
+_LIMP: Final = (Fault.BROWN_OUT, Fault.OVERHEAT, Fault.OVERLOAD)
+"""These take the torque off in the servo's own firmware: what hangs on it goes limp whatever the
+software does, so its own joint may fall and its payload with it; all else must stay safe."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """Name one case of the matrix."""
+
+    component: Component
+    instance: str | None
+    fault: Fault
+    of: Fault | None
+    phase: Phase
+
+    @property
+    def name(self) -> str:
+        """Return the case in words."""
+        where = f"{self.component.value}.{self.instance}" if self.instance else self.component.value
+        what = f"{self.fault.value}.{self.of.value}" if self.of else self.fault.value
+        return f"{where}/{what}/{self.phase.value}"
+
+    @property
+    def goes_limp(self) -> bool:
+        """Tell whether the servos themselves take the torque off."""
+        servos = self.component in (Component.SERVO, Component.SERVO_BUS)
+        return servos and (self.fault in _LIMP or self.of in _LIMP)
+
+    def request(self, robot: RobotDescription) -> FaultRequest:
+        """Return the checked request: it begins at once, and ends."""
+        raw: dict[str, Any] = {"component": self.component, "fault": self.fault}
+        raw |= {"instance": self.instance} if self.instance else {}
+        raw |= {"of": self.of, "period_s": 0.2} if self.of else {}
+        return parse_request({**raw, "duration_s": _FAULT_S}, robot)
+
+
+def cells(robot: RobotDescription) -> Iterator[Cell]:
+    """Return every supported fault of every component in every phase."""
+    for component in Component:
+        for fault in faults_of(component):
+            for instance in INSTANCES.get(component, (None,)):
+                of = faults_of(component)[0] if fault is Fault.INTERMITTENT else None
+                for phase in Phase:
+                    cell = Cell(
+                        component=component, instance=instance, fault=fault, of=of, phase=phase
+                    )
+                    if _is_possible(cell, robot):
+                        yield cell
+
+
+def _is_possible(cell: Cell, robot: RobotDescription) -> bool:
+    try:
+        cell.request(robot)
+    except FaultRefused:
+        return False
+    return True
+
+
+def play(cell: Cell, seed: int = 0) -> Case:
+    """Play one case on a robot of its own and judge it."""
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
+        kind = LockstepStack if cell.component in _SENSORS else LockstepControl
+        stack = kind(Path(folder), seed)
+        try:
+            return _Trial(cell, stack).run()
+        finally:
+            stack.close()
+
+
+class _Trial:
+    """Watch one robot through one fault."""
+
+    def __init__(self, cell: Cell, stack: LockstepControl) -> None:
+        self._cell = cell
+        self._stack = stack
+        self._stage = Stage(stack)
+        self._moved_on = 0.0
+
+    def run(self) -> Case:
+        """Set the stage, let it fail, and judge."""
+        lockstep, cell = self._stack.lockstep, self._cell
+        self._stage.begin(cell.phase)
+        begin_s = lockstep.now_s
+        lockstep.twin.hazards.begin()
+        joints = () if cell.goes_limp else self._stack.robot.joint_names
+        seen = Witness(self._stack, begin_s, (*joints, *_PARTS))
+        lockstep.faults.inject_checked(cell.request(self._stack.robot))
+        stopped_s = math.nan
+        while seen.since_s < _FAULT_S + _AFTER_S:
+            self._stage.run_for(_LOOK_S)
+            seen.look()
+            if math.isnan(stopped_s) and seen.states & set(_STOPPED):
+                stopped_s = seen.since_s
+            self._watch_standstill(seen, stopped_s)
+        hazards = tuple(hazard for hazard in lockstep.twin.hazards.found if not self._may(hazard))
+        return Case(
+            name=cell.name,
+            failures=tuple(self._failures(seen, stopped_s, hazards)),
+            figures={"cause": seen.cause, "cause_s": seen.cause_s, "rest_s": seen.rest_s},
+            seconds=seen.since_s,
+        )
+
+    def _watch_standstill(self, seen: Witness, stopped_s: float) -> None:
+        """Keep the fastest speed after the time that a stop may take."""
+        if seen.since_s > stopped_s + _REST_S + _STILL_S:
+            self._moved_on = max(self._moved_on, seen.speed_rad_s())
+
+    def _failures(
+        self, seen: Witness, stopped_s: float, hazards: tuple[Hazard, ...]
+    ) -> Iterator[str]:
+        yield from (str(hazard) for hazard in hazards)
+        if not math.isnan(stopped_s) and not seen.rest_s <= stopped_s + _REST_S:
+            yield f"not at rest {_REST_S:g} s after the stop at {stopped_s:.3f} s"
+        if self._moved_on > _STILL_RAD_S:
+            yield f"moved after the stop, at {self._moved_on:.3f} rad/s"
+        carries = self._cell.phase is Phase.CARRYING and not self._cell.goes_limp
+        if carries and not self._stage.holds_payload:
+            yield f"{PAYLOAD} is no longer in the hand"
+
+    def _may(self, hazard: Hazard) -> bool:
+        """Tell whether a servo without torque accounts for it."""
+        return self._cell.goes_limp and hazard.kind in ("fall", "joint speed", "joint range")
+
+
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+    """Play every case whose name contains `options.only`, several at a time."""
+    robot = load_robot("butler")
+    chosen = [cell for cell in cells(robot) if options.only in cell.name]
+    with multiprocessing.get_context("spawn").Pool(options.workers, maxtasksperchild=20) as pool:
+        cases = []
+        for case in pool.imap(partial(play, seed=options.seed), chosen):
+            tell(case.row)
+            cases.append(case)
+    return Report(campaign="faults", cases=tuple(cases), summary=_summary(cases))
+
+
+def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+    """Return the longest way to rest in each phase, of the cases that stopped the robot."""
+    longest = {}
+    for phase in Phase:
+        rests = [
+            float(case.figures["rest_s"])
+            for case in cases
+            if case.name.endswith(phase.value) and case.figures["cause"] != NO_CAUSE
+        ]
+        longest[f"longest_rest_s_{phase.value}"] = max(rests, default=0.0)
+    return {**longest, "unsafe": sum(bool(case.failures) for case in cases)}

@@ -1,0 +1,76 @@
+"""Report a campaign's cases as a table, as JSON and as JUnit XML."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """Tell one case: no `failures` means that all was as it must be; `figures` are for tables."""
+
+    name: str
+    failures: tuple[str, ...] = ()
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def row(self) -> str:
+        """Return one line for a table."""
+        figures = "  ".join(f"{name} {_short(value)}" for name, value in self.figures.items())
+        verdict = "ok" if not self.failures else "FAILED: " + "; ".join(self.failures)
+        return f"{self.name:44} {verdict:6} {figures}".rstrip()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """Hold what a campaign found."""
+
+    campaign: str
+    cases: tuple[Case, ...]
+    summary: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def failed(self) -> tuple[Case, ...]:
+        """Return the cases that failed."""
+        return tuple(case for case in self.cases if case.failures)
+
+    def document(self) -> dict[str, Any]:
+        """Return the report as JSON."""
+        head = {"campaign": self.campaign, "cases": len(self.cases), "failed": len(self.failed)}
+        return {**head, **self.summary, "results": [asdict(case) for case in self.cases]}
+
+    def text(self) -> str:
+        """Return what was summed up, for people."""
+        lines = [f"{name:32} {_short(value)}" for name, value in self.summary.items()]
+        lines += [case.row for case in self.failed]
+        lines += [f"{self.campaign}: {len(self.cases)} cases, {len(self.failed)} failed"]
+        return "\n".join(lines)
+
+    def write_junit(self, path: Path) -> None:
+        """Write what CI servers read."""
+        write_junit(path, self.campaign, self.cases)
+
+
+def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:
+    """Write cases in the JUnit format, as pytest does."""
+    failed = sum(bool(case.failures) for case in cases)
+    counts = {"name": suite, "tests": str(len(cases)), "failures": str(failed), "errors": "0"}
+    root = ElementTree.Element("testsuites")
+    node = ElementTree.SubElement(root, "testsuite", counts)
+    for case in cases:
+        seconds = f"{case.seconds:.3f}"
+        child = ElementTree.SubElement(
+            node, "testcase", classname=suite, name=case.name, time=seconds
+        )
+        for failure in case.failures:
+            ElementTree.SubElement(child, "failure", message=failure)
+        ElementTree.SubElement(child, "system-out").text = json.dumps(case.figures)
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def _short(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
