@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
+
 
 class StopCategory(IntEnum):
     """Name the stop categories of IEC 60204-1."""
@@ -238,6 +240,7 @@ class RobotDescription:
     estop: EstopButton | None = None
     microphone: Audio | None = None
     speaker: Audio | None = None
+    protection: Protection = NOTHING_DECLARED
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from vla_deploy.robots import schema
+from vla_deploy.robots import protection_schema, schema
 from vla_deploy.robots.calibration import calibrated
 from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
 from vla_deploy.robots.description import (
@@ -49,12 +49,17 @@ SINGLE: Mapping[str, Shape] = {
     "microphone": schema.AUDIO,
     "speaker": schema.AUDIO,
     "home": schema.HOME,
+    "clearance": protection_schema.CLEARANCE,
+    "tip_over": protection_schema.TIP_OVER,
+    "contact": protection_schema.CONTACT,
 }
 NAMED: Mapping[str, Shape] = {
     "servo_models": schema.SERVO_MODEL,
     "limits": schema.LIMITS,
     "groups": schema.GROUP,
     "hands": schema.HAND,
+    "zones": protection_schema.ZONE,
+    "workspace": protection_schema.WORKSPACE,
 }
 LISTED: Mapping[tuple[str, str], Shape] = {
     ("servo_bus", "servos"): schema.SERVO,
@@ -106,7 +111,7 @@ def _faults(document: Document, directory: Path) -> Iterator[Fault]:
     for record, key, shape in _records(document):
         yield from check_record(record, key, shape)
     yield from missing_files(document, directory)
-    for check in CHECKS:
+    for check in (*CHECKS, *protection_schema.CHECKS):
         yield from check(document)
     yield from _faults_against_mjcf(document, directory)
 
@@ -166,6 +171,7 @@ def _build(document: Document, directory: Path) -> RobotDescription:
         hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},
         poses=subtables(document, "poses"),
         home=_home(document["home"], directory),
+        protection=protection_schema.build_protection(document),
     )
 
 

@@ -19,6 +19,7 @@ class MjcfNames:
     root_bodies: tuple[str, ...]
     joint_ranges: Mapping[str, tuple[float, float] | None]
     sites: frozenset[str]
+    geoms: frozenset[str]
     mimics: Mapping[str, str]
 
 
@@ -36,6 +37,7 @@ def read_mjcf_names(path: Path) -> MjcfNames:
             joint.get("name", ""): _range_of(joint) for joint in root.findall("worldbody//joint")
         },
         sites=frozenset(site.get("name", "") for site in root.findall("worldbody//site")),
+        geoms=frozenset(geom.get("name", "") for geom in root.findall("worldbody//geom")),
         mimics={
             couple.get("joint1", ""): couple.get("joint2", "")
             for couple in root.findall("equality/joint")
@@ -56,6 +58,7 @@ def mjcf_faults(document: Document, mjcf: MjcfNames) -> Iterator[Fault]:
     yield from _one_root_body(mjcf)
     yield from _named(_joint_names(document), "a joint of the MJCF", mjcf.joint_ranges)
     yield from _named(_site_names(document), "a site of the MJCF", mjcf.sites)
+    yield from _named(_geom_names(document), "a geom of the MJCF", mjcf.geoms)
     yield from _limits_inside_stops(document, mjcf)
 
 
@@ -84,6 +87,13 @@ def _site_names(document: Document) -> Iterator[tuple[str, object]]:
         yield f"{sensor}.site", table(document, sensor).get("site")
     for name, row in subtables(document, "hands").items():
         yield f"hands.{name}.grip_site", row.get("grip_site")
+
+
+def _geom_names(document: Document) -> Iterator[tuple[str, object]]:
+    allow = table(document, "clearance").get("allow")
+    for i, pair in enumerate(allow if isinstance(allow, list) else []):
+        for name in pair if isinstance(pair, list) else []:
+            yield f"clearance.allow[{i}]", name
 
 
 def _limits_inside_stops(document: Document, mjcf: MjcfNames) -> Iterator[Fault]:

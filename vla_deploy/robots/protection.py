@@ -30,7 +30,8 @@ class Zone:
 
     `min_points` make a sample count, `trigger_count` samples in a row set the zone off and
     `release_count` without them end it. With `reaction_s` the polygon grows by the way to
-    standstill. `speed_ratio` is of the base's top speeds. An APPROACH zone has no polygon: it looks along the base's arc.
+    standstill. `speed_ratio` is of the base's top speeds. An APPROACH zone has no polygon: it
+    looks along the base's arc.
     """
 
     name: str
@@ -91,3 +92,6 @@ class Protection:
     clearance: ClearanceLimits = ClearanceLimits()
     tip_over: TipOver | None = None
     contact: ContactLimits | None = None
+
+
+NOTHING_DECLARED = Protection()

@@ -95,6 +95,11 @@ ROBOT: Shape = {
     "hands": TABLE,
     "poses": TABLE,
     "home": TABLE,
+    "zones": OPTIONAL_TABLE,
+    "workspace": OPTIONAL_TABLE,
+    "clearance": OPTIONAL_TABLE,
+    "tip_over": OPTIONAL_TABLE,
+    "contact": OPTIONAL_TABLE,
 }
 SERVO_BUS: Shape = {
     "device": TEXT,

@@ -1,0 +1,225 @@
+"""Declare what a robot file may say of zones and margins; find its faults, and build the values."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
+from vla_deploy.robots.protection import (
+    ClearanceLimits,
+    ContactLimits,
+    Protection,
+    TipOver,
+    Workspace,
+    Zone,
+    ZoneKind,
+    ZoneSource,
+)
+from vla_deploy.robots.schema import (
+    OPTIONAL_POSITIVE,
+    POLYGON,
+    POSITIVE,
+    TABLE,
+    Check,
+    Fault,
+    Shape,
+    is_number,
+    one_of,
+)
+
+Document = Mapping[str, Any]
+
+
+def _is_list_of(value: Any, size: int, holds: Callable[[Any], bool]) -> bool:
+    return isinstance(value, list) and len(value) == size and all(map(holds, value))
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 1000
+
+
+COUNT = Check(expected="an integer in 1..1000", holds=_is_count, is_optional=True)
+NOT_NEGATIVE = Check(
+    expected="a number, 0 or above", holds=lambda v: is_number(v) and v >= 0, is_optional=True
+)
+RATIO = Check(
+    expected="a number above 0 and below 1",
+    holds=lambda v: is_number(v) and 0 < v < 1,
+    is_optional=True,
+)
+LEAN = Check(
+    expected="an angle in 0.01..0.8 rad", holds=lambda v: is_number(v) and 0.01 <= v <= 0.8
+)
+POINT_3 = Check(expected="[x, y, z]", holds=lambda v: _is_list_of(v, 3, is_number))
+SOURCES = Check(
+    expected=f"a list with one or more of {', '.join(ZoneSource)}",
+    holds=lambda v: (
+        isinstance(v, list) and len(v) > 0 and all(one in list(ZoneSource) for one in v)
+    ),
+)
+PAIRS = Check(
+    expected="a list of pairs of geom names",
+    holds=lambda v: (
+        isinstance(v, list)
+        and all(_is_list_of(pair, 2, lambda n: isinstance(n, str)) for pair in v)
+    ),
+    is_optional=True,
+)
+
+ZONE: Shape = {
+    "kind": one_of(*ZoneKind),
+    "sources": SOURCES,
+    "polygon_m": Check(expected=POLYGON.expected, holds=POLYGON.holds, is_optional=True),
+    "min_points": COUNT,
+    "trigger_count": COUNT,
+    "release_count": COUNT,
+    "reaction_s": NOT_NEGATIVE,
+    "speed_ratio": RATIO,
+    "speed_m_s": OPTIONAL_POSITIVE,
+    "turn_rad_s": OPTIONAL_POSITIVE,
+    "time_before_collision_s": OPTIONAL_POSITIVE,
+}
+WORKSPACE: Shape = {"min_m": POINT_3, "max_m": POINT_3}
+CLEARANCE: Shape = {"self_m": NOT_NEGATIVE, "floor_m": NOT_NEGATIVE, "allow": PAIRS}
+TIP_OVER: Shape = {"support_m": POLYGON, "max_lean_rad": LEAN, "min_margin_m": POSITIVE}
+CONTACT: Shape = {"payload_kg": NOT_NEGATIVE, "torque_nm": TABLE}
+
+# What a kind of zone cannot do without, and what it has no use for.
+_NEEDS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    ZoneKind.STOP: (
+        ("polygon_m",),
+        ("speed_ratio", "speed_m_s", "turn_rad_s", "time_before_collision_s"),
+    ),
+    ZoneKind.SLOW: (
+        ("polygon_m", "speed_ratio"),
+        ("speed_m_s", "turn_rad_s", "time_before_collision_s"),
+    ),
+    ZoneKind.LIMIT: (("polygon_m",), ("speed_ratio", "time_before_collision_s")),
+    ZoneKind.APPROACH: (
+        ("time_before_collision_s",),
+        ("polygon_m", "reaction_s", "speed_ratio", "speed_m_s", "turn_rad_s", "min_points"),
+    ),
+}
+
+
+def zones_fit_their_kind(document: Document) -> Iterator[Fault]:
+    """Each zone has what its kind needs and nothing that its kind does not use."""
+    for name, row in subtables(document, "zones").items():
+        kind = row.get("kind")
+        needed, unused = _NEEDS.get(kind, ((), ())) if isinstance(kind, str) else ((), ())
+        for key in needed:
+            if key not in row:
+                yield Fault(
+                    key=f"zones.{name}.{key}",
+                    got="nothing",
+                    expected=f"a value: it is a {kind} zone",
+                )
+        for key in unused:
+            if key in row:
+                expected = f"no such key: a {kind} zone has no use for it"
+                yield Fault(key=f"zones.{name}.{key}", got=repr(row[key]), expected=expected)
+        if kind == ZoneKind.LIMIT and not {"speed_m_s", "turn_rad_s"} & row.keys():
+            expected = "speed_m_s, turn_rad_s or both: it is a limit zone"
+            yield Fault(key=f"zones.{name}", got="neither", expected=expected)
+
+
+def workspaces_bound_hands(document: Document) -> Iterator[Fault]:
+    """A workspace is that of a hand, and its lower corner lies below the upper one."""
+    hands = subtables(document, "hands")
+    for name, row in subtables(document, "workspace").items():
+        if name not in hands:
+            yield unknown_name(f"workspace.{name}", name, "a hand", hands)
+        low, high = row.get("min_m"), row.get("max_m")
+        if POINT_3.holds(low) and POINT_3.holds(high):
+            assert isinstance(low, list)
+            assert isinstance(high, list)
+            if not all(a < b for a, b in zip(low, high, strict=True)):
+                key = f"workspace.{name}.min_m"
+                yield Fault(key=key, got=repr(low), expected=f"below max_m {high} on every axis")
+
+
+def contact_torques_fit_servos(document: Document) -> Iterator[Fault]:
+    """A contact threshold is that of a servo joint, and below what the servo can give."""
+    models = subtables(document, "servo_models")
+    servos = {row.get("joint"): row for row in rows(table(document, "servo_bus"), "servos")}
+    names = [name for name in servos if isinstance(name, str)]
+    for joint, value in table(table(document, "contact"), "torque_nm").items():
+        key = f"contact.torque_nm.{joint}"
+        if joint not in servos:
+            yield unknown_name(key, joint, "a servo's joint", names)
+            continue
+        stall = table(models, servos[joint].get("model")).get("stall_torque_nm")
+        limit = stall if is_number(stall) else float("inf")
+        if not (is_number(value) and 0 < value < limit):
+            below = f"a number above 0 and below the stall torque {stall}"
+            yield Fault(key=key, got=repr(value), expected=below)
+
+
+def support_holds_centre(document: Document) -> Iterator[Fault]:
+    """The support polygon is convex, counter-clockwise, and the base's centre is inside."""
+    corners = table(document, "tip_over").get("support_m")
+    if not POLYGON.holds(corners):
+        return
+    assert isinstance(corners, list)
+    pairs = zip(corners, (*corners[1:], corners[0]), strict=True)
+    if not all(a[0] * b[1] - a[1] * b[0] > 0 for a, b in pairs):
+        expected = "corners counter-clockwise around the base's centre [0, 0]"
+        yield Fault(key="tip_over.support_m", got=repr(corners), expected=expected)
+
+
+CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
+    zones_fit_their_kind,
+    workspaces_bound_hands,
+    contact_torques_fit_servos,
+    support_holds_centre,
+)
+
+
+def build_protection(document: Document) -> Protection:
+    """Return the values of a robot file without faults."""
+    return Protection(
+        zones=tuple(
+            _zone(name, row, document["base"]) for name, row in subtables(document, "zones").items()
+        ),
+        workspaces={
+            name: Workspace(min_m=tuple(row["min_m"]), max_m=tuple(row["max_m"]))
+            for name, row in subtables(document, "workspace").items()
+        },
+        clearance=_clearance(table(document, "clearance")),
+        tip_over=_tip_over(document["tip_over"]) if "tip_over" in document else None,
+        contact=_contact(document["contact"]) if "contact" in document else None,
+    )
+
+
+def _zone(name: str, row: Document, base: Document) -> Zone:
+    shared = {key: row[key] for key in _PLAIN if key in row}
+    speed_m_s = row.get("speed_m_s", base["max_speed_m_s"])
+    turn_rad_s = row.get("turn_rad_s", base["max_turn_rad_s"])
+    ratio = min(1.0, speed_m_s / base["max_speed_m_s"], turn_rad_s / base["max_turn_rad_s"])
+    return Zone(
+        name=name,
+        kind=ZoneKind(row["kind"]),
+        sources=tuple(ZoneSource(source) for source in row["sources"]),
+        polygon_m=tuple((float(x), float(y)) for x, y in row.get("polygon_m", ())),
+        **{"speed_ratio": ratio, **shared},
+    )
+
+
+_PLAIN = (
+    *("min_points", "trigger_count", "release_count", "reaction_s"),
+    *("speed_ratio", "time_before_collision_s"),
+)
+
+
+def _clearance(row: Document) -> ClearanceLimits:
+    pairs = tuple((str(first), str(second)) for first, second in row.get("allow", ()))
+    margins = {key: value for key, value in row.items() if key != "allow"}
+    return ClearanceLimits(**margins, allow=pairs)
+
+
+def _tip_over(row: Document) -> TipOver:
+    corners = tuple((float(x), float(y)) for x, y in row["support_m"])
+    return TipOver(**{**row, "support_m": corners})
+
+
+def _contact(row: Document) -> ContactLimits:
+    return ContactLimits(payload_kg=row.get("payload_kg", 0.0), torque_nm=dict(row["torque_nm"]))
