@@ -21,6 +21,7 @@ from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import Mode, ModeInputs, next_mode, status_name
 from vla_deploy.control.stop_plan import StopPlan
 from vla_deploy.control.telemetry import Telemetry, TickClock
+from vla_deploy.control.tick_recorder import TickRecorder
 from vla_deploy.control.watch import Watch, safety_limits
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
@@ -90,6 +91,7 @@ class ControlNode:
         self._commands = space.ring_reader("motion_command", from_start=False)
         self._watch = Watch(space, self._servos, self._wheels, clock)
         self._telemetry = Telemetry(space, len(robot.joint_names))
+        self._tick_record = TickRecorder(space)
 
         self._mode = Mode.DISARMED
         self._safety = SafetyState()
@@ -142,7 +144,7 @@ class ControlNode:
         self._wheels.close()
         self._servos.close()
         self._button.close()
-        for topic in (self._telemetry, self._watch, self._commands):
+        for topic in (self._telemetry, self._tick_record, self._watch, self._commands):
             topic.close()
 
     # --- read and judge -----------------------------------------------------------------------
@@ -167,7 +169,11 @@ class ControlNode:
             setpoint=self._gate.sent,
             base_at_rest=self._base.at_rest,
         )
-        self._safety, self._verdict = evaluate(self._safety, inputs, self._limits)
+        before = self._safety
+        self._safety, self._verdict = evaluate(before, inputs, self._limits)
+        self._tick_record.judged(
+            self._ticks.tick, now_ns, before, inputs, self._limits, self._verdict
+        )
         self._note_reset(now_ns)
 
     def _begin_reset(self, now_ns: int) -> None:
@@ -314,6 +320,7 @@ class ControlNode:
     # --- tell ---------------------------------------------------------------------------------
 
     def _tell(self) -> None:
+        self._tick_record.sent(self._gate.sent, self._base.v_m_s, self._base.w_rad_s)
         self._telemetry.tell_joints(self._servos.state, self._gate.sent)
         self._telemetry.tell_base(self._wheels)
         if self._ticks.tick % self._status_every == 0:

@@ -10,6 +10,7 @@ from vla_deploy.ipc.errors import (
     UnknownTopic,
 )
 from vla_deploy.ipc.frame_ring import Frame, FrameReader, FrameWriter
+from vla_deploy.ipc.record_ring import Record, RecordReader, RecordWriter
 from vla_deploy.ipc.ring import Event, RingReader, RingWriter
 from vla_deploy.ipc.space import SharedSpace
 from vla_deploy.ipc.topics import BY_NAME, TOPICS, Field, Kind, Topic
@@ -28,6 +29,9 @@ __all__ = [
     "FrameWriter",
     "IpcError",
     "Kind",
+    "Record",
+    "RecordReader",
+    "RecordWriter",
     "RingReader",
     "RingWriter",
     "Sample",

@@ -12,7 +12,12 @@ FILE_HEADER_BYTES = 128
 SLOT_HEADER_BYTES = 32
 SLOT_TRAILER_BYTES = 16
 _CACHE_LINE_BYTES = 64
-_SUFFIX = {Kind.CELL: "cell", Kind.RING: "ring", Kind.FRAME: "frames"}
+_SUFFIX = {
+    Kind.CELL: "cell",
+    Kind.RING: "ring",
+    Kind.FRAME: "frames",
+    Kind.RECORD: "records",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,6 +8,7 @@ from vla_deploy.ipc.cell import CellReader, CellWriter
 from vla_deploy.ipc.doorbell import Doorbell
 from vla_deploy.ipc.errors import SpaceUnavailable, UnknownTopic
 from vla_deploy.ipc.frame_ring import FrameReader, FrameWriter
+from vla_deploy.ipc.record_ring import RecordReader, RecordWriter
 from vla_deploy.ipc.ring import RingReader, RingWriter
 from vla_deploy.ipc.segment import Segment
 from vla_deploy.ipc.topics import TOPICS, Kind, Topic
@@ -60,6 +61,15 @@ class SharedSpace:
     def frame_reader(self, name: str) -> FrameReader:
         """Open a frame ring for reading."""
         return FrameReader(self._segment(self._topic(name, Kind.FRAME), writable=False))
+
+    def record_writer(self, name: str) -> RecordWriter:
+        """Open a record ring as its owner."""
+        topic = self._topic(name, Kind.RECORD)
+        return RecordWriter(self._segment(topic, writable=True), topic, self._clock)
+
+    def record_reader(self, name: str) -> RecordReader:
+        """Open a record ring for reading."""
+        return RecordReader(self._segment(self._topic(name, Kind.RECORD), writable=False))
 
     def doorbell(self, name: str) -> Doorbell:
         """Listen for the writers of an event or frame ring.

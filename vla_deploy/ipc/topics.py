@@ -1,7 +1,8 @@
 """Declare every topic between the robot's processes: the one schema table.
 
 Cells carry packed fields (or one bounded JSON text), rings carry JSON objects, frame rings carry
-images. The layout of shared memory, the recording channel and the metric all come from here.
+images, record rings bytes of their one writer. The layout of shared memory, the recording channel
+and the metric all come from here.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ class Kind(Enum):
     CELL = "latest-value cell"
     RING = "event ring"
     FRAME = "frame ring"
+    RECORD = "record ring"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,31 @@ TOPICS: tuple[Topic, ...] = (
         deadline_s=0.2,
         summary="control state, active verdict, tick statistics, as JSON",
         fields=(Field("document", "json", 8192),),
+    ),
+    Topic(
+        name="tick_record",
+        kind=Kind.RECORD,
+        owner="control",
+        rate_hz=250,
+        summary="what every tick was judged by and what was sent, for the flight recorder",
+        slots=16384,
+        slot_bytes=976,
+    ),
+    Topic(
+        name="flight_request",
+        kind=Kind.RING,
+        owner="any",
+        summary="a request to write what the flight recorder holds, with its reason",
+        slots=16,
+        slot_bytes=1024,
+    ),
+    Topic(
+        name="flight_event",
+        kind=Kind.RING,
+        owner="recorder",
+        summary="a flight was saved, or could not be, with its file and causes",
+        slots=32,
+        slot_bytes=4096,
     ),
     Topic(
         name="motion_command",

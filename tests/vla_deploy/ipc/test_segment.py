@@ -94,6 +94,9 @@ def test_every_declared_topic_opens_for_writing_and_reading(tmp_path, clock, top
     elif topic.kind is Kind.FRAME:
         space.frame_writer(topic.name).put(bytes(topic.slot_bytes), width=1, height=1, stamp_ns=1)
         assert len(space.frame_reader(topic.name).latest().payload) == topic.slot_bytes
+    elif topic.kind is Kind.RECORD:
+        space.record_writer(topic.name).append(b"ok")
+        assert space.record_reader(topic.name).held()[0].payload == b"ok"
     elif is_document(topic):
         space.cell_writer(topic.name).put_document({"ok": 1})
         assert space.cell_reader(topic.name).latest().document() == {"ok": 1}
