@@ -86,10 +86,16 @@ class Tree:
 
     def __init__(self, root: Path = Path("/")) -> None:
         self.root = root
+        self._files: dict[str, SystemFile] = {}
 
     def file(self, path: str) -> SystemFile:
-        """Return the file, whether it is there or not."""
-        return SystemFile(self.root, path)
+        """Return a file to be read repeatedly, whether it is there or not."""
+        return self._files.setdefault(path, SystemFile(self.root, path))
+
+    def close(self, below: str = "") -> None:
+        """Give back the handles of all files, or of those below a folder."""
+        for path in [path for path in self._files if path.startswith(below)]:
+            self._files.pop(path).close()
 
     def text(self, path: str) -> str:
         """Return a file's content once.
@@ -97,7 +103,7 @@ class Tree:
         Raises:
             Missing: see `SystemFile.text`.
         """
-        file = self.file(path)
+        file = SystemFile(self.root, path)
         try:
             return file.text()
         finally:
