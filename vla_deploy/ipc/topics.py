@@ -272,6 +272,24 @@ TOPICS: tuple[Topic, ...] = (
         summary="state, pid, restarts, memory and CPU of every process, as JSON",
         fields=(Field("document", "json", 16384),),
     ),
+    Topic(
+        name="resource_directives",
+        kind=Kind.CELL,
+        owner="supervisor",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="what the budgets ask of each process: rate, model, suspension, as JSON",
+        fields=(Field("document", "json", 4096),),
+    ),
+    Topic(
+        name="budget",
+        kind=Kind.CELL,
+        owner="supervisor",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="every budget's line, the ladder, what is enforced how, as JSON",
+        fields=(Field("document", "json", 32768),),
+    ),
 )
 
 BY_NAME: dict[str, Topic] = {topic.name: topic for topic in TOPICS}

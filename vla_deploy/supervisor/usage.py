@@ -17,6 +17,7 @@ class Usage:
     memory_mb: float
     rss_mb: float
     cpu_ratio: float
+    cpu_s: float
 
 
 class UsageMeter:
@@ -56,7 +57,10 @@ class UsageMeter:
             self._cpu_s[name, process.pid] = times.user + times.system
         spent_s = sum(spent for (owner, _), spent in self._cpu_s.items() if owner == name)
         return Usage(
-            memory_mb=memory_bytes / _MB, rss_mb=rss_bytes / _MB, cpu_ratio=spent_s / elapsed_s
+            memory_mb=memory_bytes / _MB,
+            rss_mb=rss_bytes / _MB,
+            cpu_ratio=spent_s / elapsed_s,
+            cpu_s=spent_s,
         )
 
     def _proportional_bytes(self, process: psutil.Process, rss_bytes: int) -> int:
