@@ -44,6 +44,18 @@ class RobotModel:
         torque = pinocchio.computeGeneralizedGravity(self._model, self._data, q)
         return np.asarray(self._coupling.T @ torque, dtype=np.float64)
 
+    def inverse_dynamics(self, positions: Array, velocities: Array, accelerations: Array) -> Array:
+        """Return the torque (N m; N for a finger) that this motion takes, gravity included."""
+        coupling = self._coupling
+        torque = pinocchio.rnea(
+            self._model,
+            self._data,
+            coupling @ positions,
+            coupling @ velocities,
+            coupling @ accelerations,
+        )
+        return np.asarray(coupling.T @ torque, dtype=np.float64)
+
     def site_pose(self, site: str, positions: Array) -> Array:
         """Return a site's pose in the base frame.
 

@@ -68,11 +68,14 @@ class ClearanceLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TipOver:
-    """Bound the lean, and the way from the zero-moment point to the edge of the support."""
+    """Bound the lean, and how much may be used up of the way to the support polygon's edge.
+
+    `min_ratio` of the margin must be left: it is 1 standing level and 0 at tipping.
+    """
 
     support_m: Corners
     max_lean_rad: float
-    min_margin_m: float
+    min_ratio: float = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

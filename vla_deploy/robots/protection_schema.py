@@ -17,7 +17,6 @@ from vla_deploy.robots.protection import (
 from vla_deploy.robots.schema import (
     OPTIONAL_POSITIVE,
     POLYGON,
-    POSITIVE,
     TABLE,
     Check,
     Fault,
@@ -80,7 +79,7 @@ ZONE: Shape = {
 }
 WORKSPACE: Shape = {"min_m": POINT_3, "max_m": POINT_3}
 CLEARANCE: Shape = {"self_m": NOT_NEGATIVE, "floor_m": NOT_NEGATIVE, "allow": PAIRS}
-TIP_OVER: Shape = {"support_m": POLYGON, "max_lean_rad": LEAN, "min_margin_m": POSITIVE}
+TIP_OVER: Shape = {"support_m": POLYGON, "max_lean_rad": LEAN, "min_ratio": RATIO}
 CONTACT: Shape = {"payload_kg": NOT_NEGATIVE, "torque_nm": TABLE}
 
 # What a kind of zone cannot do without, and what it has no use for.

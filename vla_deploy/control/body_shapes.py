@@ -1,0 +1,127 @@
+"""Measure how far the robot's parts are from each other and from the floor, with the MJCF's shapes.
+
+Which pairs are judged follows from the file: shapes that no servo moves against each other,
+neighbours at one joint, a gripper's fingers among themselves and the pairs that the MJCF or the
+robot file excludes are left out.
+"""
+
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+import coal
+import numpy as np
+import pinocchio
+from numpy.typing import NDArray
+
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.mjcf import read_mjcf_names
+
+Array = NDArray[np.float64]
+Pair = tuple[str, str]
+
+FLOOR = "floor"
+
+
+class BodyShapes:
+    """Answer for one pose after another; the base stands at the origin of its own frame."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        path = str(robot.mjcf_path)
+        self._model = pinocchio.buildModelFromMJCF(path)
+        self._data = self._model.createData()
+        self._neutral = pinocchio.neutral(self._model)
+        mimics = read_mjcf_names(robot.mjcf_path).mimics
+        self._leaders = {**{name: name for name in robot.joint_names}, **mimics}
+        index = robot.joint_index
+        moved = [(self._model.getJointId(n), index[of]) for n, of in self._leaders.items()]
+        self._places = np.array([self._model.idx_qs[joint] for joint, _ in moved])
+        self._sources = np.array([source for _, source in moved])
+        self._grips = [
+            self._model.getFrameId(robot.hands[name].grip_site)
+            for name in robot.protection.workspaces
+        ]
+        shapes = pinocchio.buildGeomFromMJCF(self._model, path, pinocchio.GeometryType.COLLISION)
+        self._shapes = self._with_pairs(shapes, robot)
+        self._results = self._shapes.createData()
+        names = [shape.name for shape in self._shapes.geometryObjects]
+        pairs = [(names[p.first], names[p.second]) for p in self._shapes.collisionPairs]
+        self._is_floor = np.array([second == FLOOR for _, second in pairs], dtype=np.bool_)
+        self.self_pairs: list[Pair] = [pair for pair in pairs if pair[1] != FLOOR]
+        self.floor_pairs: list[Pair] = [pair for pair in pairs if pair[1] == FLOOR]
+
+    def distances(self, positions: Array) -> tuple[Array, Array]:
+        """Return the distances of `self_pairs` and of `floor_pairs`, negative in overlap."""
+        q = self._expand(positions)
+        pinocchio.computeDistances(self._model, self._data, self._shapes, self._results, q)
+        found = np.array([result.min_distance for result in self._results.distanceResults])
+        return found[~self._is_floor], found[self._is_floor]
+
+    def grips(self, positions: Array) -> Array:
+        """Return where the hands with a workspace grip, (n, 3) in the base frame."""
+        pinocchio.framesForwardKinematics(self._model, self._data, self._expand(positions))
+        points = [self._data.oMf[frame].translation for frame in self._grips]
+        return np.array(points, dtype=np.float64).reshape(-1, 3)
+
+    def centre_of_mass(self, positions: Array) -> Array:
+        """Return the whole robot's centre of mass in the base frame."""
+        centre = pinocchio.centerOfMass(self._model, self._data, self._expand(positions))
+        return np.array(centre, dtype=np.float64)
+
+    def _expand(self, positions: Array) -> Array:
+        q: Array = self._neutral.copy()
+        q[self._places] = positions[self._sources]
+        return q
+
+    def _with_pairs(
+        self, shapes: pinocchio.GeometryModel, robot: RobotDescription
+    ) -> pinocchio.GeometryModel:
+        allowed = {frozenset(pair) for pair in robot.protection.clearance.allow}
+        excluded = set(_excluded_bodies(robot))
+        objects = list(shapes.geometryObjects)
+        for second, other in enumerate(objects):
+            for first, shape in enumerate(objects[:second]):
+                bodies = frozenset((self._body(shape), self._body(other)))
+                names = frozenset((shape.name, other.name))
+                if self._may_collide(shape, other) and not (bodies in excluded or names in allowed):
+                    shapes.addCollisionPair(pinocchio.CollisionPair(first, second))
+        self._add_floor(shapes, objects)
+        return shapes
+
+    def _add_floor(
+        self, shapes: pinocchio.GeometryModel, objects: list[pinocchio.GeometryObject]
+    ) -> None:
+        plane = coal.Halfspace(np.array((0.0, 0.0, 1.0)), 0.0)
+        below = pinocchio.GeometryObject(FLOOR, 0, pinocchio.SE3.Identity(), plane)
+        floor = shapes.addGeometryObject(below)
+        for index, shape in enumerate(objects):
+            if self._movers(shape.parentJoint):
+                shapes.addCollisionPair(pinocchio.CollisionPair(index, floor))
+
+    def _may_collide(
+        self, shape: pinocchio.GeometryObject, other: pinocchio.GeometryObject
+    ) -> bool:
+        first, second = shape.parentJoint, other.parentJoint
+        parents = self._model.parents
+        if first == second or parents[first] == second or parents[second] == first:
+            return False
+        between = self._movers(first) ^ self._movers(second)
+        return len(between) > 1
+
+    def _movers(self, joint: int) -> frozenset[str]:
+        """Return the servo joints between the base and a joint, that joint included."""
+        found = set()
+        while joint > 0:
+            name = self._model.names[joint]
+            if name in self._leaders:
+                found.add(self._leaders[name])
+            joint = self._model.parents[joint]
+        return frozenset(found)
+
+    def _body(self, shape: pinocchio.GeometryObject) -> str:
+        return str(self._model.frames[shape.parentFrame].name)
+
+
+def _excluded_bodies(robot: RobotDescription) -> Iterator[frozenset[str]]:
+    root = ElementTree.parse(robot.mjcf_path).getroot()
+    for exclude in root.findall("contact/exclude"):
+        yield frozenset((exclude.get("body1", ""), exclude.get("body2", "")))
