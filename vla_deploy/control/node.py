@@ -100,6 +100,7 @@ class ControlNode:
         self._reset_until_ns: int | None = None
         self._act: Act | None = None
         self._notice = ""
+        self._judged_tick = 0
 
     def start(self) -> None:
         """Open buses and button; groups of stop category 2 keep the power they have.
@@ -171,6 +172,7 @@ class ControlNode:
         )
         before = self._safety
         self._safety, self._verdict = evaluate(before, inputs, self._limits)
+        self._judged_tick = self._ticks.tick
         self._tick_record.judged(
             self._ticks.tick, now_ns, before, inputs, self._limits, self._verdict
         )
@@ -335,6 +337,7 @@ class ControlNode:
             "cause": "" if verdict.cause is Cause.NONE else verdict.cause.value,
             "detail": "; ".join(detail for detail in details if detail)[:1500],
             "tick": self._ticks.tick,
+            "judged_tick": self._judged_tick,
             "late_ticks": self._ticks.late_ticks,
             "period_s": round(self._ticks.period_s, 6),
             "buses": {
