@@ -8,6 +8,7 @@ from platforms.ladder import LadderAction
 from platforms.profile_source import Table
 
 PROCESSES: Final = ("supervisor", "control", "perception", "planner", "executor", "twin")
+NODES: Final = ("control", "perception", "planner", "executor")
 ROLES: Final = ("detector", "planner", "key_words", "speech_to_text", "text_to_speech")
 PROVIDERS: Final = (
     "TensorrtExecutionProvider",
@@ -146,7 +147,7 @@ def schema_faults(values: Table) -> Iterator[Fault]:
     plain = {key: value for key, value in values.items() if key not in _TABLES}
     yield from _table_faults("", plain, _TOP)
     yield from _table_faults("board", values.get("board"), _BOARD)
-    yield from _group_faults("processes", values.get("processes"), PROCESSES, _SETTINGS)
+    yield from _group_faults("processes", values.get("processes"), NODES, _SETTINGS)
     yield from _model_faults(values.get("models", {}))
     yield from _budget_faults(values.get("budgets"))
     yield from _ladder_faults(values.get("ladder"))

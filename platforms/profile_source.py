@@ -21,6 +21,11 @@ class Source:
     values: Table
     origins: Mapping[str, Path]
 
+    @classmethod
+    def of_values(cls, name: str, values: Table) -> "Source":
+        """Return what another process has read."""
+        return cls(name=name, path=Path(name), values=values, origins={})
+
     def file_of(self, key: str) -> Path:
         """Return the file that a value stands in, or the profile's own for one that is missing."""
         return self.origins.get(key.partition("[")[0], self.path)

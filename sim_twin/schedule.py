@@ -20,7 +20,6 @@ class Closable(Protocol):
 @dataclass(slots=True)
 class _Entry:
     node: Node
-    period_ns: int
     due_ns: int
     opened: list[Closable] = field(default_factory=list)
 
@@ -44,8 +43,7 @@ class Schedule:
 
     def add(self, node: Node) -> None:
         """Start a node and step it from now on."""
-        period_ns = round(node.period_s * NS_PER_S)
-        entry = _Entry(node, period_ns, self._simulation.now_ns)
+        entry = _Entry(node, self._simulation.now_ns)
         self._run(entry, node.start)
         entry.due_ns = self._simulation.now_ns
         self._entries.append(entry)
@@ -90,7 +88,8 @@ class Schedule:
             self._simulation.step()
             return
         self._run(entry, entry.node.step)
-        entry.due_ns = max(entry.due_ns + entry.period_ns, self._simulation.now_ns)
+        period_ns = round(entry.node.period_s * NS_PER_S)
+        entry.due_ns = max(entry.due_ns + period_ns, self._simulation.now_ns)
 
     def _run(self, entry: _Entry, work: Callable[[], None]) -> None:
         before = len(self._opened)

@@ -3,15 +3,21 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar, runtime_checkable
 
 from drivers.clock import NS_PER_S, Clock
+from platforms import Profile
+
+PreparedT = TypeVar("PreparedT")
 
 
 class Node(Protocol):
     """Do one process' work in steps of a fixed period; IO happens inside `step`, never a sleep."""
 
-    period_s: float
+    @property
+    def period_s(self) -> float:
+        """Return the time between two steps."""
+        ...
 
     def start(self) -> None:
         """Open devices and topics."""
@@ -23,6 +29,33 @@ class Node(Protocol):
 
     def stop(self) -> None:
         """Leave devices safe and close them; called once, also when `start` failed half way."""
+        ...
+
+
+class NeedsRestart(Exception):
+    """Say why a node cannot take over a profile while it runs, but a fresh one can."""
+
+
+@runtime_checkable
+class Adaptable(Protocol[PreparedT]):
+    """Take over another profile between two steps; a node without this has nothing to change."""
+
+    def prepare(self, profile: Profile, model_tier: int) -> PreparedT:
+        """Build what the profile asks for, its models `model_tier` steps below the best.
+
+        May take long and runs beside `step`, in another thread: it reads nothing that steps write.
+
+        Raises:
+            NeedsRestart: only a fresh process can do so.
+        """
+        ...
+
+    def commit(self, prepared: PreparedT) -> PreparedT:
+        """Switch over at once and return what was replaced: committing that is the way back."""
+        ...
+
+    def discard(self, prepared: PreparedT) -> None:
+        """Release what is not needed: never committed, or replaced for good."""
         ...
 
 
@@ -44,14 +77,14 @@ class NodeContext:
 def run_node(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> None:
     """Step a node on absolute deadlines until `should_stop()`; skip periods that were missed.
 
-    `stop` follows also when `start` or `step` fails.
+    The period may change with every step. `stop` follows also when `start` or `step` fails.
     """
-    period_ns = round(node.period_s * NS_PER_S)
     try:
         node.start()
         deadline_ns = clock.now_ns()
         while not should_stop():
             node.step()
+            period_ns = round(node.period_s * NS_PER_S)
             deadline_ns = max(deadline_ns + period_ns, clock.now_ns())
             clock.sleep_until(deadline_ns)
     finally:

@@ -11,15 +11,17 @@ from pathlib import Path
 
 from drivers.clock import MonotonicClock
 from drivers.errors import DriverError
-from platforms import Profile, ProfileError, load_profile
+from platforms import ProfileError, load_profile
+from vla_deploy.adapting import AdaptingNode
+from vla_deploy.aside import AtOnce, background
 from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_CRASHED, EXIT_OK
+from vla_deploy.host_settings import REALTIME_PROCESS, HostSettings
 from vla_deploy.ipc import IpcError
 from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.node import Node, NodeContext, run_node
 from vla_deploy.robots import RobotFileError
 
 READY_DIR = "ready"
-_REALTIME_PROCESS = "control"
 _PR_SET_NAME = 15
 _log = logging.getLogger(__name__)
 
@@ -38,10 +40,7 @@ def main(
     )
     stop_signals = _catch_stop_signals()
     try:
-        profile = load_profile(context.profile)
-        if name == _REALTIME_PROCESS:
-            _raise_priority(profile)
-        node = _Announced(build(context), context.run_dir / READY_DIR / name)
+        node = _Announced(_adapting(name, build, context), context.run_dir / READY_DIR / name)
         run_node(node, context.clock, lambda: bool(stop_signals))
     except (DriverError, RobotFileError, ProfileError, IpcError, MapInvalid) as error:
         _log.error("%s", error)
@@ -52,14 +51,37 @@ def main(
     return EXIT_OK
 
 
+def _adapting(
+    name: str, build: Callable[[NodeContext], Node], context: NodeContext
+) -> AdaptingNode:
+    """Set this process up for the profile, build its node and let it follow later profiles."""
+    profile = load_profile(context.profile)
+    host = HostSettings(name)
+    for refused in host.apply(profile):
+        _log.warning("degraded: %s", refused)
+    return AdaptingNode(
+        name,
+        build(context),
+        profile,
+        ipc=context.run_dir / "ipc",
+        clock=context.clock,
+        host=host,
+        # Control prepares two numbers; a thread that holds the interpreter could cost it a tick.
+        aside=AtOnce() if name == REALTIME_PROCESS else background(),
+    )
+
+
 class _Announced:
     """Say by a file that a node is started, for whoever waits for it."""
 
     def __init__(self, node: Node, ready_file: Path) -> None:
-        self.period_s = node.period_s
         self._ready_file = ready_file
         self._node = node
         self.step = node.step
+
+    @property
+    def period_s(self) -> float:
+        return self._node.period_s
 
     def start(self) -> None:
         self._node.start()
@@ -101,16 +123,3 @@ def _catch_stop_signals() -> list[int]:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda got, _frame: caught.append(got))
     return caught
-
-
-def _raise_priority(profile: Profile) -> None:
-    if profile.realtime_priority == 0:
-        return
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(profile.realtime_priority))
-    except PermissionError:
-        _log.warning(
-            "degraded: no SCHED_FIFO priority %d (grant CAP_SYS_NICE or LimitRTPRIO); ticks may "
-            "be late under load",
-            profile.realtime_priority,
-        )

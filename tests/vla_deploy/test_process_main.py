@@ -1,14 +1,9 @@
-import logging
-import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-
-from platforms import load_profile
-from vla_deploy import process_main
 
 pytestmark = pytest.mark.stack
 
@@ -89,33 +84,3 @@ def test_a_crash_stops_the_node_and_leaves_its_trace_in_the_log(tmp_path):
     assert done.stdout.endswith("stop\n")
     assert "planner: ERROR: crashed\nTraceback" in done.stderr
     assert "KeyError: 'elbow'" in done.stderr
-
-
-@pytest.fixture
-def fifo_profile(tmp_path):
-    text = (Path(process_main.__file__).parents[1] / "platforms/profiles/desktop.toml").read_text()
-    path = tmp_path / "rt.toml"
-    path.write_text(text.replace("realtime_priority = 0", "realtime_priority = 40"))
-    return load_profile(path)
-
-
-def test_control_asks_for_the_profiles_realtime_priority(monkeypatch, fifo_profile):
-    asked = []
-    monkeypatch.setattr(os, "sched_setscheduler", lambda *given: asked.append(given))
-    process_main._raise_priority(fifo_profile)
-    assert asked == [(0, os.SCHED_FIFO, os.sched_param(40))]
-
-
-def test_a_forbidden_realtime_priority_is_logged_as_degraded(monkeypatch, fifo_profile, caplog):
-    def forbid(*_: object) -> None:
-        raise PermissionError
-
-    monkeypatch.setattr(os, "sched_setscheduler", forbid)
-    with caplog.at_level(logging.WARNING):
-        process_main._raise_priority(fifo_profile)
-    assert "degraded: no SCHED_FIFO priority 40" in caplog.text
-
-
-def test_a_profile_without_priority_asks_for_none(monkeypatch):
-    monkeypatch.setattr(os, "sched_setscheduler", lambda *_: pytest.fail("asked for a priority"))
-    process_main._raise_priority(load_profile("desktop"))

@@ -17,6 +17,7 @@ from vla_deploy.control.gravity import GravityOffset
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionSet
 from vla_deploy.control.operator_desk import Act, OperatorDesk
+from vla_deploy.control.retuning import Tuning, retuned, tuning_of
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import Mode, ModeInputs, next_mode, status_name
 from vla_deploy.control.stop_plan import StopPlan
@@ -41,7 +42,6 @@ from vla_deploy.safety import (
 
 _RESET_NS = 2 * NS_PER_S
 _SHUTDOWN_NS = 3 * NS_PER_S
-_STATUS_HZ = 50.0
 _AT_REST_MODES = (Mode.DISARMED, Mode.STOPPED)
 
 
@@ -61,7 +61,8 @@ class ControlNode:
     ) -> None:
         """Prepare everything that needs no device."""
         clock = context.clock
-        self.period_s = 1.0 / profile.control_rate_hz
+        self._robot, self._profile = robot, profile
+        self._tuning = tuning_of(profile)
         self._clock = clock
         self._servos = ServoLine(robot, profile, devices, clock)
         self._wheels = Wheels(robot, profile, devices, clock)
@@ -81,7 +82,6 @@ class ControlNode:
         self._dispatcher = Dispatcher(robot, self._motions, self._servos)
         self._limits = safety_limits(robot)
         self._ticks = TickClock(self.period_s)
-        self._status_every = max(1, round(profile.control_rate_hz / _STATUS_HZ))
 
         space = SharedSpace(context.run_dir / "ipc", clock)
         self._button = EstopButton(robot, devices, clock)
@@ -147,6 +147,31 @@ class ControlNode:
         self._button.close()
         for topic in (self._telemetry, self._tick_record, self._watch, self._commands):
             topic.close()
+
+    # --- another profile ----------------------------------------------------------------------
+
+    @property
+    def period_s(self) -> float:
+        """Return the time between two ticks."""
+        return self._tuning.period_s
+
+    def prepare(self, profile: Profile, model_tier: int) -> Tuning:
+        """Check that a profile can be taken over in motion; control has no model.
+
+        Raises:
+            ProfileError: the servo bus is too slow for its rate.
+            NeedsRestart: servos or drives would have to be set up anew.
+        """
+        return retuned(self._robot, self._profile, profile)
+
+    def commit(self, prepared: Tuning) -> Tuning:
+        """Change the period from the next tick on; motions are laid out in time, and go on."""
+        before, self._tuning = self._tuning, prepared
+        self._ticks.retune(prepared.period_s)
+        return before
+
+    def discard(self, prepared: Tuning) -> None:
+        """Release nothing: a tuning is two numbers."""
 
     # --- read and judge -----------------------------------------------------------------------
 
@@ -325,7 +350,7 @@ class ControlNode:
         self._tick_record.sent(self._gate.sent, self._base.v_m_s, self._base.w_rad_s)
         self._telemetry.tell_joints(self._servos.state, self._gate.sent)
         self._telemetry.tell_base(self._wheels)
-        if self._ticks.tick % self._status_every == 0:
+        if self._ticks.tick % self._tuning.status_every == 0:
             self._telemetry.tell_status(self._status())
 
     def _status(self) -> dict[str, Any]:

@@ -78,15 +78,21 @@ class TickClock:
         self.late_ticks = 0
         self.period_s = period_s
         self._nominal_s = period_s
+        self._next_nominal_s = period_s
         self._last_ns: int | None = None
+
+    def retune(self, period_s: float) -> None:
+        """Expect another period from the next tick on: the time up to it has the old one."""
+        self._next_nominal_s = period_s
 
     def begin(self, now_ns: int) -> float:
         """Count a tick and return the time it stands for: at most two periods."""
         self.tick += 1
         last_ns, self._last_ns = self._last_ns, now_ns
+        nominal_s, self._nominal_s = self._nominal_s, self._next_nominal_s
         if last_ns is None:
-            return self._nominal_s
+            return nominal_s
         gap_s = (now_ns - last_ns) / 1e9
-        self.late_ticks += gap_s > 1.5 * self._nominal_s
+        self.late_ticks += gap_s > 1.5 * nominal_s
         self.period_s += 0.02 * (gap_s - self.period_s)
-        return min(max(gap_s, 0.0), 2.0 * self._nominal_s)
+        return min(max(gap_s, 0.0), 2.0 * nominal_s)

@@ -290,6 +290,39 @@ TOPICS: tuple[Topic, ...] = (
         summary="every budget's line, the ladder, what is enforced how, as JSON",
         fields=(Field("document", "json", 32768),),
     ),
+    Topic(
+        name="profile_request",
+        kind=Kind.RING,
+        owner="any",
+        summary="asks the supervisor for another profile: request id, name, permission to restart",
+        slots=8,
+        slot_bytes=2048,
+    ),
+    Topic(
+        name="profile_change",
+        kind=Kind.RING,
+        owner="supervisor",
+        summary="phases of a profile change, for every process: prepare, commit, validate, ...",
+        slots=16,
+        slot_bytes=16384,
+    ),
+    Topic(
+        name="profile_answer",
+        kind=Kind.RING,
+        owner="any",
+        summary="what each process says to a phase of a profile change",
+        slots=64,
+        slot_bytes=4096,
+    ),
+    Topic(
+        name="profile_status",
+        kind=Kind.CELL,
+        owner="supervisor",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="profile in force, phase of a change, how the last one ended, as JSON",
+        fields=(Field("document", "json", 4096),),
+    ),
 )
 
 BY_NAME: dict[str, Topic] = {topic.name: topic for topic in TOPICS}

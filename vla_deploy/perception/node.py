@@ -110,6 +110,20 @@ class PerceptionNode:
             slot.close()
         self._space.close()
 
+    def prepare(self, profile: Profile, model_tier: int) -> Profile:
+        """Take the profile as it is: how it sees now has one size."""
+        return profile
+
+    def commit(self, prepared: Profile) -> Profile:
+        """Change the rates; the camera is opened anew where it is to send at another one."""
+        before, self._profile = self._profile, prepared
+        if before.camera_rate_hz != prepared.camera_rate_hz:
+            self._camera.close()
+        return before
+
+    def discard(self, prepared: Profile) -> None:
+        """Release nothing: rates are numbers."""
+
     def _read_joints(self) -> None:
         sample = self._joint_state.latest()
         if sample is not None:

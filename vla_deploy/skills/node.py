@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drivers.clock import NS_PER_S
+from platforms import Profile
 from vla_deploy.ipc import CellWriter, RingReader, RingWriter, SharedSpace
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.grid_map import load_map
@@ -73,6 +74,18 @@ class ExecutorNode:
             self._execution.cancel("the executor was stopped")
             self._conclude()
         self._space.close()
+
+    def prepare(self, profile: Profile, model_tier: int) -> float:
+        """Return the period that a profile asks for; the executor has no model."""
+        return 1.0 / profile.executor_rate_hz
+
+    def commit(self, prepared: float) -> float:
+        """Change the period; skills reckon with the clock."""
+        before, self.period_s = self.period_s, prepared
+        return before
+
+    def discard(self, prepared: float) -> None:
+        """Release nothing: a period is a number."""
 
     def _take(self, message: Mapping[str, Any]) -> None:
         command_id = str(message["command_id"])

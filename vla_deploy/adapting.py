@@ -1,0 +1,259 @@
+"""Let a node follow profile changes and budget directives between two of its steps."""
+
+import logging
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from drivers.clock import NS_PER_S, Clock
+from platforms import Profile
+from platforms.profile import profile_from
+from platforms.profile_source import Source
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.node import Adaptable, NeedsRestart, Node
+
+MIN_RATE_RATIO: Final = 0.8
+_UNSLOWED: Final = "control"
+_log = logging.getLogger(__name__)
+
+
+class Host(Protocol):
+    """Run this process as a profile says."""
+
+    def obstacles(self, profile: Profile) -> tuple[str, ...]:
+        """Return what would be refused."""
+        ...
+
+    def apply(self, profile: Profile) -> tuple[str, ...]:
+        """Apply what is permitted, and return what was refused."""
+        ...
+
+
+@dataclass(slots=True, kw_only=True)
+class _Change:
+    """Follow one change; `way_back` is what a commit has replaced."""
+
+    change_id: int
+    future: "Future[tuple[Profile, Any]]"
+    answered: bool = False
+    way_back: "tuple[Profile, Any] | None" = None
+    steps: int = 0
+    committed_ns: int = 0
+
+
+class AdaptingNode:
+    """Wrap a node; the supervisor's topics say when it prepares, commits, or goes back.
+
+    Preparation runs in `aside`; everything else happens between two steps of the node.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        node: Node,
+        profile: Profile,
+        *,
+        ipc: Path,
+        clock: Clock,
+        host: Host,
+        aside: Executor,
+    ) -> None:
+        self._name = name
+        self._node = node
+        self._profile = profile
+        self._ipc = ipc
+        self._clock = clock
+        self._host = host
+        self._aside = aside
+        self._rate_ratio = 1.0
+        self._tier = 0
+        self._tier_future: Future[tuple[Profile, Any]] | None = None
+        self._directives_sequence = -1
+        self._change: _Change | None = None
+        self._handlers: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
+            "prepare": self._on_prepare,
+            "commit": self._on_commit,
+            "validate": self._on_validate,
+            "keep": self._on_keep,
+            "rollback": self._on_rollback,
+        }
+
+    @property
+    def period_s(self) -> float:
+        """Return the time between two steps; a slowed process has a longer one."""
+        return self._node.period_s / self._rate_ratio
+
+    @property
+    def profile(self) -> Profile:
+        """Return the profile that the node runs under."""
+        return self._profile
+
+    def start(self) -> None:
+        """Start the node and listen from now on."""
+        self._node.start()
+        self._space = SharedSpace(self._ipc, self._clock)
+        self._changes = self._space.ring_reader("profile_change", from_start=False)
+        self._answers = self._space.ring_writer("profile_answer")
+        self._directives = self._space.cell_reader("resource_directives")
+
+    def step(self) -> None:
+        """Follow what the supervisor says, then step the node."""
+        for event in self._changes.drain():
+            self._handlers[event.payload["phase"]](event.payload)
+        self._tell_prepared()
+        if self._name != _UNSLOWED:
+            self._heed_directives()
+        self._node.step()
+        if self._change is not None:
+            self._change.steps += 1
+
+    def stop(self) -> None:
+        """Stop the node; what is being prepared is given up."""
+        self._node.stop()
+        self._aside.shutdown(wait=False, cancel_futures=True)
+        if hasattr(self, "_space"):
+            self._space.close()
+
+    # --- phases of a change -------------------------------------------------------------------
+
+    def _on_prepare(self, message: Mapping[str, Any]) -> None:
+        self._abandon()
+        source = Source.of_values(message["profile"], message["values"])
+        future = self._aside.submit(self._prepare, source, self._tier)
+        self._change = _Change(change_id=message["change_id"], future=future)
+
+    def _prepare(self, source: Source, tier: int) -> tuple[Profile, Any]:
+        profile = profile_from(source)
+        known = self._host.obstacles(self._profile)
+        new = [text for text in self._host.obstacles(profile) if text not in known]
+        if new:
+            raise NeedsRestart("; ".join(new))
+        return profile, self._prepared(profile, tier)
+
+    def _prepared(self, profile: Profile, tier: int) -> Any:
+        node = self._node
+        return node.prepare(profile, tier) if isinstance(node, Adaptable) else None
+
+    def _tell_prepared(self) -> None:
+        change = self._change
+        if change is None or change.answered or not change.future.done():
+            return
+        change.answered = True
+        error = change.future.exception()
+        if error is None:
+            self._answer(change.change_id, "prepare", "")
+            return
+        self._answer(
+            change.change_id, "prepare", _one_line(error), restart=isinstance(error, NeedsRestart)
+        )
+        self._change = None
+
+    def _on_commit(self, message: Mapping[str, Any]) -> None:
+        change = self._of(message)
+        if change is None or not change.answered:
+            self._answer(message["change_id"], "commit", "it has prepared nothing")
+            return
+        before = self._profile
+        change.way_back = before, self._switch(change.future.result())
+        refused = [
+            text
+            for text in self._host.apply(self._profile)
+            if text not in self._host.obstacles(before)
+        ]
+        change.steps, change.committed_ns = 0, self._clock.now_ns()
+        self._answer(change.change_id, "commit", "; ".join(refused))
+
+    def _on_validate(self, message: Mapping[str, Any]) -> None:
+        change = self._of(message)
+        if change is None:
+            self._answer(message["change_id"], "validate", "it has committed nothing")
+            return
+        elapsed_s = (self._clock.now_ns() - change.committed_ns) / NS_PER_S
+        rate_hz, wanted_hz = change.steps / max(elapsed_s, self.period_s), 1.0 / self.period_s
+        slow = rate_hz < MIN_RATE_RATIO * wanted_hz
+        reason = f"steps at {rate_hz:.1f} Hz, expected {wanted_hz:.1f} Hz" if slow else ""
+        self._answer(change.change_id, "validate", reason)
+
+    def _on_keep(self, message: Mapping[str, Any]) -> None:
+        change = self._of(message)
+        if change is not None and change.way_back is not None:
+            self._discard(change.way_back[1])
+        self._change = None
+
+    def _on_rollback(self, message: Mapping[str, Any]) -> None:
+        change = self._of(message)
+        if change is not None and change.way_back is not None:
+            self._discard(self._switch(change.way_back))
+            self._host.apply(self._profile)
+            self._change = None
+        self._abandon()
+        self._answer(message["change_id"], "rollback", "")
+
+    def _switch(self, prepared: tuple[Profile, Any]) -> Any:
+        """Put the node under a prepared profile; return what that replaced."""
+        self._profile, content = prepared
+        return self._node.commit(content) if isinstance(self._node, Adaptable) else None
+
+    def _abandon(self) -> None:
+        """Forget a preparation; one that still runs is discarded as soon as it is done."""
+        change, self._change = self._change, None
+        if change is not None and not change.future.cancel():
+            change.future.add_done_callback(self._discard_done)
+
+    def _discard_done(self, future: "Future[tuple[Profile, Any]]") -> None:
+        if future.exception() is None:
+            self._discard(future.result()[1])
+
+    def _discard(self, content: Any) -> None:
+        if isinstance(self._node, Adaptable):
+            self._node.discard(content)
+
+    def _of(self, message: Mapping[str, Any]) -> _Change | None:
+        change = self._change
+        return change if change is not None and change.change_id == message["change_id"] else None
+
+    def _answer(self, change_id: int, phase: str, reason: str, *, restart: bool = False) -> None:
+        self._answers.publish(
+            {
+                "change_id": change_id,
+                "process": self._name,
+                "phase": phase,
+                "ok": not reason,
+                "reason": reason[:1000],
+                "restart": restart,
+            }
+        )
+
+    # --- budgets ------------------------------------------------------------------------------
+
+    def _heed_directives(self) -> None:
+        sample = self._directives.latest()
+        if sample is not None and sample.sequence != self._directives_sequence:
+            self._directives_sequence = sample.sequence
+            document = sample.document()
+            self._rate_ratio = float(document.get("rate_ratio", {}).get(self._name, 1.0))
+            self._want_tier(int(document.get("model_tier", {}).get(self._name, 0)))
+        if self._tier_future is not None and self._tier_future.done() and self._change is None:
+            self._take_tier(self._tier_future)
+            self._tier_future = None
+
+    def _want_tier(self, tier: int) -> None:
+        """Prepare models of another tier, unless a change is under way: the cell comes again."""
+        if tier == self._tier or self._change is not None or self._tier_future is not None:
+            return
+        self._tier = tier
+        profile = self._profile
+        self._tier_future = self._aside.submit(lambda: (profile, self._prepared(profile, tier)))
+
+    def _take_tier(self, future: "Future[tuple[Profile, Any]]") -> None:
+        error = future.exception()
+        if error is not None:
+            _log.warning("degraded: no models of tier %d: %s", self._tier, _one_line(error))
+        elif future.result()[0] is self._profile:
+            self._discard(self._switch(future.result()))
+
+
+def _one_line(error: BaseException) -> str:
+    return str(error).replace("\n", "; ") or type(error).__name__

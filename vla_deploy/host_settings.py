@@ -1,0 +1,124 @@
+"""Apply what a profile says about one process to the kernel: priority, CPUs, nice, memory lock."""
+
+import ctypes
+import errno
+import os
+import resource
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+from platforms import Profile
+
+REALTIME_PROCESS: Final = "control"
+_LOCK_ALL: Final = 1 | 2  # MCL_CURRENT | MCL_FUTURE
+_CAP_IPC_LOCK: Final = 14
+_CAP_SYS_NICE: Final = 23
+_THREADS: Final = Path("/proc/self/task")
+
+
+class HostSettings:
+    """Hold how the kernel runs this process; threads that it has and will have share it."""
+
+    def __init__(self, process: str) -> None:
+        self._process = process
+        self._every_cpu = os.sched_getaffinity(0)
+        self._locked = False
+
+    def obstacles(self, profile: Profile) -> tuple[str, ...]:
+        """Return what the kernel would refuse of a profile; nothing is changed."""
+        return tuple(text for check in _OBSTACLES for text in check(self, profile))
+
+    def apply(self, profile: Profile) -> tuple[str, ...]:
+        """Apply as much of a profile as the kernel permits, and return what it refused."""
+        refused = list(self.obstacles(profile))
+        for act in (self._set_affinity, self._set_nice, self._set_priority, self._set_lock):
+            try:
+                act(profile)
+            except OSError as error:
+                if error.errno not in (errno.EPERM, errno.EINVAL, errno.ENOMEM, errno.EACCES):
+                    raise
+                if not refused:
+                    refused.append(f"{act.__name__.removeprefix('_')}: {error.strerror}")
+        return tuple(refused)
+
+    def _set_affinity(self, profile: Profile) -> None:
+        wanted = set(profile.processes[self._process].affinity) or self._every_cpu
+        for thread in _threads():
+            os.sched_setaffinity(thread, wanted)
+
+    def _set_nice(self, profile: Profile) -> None:
+        nice = profile.processes[self._process].nice
+        for thread in _threads():
+            if os.getpriority(os.PRIO_PROCESS, thread) != nice:
+                os.setpriority(os.PRIO_PROCESS, thread, nice)
+
+    def _set_priority(self, profile: Profile) -> None:
+        priority = self._priority(profile)
+        policy = os.SCHED_FIFO if priority else os.SCHED_OTHER
+        if (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) != (policy, priority):
+            os.sched_setscheduler(0, policy, os.sched_param(priority))
+
+    def _set_lock(self, profile: Profile) -> None:
+        wanted = self._wants_lock(profile) and _may_lock()
+        if wanted == self._locked:
+            return
+        libc = ctypes.CDLL(None, use_errno=True)
+        if (libc.mlockall(_LOCK_ALL) if wanted else libc.munlockall()) != 0:
+            raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+        self._locked = wanted
+
+    def _priority(self, profile: Profile) -> int:
+        return profile.realtime_priority if self._process == REALTIME_PROCESS else 0
+
+    def _wants_lock(self, profile: Profile) -> bool:
+        return profile.memory_lock and self._process == REALTIME_PROCESS
+
+    def _cpu_obstacle(self, profile: Profile) -> Iterator[str]:
+        beyond = set(profile.processes[self._process].affinity) - self._every_cpu
+        if beyond:
+            yield f"no CPU {sorted(beyond)} (this computer grants {sorted(self._every_cpu)})"
+
+    def _nice_obstacle(self, profile: Profile) -> Iterator[str]:
+        nice, now = profile.processes[self._process].nice, os.getpriority(os.PRIO_PROCESS, 0)
+        least = 20 - resource.getrlimit(resource.RLIMIT_NICE)[0]
+        if nice < min(now, least) and not _may(_CAP_SYS_NICE):
+            yield f"no nice {nice} after {now} (grant CAP_SYS_NICE or LimitNICE)"
+
+    def _priority_obstacle(self, profile: Profile) -> Iterator[str]:
+        priority = self._priority(profile)
+        if priority > resource.getrlimit(resource.RLIMIT_RTPRIO)[0] and not _may(_CAP_SYS_NICE):
+            yield (
+                f"no SCHED_FIFO priority {priority} (grant CAP_SYS_NICE or LimitRTPRIO); ticks may "
+                "be late under load"
+            )
+
+    def _lock_obstacle(self, profile: Profile) -> Iterator[str]:
+        if self._wants_lock(profile) and not _may_lock():
+            yield "no memory lock (grant CAP_IPC_LOCK or LimitMEMLOCK=infinity); ticks may be late"
+
+
+def _threads() -> list[int]:
+    return [int(path.name) for path in _THREADS.iterdir()]
+
+
+def _may_lock() -> bool:
+    """Tell whether all memory, also that of the future, may be locked: half a right would crash."""
+    return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY or _may(
+        _CAP_IPC_LOCK
+    )
+
+
+def _may(capability: int) -> bool:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("CapEff:"):
+            return bool(int(line.split()[1], 16) >> capability & 1)
+    return False
+
+
+_OBSTACLES: Final[tuple[Callable[[HostSettings, Profile], Iterator[str]], ...]] = (
+    HostSettings._cpu_obstacle,
+    HostSettings._nice_obstacle,
+    HostSettings._priority_obstacle,
+    HostSettings._lock_obstacle,
+)
