@@ -17,7 +17,7 @@ Points = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # A motion brings a point nearer when it takes more than this share of its own way off the distance.
-_NEARER_SHARE = 0.1
+NEARER_SHARE = 0.1
 _PROBE_M = 0.01
 _PROBE_RAD = 0.02
 _ARC_STEP_S = 0.05
@@ -25,7 +25,7 @@ _STANDING_M_S = 1e-3
 
 
 # What each direction does to the base within a probe: x in metres, turn in radians.
-_PROBES: dict[Direction, tuple[float, float]] = {
+PROBES: dict[Direction, tuple[float, float]] = {
     Direction.FORWARD: (_PROBE_M, 0.0),
     Direction.BACKWARD: (-_PROBE_M, 0.0),
     Direction.TURN_LEFT: (0.0, _PROBE_RAD),
@@ -42,7 +42,7 @@ class Footprint:
 
     def distance(self, points: Points) -> Points:
         """Return each point's distance from the footprint, negative inside."""
-        return _signed_distance(points, np.array(self.corners_m)) - self.radius_m
+        return signed_distance(points, np.array(self.corners_m)) - self.radius_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +79,8 @@ def inside(points: Points, polygon: Points) -> Mask:
     return counted
 
 
-def _signed_distance(points: Points, polygon: Points) -> Points:
+def signed_distance(points: Points, polygon: Points) -> Points:
+    """Return each point's distance to a polygon's edge, negative inside."""
     start, along = polygon, np.roll(polygon, -1, axis=0) - polygon
     length2 = np.maximum((along**2).sum(axis=1), 1e-12)
     offset = points[:, None, :] - start
@@ -123,10 +124,10 @@ def directions_towards(points: Points, footprint: Footprint) -> tuple[Direction,
     before = footprint.distance(points)
     reach = np.linalg.norm(points, axis=1)
     found = []
-    for direction, (forward_m, turn_rad) in _PROBES.items():
+    for direction, (forward_m, turn_rad) in PROBES.items():
         after = footprint.distance(moved(points, forward_m, turn_rad))
         way = abs(forward_m) + abs(turn_rad) * reach
-        if (before - after > _NEARER_SHARE * way).any():
+        if (before - after > NEARER_SHARE * way).any():
             found.append(direction)
     return tuple(found)
 
