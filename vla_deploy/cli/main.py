@@ -6,11 +6,23 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from vla_deploy.cli import bench, can, check, demo, fault, operate, run, say, servo, status
+from vla_deploy.cli import (
+    bench,
+    can,
+    check,
+    demo,
+    fault,
+    operate,
+    run,
+    say,
+    servo,
+    status,
+    validate,
+)
 from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
 from vla_deploy.cli.example import OneLineParser
 
-COMMANDS = (run, demo, say, status, operate, servo, can, fault, check, bench)
+COMMANDS = (run, demo, say, status, operate, servo, can, fault, check, bench, validate)
 EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin

@@ -1,0 +1,223 @@
+"""Kill, freeze and end every process of the robot at random moments of its work.
+
+The machine is a twin that runs by itself, so physics goes on and judges whatever dies. The robot
+runs as a service does, restarted and watched by `sim_twin.service_runner` in systemd's place.
+"""
+
+import argparse
+import math
+import random
+import signal
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.campaigns.machine import Machine
+from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.robot_service import RobotService
+
+STANDSTILL_RAD_S: Final = 0.02
+SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
+_COMMANDS: Final = (
+    "pick up the red cup and put it in the box",
+    "go to the kitchen",
+    "pick up the blue ball and put it on the coffee table",
+    "go home",
+)
+_EARLIEST_S, _LATEST_S = 0.5, 9.0
+_REST_FOR_S: Final = 0.3
+_POLL_S: Final = 0.02
+_SETTLE_S: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """Declare what must follow from the end of a process.
+
+    `rest_s` is until when everything rests, None where the robot may carry on; `ready_s` until when
+    all processes are ready again without a hand; `states` are those in which control then may be.
+    """
+
+    rest_s: float | None
+    ready_s: float
+    states: tuple[str, ...]
+
+
+_CARRIES_ON: Final = ("armed",)
+_WANTS_A_HAND: Final = ("disarmed", "stopped", "fault")
+# A frozen process is noticed by its silence, so it takes its row's limit longer than a dead one.
+RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
+    ("control", signal.SIGKILL): Rule(rest_s=1.5, ready_s=30.0, states=_WANTS_A_HAND),
+    ("control", signal.SIGSTOP): Rule(rest_s=1.5, ready_s=40.0, states=_WANTS_A_HAND),
+    ("control", signal.SIGTERM): Rule(rest_s=4.0, ready_s=30.0, states=_WANTS_A_HAND),
+    ("executor", signal.SIGKILL): Rule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
+    ("executor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=40.0, states=_CARRIES_ON),
+    ("executor", signal.SIGTERM): Rule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
+    ("perception", signal.SIGKILL): Rule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
+    ("perception", signal.SIGSTOP): Rule(rest_s=None, ready_s=60.0, states=_CARRIES_ON),
+    ("perception", signal.SIGTERM): Rule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
+    ("planner", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("planner", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("planner", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
+    ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
+    ("supervisor", signal.SIGTERM): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Injection:
+    """Name who gets which signal, how long after the command was given."""
+
+    number: int
+    process: str
+    signal: signal.Signals
+    after_s: float
+    command: str
+
+    @property
+    def name(self) -> str:
+        """Return the case in words."""
+        return f"{self.number:03d}/{self.process}/{self.signal.name}@{self.after_s:.1f}s"
+
+
+def injections(count: int, seed: int) -> list[Injection]:
+    """Return every pair of process and signal about equally often, in random order and time."""
+    draw = random.Random(seed)
+    pairs: list[tuple[str, signal.Signals]] = []
+    while len(pairs) < count:
+        round_of_all = list(RULES)
+        draw.shuffle(round_of_all)
+        pairs += round_of_all
+    return [
+        Injection(
+            number=number,
+            process=process,
+            signal=what,
+            after_s=draw.uniform(_EARLIEST_S, _LATEST_S),
+            command=_COMMANDS[number % len(_COMMANDS)],
+        )
+        for number, (process, what) in enumerate(pairs[:count])
+    ]
+
+
+class KillCampaign:
+    """Own a machine and a robot, and do injections one after the other."""
+
+    def __init__(self, folder: Path, seed: int, robot: str = "butler") -> None:
+        self._clock = MonotonicClock()
+        self._machine = Machine(folder / "machine", self._clock, robot=robot, seed=seed)
+        try:
+            self._robot = RobotService(folder / "run", self._machine.devices_dir, self._clock)
+        except BaseException:
+            self._machine.close()
+            raise
+
+    def inject(self, injection: Injection) -> Case:
+        """Do one and judge it."""
+        self._robot.make_ready()
+        job = self._robot.begin("say", injection.command)
+        self._clock.sleep_until(self._clock.now_ns() + round(injection.after_s * NS_PER_S))
+        rule, pid = (
+            RULES[injection.process, injection.signal],
+            self._robot.pid_of(injection.process),
+        )
+        self._machine.begin_watch()
+        began_ns = self._clock.now_ns()
+        self._robot.signal(injection.process, injection.signal)
+        rest_s = self._time_to_rest(began_ns, rule.rest_s)
+        ready_s = self._time_to_ready(began_ns, injection.process, pid, rule.ready_s)
+        self._clock.sleep_until(self._clock.now_ns() + round(_SETTLE_S * NS_PER_S))
+        state = self._robot.control_state()
+        failures = [*self._hazards(), *_late(rule, rest_s, ready_s)]
+        if state not in rule.states:
+            failures.append(f"control is {state}, expected {' or '.join(rule.states)}")
+        failures += [f"orphan {orphan}" for orphan in self._robot.orphans()]
+        self._robot.end(job)
+        return Case(
+            name=injection.name,
+            failures=tuple(failures),
+            figures={"rest_s": rest_s, "ready_s": ready_s, "state": state},
+            seconds=(self._clock.now_ns() - began_ns) / NS_PER_S,
+        )
+
+    def close(self) -> None:
+        """End the robot, then its machine."""
+        try:
+            self._robot.close()
+        finally:
+            self._machine.close()
+
+    def _hazards(self) -> list[str]:
+        return [
+            f"{found['kind']} {found['part']}: {found['worst']:.3g}, limit {found['limit']:.3g}"
+            for found in self._machine.hazards()
+        ]
+
+    def _time_to_rest(self, began_ns: int, limit_s: float | None) -> float:
+        """Return when everything began to rest for good, NaN where that is not asked for."""
+        if limit_s is None:
+            return math.nan
+        rest_s = math.inf
+        end_ns = began_ns + round((limit_s + _REST_FOR_S) * NS_PER_S)
+        while self._clock.now_ns() < end_ns:
+            if self._machine.fastest_rad_s() > STANDSTILL_RAD_S:
+                rest_s = math.inf
+            elif math.isinf(rest_s):
+                rest_s = (self._clock.now_ns() - began_ns) / NS_PER_S
+            self._clock.sleep_until(self._clock.now_ns() + round(_POLL_S * NS_PER_S))
+        return rest_s
+
+    def _time_to_ready(self, began_ns: int, process: str, pid: int, limit_s: float) -> float:
+        """Return when a new process of the name and all others were ready."""
+        end_ns = began_ns + round(limit_s * NS_PER_S)
+        while self._clock.now_ns() < end_ns:
+            if self._robot.is_ready() and self._robot.pid_of(process) != pid:
+                return (self._clock.now_ns() - began_ns) / NS_PER_S
+            self._clock.sleep_until(self._clock.now_ns() + round(5 * _POLL_S * NS_PER_S))
+        return math.inf
+
+
+def _late(rule: Rule, rest_s: float, ready_s: float) -> list[str]:
+    late = []
+    if rule.rest_s is not None and not rest_s <= rule.rest_s:
+        late.append(f"at rest after {rest_s:.2f} s, limit {rule.rest_s:g} s")
+    if not ready_s <= rule.ready_s:
+        late.append(f"ready after {ready_s:.1f} s, limit {rule.ready_s:g} s")
+    return late
+
+
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+    """Do `options.count` injections, 200 unless told otherwise."""
+    chosen = [
+        each for each in injections(options.count or 200, options.seed) if options.only in each.name
+    ]
+    with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
+        campaign = KillCampaign(Path(folder), options.seed)
+        try:
+            cases = [_told(campaign.inject(injection), tell) for injection in chosen]
+        finally:
+            campaign.close()
+    return Report(campaign="kills", cases=tuple(cases), summary=_summary(cases))
+
+
+def _told(case: Case, tell: Callable[[str], None]) -> Case:
+    tell(case.row)
+    return case
+
+
+def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+    """Return, for each process, its longest way to rest and back to ready."""
+    summary: dict[str, Any] = {"unsafe": sum(bool(case.failures) for case in cases)}
+    for process in sorted({process for process, _ in RULES}):
+        mine = [case.figures for case in cases if f"/{process}/" in case.name]
+        rests = [each["rest_s"] for each in mine if not math.isnan(each["rest_s"])]
+        summary[f"{process}_longest_rest_s"] = max(rests, default=math.nan)
+        summary[f"{process}_longest_ready_s"] = max((each["ready_s"] for each in mine), default=0.0)
+    return summary

@@ -1,0 +1,86 @@
+"""Run a robot's machine by itself, so that it outlives every process of the robot."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S, Clock
+from sim_twin.errors import TwinError, Unreachable
+from sim_twin.process import READY_FILE
+from sim_twin.referee import ask
+
+_READY_S: Final = 90.0
+_END_S: Final = 10.0
+_POLL_NS: Final = NS_PER_S // 20
+
+
+class Machine:
+    """Own the process of one twin; the robot finds its devices in `devices_dir`."""
+
+    def __init__(self, folder: Path, clock: Clock, *, robot: str, seed: int) -> None:
+        """Start the twin and return when it serves every device.
+
+        Raises:
+            TwinError: it ended, or is not ready in time.
+        """
+        self.folder = folder
+        self._clock = clock
+        command = ["-m", "sim_twin", "--robot", robot, "--seed", str(seed)]
+        self._process = subprocess.Popen(
+            [sys.executable, *command, "--run-dir", str(folder)], start_new_session=True
+        )
+        try:
+            self._wait_until_ready()
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def devices_dir(self) -> Path:
+        """Return where the devices are."""
+        return self.folder / "dev"
+
+    def truth(self) -> dict[str, Any]:
+        """Return what the physics knows."""
+        return ask(self.folder, "truth")
+
+    def begin_watch(self) -> None:
+        """Forget the hazards seen so far."""
+        ask(self.folder, "hazards", begin="yes")
+
+    def hazards(self) -> list[dict[str, Any]]:
+        """Return the hazards since the watch began."""
+        found: list[dict[str, Any]] = ask(self.folder, "hazards", begin="")["hazards"]
+        return found
+
+    def fastest_rad_s(self) -> float:
+        """Return the speed of the fastest joint."""
+        joints = self.truth()["joints"]
+        return max(abs(float(joint["velocity"])) for joint in joints.values())
+
+    def close(self) -> None:
+        """End the twin; ending twice is allowed."""
+        if self._process.poll() is None:
+            self._process.terminate()
+        self._process.wait(_END_S)
+
+    def _wait_until_ready(self) -> None:
+        deadline_ns = self._clock.now_ns() + round(_READY_S * NS_PER_S)
+        while not self._is_ready():
+            if self._process.poll() is not None:
+                raise TwinError(f"the twin ended with exit code {self._process.returncode}")
+            if self._clock.now_ns() > deadline_ns:
+                raise TwinError(f"the twin under {self.folder} is not ready after {_READY_S:g} s")
+            self._clock.sleep_until(self._clock.now_ns() + _POLL_NS)
+
+    def _is_ready(self) -> bool:
+        path = self.devices_dir / READY_FILE
+        if not path.is_file():
+            return False
+        try:
+            self.truth()
+        except Unreachable:
+            return False
+        return bool(json.loads(path.read_text(encoding="utf-8")))

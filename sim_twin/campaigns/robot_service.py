@@ -1,0 +1,174 @@
+"""Run the robot as a service does, and be its operator, its user and its adversary."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import psutil
+
+from drivers.clock import NS_PER_S, Clock
+from sim_twin.service_runner import ServiceRunner
+from vla_deploy.cli.session import Session
+from vla_deploy.ipc import IpcError
+from vla_deploy.supervisor import running
+from vla_deploy.supervisor.orphans import RUN_ID_VARIABLE
+
+_COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
+_READY_S: Final = 120.0
+_ACT_S: Final = 20.0
+_AGAIN_S: Final = 1.0
+_POLL_NS: Final = NS_PER_S // 20
+_FRESH_S: Final = 3.0
+_FRESH_STATUS_S: Final = 0.5
+WATCHDOG_S: Final = 10.0
+RESTART_S: Final = 1.0
+
+
+class NotReady(Exception):
+    """Say that the robot does not come up, or cannot be armed."""
+
+
+class RobotService:
+    """Hold the service of one robot whose devices are in `devices_dir`."""
+
+    def __init__(self, base: Path, devices_dir: Path, clock: Clock) -> None:
+        """Start the service; it restarts and is watched for ever."""
+        base.mkdir(parents=True, exist_ok=True)
+        self._base = base
+        self._clock = clock
+        self._session: Session | None = None
+        words = ("--runtime-base", str(base), "run", "--devices-dir", str(devices_dir))
+        self._runner = ServiceRunner(
+            [*_COMMAND, *words], dict(os.environ), watchdog_s=WATCHDOG_S, restart_s=RESTART_S
+        )
+        self._runner.start()
+
+    def make_ready(self) -> None:
+        """Wait for every process, then reset and arm as an operator does.
+
+        Raises:
+            NotReady: it does not come up, or control does not arm.
+        """
+        self._await(self.is_ready, _READY_S, "not every process is ready")
+        for act, wanted in (("reset", ("disarmed", "armed")), ("arm", ("armed",))):
+            self._do(act, wanted)
+
+    def is_ready(self) -> bool:
+        """Tell whether every process that should run is ready."""
+        table = self._document("process_table", _FRESH_S)
+        if table is None:
+            return False
+        rows = table["processes"]
+        return bool(rows) and all(row["state"] in ("ready", "not wanted") for row in rows)
+
+    def control_state(self) -> str:
+        """Return control's state, "silent" where it tells none."""
+        status = self._document("control_status", _FRESH_STATUS_S)
+        return "silent" if status is None else str(status["state"])
+
+    def pid_of(self, process: str) -> int:
+        """Return a process' id, 0 while it has none."""
+        table = self._document("process_table", _FRESH_S)
+        if table is None:
+            return 0
+        if process == "supervisor":
+            return int(table["supervisor_pid"])
+        pids = {row["name"]: row["pid"] or 0 for row in table["processes"]}
+        return int(pids[process])
+
+    def signal(self, process: str, number: signal.Signals) -> None:
+        """Send a signal to one process."""
+        os.kill(self.pid_of(process), number)
+
+    def begin(self, *words: str) -> "subprocess.Popen[bytes]":
+        """Start `vla-deploy WORDS` and do not wait for it."""
+        command = [*_COMMAND, "--runtime-base", str(self._base), *words]
+        quiet = subprocess.DEVNULL
+        return subprocess.Popen(command, stdout=quiet, stderr=quiet)
+
+    def end(self, job: "subprocess.Popen[bytes]") -> None:
+        """End a command as Ctrl-C does."""
+        if job.poll() is None:
+            job.send_signal(signal.SIGINT)
+        try:
+            job.wait(_ACT_S)
+        except subprocess.TimeoutExpired:
+            job.kill()
+            job.wait()
+
+    def orphans(self) -> list[str]:
+        """Return every process of a run that is no more."""
+        owner = running(self._base)
+        now = "" if owner is None else owner.run_id
+        return [
+            f"{process.pid} of run {run_id}"
+            for process in psutil.process_iter()
+            if (run_id := _run_id(process)) and run_id != now and self._is_mine(process)
+        ]
+
+    def close(self) -> None:
+        """End the service in order."""
+        self._runner.stop()
+        self._detach()
+
+    def _do(self, act: str, wanted: tuple[str, ...]) -> None:
+        """Do an act again and again, as a person would, until control is where it should be."""
+        deadline_ns = self._clock.now_ns() + round(_ACT_S * NS_PER_S)
+        while self.control_state() not in wanted:
+            if self._clock.now_ns() > deadline_ns:
+                status = self._document("control_status", _FRESH_S)
+                raise NotReady(f"{act}: control is not {' or '.join(wanted)}: {json.dumps(status)}")
+            self._attached().operate(act)
+            soon_ns = self._clock.now_ns() + round(_AGAIN_S * NS_PER_S)
+            while self.control_state() not in wanted and self._clock.now_ns() < soon_ns:
+                self._clock.sleep_until(self._clock.now_ns() + _POLL_NS)
+
+    def _await(self, condition: Callable[[], bool], timeout_s: float, what: str) -> None:
+        deadline_ns = self._clock.now_ns() + round(timeout_s * NS_PER_S)
+        while not condition():
+            if self._clock.now_ns() > deadline_ns:
+                table = self._document("process_table", _FRESH_S)
+                raise NotReady(f"{what} after {timeout_s:g} s: {json.dumps(table)}")
+            self._clock.sleep_until(self._clock.now_ns() + _POLL_NS)
+
+    def _document(self, topic: str, age_limit_s: float) -> dict[str, Any] | None:
+        try:
+            return self._attached().document(topic, age_limit_s)
+        except (NotReady, IpcError, OSError):
+            return None  # the run is about to come or to go
+
+    def _attached(self) -> Session:
+        """Return a session with the run that goes on now."""
+        owner = running(self._base)
+        if owner is None:
+            self._detach()
+            raise NotReady(f"no robot runs in {self._base}")
+        run_dir = Path(owner.run_dir)
+        if self._session is None or self._session.run_dir != run_dir:
+            self._detach()
+            self._session = Session(run_dir, self._clock)
+        return self._session
+
+    def _detach(self) -> None:
+        if self._session is not None:
+            self._session.close()
+        self._session = None
+
+    def _is_mine(self, process: psutil.Process) -> bool:
+        try:
+            return str(self._base) in " ".join(process.cmdline())
+        except (psutil.NoSuchProcess, psutil.AccessDenied):
+            return False
+
+
+def _run_id(process: psutil.Process) -> str | None:
+    try:
+        alive = process.status() != psutil.STATUS_ZOMBIE
+        return process.environ().get(RUN_ID_VARIABLE) if alive else None
+    except (psutil.NoSuchProcess, psutil.AccessDenied, OSError):
+        return None
