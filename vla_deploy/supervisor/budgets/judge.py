@@ -1,0 +1,137 @@
+"""Judge measurements against their lines, with hysteresis; a missing number decides nothing."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from drivers.clock import NS_PER_S
+from platforms import LadderTiming
+from vla_deploy.supervisor.budgets.lines import Line
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """Carry one number, or None and why; `ended` tells that there is nobody to be measured."""
+
+    value: float | None
+    reason: str = ""
+    ended: bool = False
+
+
+class Standing(Enum):
+    """Name where a line stands."""
+
+    OK = "ok"
+    RISING = "rising"
+    OVER = "over"
+    FALLING = "falling"
+    MISSING = "missing"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Report one line: what was measured, how it stands, and since when.
+
+    `over` is the answer with hysteresis. `beyond_since_ns` and `relieved_since_ns` say since when
+    every value was beyond the limit, or well within it; both are None in between.
+    """
+
+    line: Line
+    over: bool = False
+    standing: Standing = Standing.OK
+    measured: float | None = None
+    reason: str = ""
+    since_ns: int = 0
+    beyond_since_ns: int | None = None
+    relieved_since_ns: int | None = None
+
+    def __str__(self) -> str:
+        whose = f"{self.line.process}: " if self.line.process else ""
+        than = "below" if self.line.at_least else "above"
+        got = "unknown" if self.measured is None else f"{self.measured:.4g}"
+        return f"{whose}{self.line.metric} {got} {than} its budget of {self.line.limit:g}"
+
+
+Findings = Mapping[tuple[str, str], Finding]
+
+
+def judge(
+    lines: Iterable[Line],
+    before: Findings,
+    measured: Mapping[tuple[str, str], Measurement],
+    timing: LadderTiming,
+    now_ns: int,
+) -> dict[tuple[str, str], Finding]:
+    """Return the finding of every line.
+
+    A line is over once every value has been beyond its limit for the rise time, and no longer once
+    every value has been below the release ratio for the fall time.
+    """
+    return {
+        line.key: _judge_one(
+            _as_before(line, before.get(line.key), now_ns),
+            measured.get(line.key, Measurement(value=None, reason="nobody measures it")),
+            timing,
+            now_ns,
+        )
+        for line in lines
+    }
+
+
+def _as_before(line: Line, before: Finding | None, now_ns: int) -> Finding:
+    """Return what was known of the line; a changed limit starts anew."""
+    if before is None or before.line != line:
+        return Finding(line=line, since_ns=now_ns)
+    return before
+
+
+def _judge_one(
+    before: Finding, measurement: Measurement, timing: LadderTiming, now_ns: int
+) -> Finding:
+    value = measurement.value
+    if value is None and not measurement.ended:
+        return _told(
+            replace(before, beyond_since_ns=None, relieved_since_ns=None),
+            Standing.MISSING,
+            measurement,
+            now_ns,
+        )
+    beyond = value is not None and before.line.is_beyond(value)
+    relieved = value is None or before.line.is_relieved(value, timing.release_ratio)
+    timed = replace(
+        before,
+        beyond_since_ns=_since(before.beyond_since_ns, beyond, now_ns),
+        relieved_since_ns=_since(before.relieved_since_ns, relieved, now_ns),
+    )
+    over = _is_over(timed, timing, now_ns)
+    return _told(replace(timed, over=over), _standing(timed, over), measurement, now_ns)
+
+
+def _since(since_ns: int | None, holds: bool, now_ns: int) -> int | None:
+    if not holds:
+        return None
+    return now_ns if since_ns is None else since_ns
+
+
+def lasts(since_ns: int | None, duration_s: float, now_ns: int) -> bool:
+    """Tell whether something has held for a while without a break."""
+    return since_ns is not None and now_ns - since_ns >= round(duration_s * NS_PER_S)
+
+
+def _is_over(timed: Finding, timing: LadderTiming, now_ns: int) -> bool:
+    if timed.over:
+        return not lasts(timed.relieved_since_ns, timing.fall_s, now_ns)
+    return lasts(timed.beyond_since_ns, timing.rise_s, now_ns)
+
+
+def _standing(timed: Finding, over: bool) -> Standing:
+    if over:
+        return Standing.FALLING if timed.relieved_since_ns is not None else Standing.OVER
+    return Standing.RISING if timed.beyond_since_ns is not None else Standing.OK
+
+
+def _told(finding: Finding, standing: Standing, got: Measurement, now_ns: int) -> Finding:
+    since_ns = finding.since_ns if standing is finding.standing else now_ns
+    return replace(
+        finding, standing=standing, measured=got.value, reason=got.reason, since_ns=since_ns
+    )

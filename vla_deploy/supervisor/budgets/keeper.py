@@ -1,0 +1,158 @@
+"""Keep the budgets of one run: judge what was measured, take and undo steps, tell everyone."""
+
+import logging
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from drivers.clock import NS_PER_S, Clock
+from platforms import LadderAction, Profile
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor.budgets.documents import (
+    directives,
+    enforcement_rows,
+    history_rows,
+    ladder_rows,
+    rows,
+    stop_reason,
+)
+from vla_deploy.supervisor.budgets.emergency import Emergencies
+from vla_deploy.supervisor.budgets.enforcement import Enforcer
+from vla_deploy.supervisor.budgets.judge import Finding, Measurement, judge
+from vla_deploy.supervisor.budgets.ladder import EMERGENCY, Change, LadderState, Pressure, climb
+from vla_deploy.supervisor.budgets.lines import Line, lines_of
+from vla_deploy.supervisor.budgets.measure import Measurements, Measurer
+from vla_deploy.supervisor.budgets.sampler import Feed, Snapshot
+
+TELL_PERIOD_NS: Final = NS_PER_S // 2
+STALE_AFTER_NS: Final = 5 * NS_PER_S
+KEPT_CHANGES: Final = 20
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Orders:
+    """Say which processes shall not run, and which shall be started anew, each with the reason."""
+
+    suspended: Mapping[str, str] = field(default_factory=dict)
+    restart: Mapping[str, str] = field(default_factory=dict)
+
+
+class BudgetKeeper:
+    """Hold the run to its profile's budgets.
+
+    `step` belongs into the supervisor's loop: it measures nothing itself and never waits.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        space: SharedSpace,
+        clock: Clock,
+        feed: Feed,
+        emergencies: Emergencies,
+        enforcer: Enforcer,
+    ) -> None:
+        self.counts: Counter[str] = Counter()
+        self._clock = clock
+        self._feed = feed
+        self._emergencies = emergencies
+        self._enforcer = enforcer
+        self._measurer = Measurer()
+        self._directives = space.cell_writer("resource_directives")
+        self._cell = space.cell_writer("budget")
+        self._findings: dict[tuple[str, str], Finding] = {}
+        self._ladder = LadderState()
+        self._changes: deque[Change] = deque(maxlen=KEPT_CHANGES)
+        self._emergency = ""
+        self._seen_ns = clock.now_ns()
+        self._stale = False
+        self._told_ns = 0
+        self.adopt(profile)
+
+    def adopt(self, profile: Profile) -> None:
+        """Go on with the budgets of another profile; steps that it does not declare are undone."""
+        self._profile = profile
+        self._lines: tuple[Line, ...] = lines_of(profile.budgets, profile.total)
+        known = (*profile.ladder, EMERGENCY)
+        kept = tuple(one for one in self._ladder.taken if one.step in known)
+        self._ladder = replace(self._ladder, taken=kept)
+        self._enforcer.adopt(profile.budgets)
+
+    def step(self, pids: Mapping[str, int]) -> Orders:
+        """Judge the newest measurement, if there is a new one, and return what is to be done."""
+        now_ns = self._clock.now_ns()
+        self._feed.watch(pids)
+        restart: dict[str, str] = {}
+        snapshot = self._feed.latest()
+        if snapshot is not None and snapshot.stamp_ns > self._seen_ns:
+            self._seen_ns, self._stale = snapshot.stamp_ns, False
+            restart = self._judge(self._measure(snapshot), now_ns)
+            self._enforcer.enforce(pids, self._findings.values())
+        elif now_ns - self._seen_ns > STALE_AFTER_NS and not self._stale:
+            self._stale = True
+            self._judge(self._unknown(), now_ns)
+        if restart or now_ns - self._told_ns >= TELL_PERIOD_NS:
+            self._tell(now_ns)
+        return Orders(suspended=self._suspended(), restart=restart)
+
+    def close(self) -> None:
+        """Measure no more and give back what enforcement has made."""
+        self._feed.close()
+        self._enforcer.close()
+
+    def _measure(self, snapshot: Snapshot) -> Measurements:
+        self._emergency = self._emergencies.judge(snapshot.readings)
+        return self._measurer.measure(snapshot, frozenset(self._profile.budgets))
+
+    def _unknown(self) -> Measurements:
+        reason = f"nothing was measured for {STALE_AFTER_NS / NS_PER_S:g} s: a sensor hangs"
+        _log.warning("budgets: %s", reason)
+        return {line.key: Measurement(value=None, reason=reason) for line in self._lines}
+
+    def _judge(self, measured: Measurements, now_ns: int) -> dict[str, str]:
+        timing = self._profile.ladder_timing
+        self._findings = judge(self._lines, self._findings, measured, timing, now_ns)
+        pressure = Pressure(findings=tuple(self._findings.values()), emergency=self._emergency)
+        self._ladder, change = climb(self._profile.ladder, timing, self._ladder, pressure, now_ns)
+        if change is None:
+            return {}
+        self._record(change)
+        self._tell(now_ns)
+        restarts = change.taken and change.step.action is LadderAction.RESTART
+        return {change.step.process: f"over budget: {change.why}"} if restarts else {}
+
+    def _record(self, change: Change) -> None:
+        self._changes.append(change)
+        self.counts["taken" if change.taken else "undone"] += 1
+        self.counts[change.step.action.value] += change.taken
+        _log.log(logging.WARNING if change.taken else logging.INFO, "budgets: %s", change)
+
+    def _suspended(self) -> dict[str, str]:
+        return {
+            one.step.process: f"suspended: {one.why}"
+            for one in self._ladder.taken
+            if one.step.action is LadderAction.SUSPEND
+        }
+
+    def _tell(self, now_ns: int) -> None:
+        self._told_ns = now_ns
+        taken = self._ladder.taken
+        stop = stop_reason(taken)
+        self._directives.put_document(directives(taken))
+        self._cell.put_document(
+            {
+                "rows": rows(self._findings.values(), now_ns),
+                "ladder": {
+                    "step": len(taken),
+                    "taken": ladder_rows(taken, now_ns),
+                    "history": history_rows(self._changes, now_ns),
+                    "counts": dict(self.counts),
+                },
+                "enforced": enforcement_rows(self._enforcer.enforced),
+                "hint": self._emergencies.hint,
+                "stop": bool(stop),
+                "reason": stop,
+            }
+        )

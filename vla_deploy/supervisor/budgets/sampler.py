@@ -1,0 +1,88 @@
+"""Measure the board and the processes beside the supervisor's loop, never in it."""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from drivers.clock import Clock
+from platforms.probes import Reading
+from vla_deploy.supervisor.usage import Usage, UsageMeter
+
+SAMPLE_PERIOD_S: Final = 0.5
+
+
+class Probes(Protocol):
+    """Read the board's numbers."""
+
+    def read(self) -> Mapping[str, Reading]:
+        """Return every reading by name."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """Carry what was measured in one round; `pids` are the processes that ran then."""
+
+    stamp_ns: int
+    readings: Mapping[str, Reading]
+    usages: Mapping[str, Usage]
+    pids: Mapping[str, int]
+
+
+class Feed(Protocol):
+    """Hand out the newest snapshot without waiting."""
+
+    def watch(self, pids: Mapping[str, int]) -> None:
+        """Say which processes run from now on."""
+        ...
+
+    def latest(self) -> Snapshot | None:
+        """Return the newest snapshot, or None before the first."""
+        ...
+
+    def close(self) -> None:
+        """Measure no more."""
+        ...
+
+
+class BackgroundSampler:
+    """Measure twice a second in a thread of its own.
+
+    Some sensors take milliseconds to answer, and one that hangs must not hold the supervisor up.
+    """
+
+    def __init__(self, probes: Probes, clock: Clock, period_s: float = SAMPLE_PERIOD_S) -> None:
+        self._probes = probes
+        self._clock = clock
+        self._period_s = period_s
+        self._meter = UsageMeter(clock.now_ns())
+        self._pids: Mapping[str, int] = {}
+        self._latest: Snapshot | None = None
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="budget-sampler", daemon=True)
+        self._thread.start()
+
+    def watch(self, pids: Mapping[str, int]) -> None:
+        """Say which processes run from now on."""
+        self._pids = dict(pids)
+
+    def latest(self) -> Snapshot | None:
+        """Return the newest snapshot, or None before the first."""
+        return self._latest
+
+    def close(self) -> None:
+        """End the thread; one that hangs in a sensor ends with the process."""
+        self._closing.set()
+        self._thread.join(timeout=2 * self._period_s)
+
+    def _run(self) -> None:
+        while not self._closing.wait(self._period_s):
+            pids = self._pids
+            stamp_ns = self._clock.now_ns()
+            self._latest = Snapshot(
+                stamp_ns=stamp_ns,
+                readings=self._probes.read(),
+                usages=self._meter.sample(pids, stamp_ns),
+                pids=pids,
+            )
