@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Pair = tuple[str, str]
 
 FLOOR = "floor"
+_FINEST_M = 0.02
 
 
 class BodyShapes:
@@ -43,6 +44,12 @@ class BodyShapes:
         shapes = pinocchio.buildGeomFromMJCF(self._model, path, pinocchio.GeometryType.COLLISION)
         self._shapes = self._with_pairs(shapes, robot)
         self._results = self._shapes.createData()
+        self._covers = [
+            _cover(shape)
+            for shape in self._shapes.geometryObjects
+            if self._movers(shape.parentJoint)
+        ]
+        self._radii_m = np.concatenate([np.full(len(c), r) for _, c, r in self._covers])
         names = [shape.name for shape in self._shapes.geometryObjects]
         pairs = [(names[p.first], names[p.second]) for p in self._shapes.collisionPairs]
         self._is_floor = np.array([second == FLOOR for _, second in pairs], dtype=np.bool_)
@@ -55,6 +62,16 @@ class BodyShapes:
         pinocchio.computeDistances(self._model, self._data, self._shapes, self._results, q)
         found = np.array([result.min_distance for result in self._results.distanceResults])
         return found[~self._is_floor], found[self._is_floor]
+
+    def balls(self, positions: Array) -> tuple[Array, Array]:
+        """Return centres, (n, 3) in the base frame, and radii of balls that cover what moves."""
+        q = self._expand(positions)
+        pinocchio.forwardKinematics(self._model, self._data, q)
+        centres = [
+            local @ self._data.oMi[joint].rotation.T + self._data.oMi[joint].translation
+            for joint, local, _ in self._covers
+        ]
+        return np.concatenate(centres), self._radii_m
 
     def grips(self, positions: Array) -> Array:
         """Return where the hands with a workspace grip, (n, 3) in the base frame."""
@@ -119,6 +136,20 @@ class BodyShapes:
 
     def _body(self, shape: pinocchio.GeometryObject) -> str:
         return str(self._model.frames[shape.parentFrame].name)
+
+
+def _cover(shape: pinocchio.GeometryObject) -> tuple[int, Array, float]:
+    """Return the joint that carries a shape, and balls in a row along its longest axis."""
+    shape.geometry.computeLocalAABB()
+    box = shape.geometry.aabb_local
+    half = 0.5 * (np.array(box.max_) - np.array(box.min_))
+    axis = int(half.argmax())
+    radius_m = float(np.delete(half, axis).max())
+    reach_m = max(0.0, float(half[axis]) - 0.5 * radius_m)
+    count = 1 + int(np.ceil(2.0 * reach_m / max(radius_m, _FINEST_M)))
+    local = np.outer(np.linspace(-reach_m, reach_m, count), np.eye(3)[axis])
+    place = shape.placement
+    return shape.parentJoint, local @ place.rotation.T + place.translation, radius_m
 
 
 def _excluded_bodies(robot: RobotDescription) -> Iterator[frozenset[str]]:

@@ -10,6 +10,7 @@ from enum import Enum
 
 MAX_JOINTS = 32
 SCAN_BEAMS = 360
+OBSTACLE_POINTS = 256
 
 
 class Kind(Enum):
@@ -178,6 +179,20 @@ TOPICS: tuple[Topic, ...] = (
         deadline_s=0.5,
         summary="planar lidar; beam i at angle i degrees counter-clockwise from the robot's front",
         fields=(Field("range_m", "f4", SCAN_BEAMS, "m, 0 is no return"),),
+    ),
+    Topic(
+        name="near_obstacles",
+        kind=Kind.CELL,
+        owner="perception",
+        rate_hz=5,
+        deadline_s=1.0,
+        summary="depth camera: what stands up from the floor, nearest first, in the base frame",
+        fields=(
+            Field("count", "u4"),
+            Field("x_m", "f4", OBSTACLE_POINTS, "m"),
+            Field("y_m", "f4", OBSTACLE_POINTS, "m"),
+            Field("z_m", "f4", OBSTACLE_POINTS, "m"),
+        ),
     ),
     Topic(
         name="imu",

@@ -15,11 +15,13 @@ from drivers.opener import DeviceOpener
 from drivers.reopening import Reopening
 from platforms import Profile
 from vla_deploy.ipc import BY_NAME, CellReader, CellWriter, FrameWriter, SharedSpace
+from vla_deploy.ipc.topics import OBSTACLE_POINTS
 from vla_deploy.navigation.grid_map import load_map
 from vla_deploy.navigation.localisation import Localiser, Pose2D
 from vla_deploy.node import NodeContext
 from vla_deploy.perception.body import BodyMask
 from vla_deploy.perception.history import JointHistory
+from vla_deploy.perception.near_obstacles import NearObstacles
 from vla_deploy.perception.scene import Scene
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import SerialSensor
@@ -65,6 +67,7 @@ class PerceptionNode:
         self._body = BodyMask(robot)
         self._joints = JointHistory()
         self._scene = Scene()
+        self._obstacles = NearObstacles()
         self._localiser = self._make_localiser()
         self._imu_yaw_rad: float | None = None
         self._imu_ns = 0
@@ -85,7 +88,8 @@ class PerceptionNode:
         self._base_state: CellReader = space.cell_reader("base_state")
         self._executor_status: CellReader = space.cell_reader("executor_status")
         self._writers: dict[str, CellWriter] = {
-            name: space.cell_writer(name) for name in ("imu", "scan", "pose", "scene")
+            name: space.cell_writer(name)
+            for name in ("imu", "scan", "pose", "scene", "near_obstacles")
         }
         self._images: FrameWriter = space.frame_writer("rgbd")
         self._lidar = Reopening("lidar", self._open_lidar, self._clock)
@@ -182,18 +186,33 @@ class PerceptionNode:
         )
         self._publish_image(frame)
         positions = self._joints.at(frame.stamp_ns, STALE_JOINTS_NS)
-        if positions is None or self._camera_turn(frame.stamp_ns) > MAX_CAMERA_TURN_RAD_S:
+        if positions is None:
             return
-        self._scene.look(
-            frame.rgb,
-            frame.depth_m(),
-            frame.intrinsics,
-            self._model.camera_pose(positions),
-            self._localiser.pose_at(frame.stamp_ns),
-            self._body.mask(positions, frame.intrinsics),
-            frame.stamp_ns,
-        )
+        depth_m, camera = frame.depth_m(), self._model.camera_pose(positions)
+        pose = self._localiser.pose_at(frame.stamp_ns)
+        body = self._body.mask(positions, frame.intrinsics)
+        grips = [self._model.site_pose(site, positions)[:3, 3] for site in self._full_hands()]
+        self._obstacles.look(depth_m, frame.intrinsics, camera, body, pose, grips, frame.stamp_ns)
+        self._publish_obstacles()
+        if self._camera_turn(frame.stamp_ns) > MAX_CAMERA_TURN_RAD_S:
+            return
+        self._scene.look(frame.rgb, depth_m, frame.intrinsics, camera, pose, body, frame.stamp_ns)
         self._next_scene_ns = 0
+
+    def _full_hands(self) -> list[str]:
+        """Return the grip sites of the hands that hold something, as the executor tells."""
+        sample = self._executor_status.latest()
+        holding = {} if sample is None else sample.document().get("holding", {})
+        hands = self._robot.hands
+        return [hands[name].grip_site for name, held in holding.items() if held and name in hands]
+
+    def _publish_obstacles(self) -> None:
+        """Tell what stands around the base; the stamp is that of the present pose."""
+        points = self._obstacles.around(self._localiser.pose, self._clock.now_ns())
+        padded = np.zeros((3, OBSTACLE_POINTS), dtype=np.float32)
+        padded[:, : len(points)] = points.T
+        x_m, y_m, z_m = padded
+        self._writers["near_obstacles"].put(count=len(points), x_m=x_m, y_m=y_m, z_m=z_m)
 
     def _carry_held(self) -> None:
         """Let the things that hands hold, as the executor tells, move along with the hands."""

@@ -1,0 +1,211 @@
+"""Know the robot's surroundings as numbers for the safety judge, cheaply enough for every tick.
+
+Each part has a rate of its own and a tick works on at most one of them, the one most overdue, so
+that no tick carries all the geometry.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivers.clock import NS_PER_S
+from vla_deploy.control.axes import Floats
+from vla_deploy.control.body_shapes import BodyShapes
+from vla_deploy.control.contact_torque import ContactTorque
+from vla_deploy.control.nearby import Nearby
+from vla_deploy.ipc import BY_NAME, SharedSpace
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel
+from vla_deploy.robots.protection import ZoneSource
+from vla_deploy.safety.balance import tip_margin_ratio
+from vla_deploy.safety.clearance import JointBounds, Stopping, beyond_box, nearest_pair, stopping
+from vla_deploy.safety.keep_out import judge_keep_out, seen_from
+from vla_deploy.safety.surroundings import NOTHING_KNOWN, Surroundings, ZoneFinding
+from vla_deploy.safety.zones import IDLE, Footprint, Motion, Points, Trigger, judge_zone
+
+# From a reading to the first braking setpoint: this part's period, a tick and the servos' lag.
+ARM_REACTION_S = 0.08
+BASE_REACTION_S = 0.1
+# Of each new sample, 25 times a second: a low-pass of 0.1 s.
+_IMU_SHARE = 0.3
+_MAX_POSE_AGE_NS = round(BY_NAME["pose"].deadline_s * NS_PER_S)
+_MAX_IMU_AGE_NS = round(BY_NAME["imu"].deadline_s * NS_PER_S)
+
+
+@dataclass(slots=True)
+class _Body:
+    """Hold what a tick tells of joints and base."""
+
+    now_ns: int
+    position: Floats
+    velocity: Floats
+    effort_ratio: Floats
+    motion: Motion
+
+
+@dataclass(slots=True)
+class _Part:
+    """Hold one part's work and when it is due."""
+
+    work: Callable[[_Body], None]
+    period_ns: int
+    due_ns: int = 0
+
+
+class SurroundingsWatch:
+    """Refresh what is known of zones, clearances, balance and contact, a part at a time."""
+
+    def __init__(self, space: SharedSpace, robot: RobotDescription) -> None:
+        """Read the robot's shapes; topics may come later."""
+        self._robot = robot
+        self._known = NOTHING_KNOWN
+        self._body = BodyShapes(robot)
+        model = RobotModel(robot)
+        self._contact = ContactTorque(robot, model)
+        self._footprint = Footprint(corners_m=((0.0, 0.0),), radius_m=robot.base.footprint_radius_m)
+        self._nearby = {
+            source: Nearby(source, space, robot, model, self._body) for source in ZoneSource
+        }
+        self._triggers: dict[str, Trigger] = {}
+        self._pose = space.cell_reader("pose")
+        self._imu = space.cell_reader("imu")
+        self._acceleration: Floats | None = None
+        self._areas = {
+            area.name: np.array(area.polygon_m, dtype=np.float64) for area in robot.home.zones
+        }
+        boxes = robot.protection.workspaces
+        self._box_low = np.array([box.min_m for box in boxes.values()]).reshape(-1, 3)
+        self._box_high = np.array([box.max_m for box in boxes.values()]).reshape(-1, 3)
+        self._bounds = JointBounds(
+            lower=robot.position_min,
+            upper=robot.position_max,
+            velocity=robot.velocity_max,
+            acceleration=robot.acceleration_max,
+            reaction_s=ARM_REACTION_S,
+        )
+        self._ahead: tuple[Stopping, Floats, Floats] | None = None
+        self._parts = [_Part(work, NS_PER_S // rate_hz) for work, rate_hz in self._declared_rates()]
+
+    def _declared_rates(self) -> tuple[tuple[Callable[[_Body], None], int], ...]:
+        return (
+            (self._look_at_contact, 50),
+            (self._look_ahead, 25),
+            (self._look_at_zones, 25),
+            (self._look_at_keep_out, 10),
+            (self._look_at_balance, 25),
+        )
+
+    def refresh(
+        self,
+        now_ns: int,
+        position: Floats,
+        velocity: Floats,
+        effort_ratio: Floats,
+        v_m_s: float,
+        w_rad_s: float,
+    ) -> Surroundings:
+        """Do the part that is most overdue, if any, and return all that is known."""
+        if self._ahead is not None:
+            self._look_at_clearance(position)
+            return self._known
+        part = min(self._parts, key=lambda one: one.due_ns)
+        if now_ns >= part.due_ns and np.isfinite(position).all() and np.isfinite(velocity).all():
+            part.due_ns = max(part.due_ns, now_ns - part.period_ns) + part.period_ns
+            deceleration = self._robot.base.max_acceleration_m_s2
+            motion = Motion(v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=deceleration)
+            part.work(_Body(now_ns, position, velocity, effort_ratio, motion))
+        return self._known
+
+    def close(self) -> None:
+        """Unmap the topics."""
+        for nearby in self._nearby.values():
+            nearby.close()
+        self._pose.close()
+        self._imu.close()
+
+    def _look_at_contact(self, body: _Body) -> None:
+        torque = self._contact.update(body.now_ns, body.position, body.velocity, body.effort_ratio)
+        self._known = replace(self._known, external_torque_nm=torque)
+
+    def _look_ahead(self, body: _Body) -> None:
+        """Measure where the joints come to rest; the next tick measures where they are."""
+        ahead = stopping(body.position, body.velocity, self._bounds)
+        self._ahead = (ahead, *self._body.distances(ahead.position))
+
+    def _look_at_clearance(self, position: Floats) -> None:
+        assert self._ahead is not None, "the caller has looked ahead"
+        (ahead, self_ahead, floor_ahead), self._ahead = self._ahead, None
+        self_now, floor_now = self._body.distances(position)
+        body = self._body
+        self._known = replace(
+            self._known,
+            self_clearance=nearest_pair(body.self_pairs, self_now, self_ahead, ahead.time_s),
+            environment_clearance=nearest_pair(
+                body.floor_pairs, floor_now, floor_ahead, ahead.time_s
+            ),
+            workspace=beyond_box(
+                tuple(self._robot.protection.workspaces),
+                body.grips(position),
+                body.grips(ahead.position),
+                self._box_low,
+                self._box_high,
+                ahead.time_s,
+            ),
+        )
+
+    def _look_at_zones(self, body: _Body) -> None:
+        points: dict[ZoneSource, Points] = {
+            source: nearby.points(body.now_ns, body.position, body.motion)
+            for source, nearby in self._nearby.items()
+        }
+        self._known = replace(
+            self._known,
+            zones=tuple(self._zone_findings(points, body.motion)),
+            scan_age_s=self._nearby[ZoneSource.LIDAR].age_s,
+            depth_age_s=self._nearby[ZoneSource.DEPTH].age_s,
+        )
+
+    def _zone_findings(self, points: dict[ZoneSource, Points], motion: Motion) -> list[ZoneFinding]:
+        found = []
+        for zone in self._robot.protection.zones:
+            trigger, finding = judge_zone(
+                zone,
+                self._triggers.get(zone.name, IDLE),
+                np.concatenate([points[source] for source in zone.sources]),
+                self._footprint,
+                motion,
+                fresh=any(self._nearby[source].fresh for source in zone.sources),
+            )
+            self._triggers[zone.name] = trigger
+            if finding is not None:
+                found.append(finding)
+        return found
+
+    def _look_at_keep_out(self, body: _Body) -> None:
+        sample = self._pose.latest()
+        keep_out = None
+        if sample is not None and body.now_ns - sample.stamp_ns <= _MAX_POSE_AGE_NS:
+            x_m, y_m, yaw_rad = (float(sample.data[n]) for n in ("x_m", "y_m", "yaw_rad"))
+            areas = {name: seen_from(area, x_m, y_m, yaw_rad) for name, area in self._areas.items()}
+            keep_out = judge_keep_out(areas, self._footprint, body.motion, BASE_REACTION_S)
+        self._known = replace(self._known, keep_out=keep_out)
+
+    def _look_at_balance(self, body: _Body) -> None:
+        tip_over, sample = self._robot.protection.tip_over, self._imu.latest()
+        if tip_over is None or sample is None:
+            return
+        if body.now_ns - sample.stamp_ns > _MAX_IMU_AGE_NS:
+            self._acceleration = None
+            self._known = replace(self._known, tip_margin_ratio=None)
+            return
+        measured = np.array(sample.data["acceleration_m_s2"], dtype=np.float64)
+        last = measured if self._acceleration is None else self._acceleration
+        self._acceleration = last + _IMU_SHARE * (measured - last)
+        ratio = tip_margin_ratio(
+            self._body.centre_of_mass(body.position),
+            self._acceleration,
+            np.array(tip_over.support_m),
+            tip_over.max_lean_rad,
+        )
+        self._known = replace(self._known, tip_margin_ratio=ratio)
