@@ -5,7 +5,6 @@ import ctypes
 import logging
 import os
 import signal
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from vla_deploy.aside import AtOnce, background
 from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_CRASHED, EXIT_OK
 from vla_deploy.host_settings import REALTIME_PROCESS, HostSettings
 from vla_deploy.ipc import IpcError
+from vla_deploy.logs import process_log
 from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.node import Node, NodeContext, run_node
 from vla_deploy.robots import RobotFileError
@@ -35,13 +35,20 @@ def main(
     """
     context = _context(name, arguments)
     _name_process(name)
-    logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format=f"{name}: %(levelname)s: %(message)s"
-    )
     stop_signals = _catch_stop_signals()
+    with process_log(name, context.robot, context.run_dir):
+        return _run(name, build, context, lambda: bool(stop_signals))
+
+
+def _run(
+    name: str,
+    build: Callable[[NodeContext], Node],
+    context: NodeContext,
+    should_stop: Callable[[], bool],
+) -> int:
     try:
         node = _Announced(_adapting(name, build, context), context.run_dir / READY_DIR / name)
-        run_node(node, context.clock, lambda: bool(stop_signals))
+        run_node(node, context.clock, should_stop)
     except (DriverError, RobotFileError, ProfileError, IpcError, MapInvalid) as error:
         _log.error("%s", error)
         return EXIT_CONFIGURATION
