@@ -10,6 +10,7 @@ from platforms.tree import Missing, Tree
 
 GIB: Final = 1 << 30
 _MODULE: Final = re.compile(r"\bp(?:3767|3701|3834)-\d{4}\b")
+_PRODUCT: Final = ("sys_vendor", "product_name")
 _RELEASE: Final = re.compile(r"#\s*R(\d+)\b.*?REVISION:\s*(\d+(?:\.\d+)*)")
 
 
@@ -91,7 +92,7 @@ def identify(root: Path = Path("/")) -> Board:
     is_super = _is_super(tree, model, compatible)
     known = MODULES.get(module or "")
     return Board(
-        name=model.replace("\0", " ") or (known.name if known else "computer without device tree"),
+        name=model.replace("\0", " ") or (known.name if known else _product(tree)),
         module=module,
         memory_bytes=memory_bytes,
         l4t=l4t,
@@ -111,6 +112,15 @@ def _device_tree(tree: Tree, name: str, reasons: list[str]) -> str:
             reason = f"{name} of the board is missing, because {missing}"
     reasons.append(reason)
     return ""
+
+
+def _product(tree: Tree) -> str:
+    """Return the name that the firmware of a PC tells."""
+    try:
+        vendor, product = (tree.text(f"/sys/class/dmi/id/{key}") for key in _PRODUCT)
+    except Missing:
+        return "computer without device tree"
+    return f"{vendor} {product}"
 
 
 def _memory_bytes(tree: Tree, reasons: list[str]) -> int | None:

@@ -42,7 +42,7 @@ def read_cgroup(tree: Tree) -> Cgroup:
         controllers = tuple(tree.text(f"{folder}/cgroup.controllers").split())
     except Missing as missing:
         return Cgroup(version=2, folder=folder, controllers=(), reason=str(missing))
-    reason = "the controllers belong to version 1" if old and not controllers else ""
+    reason = "version 1 holds the other controllers" if old else ""
     return Cgroup(version=2, folder=folder, controllers=controllers, reason=reason)
 
 

@@ -1,7 +1,7 @@
 """Read how often a Jetson's SOCTHERM throttled for its supply.
 
-OC1 is under-voltage, OC2 average over-current: faults of the supply. OC3, instantaneous over-current,
-rises under ordinary heavy load.
+OC1 is under-voltage and OC2 average over-current: faults of the supply. OC3, instantaneous
+over-current, rises under ordinary heavy load.
 """
 
 from collections.abc import Iterator

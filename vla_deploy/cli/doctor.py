@@ -1,0 +1,144 @@
+"""`vla-deploy doctor | probes`: what this computer lacks, and what it tells of itself."""
+
+import argparse
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from platforms import Profile, load_profile
+from platforms.board import identify
+from platforms.probes import ProbeSet, Reading, open_probes, read_power_modes
+from platforms.tree import Tree
+from vla_deploy import doctor
+from vla_deploy.cli.errors import UsageError
+from vla_deploy.cli.example import add_command
+from vla_deploy.robots import load_robot
+
+LIVE_ROOT = Path("/")
+FIRST_LOOK_S = 0.5  # what is counted needs two looks
+_SCALES: Mapping[str, tuple[float, str]] = {
+    "bytes": (1e-6, "MB"),
+    "ratio": (100.0, "%"),
+    "Hz": (1e-6, "MHz"),
+}
+
+
+def register(commands: Any) -> None:
+    """Add the commands."""
+    examined = add_command(
+        commands,
+        "doctor",
+        "examine this computer, and say how to mend what is wrong",
+        "  vla-deploy doctor\n"
+        "  vla-deploy doctor --robot butler --profile jetson_orin_nx\n"
+        "  vla-deploy doctor --json | jq '.findings[] | select(.level == \"fail\")'\n",
+    )
+    examined.add_argument("--robot", metavar="NAME", help="check the devices of this robot, too")
+    examined.add_argument(
+        "--profile", metavar="NAME", help="what is needed (default: the profile made for the board)"
+    )
+    _add_common(examined)
+    examined.set_defaults(run=run)
+    probes = add_command(
+        commands,
+        "probes",
+        "print load, memory, power, heat and throttling of this computer",
+        "  vla-deploy probes\n  vla-deploy probes --watch 1\n  vla-deploy probes --json\n",
+    )
+    probes.add_argument("--watch", type=_period_s, metavar="S", help="again every S seconds")
+    _add_common(probes)
+    probes.set_defaults(run=run_probes)
+
+
+def _add_common(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--root",
+        type=Path,
+        default=LIVE_ROOT,
+        metavar="DIR",
+        help="a recorded tree of another computer",
+    )
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _period_s(text: str) -> float:
+    value = float(text)
+    if not 0.05 <= value <= 3600:
+        raise argparse.ArgumentTypeError(f"expected 0.05 to 3600 seconds, got {text!r}")
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the findings; return 1 where one is a failure."""
+    root = _root(arguments)
+    robot = None if arguments.robot is None else load_robot(arguments.robot)
+    profile = _profile(arguments.profile, root)
+    if root == LIVE_ROOT:
+        context = doctor.live_context(profile, robot)
+    else:
+        context = doctor.recorded_context(root, profile, robot)
+    sections = doctor.examine(context)
+    if arguments.json:
+        print(json.dumps(doctor.as_document(sections), indent=2))
+    else:
+        print(doctor.as_text(sections))
+    return 0 if doctor.succeeded(sections) else 1
+
+
+def _root(arguments: argparse.Namespace) -> Path:
+    root: Path = arguments.root
+    if not root.is_dir():
+        raise UsageError(f"--root {root}: expected a folder")
+    return root
+
+
+def _profile(name: str | None, root: Path) -> Profile | None:
+    name = name or identify(root).profile_name
+    return None if name is None else load_profile(name)
+
+
+def run_probes(arguments: argparse.Namespace) -> int:
+    """Print the readings once, or again and again until Ctrl-C."""
+    root, clock = _root(arguments), MonotonicClock()
+    with open_probes(root) as probes:
+        _wait(clock, FIRST_LOOK_S)
+        _show(probes, root, as_json=arguments.json)
+        while arguments.watch is not None:
+            _wait(clock, arguments.watch)
+            _show(probes, root, as_json=arguments.json)
+    return 0
+
+
+def _wait(clock: Clock, seconds: float) -> None:
+    clock.sleep_until(clock.now_ns() + round(seconds * NS_PER_S))
+
+
+def _show(probes: ProbeSet, root: Path, *, as_json: bool) -> None:
+    readings = probes.read()
+    if as_json:
+        rows = {name: _without_name(reading) for name, reading in readings.items()}
+        print(json.dumps(rows), flush=True)
+    else:
+        print("\n".join([*_lines(readings), _mode_line(root), ""]), flush=True)
+
+
+def _without_name(reading: Reading) -> dict[str, Any]:
+    return {key: value for key, value in asdict(reading).items() if key != "name"}
+
+
+def _lines(readings: Mapping[str, Reading]) -> Iterator[str]:
+    for name, reading in readings.items():
+        if reading.value is None:
+            yield f"{name:<34}        -      {reading.reason}"
+        else:
+            factor, unit = _SCALES.get(reading.unit, (1.0, reading.unit))
+            yield f"{name:<34} {reading.value * factor:>12.6g} {unit}"
+
+
+def _mode_line(root: Path) -> str:
+    modes = read_power_modes(Tree(root))
+    name = modes.current_name
+    return f"{'power mode':<34} {name or '-':>12} {'' if name else modes.reason}".rstrip()

@@ -1,0 +1,49 @@
+"""Tell which computer this is, and whether the profile fits it."""
+
+import os
+from collections.abc import Iterator
+
+from platforms.tree import Missing
+from vla_deploy.doctor.context import Context
+from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+
+_GB = 1e9
+_MB = 1e6
+
+
+def board(context: Context) -> Iterator[Finding]:
+    """Name the board and its release."""
+    found = context.board
+    release = f", JetPack {found.jetpack or 'unknown'} (L4T {found.l4t})" if found.l4t else ""
+    module = f", {found.module}" if found.module else ""
+    if found.profile_name is None:
+        yield warn("board", f"{found.name}: {found.reasons[-1]}", "vla-deploy profile list")
+    else:
+        yield ok("board", f"{found.name}{module}{release}")
+
+
+def profile(context: Context) -> Iterator[Finding]:
+    """Compare the profile in use with the one made for this board."""
+    made, used = context.board.profile_name, context.profile
+    if used is None:
+        yield missing("profile", f"{made or 'none'} cannot be loaded", "vla-deploy profile list")
+    elif made is None or used.name == made:
+        yield ok("profile", used.name)
+    else:
+        yield warn(
+            "profile", f"{used.name}, made for this: {made}", f"vla-deploy profile use {made}"
+        )
+
+
+def memory(context: Context) -> Iterator[Finding]:
+    """Compare processors and memory with what the profile needs."""
+    if context.board.memory_bytes is None:
+        raise Missing(next(iter(context.board.reasons), "nothing tells its size"))
+    cpus = os.cpu_count() if context.is_live else None
+    measured = f"{context.board.memory_bytes / _GB:.1f} GB" + (f", {cpus} CPUs" if cpus else "")
+    needs = None if context.profile is None else context.profile.total.memory_mb
+    if needs is not None and context.board.memory_bytes < needs * _MB:
+        measured = f"{measured}, the profile needs {needs / 1000:.1f} GB"
+        yield fail("memory", measured, "vla-deploy profile detect")
+    else:
+        yield ok("memory", measured)

@@ -1,0 +1,146 @@
+"""Check the robot's devices: are they there, may we use them, are they set up for 250 Hz."""
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from platforms.tree import Missing
+from vla_deploy.doctor.context import Context
+from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from vla_deploy.robots import RobotDescription
+
+LATENCY_MS: Final = 1
+_NO_ROBOT: Final = "no robot was named"
+_NAME_ONE: Final = "vla-deploy doctor --robot butler"
+_OS_ACCESS: Final = os.R_OK | os.W_OK
+_GOOD_CAN_STATES: Final = frozenset({"ERROR-ACTIVE"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """Name one device file of a robot, its group, and the access that its driver needs."""
+
+    name: str
+    path: str
+    group: str
+    access: int = _OS_ACCESS
+
+
+_GROUPS: Mapping[str, str] = {
+    "servo_bus": "dialout",
+    "lidar": "dialout",
+    "imu": "dialout",
+    "camera": "video",
+    "estop": "input",
+    "microphone": "audio",
+    "speaker": "audio",
+}
+_READ_ONLY: Final = frozenset({"estop"})
+
+
+def device_files(context: Context) -> Iterator[Finding]:
+    """Check that each device file of the robot is there and open to us."""
+    if context.robot is None:
+        yield missing("device files", _NO_ROBOT, _NAME_ONE)
+        return
+    for node in _nodes(context.robot):
+        yield _judged(context, node)
+
+
+def _nodes(robot: RobotDescription) -> Iterator[Node]:
+    for attribute, group in _GROUPS.items():
+        device = getattr(robot, attribute)
+        if device is not None and device.path.startswith("/"):
+            access = os.R_OK if attribute in _READ_ONLY else _OS_ACCESS
+            yield Node(name=device.device, path=device.path, group=group, access=access)
+
+
+def _judged(context: Context, node: Node) -> Finding:
+    path = context.tree.root / node.path.lstrip("/")
+    if not os.access(path, os.F_OK):
+        folder = node.path.rpartition("/")[0]
+        return fail(node.name, f"there is no {node.path}", f"ls -l {folder}   # is it plugged in?")
+    if not os.access(path, node.access):
+        return fail(
+            node.name, f"no right to open {node.path}", f"sudo usermod -aG {node.group} $USER"
+        )
+    return ok(node.name, node.path)
+
+
+def latency_timers(context: Context) -> Iterator[Finding]:
+    """Check how long FTDI adapters wait for more bytes before they hand over what they have."""
+    folder = "/sys/bus/usb-serial/devices"
+    for port in context.tree.names(folder):
+        path = f"{folder}/{port}/latency_timer"
+        if not context.tree.exists(path):
+            continue
+        name = f"{port} latency"
+        try:
+            wait_ms = context.tree.file(path).number()
+        except Missing as gone:
+            yield missing(name, str(gone))
+            continue
+        judge = ok(name, f"{wait_ms:g} ms")
+        if wait_ms > LATENCY_MS:
+            judge = _late_adapter(context, name, wait_ms, path)
+        yield judge
+
+
+def _late_adapter(context: Context, name: str, wait_ms: float, path: str) -> Finding:
+    rate_hz = context.profile.control_rate_hz if context.profile else 250.0
+    level: Callable[[str, str, str], Finding] = fail if wait_ms >= 1000 / rate_hz else warn
+    measured = f"{wait_ms:g} ms, expected {LATENCY_MS} ms at {rate_hz:g} Hz"
+    return level(name, measured, f"echo {LATENCY_MS} | sudo tee {path}")
+
+
+def can_link(context: Context) -> Iterator[Finding]:
+    """Check that the wheel drives' CAN link is up, in good health, and has the right bit rate."""
+    if context.robot is None:
+        yield missing("CAN link", _NO_ROBOT, _NAME_ONE)
+        return
+    name, bitrate = context.robot.can_bus.path, context.robot.can_bus.bitrate
+    up = f"sudo ip link set {name} up type can bitrate {bitrate} restart-ms 100"
+    if "/" in name or ":" in name:
+        yield missing("CAN link", f"{name} is no network link; its driver opens it")
+    elif not context.tree.exists(f"/sys/class/net/{name}"):
+        yield fail("CAN link", f"there is no link {name}", "sudo modprobe mttcan; ip link")
+    else:
+        yield _link(context, name, bitrate, up)
+
+
+def _link(context: Context, name: str, bitrate: int, up: str) -> Finding:
+    try:
+        link = json.loads(context.ask(("ip", "-details", "-json", "link", "show", name)))[0]
+        data: dict[str, Any] = link["linkinfo"].get("info_data", {})
+        flags, kind = link["flags"], link["linkinfo"]["info_kind"]
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        return missing("CAN link", f"`ip` tells nothing of {name}: {error}")
+    if "UP" not in flags:
+        return fail("CAN link", f"{name} is down", up)
+    if kind == "vcan":
+        return ok("CAN link", f"{name} is up (virtual)")
+    state, found = data.get("state"), data.get("bittiming", {}).get("bitrate")
+    if found != bitrate:
+        measured = f"{name} runs at {found} bit/s, expected {bitrate}"
+        return fail("CAN link", measured, f"sudo ip link set {name} down; {up}")
+    if state not in _GOOD_CAN_STATES:
+        return warn("CAN link", f"{name} is {state}", f"sudo ip link set {name} down; {up}")
+    return ok("CAN link", f"{name} is {state} at {bitrate} bit/s")
+
+
+def sound(context: Context) -> Iterator[Finding]:
+    """Check that the sound cards that the robot file names are there."""
+    robot = context.robot
+    devices = [] if robot is None else [one for one in (robot.microphone, robot.speaker) if one]
+    named = [one for one in devices if not one.path.startswith("/") and not Path(one.path).suffix]
+    if not named:
+        return
+    cards = context.tree.text("/proc/asound/cards")
+    for device in named:
+        if device.path in cards:
+            yield ok(device.device, device.path)
+        else:
+            yield warn(device.device, f"no sound card is called {device.path!r}", "aplay -l")

@@ -1,0 +1,43 @@
+"""Hold one line of the doctor: what was measured, how good it is, the command that mends it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Level(StrEnum):
+    """Grade a finding; `missing` means that it could not be found out, or is not installed."""
+
+    OK = "ok"
+    WARN = "warn"
+    FAIL = "fail"
+    MISSING = "missing"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Hold one line; `remedy` is a command to type, empty where nothing needs one."""
+
+    name: str
+    level: Level
+    measured: str
+    remedy: str = ""
+
+
+def ok(name: str, measured: str) -> Finding:
+    """Return a finding that needs nothing."""
+    return Finding(name=name, level=Level.OK, measured=measured)
+
+
+def warn(name: str, measured: str, remedy: str) -> Finding:
+    """Return a finding under which the stack runs, but not as it should."""
+    return Finding(name=name, level=Level.WARN, measured=measured, remedy=remedy)
+
+
+def fail(name: str, measured: str, remedy: str) -> Finding:
+    """Return a finding that keeps the stack from running."""
+    return Finding(name=name, level=Level.FAIL, measured=measured, remedy=remedy)
+
+
+def missing(name: str, why: str, remedy: str = "") -> Finding:
+    """Return a finding that could not be made."""
+    return Finding(name=name, level=Level.MISSING, measured=why, remedy=remedy)

@@ -1,0 +1,123 @@
+"""Check heat, throttling, power mode and processor clocks."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from platforms.probes import open_probes, read_power_modes
+from platforms.probes.thermal import ZONES
+from platforms.tree import Missing, Tree, number_in
+from vla_deploy.doctor.context import Context
+from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+
+MARGIN_K: Final = 10.0
+TRIPS: Final = frozenset({"passive", "hot", "critical"})
+THROTTLE_WORDS: Final = {"oc1": "under-voltage", "oc2": "average over-current"}
+GOVERNOR: Final = "performance"
+_CPUFREQ: Final = "/sys/devices/system/cpu/cpufreq"
+_WATCH: Final = "vla-deploy probes --watch 1"
+
+
+def heat(context: Context) -> Iterator[Finding]:
+    """Check the margin of each thermal zone to where the kernel slows the computer down."""
+    margins = sorted(_margins(context.tree))
+    if not margins:
+        yield missing("temperature", f"no zone in {ZONES} tells temperature and trip point")
+        return
+    margin_k, zone, value_c, trip_c = margins[0]
+    measured = f"{zone} {value_c:.0f} degC, throttles at {trip_c:.0f} degC"
+    if margin_k <= 0:
+        yield fail("temperature", measured, f"{_WATCH}   # clean the fan, free the air")
+    elif margin_k < MARGIN_K:
+        yield warn("temperature", measured, _WATCH)
+    else:
+        yield ok("temperature", measured)
+
+
+def _margins(tree: Tree) -> Iterator[tuple[float, str, float, float]]:
+    for folder in tree.names(ZONES):
+        if not folder.startswith("thermal_zone"):
+            continue
+        zone = f"{ZONES}/{folder}"
+        try:
+            name = tree.text(f"{zone}/type")
+            value_c = number_in(tree.text(f"{zone}/temp"), zone) / 1000
+            trip_c = min(_trips_c(tree, zone))
+        except (Missing, ValueError):  # a zone that sleeps, or has no trip point
+            continue
+        yield trip_c - value_c, name, value_c, trip_c
+
+
+def _trips_c(tree: Tree, zone: str) -> Iterator[float]:
+    for name in tree.names(zone):
+        if name.startswith("trip_point_") and name.endswith("_type"):
+            kind = tree.text(f"{zone}/{name}")
+            value_c = number_in(tree.text(f"{zone}/{name.replace('_type', '_temp')}"), zone) / 1000
+            if kind in TRIPS and value_c > 0:
+                yield value_c
+
+
+def throttling(context: Context) -> Iterator[Finding]:
+    """Tell how often the supply made the board slow down since boot."""
+    with open_probes(context.tree.root, nvml=False) as probes:
+        readings = probes.read()
+    known = [readings[f"throttle_count.{counter}"] for counter in THROTTLE_WORDS]
+    measured = ", ".join(
+        f"{reading.value:g} times {words}"
+        for reading, words in zip(known, THROTTLE_WORDS.values(), strict=True)
+        if reading.value is not None
+    )
+    if not measured:
+        yield missing("throttling", known[0].reason.removeprefix("missing, because "))
+    elif any(reading.value for reading in known):
+        remedy = f"{_WATCH}   # is the supply too weak?"
+        yield warn("throttling", f"{measured} since boot", remedy)
+    else:
+        yield ok("throttling", f"{measured} since boot")
+
+
+def power_mode(context: Context) -> Iterator[Finding]:
+    """Compare the board's power mode with the one that the profile asks for."""
+    modes = read_power_modes(context.tree)
+    wanted = context.profile.power_mode if context.profile else ""
+    ids = {name: number for number, name in modes.names.items()}
+    if modes.current is None:
+        yield missing("power mode", modes.reason)
+    elif not wanted or modes.current_name == wanted:
+        asked = "" if wanted else ", the profile asks for none"
+        yield ok("power mode", f"{modes.current_name}{asked}")
+    elif wanted not in ids:
+        measured = f"the board has no mode {wanted}, only {', '.join(ids)}"
+        yield fail("power mode", measured, "vla-deploy profile detect")
+    else:
+        measured = f"{modes.current_name}, expected {wanted}"
+        yield warn("power mode", measured, f"sudo nvpmodel -m {ids[wanted]}")
+
+
+def governor(context: Context) -> Iterator[Finding]:
+    """Check that the processors do not lower their clock between two ticks."""
+    files = [
+        f"{_CPUFREQ}/{name}/scaling_governor"
+        for name in context.tree.names(_CPUFREQ)
+        if name.startswith("policy")
+    ]
+    if not files:
+        yield missing("CPU governor", f"{_CPUFREQ} has no policy: the kernel does not set clocks")
+        return
+    found = sorted({context.tree.text(path) for path in files})
+    if found == [GOVERNOR]:
+        yield ok("CPU governor", GOVERNOR)
+    else:
+        remedy = f"echo {GOVERNOR} | sudo tee {_CPUFREQ}/policy*/scaling_governor"
+        yield warn("CPU governor", f"{', '.join(found)}, expected {GOVERNOR}", remedy)
+
+
+def isolated_processors(context: Context) -> Iterator[Finding]:
+    """Tell which processors the kernel leaves to those who ask for them."""
+    isolated = context.tree.text("/sys/devices/system/cpu/isolated")
+    wanted = context.profile.processes["control"].affinity if context.profile else ()
+    if isolated or not wanted or not (context.profile and context.profile.realtime_priority):
+        yield ok("isolated CPUs", isolated or "none, and the profile needs none")
+    else:
+        listed = ",".join(str(cpu) for cpu in wanted)
+        remedy = f"sudoedit /boot/extlinux/extlinux.conf   # add isolcpus={listed} to APPEND"
+        yield warn("isolated CPUs", f"none; control runs on {listed} beside others", remedy)

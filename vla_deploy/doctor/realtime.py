@@ -1,0 +1,157 @@
+"""Check what control needs of the kernel: real-time rights, locked memory, quick wake-ups."""
+
+import gzip
+import os
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from drivers.clock import NS_PER_S
+from platforms.tree import Missing
+from vla_deploy.doctor.context import UNLIMITED, Context
+from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+
+LIMITS_FILE: Final = "/etc/security/limits.d/90-vla-deploy.conf"
+MEMORY_LOCK_BYTES: Final = 512 << 20
+WAKE_UP_TEST_S: Final = 1.0
+LATE_RATIO: Final = 0.2  # of the period: a tick this late counts as late
+_QUANTILE: Final = 0.99
+_SWITCH: Final = "CONFIG_RT_GROUP_SCHED=y"
+
+
+def _wanted(context: Context) -> int:
+    return context.profile.realtime_priority if context.profile else 0
+
+
+def preempt_rt(context: Context) -> Iterator[Finding]:
+    """Tell whether the kernel preempts everywhere."""
+    version = context.tree.text("/proc/version")
+    if "PREEMPT_RT" in version:
+        yield ok("kernel", "PREEMPT_RT")
+    elif _wanted(context):
+        remedy = (
+            "apt-cache search nvidia-l4t-rt"
+            if context.board.l4t
+            else "sudo pro enable realtime-kernel"
+        )
+        yield warn("kernel", "no PREEMPT_RT: wake-ups may be late by milliseconds", remedy)
+    else:
+        yield ok("kernel", "no PREEMPT_RT, which the profile does not ask for")
+
+
+def fifo(context: Context) -> Iterator[Finding]:
+    """Check that SCHED_FIFO is granted, by asking for it."""
+    rights, name = context.rights, "SCHED_FIFO"
+    if not rights.fifo_refusal:
+        yield ok(name, "granted")
+        return
+    measured = f"{rights.fifo_refusal}; RLIMIT_RTPRIO is {rights.realtime_priority_limit}"
+    remedy = f'echo "$USER - rtprio 80" | sudo tee -a {LIMITS_FILE}   # then log in anew'
+    level: Callable[[str, str, str], Finding] = fail if _wanted(context) else warn
+    yield level(name, measured, remedy)
+
+
+def realtime_share(context: Context) -> Iterator[Finding]:
+    """Check how much of each period real-time processes may use."""
+    runtime_us = context.tree.file("/proc/sys/kernel/sched_rt_runtime_us").number()
+    period_us = context.tree.file("/proc/sys/kernel/sched_rt_period_us").number()
+    remedy = "sudo sysctl -w kernel.sched_rt_runtime_us=950000"
+    if runtime_us < 0:
+        yield ok("real-time share", "no limit")
+    elif runtime_us == 0 or period_us <= 0:
+        yield fail("real-time share", "0 %: no real-time process may run", remedy)
+    else:
+        yield ok("real-time share", f"{100 * runtime_us / period_us:.0f} % of each period")
+
+
+def group_scheduling(context: Context) -> Iterator[Finding]:
+    """Check for RT_GROUP_SCHED, under which SCHED_FIFO fails below the root control group."""
+    if not _has_group_scheduling(context):
+        yield ok("RT_GROUP_SCHED", "off, or unknown to this kernel")
+    elif context.rights.fifo_refusal:
+        yield warn(
+            "RT_GROUP_SCHED",
+            "on: SCHED_FIFO fails below the root control group",
+            "echo $$ | sudo tee /sys/fs/cgroup/cgroup.procs",
+        )
+    else:
+        yield ok("RT_GROUP_SCHED", "on, but SCHED_FIFO is granted here")
+
+
+def _has_group_scheduling(context: Context) -> bool:
+    if context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us"):
+        return True
+    try:
+        packed = (context.tree.root / "proc/config.gz").read_bytes()
+        return _SWITCH in gzip.decompress(packed).decode(errors="replace")
+    except (OSError, EOFError, zlib.error):
+        pass  # seldom there: distributions keep it in /boot
+    try:
+        release = context.tree.text("/proc/sys/kernel/osrelease")
+        return _SWITCH in context.tree.text(f"/boot/config-{release}")
+    except Missing:
+        return False
+
+
+def memory_lock(context: Context) -> Iterator[Finding]:
+    """Check that control may keep its memory from being swapped out."""
+    rights, name = context.rights, "memory lock"
+    limit = rights.memory_lock_bytes
+    if rights.may_lock_all or limit == UNLIMITED:
+        yield ok(name, "unlimited")
+    elif limit >= MEMORY_LOCK_BYTES:
+        yield ok(name, f"{limit >> 20} MiB")
+    else:
+        needs = context.profile is not None and context.profile.memory_lock
+        level: Callable[[str, str, str], Finding] = fail if needs else warn
+        remedy = f'echo "$USER - memlock unlimited" | sudo tee -a {LIMITS_FILE}   # log in anew'
+        yield level(name, f"{limit >> 10} KiB, expected {MEMORY_LOCK_BYTES >> 20} MiB", remedy)
+
+
+def wake_up(context: Context) -> Iterator[Finding]:
+    """Measure for a second how late this computer wakes a process at the control rate."""
+    if not context.is_live:
+        yield missing("wake-up", "measured on the computer itself only")
+        return
+    rate_hz = context.profile.control_rate_hz if context.profile else 250.0
+    priority = _wanted(context)
+    with _scheduled(priority) as how:
+        late_ns = _lateness_ns(context, round(NS_PER_S / rate_hz))
+    p99_ms = late_ns[int(_QUANTILE * len(late_ns))] / 1e6
+    measured = f"p99 {p99_ms:.2f} ms, worst {late_ns[-1] / 1e6:.2f} ms late at {rate_hz:g} Hz {how}"
+    limit_ms = 1000 * LATE_RATIO / rate_hz
+    if p99_ms <= limit_ms:
+        yield ok("wake-up", measured)
+    else:
+        remedy = "vla-deploy doctor   # again while the computer is idle; then see SCHED_FIFO"
+        level: Callable[[str, str, str], Finding] = fail if priority else warn
+        yield level("wake-up", f"{measured}, expected {limit_ms:.2g} ms", remedy)
+
+
+def _lateness_ns(context: Context, period_ns: int) -> list[int]:
+    clock, late_ns = context.clock, []
+    deadline_ns = clock.now_ns()
+    for _ in range(round(WAKE_UP_TEST_S * NS_PER_S / period_ns)):
+        deadline_ns += period_ns
+        clock.sleep_until(deadline_ns)
+        late_ns.append(max(clock.now_ns() - deadline_ns, 0))
+    return sorted(late_ns)
+
+
+@contextmanager
+def _scheduled(priority: int) -> Iterator[str]:
+    """Run as control does, as far as permitted; say how."""
+    if not priority:
+        yield "as an ordinary process"
+        return
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError:
+        yield "without SCHED_FIFO"
+        return
+    try:
+        yield f"with SCHED_FIFO {priority}"
+    finally:
+        os.sched_setscheduler(0, policy, parameters)

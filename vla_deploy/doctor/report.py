@@ -1,0 +1,68 @@
+"""Write what the doctor found: for a person, by topic, within 100 columns; or as a document."""
+
+import textwrap
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any, Final
+
+from vla_deploy.doctor.finding import Finding, Level
+from vla_deploy.doctor.table import Section
+
+COLUMNS: Final = 100
+_NAME_COLUMNS: Final = 18
+_INDENT: Final = 2 + len(Level.MISSING) + 2 + _NAME_COLUMNS + 1
+_ARROW: Final = "-> "
+
+
+def succeeded(sections: Sequence[Section]) -> bool:
+    """Tell whether nothing failed."""
+    return all(one.level is not Level.FAIL for section in sections for one in section.findings)
+
+
+def as_document(sections: Sequence[Section]) -> dict[str, Any]:
+    """Return everything as a JSON document."""
+    rows = [
+        {"topic": section.topic, **asdict(one)} for section in sections for one in section.findings
+    ]
+    return {"ok": succeeded(sections), "counts": _counts(sections), "findings": rows}
+
+
+def as_text(sections: Sequence[Section]) -> str:
+    """Return lines for a person; under each trouble stands the command that mends it."""
+    lines = [line for section in sections for line in _section(section)]
+    counts = _counts(sections)
+    summary = ", ".join(f"{counts[level]} {level}" for level in Level)
+    return "\n".join([*lines, summary])
+
+
+def _counts(sections: Sequence[Section]) -> dict[str, int]:
+    counted = Counter(one.level for section in sections for one in section.findings)
+    return {level: counted[level] for level in Level}
+
+
+def _section(section: Section) -> Iterator[str]:
+    yield section.topic
+    for finding in section.findings:
+        yield from _lines(finding)
+    yield ""
+
+
+def _lines(finding: Finding) -> Iterator[str]:
+    head = f"  {finding.level:<{len(Level.MISSING)}}  {finding.name:<{_NAME_COLUMNS}} "
+    room = COLUMNS - _INDENT
+    first, *rest = textwrap.wrap(finding.measured, room) or [""]
+    yield f"{head}{first}"
+    yield from (" " * _INDENT + line for line in rest)
+    if finding.remedy:
+        yield from _remedy(finding.remedy)
+
+
+def _remedy(command: str) -> Iterator[str]:
+    """Keep a command whole, even where it is long: it is there to be copied."""
+    command, _, comment = command.partition("   # ")
+    yield f"{' ' * (_INDENT - len(_ARROW))}{_ARROW}{command}"
+    if comment:
+        yield from textwrap.wrap(
+            comment, COLUMNS, initial_indent=" " * _INDENT, subsequent_indent=" " * _INDENT
+        )

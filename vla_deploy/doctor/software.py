@@ -1,0 +1,129 @@
+"""Check what is installed: Python and packages, models, OpenGL, ROS, the systemd unit."""
+
+import importlib.metadata
+import importlib.util
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+from platforms.tree import Missing
+from vla_deploy.doctor.context import Context
+from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+
+PROJECT: Final = "vla-deploy"
+MODELS: Final = Path(__file__).parent.parent / "models"
+OLDEST_PYTHON: Final = (3, 11)
+NEWEST_PYTHON: Final = (3, 13)
+GL_PACKAGES: Final = "sudo apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
+UNIT: Final = "vla-deploy.service"
+UNIT_FOLDERS: Final = ("/etc/systemd/system", "/usr/lib/systemd/system", "/lib/systemd/system")
+# Import name, the extra that brings it, what it is for.
+EXTRAS: Mapping[str, tuple[str, str]] = {
+    "sounddevice": ("audio", "microphone and speaker"),
+    "gpiod": ("gpio", "an e-stop button on a GPIO line"),
+    "pynvml": ("nvml", "the load of NVIDIA cards, and of Thor's GPU"),
+}
+_NAME: Final = re.compile(r"^[A-Za-z0-9._-]+")
+
+
+def python(context: Context) -> Iterator[Finding]:
+    """Check the interpreter's version."""
+    del context
+    version = sys.version_info[:2]
+    measured = ".".join(map(str, sys.version_info[:3]))
+    if OLDEST_PYTHON <= version <= NEWEST_PYTHON:
+        yield ok("Python", measured)
+    else:
+        wanted = f"{'.'.join(map(str, OLDEST_PYTHON))} to {'.'.join(map(str, NEWEST_PYTHON))}"
+        yield fail("Python", f"{measured}, expected {wanted}", "uv python install 3.12")
+
+
+def packages(context: Context) -> Iterator[Finding]:
+    """Check that every required package is installed, and which extras are."""
+    del context
+    required = importlib.metadata.requires(PROJECT) or [] if _installed(PROJECT) else []
+    names = [_name(row) for row in required if "extra ==" not in row]
+    absent = [name for name in names if not _installed(name)]
+    if absent:
+        yield fail("packages", f"without {', '.join(absent)}", f"pip install {' '.join(absent)}")
+    else:
+        yield ok("packages", f"all {len(names)} installed")
+    for module, (extra, purpose) in EXTRAS.items():
+        if importlib.util.find_spec(module) is None:
+            remedy = f"pip install '{PROJECT}[{extra}]'"
+            yield missing(f"extra {extra}", f"not installed; for {purpose}", remedy)
+        else:
+            yield ok(f"extra {extra}", "installed")
+
+
+def _name(requirement: str) -> str:
+    found = _NAME.match(requirement)
+    return found.group() if found else requirement
+
+
+def _installed(name: str) -> bool:
+    try:
+        importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def models(context: Context) -> Iterator[Finding]:
+    """Check that the models which the profile names are there."""
+    wanted = context.profile.models if context.profile else {}
+    if not wanted:
+        yield ok("models", "the profile names none")
+    for role, choice in wanted.items():
+        absent = [tier for tier in choice.tiers if not (MODELS / tier).is_dir()]
+        if absent:
+            remedy = f"ls {MODELS}   # expected {', '.join(absent)}"
+            yield fail(f"model, {role}", f"without {', '.join(absent)}", remedy)
+        else:
+            yield ok(f"model, {role}", ", ".join(choice.tiers))
+
+
+def open_gl(context: Context) -> Iterator[Finding]:
+    """Open EGL in a process of its own, as a broken driver may take its caller along."""
+    try:
+        yield ok(
+            "OpenGL (EGL)", context.ask((sys.executable, "-m", "vla_deploy.doctor.egl")).strip()
+        )
+    except Missing as missing_egl:
+        if not context.is_live:
+            raise
+        yield warn("OpenGL (EGL)", f"{missing_egl}; the twin draws nothing", GL_PACKAGES)
+
+
+def ros(context: Context) -> Iterator[Finding]:
+    """Tell which ROS is installed; only the ROS gateway needs it."""
+    found = context.tree.names("/opt/ros")
+    if not found:
+        remedy = "sudo apt-get install -y ros-jazzy-ros-base   # only for the ROS gateway"
+        yield missing("ROS", "not installed", remedy)
+    elif context.is_live and importlib.util.find_spec("rclpy") is None:
+        measured = f"{', '.join(found)}, but this shell has no rclpy"
+        yield missing("ROS", measured, f"source /opt/ros/{found[-1]}/setup.bash")
+    else:
+        yield ok("ROS", ", ".join(found))
+
+
+def service(context: Context) -> Iterator[Finding]:
+    """Tell how the systemd unit is, if it is installed."""
+    if not any(context.tree.exists(f"{folder}/{UNIT}") for folder in UNIT_FOLDERS):
+        yield missing("service", f"{UNIT} is not installed", "sudo vla-deploy install")
+        return
+    rows = context.ask(("systemctl", "show", UNIT, "--property=ActiveState,NRestarts,Result"))
+    state = dict(row.partition("=")[::2] for row in rows.splitlines())
+    measured = (
+        f"{state.get('ActiveState')}, {state.get('NRestarts')} restarts, "
+        f"last result {state.get('Result')}"
+    )
+    if state.get("ActiveState") == "active":
+        yield ok("service", measured)
+    elif state.get("ActiveState") == "failed":
+        yield fail("service", measured, f"journalctl -u {UNIT} -n 50")
+    else:
+        yield warn("service", measured, f"sudo systemctl enable --now {UNIT}")
