@@ -1,0 +1,68 @@
+"""Remember which profile a person has chosen, for the next start."""
+
+import json
+import os
+from pathlib import Path
+from typing import Final
+
+from platforms.board import identify
+
+_NAME: Final = "profile.json"
+_FALLBACK: Final = "desktop"
+
+
+class ProfileChoice:
+    """Keep the chosen profile in a small file; the old choice stays until the new one is whole."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def load(self) -> str | None:
+        """Return the chosen profile; None when none is, or what is there cannot be read."""
+        try:
+            chosen = json.loads(self.path.read_text())["profile"]
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return chosen if isinstance(chosen, str) else None
+
+    def save(self, profile: str) -> None:
+        """Choose a profile.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = self.path.with_name(f".{self.path.name}-{os.getpid()}")
+        fresh.write_text(json.dumps({"profile": profile}) + "\n")
+        with fresh.open("rb") as written:
+            os.fsync(written.fileno())
+        fresh.replace(self.path)
+
+
+def choice_of(runtime_base: Path | None) -> ProfileChoice:
+    """Return where the choice is kept: beside the runs of a chosen base, else with the state."""
+    return ProfileChoice((runtime_base or _state_folder()) / _NAME)
+
+
+def start_profile(runtime_base: Path | None, root: Path = Path("/")) -> tuple[str, str]:
+    """Return the profile to start with when none is given, and why."""
+    chosen = choice_of(runtime_base).load()
+    if chosen is not None:
+        return chosen, "chosen by: vla-deploy profile use"
+    return detect(root)
+
+
+def detect(root: Path = Path("/")) -> tuple[str, str]:
+    """Return the profile made for this computer, and why."""
+    board = identify(root)
+    reasons = "; ".join(board.reasons)
+    if board.profile_name is None:
+        return _FALLBACK, f"{board.name} is not known: {reasons}"
+    return board.profile_name, f"{board.name}" + (f": {reasons}" if reasons else "")
+
+
+def _state_folder() -> Path:
+    if os.getuid() == 0:
+        return Path("/var/lib/vla-deploy")
+    home = os.environ.get("XDG_STATE_HOME")
+    return (Path(home) if home else Path.home() / ".local" / "state") / "vla-deploy"

@@ -1,0 +1,365 @@
+"""Take the running robot to another profile: prepare, commit, watch, keep - or go back."""
+
+import itertools
+import logging
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from typing import Any, Final
+
+import psutil
+
+from drivers.clock import NS_PER_S, Clock
+from platforms import Profile, ProfileError
+from platforms.power_switch import PowerSwitch
+from platforms.profile import profile_from
+from platforms.profile_source import read_source
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor import profile_change
+from vla_deploy.supervisor.profile_change import Change, Member, Outcome, Phase, Request
+from vla_deploy.supervisor.profile_choice import ProfileChoice
+from vla_deploy.supervisor.profile_trial import Trial
+
+_STATUS_NS: Final = NS_PER_S // 2
+_MB: Final = 1_000_000
+_CONTROL: Final = "control"
+_DISARMED: Final = "disarmed"
+_log = logging.getLogger(__name__)
+
+
+class ProfileSwitch:
+    """Own the profile that is in force; `profile` is what a process that starts now gets.
+
+    All or none of the processes change. Until a change is kept nothing is written down, so that a
+    supervisor that ends meanwhile leaves the old profile.
+    """
+
+    def __init__(
+        self,
+        profile: str,
+        space: SharedSpace,
+        clock: Clock,
+        choice: ProfileChoice,
+        power: PowerSwitch,
+        aside: Executor,
+    ) -> None:
+        self.profile = profile
+        self._kept = profile
+        self._clock = clock
+        self._choice = choice
+        self._power = power
+        self._aside = aside
+        self._power_set: Future[str] | None = None
+        self._requests = space.ring_reader("profile_request", from_start=False)
+        self._changes = space.ring_writer("profile_change")
+        self._answers = space.ring_reader("profile_answer", from_start=False)
+        self._status = space.cell_writer("profile_status")
+        self._trial = Trial(space, clock)
+        self._ids = itertools.count(1)
+        self._change: Change | None = None
+        self._adopted: dict[str, int] = {}
+        self._doubtful: dict[str, int] = {}
+        self._outcome: dict[str, Any] = {}
+        self._status_due_ns = 0
+        self._phases: Mapping[Phase, Callable[[Change, Mapping[str, Member]], None]] = {
+            Phase.PREPARE: self._preparing,
+            Phase.SET_POWER: self._setting_power,
+            Phase.COMMIT: self._committing,
+            Phase.WATCH: self._watching,
+            Phase.VALIDATE: self._validating,
+            Phase.ROLLBACK: self._rolling_back,
+        }
+
+    def step(self, members: Mapping[str, Member], absent: Mapping[str, str]) -> tuple[str, ...]:
+        """Go on; return which processes are to be started again.
+
+        `members` are ready and follow profiles, `absent` are on their way up, with their state.
+        """
+        for event in self._requests.drain():
+            self._take(Request.of(event.payload), members, absent)
+        answers = [event.payload for event in self._answers.drain()]
+        change = self._change
+        if change is None:
+            self._tell()
+            return self._strangers(members)
+        for answer in answers:
+            change.note(answer)
+        self._look_for_dead(change, members)
+        self._phases[change.phase](change, members)
+        self._tell()
+        return self._to_restart(change, members)
+
+    def close(self) -> None:
+        """Give up what runs aside."""
+        self._aside.shutdown(wait=False, cancel_futures=True)
+
+    # --- a request ----------------------------------------------------------------------------
+
+    def _take(
+        self, request: Request, members: Mapping[str, Member], absent: Mapping[str, str]
+    ) -> None:
+        try:
+            source = read_source(request.profile)
+            target = profile_from(source)
+            self._refuse_if_busy(absent)
+            self._power.check(target.power_mode)
+            _refuse_small_computer(target)
+        except ProfileError as error:
+            self._conclude(request, Outcome.REFUSED, "; ".join(error.faults), 0.0)
+            return
+        now_ns = self._clock.now_ns()
+        self._trial.begin()
+        change = Change(
+            change_id=next(self._ids),
+            request=request,
+            target=target,
+            values=source.values,
+            pids={name: member.pid for name, member in members.items()},
+            began_ns=now_ns,
+            deadline_ns=now_ns + _ns(profile_change.PREPARE_S),
+        )
+        self._change = change
+        self._changes.publish(
+            {
+                "change_id": change.change_id,
+                "phase": "prepare",
+                "profile": request.profile,
+                "values": change.values,
+            }
+        )
+
+    def _refuse_if_busy(self, absent: Mapping[str, str]) -> None:
+        if self._change is not None:
+            running = self._change.request.profile
+            raise ProfileError((f"a change to {running} is under way: wait for its end",))
+        if absent:
+            states = ", ".join(f"{name} is {state}" for name, state in absent.items())
+            raise ProfileError((f"{states}: wait until it is ready",))
+
+    # --- phases -------------------------------------------------------------------------------
+
+    def _preparing(self, change: Change, _: Mapping[str, Member]) -> None:
+        if self._is_waiting(change):
+            return
+        refusals = self._settle_restarts(change)
+        if refusals:
+            self._go_back(change, _listed(refusals))
+        elif change.request.dry_run:
+            self._go_back(change, "")
+        else:
+            self._set_power(change)
+
+    def _settle_restarts(self, change: Change) -> dict[str, str]:
+        """Put who may be restarted aside, and return the refusals that remain."""
+        refusals = dict(change.refusals)
+        for name, reason in change.refusals.items():
+            if not change.answers[name]["restart"]:
+                continue
+            if not change.request.allow_restart:
+                refusals[name] = f"needs a restart: {reason}; permit it with --allow-restart"
+            elif name == _CONTROL and self._trial.control_state != _DISARMED:
+                refusals[name] = f"needs a restart: {reason}; disarm first"
+            else:
+                change.restarts.add(name)
+                del refusals[name]
+        return refusals
+
+    def _set_power(self, change: Change) -> None:
+        change.enter(Phase.SET_POWER, self._clock.now_ns(), _ns(profile_change.SET_POWER_S))
+        change.power_before = self._power.current() if change.target.power_mode else ""
+        self._power_set = self._aside.submit(self._power.set, change.target.power_mode)
+
+    def _setting_power(self, change: Change, _: Mapping[str, Member]) -> None:
+        assert self._power_set is not None
+        if not self._power_set.done():
+            if self._clock.now_ns() >= change.deadline_ns:
+                self._go_back(change, f"power mode {change.target.power_mode}: not set in time")
+            return
+        failure = self._power_set.result()
+        if failure:
+            self._go_back(change, failure)
+            return
+        self._commit(change)
+
+    def _commit(self, change: Change) -> None:
+        change.committed = True
+        self.profile = change.request.profile
+        limit_s = profile_change.RESTART_S if change.restarts else profile_change.COMMIT_S
+        change.enter(Phase.COMMIT, self._clock.now_ns(), _ns(limit_s))
+        self._publish(change, "commit")
+
+    def _committing(self, change: Change, members: Mapping[str, Member]) -> None:
+        back = {
+            name
+            for name in change.restarts
+            if name in members and members[name].pid != change.pids[name]
+        }
+        if self._is_waiting(change, tuple(change.restarts - back)):
+            return
+        if change.refusals:
+            self._go_back(change, _listed(change.refusals))
+            return
+        self._trial.begin()
+        change.enter(Phase.WATCH, self._clock.now_ns(), _ns(profile_change.WATCH_S))
+
+    def _watching(self, change: Change, _: Mapping[str, Member]) -> None:
+        if self._clock.now_ns() >= change.deadline_ns:
+            limit_ns = _ns(profile_change.VALIDATE_S)
+            change.enter(Phase.VALIDATE, self._clock.now_ns(), limit_ns)
+            self._publish(change, "validate")
+
+    def _validating(self, change: Change, members: Mapping[str, Member]) -> None:
+        if self._is_waiting(change):
+            return
+        faults = [*self._trial.faults(change.target)]
+        faults += [_listed(change.refusals)] if change.refusals else []
+        if faults:
+            self._go_back(change, "; ".join(faults))
+            return
+        self._keep(change, members)
+
+    def _keep(self, change: Change, members: Mapping[str, Member]) -> None:
+        try:
+            self._choice.save(change.request.profile)
+        except OSError as error:
+            self._go_back(change, f"{self._choice.path}: {error.strerror}")
+            return
+        self._publish(change, "keep")
+        self._kept = self.profile
+        self._adopted = {name: member.pid for name, member in members.items()}
+        self._doubtful = {}
+        self._end(change, Outcome.KEPT, "")
+
+    def _rolling_back(self, change: Change, _: Mapping[str, Member]) -> None:
+        power_due = self._power_set is not None and not self._power_set.done()
+        late = self._clock.now_ns() >= change.deadline_ns
+        if (change.silent or power_due) and not late:
+            return
+        reason = change.failure
+        if change.silent:
+            reason += f"; {', '.join(change.silent)} did not go back and is started again"
+            self._doubtful = {name: change.pids[name] for name in change.silent}
+        if self._power_set is not None and self._power_set.done() and self._power_set.result():
+            reason += f"; {self._power_set.result()}"
+        self._power_set = None
+        if change.request.dry_run and not reason:
+            self._end(change, Outcome.WOULD_WORK, _restart_note(change))
+        else:
+            outcome = Outcome.ROLLED_BACK if change.committed else Outcome.REFUSED
+            self._end(change, outcome, reason)
+
+    def _go_back(self, change: Change, failure: str) -> None:
+        change.failure = failure
+        self.profile = self._kept
+        self._power_set = (
+            self._aside.submit(self._power.set, change.power_before)
+            if change.power_before
+            else None
+        )
+        change.enter(Phase.ROLLBACK, self._clock.now_ns(), _ns(profile_change.ROLLBACK_S))
+        self._publish(change, "rollback")
+
+    def _is_waiting(self, change: Change, restarting: tuple[str, ...] = ()) -> bool:
+        """Tell whether answers may still come; when it is too late for them, go back."""
+        missing = (*change.silent, *restarting)
+        if not missing:
+            return False
+        if self._clock.now_ns() >= change.deadline_ns:
+            self._go_back(change, f"{', '.join(missing)}: no answer to {change.phase} in time")
+        return True
+
+    # --- processes that come and go -----------------------------------------------------------
+
+    def _look_for_dead(self, change: Change, members: Mapping[str, Member]) -> None:
+        dead = [
+            name
+            for name, pid in change.pids.items()
+            if name not in change.restarts and (name not in members or members[name].pid != pid)
+        ]
+        if not dead:
+            return
+        for name in dead:
+            del change.pids[name]
+        if change.phase is not Phase.ROLLBACK:
+            self._go_back(change, f"{', '.join(dead)} ended meanwhile")
+
+    def _to_restart(self, change: Change, members: Mapping[str, Member]) -> tuple[str, ...]:
+        if change.phase is not Phase.COMMIT:
+            return ()
+        return tuple(
+            name
+            for name in change.restarts
+            if name in members and members[name].pid == change.pids[name]
+        )
+
+    def _strangers(self, members: Mapping[str, Member]) -> tuple[str, ...]:
+        """Name who runs under another profile than the one in force, once nothing changes."""
+        return tuple(
+            name
+            for name, member in members.items()
+            if self._is_stranger(name, member)
+            and (name != _CONTROL or self._trial.control_state == _DISARMED)
+        )
+
+    def _is_stranger(self, name: str, member: Member) -> bool:
+        if self._doubtful.get(name) == member.pid:
+            return True
+        return member.started_under != self.profile and self._adopted.get(name) != member.pid
+
+    # --- tell ---------------------------------------------------------------------------------
+
+    def _publish(self, change: Change, phase: str) -> None:
+        self._changes.publish(
+            {"change_id": change.change_id, "phase": phase, "profile": change.request.profile}
+        )
+
+    def _end(self, change: Change, outcome: Outcome, reason: str) -> None:
+        self._change = None
+        took_s = (self._clock.now_ns() - change.began_ns) / NS_PER_S
+        self._conclude(change.request, outcome, reason, took_s)
+
+    def _conclude(self, request: Request, outcome: Outcome, reason: str, took_s: float) -> None:
+        level = logging.INFO if outcome in (Outcome.KEPT, Outcome.WOULD_WORK) else logging.WARNING
+        _log.log(level, "profile %s: %s%s", request.profile, outcome, reason and f" ({reason})")
+        self._outcome = {
+            "request_id": request.request_id,
+            "profile": request.profile,
+            "outcome": outcome.value,
+            "reason": reason[:2000],
+            "took_s": round(took_s, 3),
+        }
+        self._status_due_ns = 0
+
+    def _tell(self) -> None:
+        now_ns, change = self._clock.now_ns(), self._change
+        if now_ns < self._status_due_ns:
+            return
+        self._status_due_ns = now_ns + _STATUS_NS
+        self._status.put_document(
+            {
+                "profile": self._kept,
+                "phase": change.phase.value if change else "",
+                "target": change.request.profile if change else "",
+                "last": self._outcome,
+            }
+        )
+
+
+def _refuse_small_computer(profile: Profile) -> None:
+    has_mb, wants_mb = psutil.virtual_memory().total / _MB, profile.total.memory_mb
+    if wants_mb > has_mb:
+        text = (
+            f"budgets.total.memory_mb: expected at most the {has_mb:.0f} MB that this computer has"
+        )
+        raise ProfileError((f"{text}, got {wants_mb:g}",))
+
+
+def _ns(duration_s: float) -> int:
+    return round(duration_s * NS_PER_S)
+
+
+def _listed(refusals: Mapping[str, str]) -> str:
+    return "; ".join(f"{name}: {reason}" for name, reason in refusals.items())
+
+
+def _restart_note(change: Change) -> str:
+    return f"with a restart of {', '.join(sorted(change.restarts))}" if change.restarts else ""
