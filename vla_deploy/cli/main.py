@@ -11,6 +11,7 @@ from vla_deploy.cli import (
     can,
     check,
     demo,
+    doctor,
     fault,
     operate,
     run,
@@ -22,7 +23,7 @@ from vla_deploy.cli import (
 from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
 from vla_deploy.cli.example import OneLineParser
 
-COMMANDS = (run, demo, say, status, operate, servo, can, fault, check, bench, validate)
+COMMANDS = (run, demo, say, status, operate, servo, can, fault, check, doctor, bench, validate)
 EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin
