@@ -1,0 +1,134 @@
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from drivers.clock import NS_PER_S
+from platforms import LadderAction, LadderStep, LadderTiming, Profile, load_profile
+from platforms.probes import Reading
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor.budgets import BudgetKeeper, Orders, Snapshot
+from vla_deploy.supervisor.budgets.cgroup import CgroupTree
+from vla_deploy.supervisor.budgets.emergency import Emergencies
+from vla_deploy.supervisor.budgets.enforcement import Enforcer
+from vla_deploy.supervisor.usage import Usage
+
+
+class StepClock:
+    def __init__(self) -> None:
+        self.ns = NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.ns = max(self.ns, deadline_ns)
+
+
+class ScriptedFeed:
+    """Hand out what a test says was measured."""
+
+    def __init__(self) -> None:
+        self.closed = False
+        self.snapshot: Snapshot | None = None
+        self.watched: Mapping[str, int] = {}
+
+    def watch(self, pids: Mapping[str, int]) -> None:
+        self.watched = pids
+
+    def latest(self) -> Snapshot | None:
+        return self.snapshot
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class World:
+    """Step a keeper twice a second under what processes and board are said to use."""
+
+    def __init__(self, directory: Path, profile: Profile) -> None:
+        # No kernel gives out pids like these.
+        self.pids = {"control": 2**30, "perception": 2**30 + 1, "planner": 2**30 + 2}
+        self.clock = StepClock()
+        self.feed = ScriptedFeed()
+        self.space = SharedSpace(directory / "ipc", self.clock)
+        self.readings: dict[str, float | None] = {}
+        self.memory_mb = dict.fromkeys(self.pids, 50.0)
+        self.cpu_ratio = dict.fromkeys(self.pids, 0.1)
+        self.running = dict(self.pids)
+        self.restarted: list[str] = []
+        self._cpu_s = dict.fromkeys(self.pids, 0.0)
+        self.keeper = BudgetKeeper(
+            profile,
+            self.space,
+            self.clock,
+            self.feed,
+            Emergencies({"tj-thermal": 104.5}),
+            Enforcer(CgroupTree(directory)),
+        )
+
+    def go(self, seconds: float, *, measured: bool = True) -> Orders:
+        orders = Orders()
+        for _ in range(round(2 * seconds)):
+            self.clock.ns += NS_PER_S // 2
+            if measured:
+                self.feed.snapshot = self._snapshot()
+            orders = self.keeper.step(self.running)
+            self.running = {k: v for k, v in self.pids.items() if k not in orders.suspended}
+            self.restarted += orders.restart
+        return orders
+
+    def cell(self, name: str) -> dict:
+        return self.space.cell_reader(name).latest().document()
+
+    def _snapshot(self) -> Snapshot:
+        for name in self.running:
+            self._cpu_s[name] += self.cpu_ratio[name] / 2
+        return Snapshot(
+            stamp_ns=self.clock.ns,
+            readings={
+                name: Reading(name=name, value=value, unit="", reason="asleep" * (value is None))
+                for name, value in self.readings.items()
+            },
+            usages={
+                name: Usage(
+                    memory_mb=self.memory_mb[name],
+                    rss_mb=self.memory_mb[name],
+                    cpu_ratio=0.0,
+                    cpu_s=self._cpu_s[name],
+                )
+                for name in self.running
+            },
+            pids=dict(self.running),
+        )
+
+
+def step(action: str, process: str = "", ratio: float = 1.0) -> LadderStep:
+    return LadderStep(action=LadderAction(action), process=process, ratio=ratio)
+
+
+@pytest.fixture
+def profile() -> Profile:
+    base = load_profile("desktop")
+    return replace(
+        base,
+        total=replace(base.total, temperature_c=85.0, power_w=20.0),
+        ladder=(
+            step("slow", "perception", 0.5),
+            step("slow", "perception", 0.25),
+            step("smaller_model", "perception"),
+            step("suspend", "planner"),
+            step("restart", "perception"),
+            step("protective_stop"),
+        ),
+        ladder_timing=LadderTiming(rise_s=2.0, fall_s=4.0, release_ratio=0.8),
+    )
+
+
+@pytest.fixture
+def world(tmp_path: Path, profile: Profile) -> Iterator[World]:
+    world = World(tmp_path, profile)
+    yield world
+    world.keeper.close()
+    world.space.close()
