@@ -44,8 +44,8 @@ class PowerSwitch:
         if masks.get(wanted) != masks.get(modes.current):
             raise ProfileError(
                 (
-                    f"power_mode: {modes.current_name} -> {modes.names[wanted]} needs a reboot: other "
-                    f"units get power; nvpmodel -m {wanted}, reboot, then choose the profile",
+                    f"power_mode: {modes.current_name} -> {modes.names[wanted]} needs a reboot, "
+                    f"for other units get power: nvpmodel -m {wanted}, reboot, use it then",
                 )
             )
 
