@@ -9,7 +9,6 @@ import json
 import logging
 import logging.handlers
 import os
-import queue
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
@@ -17,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, TextIO
 
@@ -68,7 +68,7 @@ class RunLog:
         if journal is not None:
             sinks.append(JournalHandler(journal, origin.journal_fields()))
         self._sinks = sinks
-        self._queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._queue: SimpleQueue[Any] = SimpleQueue()
         self._handler = _NeverWaiting(self._queue, clock or MonotonicClock())
         self._listener = logging.handlers.QueueListener(self._queue, *sinks)
 
@@ -98,9 +98,9 @@ class RunLog:
 class _NeverWaiting(logging.handlers.QueueHandler):
     """Queue records, made into text here: what they refer to may change; drop what is too much."""
 
-    queue: "queue.SimpleQueue[Any]"
+    queue: SimpleQueue[Any]
 
-    def __init__(self, lines: "queue.SimpleQueue[Any]", clock: Clock) -> None:
+    def __init__(self, lines: SimpleQueue[Any], clock: Clock) -> None:
         super().__init__(lines)
         self._clock = clock
         self._dropped = 0

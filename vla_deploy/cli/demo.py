@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     _make_folder(arguments.out)
     log = logging.NullHandler() if arguments.json else logging.StreamHandler(sys.stdout)
-    logging.basicConfig(handlers=[log], level=logging.WARNING, format="%(message)s")
+    log.setLevel(logging.WARNING)  # of the handler: the run's log takes more
+    logging.basicConfig(handlers=[log], format="%(message)s")
     outcome = Demo(arguments, options).run()
     path = arguments.out / "outcome.json"
     path.write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")

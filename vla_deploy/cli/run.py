@@ -1,12 +1,16 @@
 """`vla-deploy run`: keep a robot, or its twin, running until Ctrl-C."""
 
 import argparse
+import faulthandler
 import logging
+import os
 import sys
 from typing import Any
 
+from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
-from vla_deploy.supervisor import RunOptions, Supervisor
+from vla_deploy.logs import journal_stream
+from vla_deploy.supervisor import ProcessGivenUp, RunOptions, Supervisor
 
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
   vla-deploy run --twin --seed 7        other places for the objects
@@ -51,12 +55,18 @@ def _seed(text: str) -> int:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Run until SIGINT or SIGTERM."""
+    """Run until SIGINT or SIGTERM.
+
+    Raises:
+        CommandFailed: the robot cannot go on without a process that was given up.
+    """
     for option in ("viewer", "paced"):
         if vars(arguments)[option] and not arguments.twin:
             sys.stderr.write(f"run: --{option} is about the twin; add --twin\n")
             return 2
-    logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
+    faulthandler.enable()
+    if not journal_stream(os.environ, sys.stderr.fileno()):  # the supervisor logs there itself
+        logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
     arm = arguments.twin if arguments.arm is None else arguments.arm
     options = RunOptions(
         robot=arguments.robot,
@@ -73,6 +83,9 @@ def main(arguments: argparse.Namespace) -> int:
         supervisor.start()
         if not supervisor.stop_requested:
             print('ready; in another terminal: vla-deploy say "go to the kitchen"', flush=True)
-        supervisor.run_until_stopped()
+        try:
+            supervisor.run_until_stopped()
+        except ProcessGivenUp as error:
+            raise CommandFailed(str(error)) from error
     print("stopped in order")
     return 0

@@ -2,6 +2,7 @@
 
 from vla_deploy.supervisor.errors import (
     AlreadyRunning,
+    ProcessGivenUp,
     RuntimeUnavailable,
     StartFailed,
     SupervisorError,
@@ -9,12 +10,14 @@ from vla_deploy.supervisor.errors import (
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.runtime import Owner, default_base, running
 from vla_deploy.supervisor.supervisor import Supervisor
-from vla_deploy.supervisor.table import TABLE, ProcessSpec, RestartPolicy
+from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, RestartPolicy, Watched
 
 __all__ = [
     "TABLE",
     "AlreadyRunning",
+    "GivingUp",
     "Owner",
+    "ProcessGivenUp",
     "ProcessSpec",
     "RestartPolicy",
     "RunOptions",
@@ -22,6 +25,7 @@ __all__ = [
     "StartFailed",
     "Supervisor",
     "SupervisorError",
+    "Watched",
     "default_base",
     "running",
 ]

@@ -4,12 +4,20 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from drivers.clock import Clock
+from vla_deploy.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
 from vla_deploy.supervisor.lifecycle import Act, Action, Seen
+from vla_deploy.supervisor.liveness import Liveness, Vital
+from vla_deploy.supervisor.log_files import OUTPUT_SUFFIX
+from vla_deploy.supervisor.notify import hide_from_children
 from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.orphans import RUN_ID_VARIABLE
-from vla_deploy.supervisor.process import ChildProcess, last_lines
+from vla_deploy.supervisor.orphans import PROCESS_VARIABLE, end_leftovers
+from vla_deploy.supervisor.process import ChildProcess
 from vla_deploy.supervisor.readiness import Readiness
 from vla_deploy.supervisor.table import ProcessSpec
+
+_STDERR = 2
+_MOST_OUTPUT_BYTES = 4_000_000
 
 
 class Crew:
@@ -21,16 +29,32 @@ class Crew:
         options: RunOptions,
         run_dir: Path,
         readiness: Mapping[str, Readiness],
+        liveness: Mapping[str, Liveness],
+        clock: Clock,
     ) -> None:
+        self.started: dict[str, tuple[int, int]] = {}
+        """The pid of each child that was ever started, and when."""
         self._specs = {spec.name: spec for spec in table}
         self._options = options
         self._run_dir = run_dir
         self._readiness = readiness
+        self._liveness = liveness
+        self._clock = clock
         self._children: dict[str, ChildProcess] = {}
-        self._environment = {**os.environ, RUN_ID_VARIABLE: run_dir.name}
+        self._ready: set[str] = set()
+        self._unswept: set[str] = set()
+        self._environment = {
+            **os.environ,
+            RUN_ID_VARIABLE: run_dir.name,
+            "PYTHONFAULTHANDLER": "1",  # a process that hangs is aborted, and tells where it hung
+        }
+        hide_from_children(self._environment)
+        if not journal_stream(os.environ, _STDERR):
+            self._environment.pop("JOURNAL_STREAM", None)
         self._do: Mapping[Act, Callable[[str], None]] = {
             Act.SPAWN: self._spawn,
             Act.TERMINATE: lambda name: self._children[name].terminate(),
+            Act.ABORT: lambda name: self._children[name].abort(),
             Act.KILL: lambda name: self._children[name].kill(),
         }
 
@@ -53,21 +77,50 @@ class Crew:
         """Tell whether the running child's topic is young."""
         return self._readiness[name].is_fresh(self._children[name].pid)
 
-    def last_words(self, name: str, count: int) -> list[str]:
-        """Return the end of the child's log."""
-        return last_lines(self._log_path(name), count)
+    def examine(self, rate_ratios: Mapping[str, float]) -> dict[str, tuple[Vital, ...]]:
+        """Return the vital signs of each child that is ready; call it at a steady pace."""
+        return {
+            name: self._liveness[name].examine(pid, rate_ratios.get(name, 1.0))
+            for name, pid in self.pids().items()
+            if name in self._ready
+        }
+
+    def forgive_silence(self) -> None:
+        """Let silence count from now, as after nobody has looked for a while."""
+        for name in self._ready:
+            self._liveness[name].begin()
+
+    def bound_output(self) -> None:
+        """Empty what a child has written past its log when that has grown large."""
+        for name in self._children:
+            path = self._output_path(name)
+            if path.stat().st_size > _MOST_OUTPUT_BYTES:
+                os.truncate(path, 0)
 
     def kill_all(self) -> None:
-        """End every child at once; only for when an orderly stop has failed."""
+        """End every child at once, and what any of them has left behind."""
         for child in self._children.values():
             child.kill()
+        end_leftovers(self._run_dir.name)
 
     def _see(self, name: str, child: ChildProcess) -> Seen:
         exit_code = child.exit_code()
         if exit_code is not None:
+            self._sweep_after(name)
             return Seen(exit_code=exit_code)
-        judge = self._readiness[name]
-        return Seen(ready=judge.is_ready(child.pid), silent=judge.is_silent(child.pid))
+        ready = self._readiness[name].is_ready(child.pid)
+        if ready and name not in self._ready:
+            self._ready.add(name)
+            self._liveness[name].begin()
+        silence = self._liveness[name].silence(child.pid) if name in self._ready else ""
+        return Seen(ready=ready, silence=silence)
+
+    def _sweep_after(self, name: str) -> None:
+        """End, once, what an ended child has left outside its process group."""
+        if name in self._unswept:
+            self._unswept.remove(name)
+            self._ready.discard(name)
+            end_leftovers(self._run_dir.name, name)
 
     def _spawn(self, name: str) -> None:
         self._readiness[name].forget()
@@ -75,9 +128,14 @@ class Crew:
         command = spec.command + (spec.twin_command if self._options.twin else ())
         command += spec.viewer_command if self._options.viewer else ()
         command += spec.paced_command if self._options.paced else ()
-        self._children[name] = ChildProcess(
-            self._options.fill(command, self._run_dir), self._environment, self._log_path(name)
+        child = ChildProcess(
+            self._options.fill(command, self._run_dir),
+            {**self._environment, PROCESS_VARIABLE: name},
+            self._output_path(name),
         )
+        self._children[name] = child
+        self._unswept.add(name)
+        self.started[name] = (child.pid, self._clock.now_ns())
 
-    def _log_path(self, name: str) -> Path:
-        return self._run_dir / "logs" / f"{name}.log"
+    def _output_path(self, name: str) -> Path:
+        return self._run_dir / LOGS_DIR / f"{name}{OUTPUT_SUFFIX}"

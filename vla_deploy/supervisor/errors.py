@@ -3,6 +3,7 @@
 SupervisorError
 ├── AlreadyRunning      another supervisor holds the runtime directory: stop it or choose another
 ├── RuntimeUnavailable  the runtime directory cannot be used: fix its path or permissions
+├── ProcessGivenUp      the robot cannot go on without that process: the run ends
 └── StartFailed         a process did not become ready: its last words are in the message
 """
 
@@ -21,3 +22,7 @@ class RuntimeUnavailable(SupervisorError):
 
 class StartFailed(SupervisorError):
     """Say which process did not become ready, and why."""
+
+
+class ProcessGivenUp(SupervisorError):
+    """Say which process the robot cannot do without was given up, and why."""

@@ -6,6 +6,7 @@ that know nothing of it, and no Python code runs between fork and exec of a thre
 
 import ctypes
 import os
+import resource
 import signal
 import sys
 
@@ -18,6 +19,8 @@ def main() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != supervisor_pid:  # it died before the request was in place
         sys.exit(f"the supervisor, pid {supervisor_pid}, has already ended")
+    # What an aborted process tells is its traceback; cores of this size would fill the disk.
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
     os.execv(sys.executable, [sys.executable, *command])
 
 

@@ -8,13 +8,18 @@ from drivers.clock import NS_PER_S
 from vla_deploy.exit_codes import EXIT_CONFIGURATION
 from vla_deploy.supervisor.table import ProcessSpec
 
+ABORT_GRACE_NS = NS_PER_S
+"""How long a process that hangs may take to write down where it hung, before it is killed."""
+
 
 class State(Enum):
     """Name where a process stands."""
 
+    OFF = "off"
     WAITING = "waiting"
     STARTING = "starting"
     READY = "ready"
+    ABORTING = "aborting"
     BACKOFF = "back-off"
     GIVEN_UP = "given up"
     STOPPING = "stopping"
@@ -22,19 +27,21 @@ class State(Enum):
 
 
 class Act(Enum):
-    """Name what is to be done to a process."""
+    """Name what is to be done to a process; ABORT lets it tell where it hangs, then it ends."""
 
     SPAWN = "spawn"
     TERMINATE = "terminate"
+    ABORT = "abort"
     KILL = "kill"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """Remember one process; `until_ns` ends its back-off, its start or its stop."""
+    """Remember one process; `until_ns` ends its back-off, its start, its abortion or its stop."""
 
     state: State = State.WAITING
     until_ns: int = 0
+    ready_ns: int = 0
     was_ready: bool = False
     failures_ns: tuple[int, ...] = ()
     restarts: int = 0
@@ -46,17 +53,17 @@ class Record:
 class Seen:
     """Report what was observed of one process; `exit_code` is None while it runs.
 
-    `silent` tells that it has told nothing for longer than the table allows.
+    `silence` tells which topic it has not written for longer than the table allows.
     """
 
     exit_code: int | None = None
     ready: bool = False
-    silent: bool = False
+    silence: str = ""
 
 
 Step = tuple[Record, Act | None]
 Action = tuple[Act, str]
-_ALIVE = frozenset({State.STARTING, State.READY, State.STOPPING})
+RUNNING = frozenset({State.STARTING, State.READY, State.ABORTING, State.STOPPING})
 
 
 def reconcile(
@@ -64,22 +71,62 @@ def reconcile(
     records: Mapping[str, Record],
     seen: Mapping[str, Seen],
     *,
-    stopping: bool,
+    unwanted: Mapping[str, str],
     now_ns: int,
 ) -> tuple[dict[str, Record], tuple[Action, ...]]:
-    """Return the new records and what is to be done, in order."""
-    after = dict(records)
-    actions: list[Action] = []
-    decide, order = (_stop_step, reversed(table)) if stopping else (_run_step, iter(table))
+    """Return the new records and what is to be done, in order.
+
+    `unwanted` tells why a process shall not run; the last of them in the table stops first.
+    """
+    stopped, stops = _end(table, records, seen, unwanted, State.OFF, now_ns)
+    after = dict(stopped)
+    actions = list(stops)
     may_go = True
-    for spec in order:
-        record, act = decide(
+    for spec in (spec for spec in table if spec.name not in unwanted):
+        record, act = _run_step(
             spec, after[spec.name], seen.get(spec.name, Seen()), may_go=may_go, now_ns=now_ns
         )
         after[spec.name] = record
         if act is not None:
             actions.append((act, spec.name))
-        may_go &= record.state is State.STOPPED if stopping else _lets_others_go(record)
+        may_go &= _lets_others_go(record)
+    return after, tuple(actions)
+
+
+def wind_down(
+    table: Sequence[ProcessSpec],
+    records: Mapping[str, Record],
+    seen: Mapping[str, Seen],
+    *,
+    now_ns: int,
+) -> tuple[dict[str, Record], tuple[Action, ...]]:
+    """Return the new records and what is to be done to stop everything, the last first."""
+    everyone = dict.fromkeys(records, "")
+    return _end(table, records, seen, everyone, State.STOPPED, now_ns)
+
+
+def _end(
+    table: Sequence[ProcessSpec],
+    records: Mapping[str, Record],
+    seen: Mapping[str, Seen],
+    unwanted: Mapping[str, str],
+    end: State,
+    now_ns: int,
+) -> tuple[dict[str, Record], tuple[Action, ...]]:
+    after = dict(records)
+    actions: list[Action] = []
+    may_go = True
+    for spec in (spec for spec in reversed(table) if spec.name in unwanted):
+        record, act = _stop_step(
+            spec, after[spec.name], seen.get(spec.name, Seen()), may_go=may_go, now_ns=now_ns
+        )
+        gone_for_good = record.state is State.GIVEN_UP and end is State.OFF
+        if record.state not in RUNNING and not gone_for_good:
+            record = replace(record, state=end, reason=unwanted[spec.name] or record.reason)
+        after[spec.name] = record
+        if act is not None:
+            actions.append((act, spec.name))
+        may_go &= record.state not in RUNNING
     return after, tuple(actions)
 
 
@@ -89,7 +136,9 @@ def _lets_others_go(record: Record) -> bool:
 
 
 def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, now_ns: int) -> Step:
-    if record.state in _ALIVE:
+    if record.state is State.STOPPING:  # wanted again while it stops: it ends, then starts anew
+        return _stop_step(spec, record, seen, may_go=True, now_ns=now_ns)
+    if record.state in RUNNING:
         return _watch(spec, record, seen, now_ns)
     if not may_go or record.state is State.GIVEN_UP or now_ns < record.until_ns:
         return record, None
@@ -98,6 +147,7 @@ def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, no
         state=State.STARTING,
         until_ns=now_ns + round(spec.ready_timeout_s * NS_PER_S),
         restarts=record.restarts + (record.state is State.BACKOFF),
+        reason=record.reason if record.state is State.BACKOFF else "",
     )
     return started, Act.SPAWN
 
@@ -105,26 +155,36 @@ def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, no
 def _watch(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
     if seen.exit_code is not None:
         return _failed(spec, record, seen.exit_code, now_ns), None
-    if record.state is State.READY and seen.silent:
-        reason = f"silent for more than {spec.silence_limit_s:g} s"
-        return replace(record, reason=reason), Act.KILL
-    if record.state is not State.STARTING:
-        return record, None
+    if record.state is State.ABORTING:
+        return record, Act.KILL if now_ns >= record.until_ns else None
+    if record.state is State.READY:
+        return _watch_ready(spec, record, seen, now_ns)
     if seen.ready:
-        return replace(record, state=State.READY, was_ready=True, reason=""), None
+        ready = replace(record, state=State.READY, ready_ns=now_ns, was_ready=True, reason="")
+        return ready, None
     if now_ns >= record.until_ns:
-        reason = f"not ready within {spec.ready_timeout_s:g} s"
-        return replace(record, reason=reason), Act.KILL
+        return _abort(record, f"not ready within {spec.ready_timeout_s:g} s", now_ns)
     return record, None
+
+
+def _watch_ready(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
+    if seen.silence:
+        return _abort(record, seen.silence, now_ns)
+    if record.failures_ns and now_ns - record.ready_ns >= spec.restart.stable_s * NS_PER_S:
+        return replace(record, failures_ns=()), None
+    return record, None
+
+
+def _abort(record: Record, reason: str, now_ns: int) -> Step:
+    until_ns = now_ns + ABORT_GRACE_NS
+    return replace(record, state=State.ABORTING, until_ns=until_ns, reason=reason), Act.ABORT
 
 
 def _failed(spec: ProcessSpec, record: Record, exit_code: int, now_ns: int) -> Record:
     policy = spec.restart
     window_ns = round(policy.window_s * NS_PER_S)
     recent = (*(at for at in record.failures_ns if now_ns - at < window_ns), now_ns)
-    overdue = record.state is State.STARTING and now_ns >= record.until_ns
-    was_killed = bool(record.reason) and (overdue or record.state is State.READY)
-    why = record.reason if was_killed else describe_exit(exit_code)
+    why = record.reason if record.state is State.ABORTING else describe_exit(exit_code)
     failed = replace(record, failures_ns=recent, exit_code=exit_code, reason=why)
     # What the file or the wiring says will not change by trying again before it ever worked.
     if exit_code == EXIT_CONFIGURATION and not record.was_ready:
@@ -137,10 +197,11 @@ def _failed(spec: ProcessSpec, record: Record, exit_code: int, now_ns: int) -> R
 
 
 def _stop_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, now_ns: int) -> Step:
-    if record.state not in _ALIVE:
-        return replace(record, state=State.STOPPED), None
+    if record.state not in RUNNING:
+        return record, None
     if seen.exit_code is not None:
-        return replace(record, state=State.STOPPED, exit_code=seen.exit_code), None
+        ended = replace(record, state=State.WAITING, exit_code=seen.exit_code, until_ns=now_ns)
+        return ended, None
     if record.state is State.STOPPING:
         return record, Act.KILL if now_ns >= record.until_ns else None
     if not may_go:

@@ -1,10 +1,12 @@
 """Find and end processes that a dead run has left behind, by the run id they carry."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import psutil
 
-RUN_ID_VARIABLE = "VLA_DEPLOY_RUN_ID"
+from vla_deploy.logs import RUN_ID_VARIABLE
+
+PROCESS_VARIABLE = "VLA_DEPLOY_PROCESS"
 _TERM_WAIT_S = 1.0
 _KILL_WAIT_S = 2.0
 
@@ -21,11 +23,30 @@ def end_orphans(run_ids: Collection[str]) -> list[int]:
     return [process.pid for process in orphans]
 
 
+def end_leftovers(run_id: str, process_name: str | None = None) -> list[int]:
+    """Kill what a run's ended processes have started, wherever it has moved; return the pids.
+
+    With a name, only what that process of the table has started.
+    """
+    leftovers = []
+    for process in psutil.process_iter():
+        environment = _environment(process)
+        named = process_name in (None, environment.get(PROCESS_VARIABLE))
+        if environment.get(RUN_ID_VARIABLE) == run_id and named:
+            _signal(process, kill=True)
+            leftovers.append(process.pid)
+    return leftovers
+
+
 def _run_id(process: psutil.Process) -> str | None:
+    return _environment(process).get(RUN_ID_VARIABLE)
+
+
+def _environment(process: psutil.Process) -> Mapping[str, str]:
     try:
-        return process.environ().get(RUN_ID_VARIABLE)
+        return process.environ()
     except (psutil.AccessDenied, psutil.NoSuchProcess, OSError):
-        return None  # another user's, a kernel thread, or gone meanwhile: not ours
+        return {}  # another user's, a kernel thread, or gone meanwhile: not ours
 
 
 def _signal(process: psutil.Process, *, kill: bool) -> None:

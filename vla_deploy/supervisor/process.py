@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -13,21 +12,21 @@ _LAUNCH = str(Path(__file__).with_name("launch.py"))
 
 
 class ChildProcess:
-    """Run one Python command in its own session, its output in a log file.
+    """Run one Python command in its own session, its output in a file.
 
     It gets SIGTERM from the kernel when the supervisor ends, however that ends.
     """
 
     def __init__(
-        self, command: Sequence[str], environment: Mapping[str, str], log_path: Path
+        self, command: Sequence[str], environment: Mapping[str, str], output_path: Path
     ) -> None:
-        log_path.parent.mkdir(parents=True, exist_ok=True)
-        with log_path.open("ab") as log:
+        output_path.parent.mkdir(parents=True, exist_ok=True)
+        with output_path.open("ab") as output:
             self._popen = subprocess.Popen(
                 [sys.executable, "-I", "-S", _LAUNCH, str(os.getpid()), *command],
                 env=environment,
                 stdin=subprocess.DEVNULL,
-                stdout=log,
+                stdout=output,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
@@ -50,6 +49,14 @@ class ChildProcess:
         """Ask the child to stop in order."""
         self._popen.terminate()
 
+    def abort(self) -> None:
+        """Let a child that hangs write down where, and end; one that is stopped goes on for that.
+
+        It does nothing else on its way: the signal is waiting for it when it goes on.
+        """
+        for number in (signal.SIGABRT, signal.SIGCONT):
+            self._popen.send_signal(number)
+
     def kill(self) -> None:
         """End the child and its group at once."""
         if self._popen.returncode is None:
@@ -58,11 +65,3 @@ class ChildProcess:
     def _signal_group(self, number: int) -> None:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, number)
-
-
-def last_lines(log_path: Path, count: int) -> list[str]:
-    """Return the last lines of a log file, none when there is no such file."""
-    if not log_path.is_file():
-        return []
-    with log_path.open(errors="replace") as log:
-        return [line.rstrip() for line in deque(log, maxlen=count)]

@@ -16,8 +16,6 @@ class Readiness:
         self._clock = clock
         self._deadline_s = BY_NAME[spec.ready_topic].deadline_s if spec.ready_topic else 0.0
         self._reader = _reader(space, spec.ready_topic)
-        self._alive = _reader(space, spec.alive_topic)
-        self._silence_limit_s = spec.silence_limit_s
 
     def forget(self) -> None:
         """Remove what an earlier instance has left, before the next one starts."""
@@ -36,13 +34,6 @@ class Readiness:
         if sample is None or sample.writer_pid != pid:
             return False
         return sample.age_s(self._clock.now_ns()) <= self._deadline_s
-
-    def is_silent(self, pid: int) -> bool:
-        """Tell whether the last that `pid` wrote to the topic that it always writes is too old."""
-        sample = self._alive.latest() if self._alive is not None else None
-        if sample is None or sample.writer_pid != pid:
-            return False
-        return sample.age_s(self._clock.now_ns()) > self._silence_limit_s
 
 
 def _reader(space: SharedSpace, topic: str | None) -> CellReader | None:

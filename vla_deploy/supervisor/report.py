@@ -8,6 +8,7 @@ from drivers.clock import Clock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.crew import Crew
 from vla_deploy.supervisor.lifecycle import Record
+from vla_deploy.supervisor.liveness import Vital
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.usage import UsageMeter
 
@@ -30,8 +31,14 @@ class Report:
             "supervisor_pid": os.getpid(),
         }
 
-    def publish(self, records: Mapping[str, Record], crew: Crew) -> None:
-        """Measure every process and publish the table."""
+    def publish(
+        self,
+        records: Mapping[str, Record],
+        crew: Crew,
+        vitals: Mapping[str, tuple[Vital, ...]],
+        refusal: str,
+    ) -> None:
+        """Measure every process and publish the table; `refusal` is why no command is taken."""
         pids = crew.pids()
         measured = self._meter.sample({_SUPERVISOR: os.getpid(), **pids}, self._clock.now_ns())
         usages = {
@@ -43,12 +50,16 @@ class Report:
             for name, usage in measured.items()
         }
         rows = [
-            {**_row(name, record, pids, crew), **usages.get(name, _UNKNOWN_USAGE)}
+            {
+                **_row(name, record, pids, crew, vitals.get(name, ())),
+                **usages.get(name, _UNKNOWN_USAGE),
+            }
             for name, record in records.items()
         ]
         self._cell.put_document(
             {
                 **self._head,
+                "refusal": refusal,
                 "processes": rows,
                 "supervisor": usages[_SUPERVISOR],
                 "peak_memory_mb": round(self._meter.peak_memory_mb, 1),
@@ -57,7 +68,13 @@ class Report:
         )
 
 
-def _row(name: str, record: Record, pids: Mapping[str, int], crew: Crew) -> dict[str, Any]:
+def _row(
+    name: str,
+    record: Record,
+    pids: Mapping[str, int],
+    crew: Crew,
+    vitals: tuple[Vital, ...],
+) -> dict[str, Any]:
     return {
         "name": name,
         "state": record.state.value,
@@ -66,4 +83,14 @@ def _row(name: str, record: Record, pids: Mapping[str, int], crew: Crew) -> dict
         "restarts": record.restarts,
         "exit_code": record.exit_code,
         "reason": record.reason,
+        "topics": [_topic(vital) for vital in vitals],
+        "alarms": [alarm for vital in vitals for alarm in vital.alarms],
+    }
+
+
+def _topic(vital: Vital) -> dict[str, Any]:
+    return {
+        "topic": vital.topic,
+        "age_s": round(vital.age_s, 3),
+        "rate_hz": None if vital.rate_hz is None else round(vital.rate_hz, 1),
     }

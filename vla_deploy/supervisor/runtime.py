@@ -2,50 +2,48 @@
 
 import fcntl
 import json
+import logging
 import os
 import shutil
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
-import psutil
-
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
 from vla_deploy.supervisor.orphans import end_orphans
+from vla_deploy.supervisor.state_folder import BoundedFolder, state_dir_of, user_base
 
 SHARED_MEMORY = Path("/dev/shm")
+KEEP_LOGS_OF_RUNS = 20
 _OWNER_FILE = "owner.json"
+_ENDED_STATES = ("Z", "X")
+_START_FIELD = 19  # of /proc/<pid>/stat after the name and the state, see proc_pid_stat(5)
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Owner:
-    """Identify the supervisor of a run; the start time tells it from a later process of its pid."""
+    """Identify the supervisor of a run; the start time tells it from a later process of its pid.
+
+    That is counted since the computer's start: no jump of the wall clock makes it another.
+    """
 
     pid: int
-    started: float
+    start_ticks: int
     run_id: str
     run_dir: str
 
     def is_alive(self) -> bool:
         """Tell whether that very process still runs; one that nobody has reaped does not."""
-        try:
-            process = psutil.Process(self.pid)
-            is_the_same = process.create_time() == self.started
-            return is_the_same and process.status() != psutil.STATUS_ZOMBIE
-        except psutil.NoSuchProcess:
-            return False
+        found = _state_and_start(self.pid)
+        return found is not None and found[0] not in _ENDED_STATES and found[1] == self.start_ticks
 
 
 def default_base() -> Path:
     """Return where runs live unless told otherwise."""
     if os.getuid() == 0:
         return Path("/run/vla-deploy")
-    user_runtime = os.environ.get("XDG_RUNTIME_DIR")
-    return (
-        Path(user_runtime) / "vla-deploy"
-        if user_runtime
-        else Path(f"/tmp/vla-deploy-{os.getuid()}")
-    )
+    return user_base()
 
 
 def running(base: Path) -> Owner | None:
@@ -71,13 +69,15 @@ class Runtime:
         self._shared_memory = shared_memory
         _make_private(base)
         self._lock_fd = _lock(base)
-        self.orphans = _sweep_runs(base)
+        self.state_dir = state_dir_of(base)
+        self._old_logs = old_logs(self.state_dir)
+        self.orphans = _sweep_runs(base, self._old_logs)
         _sweep_shared_memory(shared_memory)
         self.run_id = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
         self.run_dir = base / self.run_id
         self._owner = Owner(
             pid=os.getpid(),
-            started=psutil.Process().create_time(),
+            start_ticks=own_start_ticks(),
             run_id=self.run_id,
             run_dir=str(self.run_dir),
         )
@@ -87,7 +87,8 @@ class Runtime:
         _point_to(base / "current", self.run_id)
 
     def close(self) -> None:
-        """Remove everything of this run and let the next supervisor in."""
+        """Keep the logs, remove everything else of this run and let the next supervisor in."""
+        _keep_logs(self.run_dir, self._old_logs)
         (self._base / "current").unlink(missing_ok=True)
         shutil.rmtree(self.ipc_dir, ignore_errors=True)
         shutil.rmtree(self.run_dir, ignore_errors=True)
@@ -106,6 +107,23 @@ class Runtime:
         unfinished.rename(directory)  # a sweeper never sees it without its owner
         link.symlink_to(directory)
         return directory
+
+
+def _state_and_start(pid: int) -> tuple[str, int] | None:
+    """Return a process' state and its start in clock ticks since boot, None when there is none."""
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    fields = text.rpartition(")")[2].split()  # the name before may hold anything
+    return fields[0], int(fields[_START_FIELD])
+
+
+def own_start_ticks() -> int:
+    """Return when this process was started, in clock ticks since boot."""
+    found = _state_and_start(os.getpid())
+    assert found is not None, "this process runs"
+    return found[1]
 
 
 def _prefix() -> str:
@@ -150,10 +168,26 @@ def _lock(base: Path) -> int:
     return fd
 
 
-def _sweep_runs(base: Path) -> list[int]:
+def old_logs(state_dir: Path) -> BoundedFolder:
+    """Return the folder with the logs of runs that have ended."""
+    return BoundedFolder(state_dir / "runs", KEEP_LOGS_OF_RUNS)
+
+
+def _keep_logs(run_dir: Path, folder: BoundedFolder) -> None:
+    logs = run_dir / "logs"
+    if not logs.is_dir():
+        return
+    try:
+        shutil.move(logs, folder.claim(run_dir.name))
+    except OSError as error:
+        _log.warning("the logs of run %s are lost: %s", run_dir.name, error)
+
+
+def _sweep_runs(base: Path, logs: BoundedFolder) -> list[int]:
     stale = [path for path in base.iterdir() if path.is_dir() and not path.is_symlink()]
     orphans = end_orphans({path.name for path in stale}) if stale else []
     for path in stale:
+        _keep_logs(path, logs)
         shutil.rmtree(path, ignore_errors=True)
     return orphans
 

@@ -1,8 +1,7 @@
 """Bring reality in line with the process table until someone asks to stop."""
 
 import logging
-import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
@@ -10,20 +9,22 @@ from platforms import load_profile
 from vla_deploy.exit_codes import EXIT_CONFIGURATION
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.crew import Crew
-from vla_deploy.supervisor.errors import StartFailed, SupervisorError
-from vla_deploy.supervisor.lifecycle import Record, State, reconcile
+from vla_deploy.supervisor.consequences import Consequences
+from vla_deploy.supervisor.errors import ProcessGivenUp, StartFailed, SupervisorError
+from vla_deploy.supervisor.last_words import complaint, last_words
+from vla_deploy.supervisor.lifecycle import Action, Record, State, reconcile, wind_down
+from vla_deploy.supervisor.liveness import Vital
+from vla_deploy.supervisor.notify import NotifyTarget, own_target
 from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.readiness import readiness_of
-from vla_deploy.supervisor.report import Report
-from vla_deploy.supervisor.runtime import Runtime, default_base
-from vla_deploy.supervisor.table import TABLE, ProcessSpec
+from vla_deploy.supervisor.predicates import RunContext
+from vla_deploy.supervisor.run import Run
+from vla_deploy.supervisor.status_line import status_line
+from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec
 
 _PERIOD_NS = NS_PER_S // 20
 _REPORT_NS = NS_PER_S // 2
-_LAST_WORDS = 12
-_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_TROUBLE = frozenset({State.BACKOFF, State.GIVEN_UP})
+_HELD_UP_NS = NS_PER_S
+_TROUBLE = frozenset({State.BACKOFF, State.GIVEN_UP, State.ABORTING})
 _log = logging.getLogger(__name__)
 
 
@@ -39,14 +40,23 @@ class Supervisor:
         options: RunOptions,
         table: tuple[ProcessSpec, ...] = TABLE,
         clock: Clock | None = None,
+        notify: NotifyTarget | None = None,
     ) -> None:
         self.stop_requested = False
+        self.profile = load_profile(options.profile)
+        """The profile in force; who switches it puts the new one here."""
+        self._robot = load_robot(options.robot)
         self._options = options
-        self._table = tuple(spec for spec in table if options.twin or not spec.needs_twin)
+        self._table = table
         self._clock: Clock = clock or MonotonicClock()
-        self._records = {spec.name: Record() for spec in self._table}
+        self._notify = own_target() if notify is None else notify
+        self._records = {spec.name: Record() for spec in table}
+        self._vitals: dict[str, tuple[Vital, ...]] = {}
+        self._alarms: frozenset[str] = frozenset()
+        self._consequences = Consequences(table)
         self._report_due_ns = 0
-        self._run: _Run | None = None
+        self._stepped_ns: int | None = None
+        self._run: Run | None = None
 
     def __enter__(self) -> "Supervisor":
         return self
@@ -78,12 +88,16 @@ class Supervisor:
         Raises:
             AlreadyRunning: another supervisor holds the runtime directory.
             RuntimeUnavailable: the runtime directory cannot be used.
-            ProfileError, RobotFileError: they have faults; nothing was started.
             StartFailed: a process was given up; everything is stopped again.
         """
-        load_profile(self._options.profile)
-        load_robot(self._options.robot)
-        self._run = _Run(self._options, self._table, self._clock, self.request_stop)
+        self._run = Run(
+            self._options,
+            self._table,
+            self._clock,
+            lambda: self.profile,
+            self._notify,
+            self.request_stop,
+        )
         try:
             self._wait_until_ready()
         except BaseException:
@@ -97,10 +111,16 @@ class Supervisor:
         self._step(stopping=False)
 
     def run_until_stopped(self) -> None:
-        """Keep the processes running until SIGINT, SIGTERM, SIGHUP or `request_stop`."""
+        """Keep the processes running until SIGINT, SIGTERM, SIGHUP or `request_stop`.
+
+        Raises:
+            ProcessGivenUp: the robot cannot go on without that process.
+        """
         while not self.stop_requested:
             self._pause()
             self.step()
+            if self._consequences.end:
+                raise ProcessGivenUp(self._consequences.end)
 
     def request_stop(self) -> None:
         """Let `start` and `run_until_stopped` return soon."""
@@ -110,6 +130,7 @@ class Supervisor:
         """Stop every process, the last started first, and remove the run; twice is allowed."""
         if self._run is None:
             return
+        self._run.notifier.stopping()
         try:
             while any(record.state is not State.STOPPED for record in self._records.values()):
                 self._step(stopping=True)
@@ -121,83 +142,104 @@ class Supervisor:
     def _wait_until_ready(self) -> None:
         while not self.stop_requested:
             self.step()
-            for name, record in self._records.items():
-                if record.state is State.GIVEN_UP:
-                    raise StartFailed(self._failure(name, record))
-            if all(record.state is State.READY for record in self._records.values()):
+            for spec in self._table:
+                record = self._records[spec.name]
+                if record.state is State.GIVEN_UP and spec.giving_up is not GivingUp.CARRY_ON:
+                    raise StartFailed(self._failure(spec.name, record))
+            if self._is_ready():
                 return
             self._pause()
 
+    def _is_ready(self) -> bool:
+        settled = (State.READY, State.OFF)
+        return all(
+            self._records[spec.name].state in settled or spec.giving_up is GivingUp.CARRY_ON
+            for spec in self._table
+        )
+
     def _failure(self, name: str, record: Record) -> str:
-        words = self._started().crew.last_words(name, _LAST_WORDS)
+        words = last_words(self.run_dir, name)
         if record.exit_code == EXIT_CONFIGURATION and words:
-            return f"{name} did not start: {_without_sender(name, words[-1])}"
+            return f"{name} did not start: {complaint(self.run_dir, name)}"
         return "\n".join([f"{name} did not start: {record.reason}", *words])
 
     def _step(self, *, stopping: bool) -> None:
         run, now_ns, before = self._started(), self._clock.now_ns(), self._records
-        self._records, actions = reconcile(
-            self._table, before, run.crew.observe(), stopping=stopping, now_ns=now_ns
-        )
+        self._forgive_when_held_up(now_ns)
+        self._records, actions = self._decide(stopping=stopping, now_ns=now_ns)
         run.crew.perform(actions)
+        run.crashes.note(before, self._records, run.crew.started)
         changed = _log_changes(before, self._records)
+        if changed:
+            self._consequences.take(self._records, run.space)
         if changed or now_ns >= self._report_due_ns:
+            self._report(now_ns)
+        run.notifier.step(
+            ready=self._is_ready(),
+            stopping=stopping,
+            status=status_line(self._records, stopping=stopping),
+            troubles=run.health.troubles(),
+        )
+
+    def _decide(
+        self, *, stopping: bool, now_ns: int
+    ) -> tuple[dict[str, Record], tuple[Action, ...]]:
+        run = self._started()
+        seen = run.crew.observe()
+        if stopping:
+            return wind_down(self._table, self._records, seen, now_ns=now_ns)
+        return reconcile(
+            self._table, self._records, seen, unwanted=self._unwanted(run), now_ns=now_ns
+        )
+
+    def _unwanted(self, run: Run) -> dict[str, str]:
+        run.directives.refresh()
+        context = RunContext(
+            twin=self._options.twin,
+            robot=self._robot,
+            profile=self.profile,
+            suspended=run.directives.suspended,
+        )
+        reasons = {spec.name: spec.when(context) for spec in self._table}
+        return {name: reason for name, reason in reasons.items() if reason}
+
+    def _report(self, now_ns: int) -> None:
+        run = self._started()
+        if now_ns >= self._report_due_ns:
             self._report_due_ns = now_ns + _REPORT_NS
-            run.report.publish(self._records, run.crew)
+            self._vitals = run.crew.examine(run.directives.rate_ratios)
+            run.crew.bound_output()
+            self._log_alarms()
+        run.report.publish(self._records, run.crew, self._vitals, self._consequences.refusal)
+
+    def _log_alarms(self) -> None:
+        """Log an alarm when it is raised, not for as long as it lasts."""
+        alarms = {
+            f"{name}: {vital.topic}": alarm
+            for name, vitals in self._vitals.items()
+            for vital in vitals
+            for alarm in vital.alarms
+        }
+        for where in alarms.keys() - self._alarms:
+            _log.warning("%s", alarms[where])
+        for where in self._alarms - alarms.keys():
+            _log.info("%s: in order again", where)
+        self._alarms = frozenset(alarms)
+
+    def _forgive_when_held_up(self, now_ns: int) -> None:
+        """Hold no silence against others that this process may have had in common with them."""
+        stepped_ns, self._stepped_ns = self._stepped_ns, now_ns
+        if stepped_ns is not None and now_ns - stepped_ns > _HELD_UP_NS:
+            _log.warning("the supervisor was held up for %.1f s", (now_ns - stepped_ns) / NS_PER_S)
+            self._started().crew.forgive_silence()
 
     def _pause(self) -> None:
         self._clock.sleep_until(self._clock.now_ns() + _PERIOD_NS)
 
-    def _started(self) -> "_Run":
+    def _started(self) -> Run:
         if self._run is None:
             raise SupervisorError("the run is not started: call start() first")
         return self._run
-
-
-class _Run:
-    """Hold everything that exists only between start and stop."""
-
-    def __init__(
-        self,
-        options: RunOptions,
-        table: tuple[ProcessSpec, ...],
-        clock: Clock,
-        on_stop_signal: Callable[[], None],
-    ) -> None:
-        self.runtime = Runtime(options.runtime_base or default_base())
-        run_dir = self.runtime.run_dir
-        try:
-            self.space = SharedSpace(run_dir / "ipc", clock)
-            self.crew = Crew(
-                table, options, run_dir, readiness_of(table, run_dir, self.space, clock)
-            )
-            self.report = Report(self.runtime.run_id, options, self.space, clock)
-        except BaseException:
-            self.runtime.close()
-            raise
-        self._handlers = {
-            number: signal.signal(number, lambda *_: on_stop_signal())
-            for number in _STOP_SIGNALS
-            if not _is_ignored_hangup(number)
-        }
-
-    def close(self) -> None:
-        """End whoever is left, remove the run, give the signals back."""
-        self.crew.kill_all()
-        self.space.close()
-        self.runtime.close()
-        for number, handler in self._handlers.items():
-            signal.signal(number, handler)
-
-
-def _is_ignored_hangup(number: int) -> bool:
-    """Tell whether whoever started this wants it to outlive the terminal, as nohup does."""
-    return number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN
-
-
-def _without_sender(name: str, line: str) -> str:
-    """Return a process' last line without the name and level in front of it."""
-    return line.removeprefix(f"{name}: ").removeprefix("ERROR: ")
 
 
 def _arm(space: SharedSpace) -> None:

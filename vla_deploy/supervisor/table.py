@@ -4,17 +4,54 @@ They stop in the reverse order. Whoever starts waits until all before it are rea
 """
 
 from dataclasses import dataclass
+from enum import Enum
+
+from vla_deploy.supervisor.predicates import (
+    Predicate,
+    all_of,
+    always,
+    budgeted,
+    not_suspended,
+    twin_only,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestartPolicy:
-    """Declare when an ended process is started again, and when no more."""
+    """Declare when an ended process is started again, and when no more.
+
+    One that has been ready for `stable_s` starts with a clean sheet: its failures are forgotten.
+    """
 
     initial_s: float = 0.25
     factor: float = 2.0
     cap_s: float = 5.0
     window_s: float = 60.0
     max_restarts: int = 5
+    stable_s: float = 30.0
+
+
+class GivingUp(Enum):
+    """Say what becomes of the robot when a process is given up."""
+
+    END_RUN = "the run ends with an error, for the service manager to start it anew"
+    NO_COMMANDS = "the running command is cancelled, and commands are refused with the reason"
+    CARRY_ON = "the others carry on"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watched:
+    """Declare a topic by which a process is judged alive.
+
+    Older than `silence_limit_s`, the process is ended and started again; None never ends it. Fewer
+    than `rate_ratio` of the declared values within the window raise an alarm. `profile_rate` names
+    the profile's rate where that overrules the topic's.
+    """
+
+    topic: str
+    silence_limit_s: float | None = None
+    rate_ratio: float = 0.5
+    profile_rate: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,10 +60,9 @@ class ProcessSpec:
 
     `command` follows the Python interpreter, `{...}` are filled from the run's options;
     `twin_command` is added in twin mode, `viewer_command` with a viewer, `paced_command` where
-    buses take their time. It is ready when
+    buses take their time. It runs while `when` has nothing against it. It is ready when
     `ready_topic` is fresh from its own pid and all `ready_files`, relative to the run directory,
-    exist. Once ready it is killed, and so started again, when `alive_topic`, which it writes
-    whatever its devices do, is older than `silence_limit_s`.
+    exist. `watched` are the topics it writes whatever its devices do.
     """
 
     name: str
@@ -34,14 +70,14 @@ class ProcessSpec:
     twin_command: tuple[str, ...] = ()
     viewer_command: tuple[str, ...] = ()
     paced_command: tuple[str, ...] = ()
-    needs_twin: bool = False
+    when: Predicate = always
     ready_topic: str | None = None
     ready_files: tuple[str, ...] = ()
     ready_timeout_s: float = 20.0
-    alive_topic: str | None = None
-    silence_limit_s: float = 5.0
+    watched: tuple[Watched, ...] = ()
     stop_timeout_s: float = 3.0
     restart: RestartPolicy = RestartPolicy()
+    giving_up: GivingUp = GivingUp.NO_COMMANDS
 
 
 _NODE = ("--run-dir", "{run_dir}", "--robot", "{robot}", "--profile", "{profile}")
@@ -54,9 +90,11 @@ TABLE: tuple[ProcessSpec, ...] = (
         command=("-m", "sim_twin", *_TWIN),
         viewer_command=("--viewer",),
         paced_command=("--paced",),
-        needs_twin=True,
+        when=twin_only,
         ready_files=("dev/ready",),
         ready_timeout_s=60.0,
+        watched=(Watched(topic="twin_status", silence_limit_s=10.0),),
+        giving_up=GivingUp.END_RUN,
     ),
     ProcessSpec(
         name="control",
@@ -65,30 +103,37 @@ TABLE: tuple[ProcessSpec, ...] = (
         ready_topic="joint_state",
         ready_files=("ready/control",),
         stop_timeout_s=5.0,
-        alive_topic="control_status",
+        watched=(
+            Watched(topic="control_status", silence_limit_s=5.0),
+            Watched(topic="joint_state", profile_rate="control_rate_hz"),
+        ),
+        giving_up=GivingUp.END_RUN,
     ),
     ProcessSpec(
         name="perception",
         command=("-m", "vla_deploy.perception", *_NODE),
         twin_command=_DEVICES,
+        when=all_of(budgeted("perception"), not_suspended("perception")),
         ready_topic="scan",
         ready_files=("ready/perception",),
         ready_timeout_s=40.0,
-        alive_topic="scene",
-        silence_limit_s=10.0,
+        watched=(Watched(topic="scene", silence_limit_s=10.0),),
     ),
     ProcessSpec(
         name="planner",
         command=("-m", "vla_deploy.planning", *_NODE),
         twin_command=_DEVICES,
+        when=all_of(budgeted("planner"), not_suspended("planner")),
         ready_files=("ready/planner",),
+        watched=(Watched(topic="planner_status", silence_limit_s=5.0),),
     ),
     ProcessSpec(
         name="executor",
         command=("-m", "vla_deploy.skills", *_NODE),
         twin_command=_DEVICES,
+        when=all_of(budgeted("executor"), not_suspended("executor")),
         ready_topic="executor_status",
         ready_files=("ready/executor",),
-        alive_topic="executor_status",
+        watched=(Watched(topic="executor_status", silence_limit_s=5.0),),
     ),
 )

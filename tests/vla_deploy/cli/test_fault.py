@@ -7,12 +7,12 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.main import main
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor.runtime import own_start_ticks
 
 
 class Twin:
@@ -51,7 +51,7 @@ def base(tmp_path: Path) -> Path:
     (run_dir / "dev").mkdir(parents=True)
     owner = {
         "pid": os.getpid(),
-        "started": psutil.Process().create_time(),
+        "start_ticks": own_start_ticks(),
         "run_id": "run",
         "run_dir": str(run_dir),
     }

@@ -1,4 +1,4 @@
-import signal
+import contextlib
 import sys
 import time
 from collections.abc import Callable
@@ -59,8 +59,10 @@ def stage(tmp_path: Path):
     yield stage
     for name in ("a", "b", "c", "grandchild"):
         for pid in stage.pids(name):
-            if psutil.pid_exists(pid) and CHILD in " ".join(psutil.Process(pid).cmdline()):
-                psutil.Process(pid).send_signal(signal.SIGKILL)
+            with contextlib.suppress(psutil.NoSuchProcess):  # a zombie is none either
+                process = psutil.Process(pid)
+                if CHILD in " ".join(process.cmdline()):
+                    process.kill()
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 import pytest
 
-from vla_deploy.supervisor.lifecycle import Act, Record, Seen, State, reconcile
+from vla_deploy.supervisor.lifecycle import Act, Record, Seen, State, reconcile, wind_down
+from vla_deploy.supervisor.predicates import twin_only
 from vla_deploy.supervisor.table import TABLE, ProcessSpec, RestartPolicy
 
 S = 1_000_000_000
@@ -20,9 +21,16 @@ class Play:
         self.records = {row.name: Record() for row in rows}
         self.now_s = 0.0
 
-    def step(self, *, stopping: bool = False, **seen: Seen) -> list[tuple[Act, str]]:
+    def step(self, *, unwanted=(), **seen: Seen) -> list[tuple[Act, str]]:
+        reasons = dict.fromkeys(unwanted, "not now")
         self.records, actions = reconcile(
-            self.rows, self.records, seen, stopping=stopping, now_ns=round(self.now_s * S)
+            self.rows, self.records, seen, unwanted=reasons, now_ns=round(self.now_s * S)
+        )
+        return list(actions)
+
+    def stop(self, **seen: Seen) -> list[tuple[Act, str]]:
+        self.records, actions = wind_down(
+            self.rows, self.records, seen, now_ns=round(self.now_s * S)
         )
         return list(actions)
 
@@ -112,8 +120,8 @@ def test_a_process_that_is_not_ready_in_time_is_killed_and_counts_as_failed():
     play.now_s = 9.99
     assert play.step(a=RUNNING) == []
     play.now_s = 10.0
-    assert play.step(a=RUNNING) == [(Act.KILL, "a")]
-    play.step(a=Seen(exit_code=-9))
+    assert play.step(a=RUNNING) == [(Act.ABORT, "a")]
+    play.step(a=Seen(exit_code=-6))
     assert play.state("a") is State.BACKOFF
     assert play.records["a"].reason == "not ready within 10 s"
 
@@ -139,58 +147,137 @@ def test_one_that_was_given_up_does_not_hold_back_the_restart_of_others():
 def test_the_last_started_stops_first_and_the_next_waits_for_it():
     play = Play().all_ready()
     dead = Seen(exit_code=0)
-    assert play.step(stopping=True, a=READY, b=READY, c=READY) == [(Act.TERMINATE, "c")]
-    assert play.step(stopping=True, a=READY, b=READY, c=READY) == []
-    assert play.step(stopping=True, a=READY, b=READY, c=dead) == [(Act.TERMINATE, "b")]
-    assert play.step(stopping=True, a=READY, b=dead, c=dead) == [(Act.TERMINATE, "a")]
-    play.step(stopping=True, a=dead, b=dead, c=dead)
+    assert play.stop(a=READY, b=READY, c=READY) == [(Act.TERMINATE, "c")]
+    assert play.stop(a=READY, b=READY, c=READY) == []
+    assert play.stop(a=READY, b=READY, c=dead) == [(Act.TERMINATE, "b")]
+    assert play.stop(a=READY, b=dead, c=dead) == [(Act.TERMINATE, "a")]
+    play.stop(a=dead, b=dead, c=dead)
     assert {record.state for record in play.records.values()} == {State.STOPPED}
 
 
 def test_one_that_does_not_stop_in_time_is_killed():
     play = Play(ROWS[:1])
     play.step()
-    assert play.step(stopping=True, a=RUNNING) == [(Act.TERMINATE, "a")]
+    assert play.stop(a=RUNNING) == [(Act.TERMINATE, "a")]
     play.now_s = 2.99
-    assert play.step(stopping=True, a=RUNNING) == []
+    assert play.stop(a=RUNNING) == []
     play.now_s = 3.0
-    assert play.step(stopping=True, a=RUNNING) == [(Act.KILL, "a")]
+    assert play.stop(a=RUNNING) == [(Act.KILL, "a")]
 
 
 @pytest.mark.parametrize("state", [State.WAITING, State.BACKOFF, State.GIVEN_UP])
 def test_one_that_does_not_run_is_stopped_at_once(state):
     play = Play(ROWS[:1])
     play.records["a"] = Record(state=state)
-    assert play.step(stopping=True) == []
+    assert play.stop() == []
     assert play.state("a") is State.STOPPED
 
 
 def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_it():
     assert [row.name for row in TABLE] == ["twin", "control", "perception", "planner", "executor"]
-    assert [row.name for row in TABLE if row.needs_twin] == ["twin"]
+    assert [row.name for row in TABLE if row.when is twin_only] == ["twin"]
     assert all(row.ready_files or row.ready_topic for row in TABLE)
 
 
-def test_a_ready_process_that_falls_silent_is_killed_and_started_again_with_that_reason():
+def test_a_ready_process_that_falls_silent_is_aborted_and_started_again_with_that_reason():
     play = Play().all_ready()
-    assert play.step(a=READY, b=Seen(silent=True), c=READY) == [(Act.KILL, "b")]
-    assert play.step(a=READY, b=Seen(exit_code=-9), c=READY) == []
+    assert play.step(a=READY, b=Seen(silence="scene silent"), c=READY) == [(Act.ABORT, "b")]
+    assert play.state("b") is State.ABORTING
+    assert play.step(a=READY, b=Seen(exit_code=-6), c=READY) == []
     assert play.state("b") is State.BACKOFF
-    assert play.records["b"].reason == "silent for more than 5 s"
+    assert play.records["b"].reason == "scene silent"
     play.now_s += POLICY.initial_s
     assert play.step(a=READY, c=READY) == [(Act.SPAWN, "b")]
     play.step(a=READY, b=READY, c=READY)
     assert play.records["b"].reason == ""
 
 
+def test_one_that_does_not_end_when_aborted_is_killed_after_a_second():
+    play = Play(ROWS[:1])
+    play.step()
+    play.step(a=READY)
+    play.step(a=Seen(silence="scene silent"))
+    play.now_s = 0.99
+    assert play.step(a=RUNNING) == []
+    play.now_s = 1.0
+    assert play.step(a=RUNNING) == [(Act.KILL, "a")]
+    play.step(a=Seen(exit_code=-9))
+    assert (play.state("a"), play.records["a"].reason) == (State.BACKOFF, "scene silent")
+
+
 def test_a_process_that_ends_by_itself_after_a_restart_is_not_called_silent():
     play = Play().all_ready()
-    play.step(a=READY, b=Seen(silent=True), c=READY)
-    play.step(a=READY, b=Seen(exit_code=-9), c=READY)
+    play.step(a=READY, b=Seen(silence="scene silent"), c=READY)
+    play.step(a=READY, b=Seen(exit_code=-6), c=READY)
     play.now_s += POLICY.initial_s
     play.step(a=READY, c=READY)
     play.step(a=READY, b=Seen(exit_code=1), c=READY)
     assert play.records["b"].reason == "exit code 1"
+
+
+def test_after_a_stable_run_earlier_failures_are_forgotten():
+    play = Play(ROWS[:1])
+    play.step()
+    for _ in range(12):  # far more than the window allows, each after a stable run
+        play.step(a=READY)
+        play.now_s += POLICY.stable_s
+        play.step(a=READY)
+        assert play.records["a"].failures_ns == ()
+        play.step(a=Seen(exit_code=1))
+        play.now_s += POLICY.initial_s
+        assert play.step() == [(Act.SPAWN, "a")]
+
+
+def test_a_moment_less_than_a_stable_run_forgets_nothing():
+    play = Play(ROWS[:1])
+    play.step()
+    play.step(a=Seen(exit_code=1))
+    play.now_s += POLICY.initial_s
+    play.step()
+    play.step(a=READY)
+    play.now_s += POLICY.stable_s - 0.001
+    play.step(a=READY)
+    assert len(play.records["a"].failures_ns) == 1
+
+
+def test_what_is_not_wanted_is_not_started_and_holds_nobody_up():
+    play = Play()
+    assert play.step(unwanted="a") == [(Act.SPAWN, "b")]
+    assert (play.state("a"), play.records["a"].reason) == (State.OFF, "not now")
+
+
+def test_what_is_no_longer_wanted_stops_in_order_the_last_first():
+    play = Play().all_ready()
+    assert play.step(unwanted="bc", a=READY, b=READY, c=READY) == [(Act.TERMINATE, "c")]
+    assert play.step(unwanted="bc", a=READY, b=READY, c=READY) == []
+    ended = Seen(exit_code=0)
+    assert play.step(unwanted="bc", a=READY, b=READY, c=ended) == [(Act.TERMINATE, "b")]
+    play.step(unwanted="bc", a=READY, b=ended, c=ended)
+    assert [play.state(name) for name in "abc"] == [State.READY, State.OFF, State.OFF]
+
+
+def test_what_is_wanted_again_starts_again_and_counts_as_no_failure():
+    play = Play().all_ready()
+    play.step(unwanted="c", a=READY, b=READY, c=READY)
+    play.step(unwanted="c", a=READY, b=READY, c=Seen(exit_code=0))
+    assert play.step(a=READY, b=READY, c=Seen(exit_code=0)) == [(Act.SPAWN, "c")]
+    assert (play.records["c"].restarts, play.records["c"].failures_ns) == (0, ())
+
+
+def test_what_is_wanted_again_while_it_stops_ends_first():
+    play = Play().all_ready()
+    play.step(unwanted="c", a=READY, b=READY, c=READY)
+    assert play.step(a=READY, b=READY, c=READY) == []
+    play.step(a=READY, b=READY, c=Seen(exit_code=0))
+    assert play.step(a=READY, b=READY) == [(Act.SPAWN, "c")]
+
+
+def test_a_change_of_mind_does_not_revive_what_was_given_up():
+    play = Play(ROWS[:1])
+    play.records["a"] = Record(state=State.GIVEN_UP, was_ready=True, reason="exit code 1")
+    play.step(unwanted="a")
+    play.step()
+    assert (play.state("a"), play.records["a"].reason) == (State.GIVEN_UP, "exit code 1")
 
 
 def test_nothing_is_started_after_one_that_was_given_up_before_it_ever_worked():

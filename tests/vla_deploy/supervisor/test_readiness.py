@@ -66,14 +66,3 @@ def test_files_of_an_earlier_instance_are_forgotten_even_dangling_links(tmp_path
     readiness.forget()
     assert not (tmp_path / "x").exists()
     assert not (tmp_path / "y").is_symlink()
-
-
-def test_a_process_is_silent_when_its_own_last_word_is_too_old(tmp_path, space, clock):
-    readiness = judge(tmp_path, space, clock, alive_topic="base_state", silence_limit_s=2.0)
-    assert not readiness.is_silent(os.getpid())
-    space.cell_writer("base_state").commit()
-    clock.time_ns += 2 * NS_PER_S
-    assert not readiness.is_silent(os.getpid())
-    clock.time_ns += 1
-    assert readiness.is_silent(os.getpid())
-    assert not readiness.is_silent(os.getpid() + 1)

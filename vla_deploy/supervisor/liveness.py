@@ -1,0 +1,158 @@
+"""Judge by its data whether a process is alive: age, rate and validity of what it writes."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.clock import NS_PER_S, Clock
+from platforms import Profile
+from vla_deploy.ipc import BY_NAME, Sample, SharedSpace
+from vla_deploy.supervisor.table import ProcessSpec, Watched
+
+WINDOW_S = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vital:
+    """Report one watched topic; `rate_hz` is None until a window is full."""
+
+    topic: str
+    age_s: float
+    rate_hz: float | None
+    alarms: tuple[str, ...] = ()
+
+
+class Liveness:
+    """Watch the topics of one process, one instance of it after the other."""
+
+    def __init__(
+        self,
+        spec: ProcessSpec,
+        space: SharedSpace,
+        clock: Clock,
+        profile: Callable[[], Profile],
+    ) -> None:
+        self._clock = clock
+        self._pulses = [_Pulse(spec.name, row, space, profile) for row in spec.watched]
+
+    def begin(self) -> None:
+        """Start over with an instance that is ready now: what it does not write counts from now."""
+        now_ns = self._clock.now_ns()
+        for pulse in self._pulses:
+            pulse.begin(now_ns)
+
+    def silence(self, pid: int) -> str:
+        """Return which topic has been silent for longer than the table allows, or ""."""
+        now_ns = self._clock.now_ns()
+        silences = (pulse.silence(pid, now_ns) for pulse in self._pulses)
+        return next((words for words in silences if words), "")
+
+    def examine(self, pid: int, rate_ratio: float = 1.0) -> tuple[Vital, ...]:
+        """Return age, rate and alarms of every topic; call it at a steady pace.
+
+        `rate_ratio` is the share of its rate at which the process is told to work.
+        """
+        now_ns = self._clock.now_ns()
+        return tuple(pulse.examine(pid, now_ns, rate_ratio) for pulse in self._pulses)
+
+
+class _Pulse:
+    def __init__(
+        self, process: str, row: Watched, space: SharedSpace, profile: Callable[[], Profile]
+    ) -> None:
+        topic = BY_NAME[row.topic]
+        self._name = f"{process}: {row.topic}"
+        self._row = row
+        self._deadline_s = topic.deadline_s
+        self._topic_hz = topic.rate_hz
+        self._profile = profile
+        self._reader = space.cell_reader(row.topic)
+        self._begun_ns = 0
+        self._counts: deque[tuple[int, int]] = deque()
+
+    def begin(self, now_ns: int) -> None:
+        self._begun_ns = now_ns
+        self._counts.clear()
+
+    def silence(self, pid: int, now_ns: int) -> str:
+        limit_s = self._row.silence_limit_s
+        sample = self._own(pid)
+        last_ns = max(self._begun_ns, sample.stamp_ns if sample is not None else 0)
+        age_s = (now_ns - last_ns) / NS_PER_S
+        if limit_s is None or age_s <= limit_s:
+            return ""
+        return f"{self._row.topic} silent for {age_s:.1f} s, limit {limit_s:g} s"
+
+    def examine(self, pid: int, now_ns: int, rate_ratio: float) -> Vital:
+        sample = self._own(pid)
+        age_s = self._age_s(sample, now_ns)
+        rate_hz = self._measured_hz(sample, now_ns)
+        declared_hz = self._declared_hz() * rate_ratio
+        least_hz = declared_hz * self._row.rate_ratio
+        alarms = []
+        if age_s > self._deadline_s / max(rate_ratio, 0.01):
+            alarms.append(f"{self._name}: age {age_s:.2f} s, limit {self._deadline_s:g} s")
+        if rate_hz is not None and rate_hz < least_hz:
+            alarms.append(
+                f"{self._name}: rate {rate_hz:.1f} Hz, limit {least_hz:.1f} Hz of "
+                f"{declared_hz:g} Hz declared"
+            )
+        alarms += [f"{self._name}.{fault}" for fault in faults_of(sample)]
+        return Vital(topic=self._row.topic, age_s=age_s, rate_hz=rate_hz, alarms=tuple(alarms))
+
+    def _declared_hz(self) -> float:
+        """Return the rate of the profile in force, which may change while this runs."""
+        name = self._row.profile_rate
+        return float(getattr(self._profile(), name)) if name else self._topic_hz
+
+    def _own(self, pid: int) -> Sample | None:
+        sample = self._reader.latest()
+        return sample if sample is not None and sample.writer_pid == pid else None
+
+    def _age_s(self, sample: Sample | None, now_ns: int) -> float:
+        since_ns = self._begun_ns if sample is None else sample.stamp_ns
+        return (now_ns - since_ns) / NS_PER_S
+
+    def _measured_hz(self, sample: Sample | None, now_ns: int) -> float | None:
+        """Return the rate over the window; it is known once the window is full."""
+        if sample is None:
+            self._counts.clear()
+            return None
+        self._counts.append((now_ns, sample.sequence))
+        while len(self._counts) > 1 and now_ns - self._counts[1][0] >= WINDOW_S * NS_PER_S:
+            self._counts.popleft()
+        first_ns, first = self._counts[0]
+        if now_ns - first_ns < WINDOW_S * NS_PER_S:
+            return None
+        return (sample.sequence - first) * NS_PER_S / (now_ns - first_ns)
+
+
+def faults_of(sample: Sample | None) -> tuple[str, ...]:
+    """Return what cannot be in a topic: numbers that are none, documents that are no JSON."""
+    if sample is None:
+        return ()
+    if sample.dtype is None:
+        try:
+            sample.document()
+        except ValueError as error:
+            return (f"document: {error}, expected JSON",)
+        return ()
+    record = sample.data
+    floats = [name for name in sample.dtype.names or () if sample.dtype[name].base.kind == "f"]
+    return tuple(
+        f"{name}: not finite, expected numbers"
+        for name in floats
+        if not np.isfinite(record[name]).all()
+    )
+
+
+def liveness_of(
+    table: tuple[ProcessSpec, ...],
+    space: SharedSpace,
+    clock: Clock,
+    profile: Callable[[], Profile],
+) -> Mapping[str, Liveness]:
+    """Return the judge of each process."""
+    return {spec.name: Liveness(spec, space, clock, profile) for spec in table}

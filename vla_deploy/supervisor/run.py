@@ -1,0 +1,112 @@
+"""Hold everything that exists only between the start and the stop of a run."""
+
+import logging
+import os
+import signal
+from collections.abc import Callable
+from typing import Any
+
+from drivers.clock import Clock
+from platforms import Profile
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.journal import JOURNAL_SOCKET
+from vla_deploy.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
+from vla_deploy.supervisor.crash_reports import CrashReports, crash_folder
+from vla_deploy.supervisor.crew import Crew
+from vla_deploy.supervisor.directives import Directives
+from vla_deploy.supervisor.health import Health
+from vla_deploy.supervisor.liveness import liveness_of
+from vla_deploy.supervisor.notify import Notifier, NotifyTarget
+from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.readiness import readiness_of
+from vla_deploy.supervisor.report import Report
+from vla_deploy.supervisor.runtime import Runtime, default_base
+from vla_deploy.supervisor.table import ProcessSpec
+
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_STDERR = 2
+_log = logging.getLogger(__name__)
+
+
+class Run:
+    """Own the run's directory, its shared memory, its children and who reports on them."""
+
+    def __init__(
+        self,
+        options: RunOptions,
+        table: tuple[ProcessSpec, ...],
+        clock: Clock,
+        profile: Callable[[], Profile],
+        notify: NotifyTarget,
+        on_stop_signal: Callable[[], None],
+    ) -> None:
+        self._handlers = _handle_stop_signals(on_stop_signal)
+        try:
+            self.runtime = Runtime(options.runtime_base or default_base())
+        except BaseException:
+            self._give_signals_back()
+            raise
+        try:
+            self._open(options, table, clock, profile, notify)
+        except BaseException:
+            self.runtime.close()
+            self._give_signals_back()
+            raise
+
+    def _open(
+        self,
+        options: RunOptions,
+        table: tuple[ProcessSpec, ...],
+        clock: Clock,
+        profile: Callable[[], Profile],
+        notify: NotifyTarget,
+    ) -> None:
+        run_dir = self.runtime.run_dir
+        self.space = SharedSpace(run_dir / "ipc", clock)
+        self.crew = Crew(
+            table,
+            options,
+            run_dir,
+            readiness_of(table, run_dir, self.space, clock),
+            liveness_of(table, self.space, clock, profile),
+            clock,
+        )
+        self.report = Report(self.runtime.run_id, options, self.space, clock)
+        self.directives = Directives(self.space)
+        self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
+        self.notifier = Notifier(notify, clock)
+        self.crashes = CrashReports(
+            crash_folder(self.runtime.state_dir), run_dir, options, self.space, clock
+        )
+        origin = LogOrigin(process="supervisor", robot=options.robot, run_id=run_dir.name)
+        journal = JOURNAL_SOCKET if journal_stream(os.environ, _STDERR) else None
+        self._log = RunLog(origin, run_dir / LOGS_DIR, journal, clock)
+        self._log.__enter__()
+        if self.runtime.orphans:
+            _log.warning("ended what a dead run had left: pids %s", self.runtime.orphans)
+
+    def close(self) -> None:
+        """End whoever is left, keep the logs, remove the run, give the signals back."""
+        self.crew.kill_all()
+        self.notifier.close()
+        self.space.close()
+        self._log.close()
+        self.runtime.close()
+        self._give_signals_back()
+
+    def _give_signals_back(self) -> None:
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+
+
+def _handle_stop_signals(on_stop_signal: Callable[[], None]) -> dict[signal.Signals, Any]:
+    return {
+        number: signal.signal(number, lambda *_: on_stop_signal())
+        for number in _STOP_SIGNALS
+        if not _is_ignored_hangup(number)
+    }
+
+
+def _is_ignored_hangup(number: int) -> bool:
+    """Tell whether whoever started this wants it to outlive the terminal, as nohup does."""
+    return number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN

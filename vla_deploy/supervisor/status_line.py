@@ -1,0 +1,27 @@
+"""Say in one line how the run is, for systemd and for people."""
+
+from collections.abc import Mapping
+
+from vla_deploy.supervisor.lifecycle import Record, State
+
+_SETTLED = frozenset({State.READY, State.OFF})
+_TROUBLE = frozenset({State.ABORTING, State.BACKOFF, State.GIVEN_UP})
+
+
+def status_line(records: Mapping[str, Record], *, stopping: bool) -> str:
+    """Return who is not ready, and why, or that all are."""
+    wanted = {name: record for name, record in records.items() if record.state is not State.OFF}
+    if stopping:
+        left = [name for name, record in wanted.items() if record.state is not State.STOPPED]
+        return f"stopping: {', '.join(left) or 'nobody'} left"
+    troubles = [
+        f"{name} {record.state.value} ({record.reason})"
+        for name, record in wanted.items()
+        if record.state in _TROUBLE
+    ]
+    if troubles:
+        return f"degraded: {'; '.join(troubles)}"
+    pending = [name for name, record in wanted.items() if record.state not in _SETTLED]
+    if pending:
+        return f"starting {pending[0]}: {len(wanted) - len(pending)} of {len(wanted)} ready"
+    return f"all {len(wanted)} processes ready"
