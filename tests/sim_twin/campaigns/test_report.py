@@ -1,0 +1,36 @@
+"""A campaign's report must be read by people and by CI servers alike."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+from sim_twin.campaigns.report import Case, Report
+
+GOOD = Case(name="servo_bus/off/idle", figures={"rest_s": 0.5}, seconds=3.5)
+BAD = Case(name="drive/stuck/driving", failures=("fall red_cup: 2, limit 1", "moved on"))
+REPORT = Report(campaign="faults", cases=(GOOD, BAD), summary={"longest_rest_s": 0.5})
+
+
+def test_the_document_counts_and_carries_every_case() -> None:
+    document = json.loads(json.dumps(REPORT.document()))
+    assert (document["cases"], document["failed"]) == (2, 1)
+    assert [result["name"] for result in document["results"]] == [GOOD.name, BAD.name]
+    assert document["longest_rest_s"] == 0.5
+
+
+def test_the_text_shows_the_failed_cases_and_the_sum() -> None:
+    text = REPORT.text()
+    assert BAD.row in text
+    assert GOOD.row not in text
+    assert text.endswith("faults: 2 cases, 1 failed")
+
+
+def test_junit_names_cases_failures_and_time(tmp_path: Path) -> None:
+    path = tmp_path / "out.xml"
+    REPORT.write_junit(path)
+    suite = ElementTree.parse(path).getroot()[0]
+    assert suite.attrib == {"name": "faults", "tests": "2", "failures": "1", "errors": "0"}
+    good, bad = suite.findall("testcase")
+    assert good.get("time") == "3.500"
+    assert [failure.get("message") for failure in bad.findall("failure")] == list(BAD.failures)
+    assert good.find("failure") is None
