@@ -14,12 +14,16 @@ Table = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """Hold a profile as it stands in its files; `origins` says which file set each dotted key."""
+    """Hold a profile as it stands in its files; `origins` says which file set each dotted key.
+
+    `parents` are what it inherits from, the nearest first.
+    """
 
     name: str
     path: Path
     values: Table
     origins: Mapping[str, Path]
+    parents: tuple[str, ...] = ()
 
     @classmethod
     def of_values(cls, name: str, values: Table) -> "Source":
@@ -45,7 +49,8 @@ def read_source(name_or_path: str | Path) -> Source:
         own = {key: value for key, value in document.items() if key != "inherits"}
         values = _merged(values, own)
         origins |= dict.fromkeys((key for key, _ in flat(own)), file)
-    return Source(name=path.stem, path=path, values=values, origins=origins)
+    parents = tuple(file.stem for file, _ in chain[1:])
+    return Source(name=path.stem, path=path, values=values, origins=origins, parents=parents)
 
 
 def flat(table: Table, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -37,13 +37,17 @@ def register(commands: Any) -> None:
         default=None,
         help="arm once everything is ready (default: only with --twin)",
     )
-    run.set_defaults(run=main)
+    run.set_defaults(run=main, profile=None)
 
 
 def add_robot_arguments(command: argparse.ArgumentParser) -> None:
     """Add what chooses robot, profile and world."""
     command.add_argument("--robot", default="butler", help="name or folder (default: butler)")
-    command.add_argument("--profile", default="desktop", help="platform profile")
+    command.add_argument(
+        "--profile",
+        default="desktop",
+        help="platform profile (run takes the chosen or detected one)",
+    )
     command.add_argument("--world", default="flat", help="the twin's world")
     command.add_argument("--seed", type=_seed, default=0, help="where the objects lie")
 
@@ -68,9 +72,13 @@ def main(arguments: argparse.Namespace) -> int:
     if not journal_stream(os.environ, sys.stderr.fileno()):  # the supervisor logs there itself
         logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
     arm = arguments.twin if arguments.arm is None else arguments.arm
+    profile = arguments.profile
+    if profile is None:
+        profile, why = start_profile(arguments.runtime_base)
+        logging.info("profile %s: %s", profile, why)
     options = RunOptions(
         robot=arguments.robot,
-        profile=arguments.profile,
+        profile=profile,
         twin=arguments.twin,
         viewer=arguments.viewer,
         paced=arguments.paced,

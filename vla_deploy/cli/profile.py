@@ -1,0 +1,239 @@
+"""`vla-deploy profile`: list, show, detect, validate and use platform profiles."""
+
+import argparse
+import json
+import sys
+import uuid
+from pathlib import Path
+from typing import Any
+
+from drivers.clock import NS_PER_S
+from platforms import ProfileError, load_profile
+from platforms.power_switch import PowerSwitch
+from platforms.profile import PROFILES, profile_from, profile_names
+from platforms.profile_source import Source, flat, read_source
+from vla_deploy.cli.errors import CommandFailed
+from vla_deploy.cli.example import add_command
+from vla_deploy.cli.session import Session, attach
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor import default_base, running
+from vla_deploy.supervisor.profile_change import Outcome, Phase
+from vla_deploy.supervisor.profile_choice import choice_of, detect, start_profile
+
+TIMEOUT_NS = 90 * NS_PER_S
+_BASE = "base"
+EXAMPLES = """  vla-deploy profile list
+  vla-deploy profile show jetson_orin_nx --diff desktop
+  vla-deploy profile detect
+  vla-deploy profile validate my_board.toml
+  vla-deploy profile use jetson_orin_nano_8gb     on the running robot, or for its next start
+"""
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    profile = add_command(commands, "profile", "choose how the stack uses this computer", EXAMPLES)
+    acts = profile.add_subparsers(dest="act", required=True, metavar="ACT")
+    listing = add_command(acts, "list", "list the profiles", "  vla-deploy profile list\n")
+    listing.set_defaults(run=list_profiles)
+    show = add_command(
+        acts, "show", "show a profile", "  vla-deploy profile show desktop --provenance\n"
+    )
+    show.add_argument("name", nargs="?", help="name or path (default: the one for this computer)")
+    show.add_argument("--diff", metavar="OTHER", help="show only what differs from another one")
+    show.add_argument("--provenance", action="store_true", help="say which file set each value")
+    show.set_defaults(run=show_profile)
+    found = add_command(
+        acts, "detect", "tell which profile fits this computer", "  vla-deploy profile detect\n"
+    )
+    found.set_defaults(run=detect_profile)
+    valid = add_command(
+        acts, "validate", "check a profile file", "  vla-deploy profile validate my_board.toml\n"
+    )
+    valid.add_argument("path", help="a path that ends in .toml, or a name")
+    valid.set_defaults(run=validate_profile)
+    _register_use(acts)
+    for act in acts.choices.values():
+        act.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _register_use(acts: Any) -> None:
+    use = add_command(
+        acts,
+        "use",
+        "take the running robot to a profile, and every later start",
+        "  vla-deploy profile use jetson_orin_nano_8gb_super --dry-run\n",
+    )
+    use.add_argument("name", help="name or path")
+    use.add_argument("--dry-run", action="store_true", help="prepare everything, change nothing")
+    use.add_argument(
+        "--allow-restart",
+        action="store_true",
+        help="restart a process that cannot change while it runs",
+    )
+    use.set_defaults(run=use_profile)
+
+
+def list_profiles(arguments: argparse.Namespace) -> int:
+    """Print every profile, which one fits this computer and which one is chosen."""
+    fits, chosen = detect()[0], choice_of(arguments.runtime_base).load()
+    rows = [_row(name, fits, chosen) for name in profile_names()]
+    lines = [f"{row['name']:<28} {row['note']}".rstrip() for row in rows]
+    return _tell(arguments, rows, "\n".join(lines))
+
+
+def _row(name: str, fits: str, chosen: str | None) -> dict[str, Any]:
+    source = read_source(name)
+    notes = (
+        (name.endswith(_BASE), "to inherit from"),
+        (name == fits, "fits this computer"),
+        (name == chosen, "chosen"),
+    )
+    return {
+        "name": name,
+        "inherits": source.parents,
+        "note": ", ".join(note for holds, note in notes if holds),
+    }
+
+
+def show_profile(arguments: argparse.Namespace) -> int:
+    """Print a profile's values, or what differs from another one."""
+    source = read_source(arguments.name or start_profile(arguments.runtime_base)[0])
+    profile_from(source)
+    values = dict(flat(source.values))
+    if arguments.diff:
+        other = dict(flat(read_source(arguments.diff).values))
+        keys = sorted(key for key in values | other if values.get(key) != other.get(key))
+        document: dict[str, Any] = {key: [values.get(key), other.get(key)] for key in keys}
+        lines = [
+            f"{key}: {_shown(mine)}   not {_shown(its)}" for key, (mine, its) in document.items()
+        ]
+        return _tell(arguments, document, "\n".join(lines) or "no difference")
+    document = {key: values[key] for key in sorted(values)}
+    lines = [f"{key} = {_shown(value)}" for key, value in document.items()]
+    if arguments.provenance:
+        document = {
+            key: {"value": value, "file": str(source.file_of(key))}
+            for key, value in document.items()
+        }
+        lines = [
+            f"{line:<60}  {_file(source, key)}" for line, key in zip(lines, document, strict=True)
+        ]
+    return _tell(arguments, document, "\n".join(lines))
+
+
+def detect_profile(arguments: argparse.Namespace) -> int:
+    """Print which profile fits this computer, and which one a start would take."""
+    name, why = detect()
+    taken, reason = start_profile(arguments.runtime_base)
+    document = {"profile": name, "why": why, "next_start": taken, "next_start_why": reason}
+    text = f"{name} ({why})" + (
+        "" if taken == name else f"\nthe next start takes {taken} ({reason})"
+    )
+    return _tell(arguments, document, text)
+
+
+def validate_profile(arguments: argparse.Namespace) -> int:
+    """Print every fault of a profile; exit code 2 when it has some."""
+    try:
+        profile = load_profile(arguments.path)
+    except ProfileError as error:
+        if not arguments.json:
+            raise
+        sys.stdout.write(
+            json.dumps({"valid": False, "faults": list(error.faults)}, indent=2) + "\n"
+        )
+        return 2
+    return _tell(arguments, {"valid": True, "faults": []}, f"{profile.name}: valid")
+
+
+def use_profile(arguments: argparse.Namespace) -> int:
+    """Choose a profile; a running robot takes it over at once, or says why not."""
+    name = _absolute(arguments.name)
+    load_profile(name)
+    if running(arguments.runtime_base or default_base()) is None:
+        return _choose(arguments, name)
+    session = attach(arguments.runtime_base)
+    try:
+        outcome = _request(session, name, arguments)
+    finally:
+        session.close()
+    if outcome["outcome"] not in (Outcome.KEPT, Outcome.WOULD_WORK):
+        if arguments.json:
+            sys.stdout.write(json.dumps(outcome, indent=2) + "\n")
+        raise CommandFailed(f"profile {name} {outcome['outcome']}: {outcome['reason']}")
+    note = f" {outcome['reason']}" if outcome["reason"] else ""
+    return _tell(arguments, outcome, f"profile {name}: {outcome['outcome']}{note}")
+
+
+def _choose(arguments: argparse.Namespace, name: str) -> int:
+    """Keep the choice for the next start."""
+    PowerSwitch().check(load_profile(name).power_mode)
+    if not arguments.dry_run:
+        choice_of(arguments.runtime_base).save(name)
+    outcome = Outcome.WOULD_WORK if arguments.dry_run else Outcome.KEPT
+    document = {"profile": name, "outcome": outcome.value, "reason": "no robot runs"}
+    return _tell(
+        arguments, document, f"profile {name}: {outcome} for the next start; no robot runs"
+    )
+
+
+def _request(session: Session, name: str, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Ask the supervisor and wait for the end.
+
+    Raises:
+        CommandFailed: it tells nothing.
+    """
+    clock, request_id = session.clock, uuid.uuid4().hex
+    space = SharedSpace(session.run_dir / "ipc", clock)
+    space.ring_writer("profile_request").publish(
+        {
+            "request_id": request_id,
+            "profile": name,
+            "allow_restart": arguments.allow_restart,
+            "dry_run": arguments.dry_run,
+        }
+    )
+    space.close()
+    until_ns = clock.now_ns() + TIMEOUT_NS
+    told = ""
+    while clock.now_ns() < until_ns:
+        status = session.document("profile_status", age_limit_s=3.0) or {}
+        last: dict[str, Any] = status.get("last", {})
+        if last.get("request_id") == request_id:
+            return last
+        phase = status.get("phase", "")
+        if phase and phase != told and not arguments.json:
+            sys.stdout.write(f"{_WORDS[phase]}\n")
+            told = phase
+        session.pause()
+    raise CommandFailed(f"the supervisor tells nothing of profile {name}: vla-deploy status")
+
+
+_WORDS = {
+    Phase.PREPARE: "every process prepares",
+    Phase.SET_POWER: "setting the power mode",
+    Phase.COMMIT: "switching over",
+    Phase.WATCH: "watching rates, late ticks and memory",
+    Phase.VALIDATE: "judging",
+    Phase.ROLLBACK: "going back",
+}
+
+
+def _absolute(name: str) -> str:
+    """Return what also another process, with another working directory, finds."""
+    return str(Path(name).resolve()) if name.endswith(".toml") else name
+
+
+def _file(source: Source, key: str) -> str:
+    path = source.file_of(key)
+    return path.name if path.is_relative_to(PROFILES) else str(path)
+
+
+def _shown(value: object) -> str:
+    return "nothing" if value is None else json.dumps(value)
+
+
+def _tell(arguments: argparse.Namespace, document: object, text: str) -> int:
+    sys.stdout.write((json.dumps(document, indent=2) if arguments.json else text) + "\n")
+    return 0
