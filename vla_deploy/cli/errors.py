@@ -11,6 +11,7 @@ from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.planning.errors import PlanningError
 from vla_deploy.robots import RobotFileError
 from vla_deploy.supervisor import SupervisorError
+from vla_deploy.telemetry.errors import TelemetryError
 
 
 class UsageError(Exception):
@@ -31,4 +32,5 @@ USER_ERRORS = (
     ProfileError,
     RobotFileError,
     SupervisorError,
+    TelemetryError,
 )

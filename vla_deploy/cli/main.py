@@ -13,7 +13,9 @@ from vla_deploy.cli import (
     demo,
     doctor,
     fault,
+    flight,
     operate,
+    profile,
     run,
     say,
     servo,
@@ -23,7 +25,7 @@ from vla_deploy.cli import (
 from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
 from vla_deploy.cli.example import OneLineParser
 
-COMMANDS = (run, demo, say, status, operate, servo, can, fault, check, doctor, bench, validate)
+COMMANDS = (run, demo, say, status, operate, profile, servo, can, fault, flight, check, doctor, bench, validate)
 EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin

@@ -66,6 +66,18 @@ class Session:
             pause=self.pause,
         )
 
+    def save_flight(self, reason: str, timeout_s: float) -> dict[str, Any] | None:
+        """Ask the flight recorder for a flight; return what it says, None when it is silent."""
+        answers = self._space.ring_reader("flight_event", from_start=False)
+        self._space.ring_writer("flight_request").publish({"source": "cli", "reason": reason})
+        end_ns = self.clock.now_ns() + round(timeout_s * NS_PER_S)
+        while self.clock.now_ns() < end_ns:
+            for event in answers.drain():
+                if "request" in event.payload["causes"]:
+                    return event.payload
+            self.pause()
+        return None
+
     def close(self) -> None:
         """Let go of the run's shared memory."""
         self._space.close()

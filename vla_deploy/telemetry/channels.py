@@ -1,0 +1,120 @@
+"""Derive the recording's channels, JSON schema and JSON text, from the one schema table."""
+
+import base64
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from vla_deploy.ipc import Field, Kind, Topic
+from vla_deploy.ipc.layout import is_document, record_dtype
+
+TICKS: Final = "tick_record"
+IMAGE_SCHEMA: Final = "foxglove.CompressedImage"
+_TIME = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
+_BYTES = {"type": "string", "contentEncoding": "base64"}
+_IMAGE = {
+    "timestamp": _TIME,
+    "frame_id": {"type": "string"},
+    "data": _BYTES,
+    "format": {"type": "string"},
+}
+_TICK = {
+    "tick": {"type": "integer", "description": "number of the tick since control started"},
+    "writer_pid": {"type": "integer", "description": "pid of control"},
+    "cause": {"type": "string"},
+    "reaction": {"type": "string"},
+    "record": {**_BYTES, "description": "vla_deploy.ipc.delta, exact to the bit"},
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """Describe one channel of the file."""
+
+    topic: str
+    schema_name: str
+    schema: Mapping[str, Any]
+
+    @property
+    def schema_text(self) -> bytes:
+        """Return the JSON schema as bytes."""
+        return json.dumps(self.schema).encode()
+
+
+def channels_of(topic: Topic) -> tuple[Channel, ...]:
+    """Return what a topic becomes in the file: one channel, two for images with depth."""
+    if topic.kind is Kind.FRAME:
+        return tuple(
+            Channel(topic=f"{topic.name}/{part}", schema_name=IMAGE_SCHEMA, schema=_object(_IMAGE))
+            for part in ("colour", "depth")
+        )
+    schema = {**_object(_properties(topic)), "description": topic.summary}
+    return (Channel(topic=topic.name, schema_name=f"vla_deploy.{topic.name}", schema=schema),)
+
+
+def cell_text(topic: Topic, payload: bytes) -> bytes:
+    """Return a cell's value as JSON; what is no number becomes null."""
+    if is_document(topic):
+        return payload
+    record = np.frombuffer(payload, record_dtype(topic))[0]
+    return json.dumps({field.name: _plain(record[field.name]) for field in topic.fields}).encode()
+
+
+def image_text(frame_id: str, stamp_ns: int, data: bytes, form: str) -> bytes:
+    """Return a compressed image as the JSON that viewers know."""
+    second, rest = divmod(stamp_ns, 1_000_000_000)
+    return json.dumps(
+        {
+            "timestamp": {"sec": second, "nsec": rest},
+            "frame_id": frame_id,
+            "data": base64.b64encode(data).decode(),
+            "format": form,
+        }
+    ).encode()
+
+
+def tick_text(row: Mapping[str, Any] | None, record: bytes, writer_pid: int) -> bytes:
+    """Return a tick's record with what a person wants to see of it."""
+    shown = {}
+    if row is not None:
+        verdict = row["verdict"]
+        shown = {
+            "tick": row["tick"],
+            "cause": verdict.cause.value,
+            "reaction": verdict.reaction.name,
+        }
+    document = {**shown, "writer_pid": writer_pid, "record": base64.b64encode(record).decode()}
+    return json.dumps(document).encode()
+
+
+def tick_bytes(text: bytes) -> bytes:
+    """Return the record that `tick_text` carried."""
+    return base64.b64decode(json.loads(text)["record"])
+
+
+def _properties(topic: Topic) -> Mapping[str, Any]:
+    if topic.kind is Kind.RECORD:
+        return _TICK
+    if topic.kind is Kind.CELL and not is_document(topic):
+        return {field.name: _property(field) for field in topic.fields}
+    return {}
+
+
+def _property(field: Field) -> dict[str, Any]:
+    number = {"type": ["number", "null"], "description": field.unit}
+    return number if field.shape == 1 else {"type": "array", "items": number}
+
+
+def _object(properties: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "properties": dict(properties)}
+
+
+def _plain(value: Any) -> Any:
+    plain = value.tolist()
+    numbers = plain if isinstance(plain, list) else [plain]
+    finite = [number if math.isfinite(number) else None for number in numbers]
+    return finite if isinstance(plain, list) else finite[0]

@@ -1,0 +1,115 @@
+"""Read a recorded flight: who, why, and every message in order."""
+
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mcap.exceptions import McapError
+from mcap.reader import McapReader, make_reader
+from zstandard import ZstdError
+
+from vla_deploy.telemetry.errors import FlightUnreadable
+from vla_deploy.telemetry.writing import METADATA
+
+# What the library and what it unpacks with raise on bytes that are no MCAP; lz4: RuntimeError.
+_SPOILED = (McapError, struct.error, ZstdError, RuntimeError, ValueError, KeyError, EOFError)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Message:
+    """Carry one message; `stamp_ns` is monotonic, in the run's clock."""
+
+    topic: str
+    stamp_ns: int
+    text: bytes
+
+    def document(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        document: dict[str, Any] = json.loads(self.text)
+        return document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flight:
+    """Describe one file; `counts` is the number of messages per topic."""
+
+    path: Path
+    run_id: str
+    robot: str
+    profile: str
+    version: str
+    wall_offset_ns: int
+    causes: tuple[dict[str, Any], ...]
+    counts: dict[str, int]
+    start_ns: int
+    end_ns: int
+
+    def messages(self, *topics: str) -> Iterator[Message]:
+        """Return the messages of some topics by time, or of all.
+
+        Raises:
+            FlightUnreadable: the file is cut off or spoiled.
+        """
+        with self.path.open("rb") as file:
+            try:
+                for _, channel, message in make_reader(file, validate_crcs=True).iter_messages(
+                    topics=topics or None
+                ):
+                    yield Message(
+                        topic=channel.topic,
+                        stamp_ns=message.log_time - self.wall_offset_ns,
+                        text=message.data,
+                    )
+            except _SPOILED as error:
+                raise _unreadable(self.path, error) from error
+
+
+def read_flight(path: Path) -> Flight:
+    """Read what a flight says of itself.
+
+    Raises:
+        FlightUnreadable: the file cannot be opened, is cut off, spoiled, or no flight.
+    """
+    try:
+        with path.open("rb") as file:
+            return _describe(path, make_reader(file, validate_crcs=True))
+    except OSError as error:
+        raise FlightUnreadable(f"{path}: {error.strerror}") from error
+    except _SPOILED as error:
+        raise _unreadable(path, error) from error
+
+
+def _describe(path: Path, reader: McapReader) -> Flight:
+    metadata = {record.name: record.metadata for record in reader.iter_metadata()}[METADATA]
+    summary = reader.get_summary()
+    if summary is None or summary.statistics is None:
+        raise ValueError("it has no summary")
+    statistics = summary.statistics
+    counts = {
+        summary.channels[channel].topic: count
+        for channel, count in statistics.channel_message_counts.items()
+    }
+    offset_ns = int(metadata["wall_offset_ns"])
+    return Flight(
+        path=path,
+        run_id=metadata["run_id"],
+        robot=metadata["robot"],
+        profile=metadata["profile"],
+        version=metadata["vla_deploy"],
+        wall_offset_ns=offset_ns,
+        causes=tuple(json.loads(metadata["causes"])),
+        counts=counts,
+        start_ns=statistics.message_start_time - offset_ns,
+        end_ns=statistics.message_end_time - offset_ns,
+    )
+
+
+def _unreadable(path: Path, error: Exception) -> FlightUnreadable:
+    reason = str(error) or type(error).__name__
+    return FlightUnreadable(
+        f"{path}: no whole flight: {reason}; expected an MCAP file of the flight recorder, see: "
+        "vla-deploy flight list"
+    )

@@ -1,0 +1,168 @@
+"""Run the flight recorder: remember everything, and write it down after a stop or a crash."""
+
+import json
+import logging
+import math
+import os
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S
+from vla_deploy.ipc import RingWriter, SharedSpace
+from vla_deploy.node import NodeContext
+from vla_deploy.telemetry.folder import FlightFolder
+from vla_deploy.telemetry.memory import Memory
+from vla_deploy.telemetry.triggers import Debounce, Kind, Trigger, Watcher
+from vla_deploy.telemetry.writing import FlightHead, write_flight
+
+MESSAGES_AT_ONCE: Final = 150
+_SHOWN_CAUSES = 20
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class _Writing:
+    """Hold the flight that is being written."""
+
+    part: Path
+    causes: list[Trigger]
+    progress: Iterator[None]
+
+
+class RecorderNode:
+    """Keep the last half minute of every topic, and never hold anybody up.
+
+    A flight is written a few messages per step, so that what goes on meanwhile is not missed.
+    """
+
+    period_s = 0.04
+
+    def __init__(
+        self,
+        context: NodeContext,
+        folder: FlightFolder,
+        wall_ns: Callable[[], int],
+        debounce: Debounce | None = None,
+    ) -> None:
+        self._context = context
+        self._clock = context.clock
+        self._space = SharedSpace(context.run_dir / "ipc", context.clock)
+        self._folder = folder
+        self._wall_ns = wall_ns
+        self._watcher = Watcher()
+        self._debounce = debounce or Debounce()
+        self._writing: _Writing | None = None
+        self._memory: Memory
+        self._events: RingWriter
+        self._started_ns = 0
+        self._parent_pid = os.getppid()
+
+    def start(self) -> None:
+        """Open every topic of the schema table; what is still in the rings counts."""
+        self._started_ns = self._clock.now_ns()
+        self._memory = Memory(self._space)
+        self._events = self._space.ring_writer("flight_event")
+
+    def step(self) -> None:
+        """Remember what is new, look for a reason to write, and write a bit."""
+        now_ns = self._clock.now_ns()
+        self._look(now_ns)
+        if self._writing is None:
+            self._begin(now_ns)
+        else:
+            self._go_on(self._writing)
+
+    def stop(self) -> None:
+        """Write what waits to be written, and close the topics.
+
+        A supervisor that was killed tells nobody: this process then has another parent.
+        """
+        if os.getppid() != self._parent_pid:
+            now_ns = self._clock.now_ns()
+            self._notice(Trigger(kind=Kind.CRASH, what="supervisor", at_ns=now_ns))
+        self._finish()
+        self._begin(math.inf)
+        self._finish()
+        self._space.close()
+
+    # --- look ---------------------------------------------------------------------------------
+
+    def _look(self, now_ns: int) -> None:
+        find: dict[str, Callable[[dict[str, Any], int], list[Trigger]]] = {
+            "control_status": self._watcher.status,
+            "process_table": self._watcher.table,
+            "flight_request": self._request,
+        }
+        for channel, kept in self._memory.refresh(now_ns):
+            if channel in find:
+                for trigger in find[channel](json.loads(kept.payload), kept.stamp_ns):
+                    self._notice(trigger)
+
+    def _request(self, request: dict[str, Any], at_ns: int) -> list[Trigger]:
+        if at_ns < self._started_ns:
+            return []
+        reason = str(request.get("reason", ""))
+        return [Trigger(kind=Kind.REQUEST, what="request", at_ns=at_ns, detail=reason)]
+
+    def _notice(self, trigger: Trigger) -> None:
+        _log.info("%s: %s %s", trigger.kind.value, trigger.what, trigger.detail)
+        self._debounce.add(trigger)
+
+    # --- write --------------------------------------------------------------------------------
+
+    def _begin(self, now_ns: float) -> None:
+        """Begin a flight when one is due; `inf` takes whatever waits."""
+        causes = self._debounce.take(now_ns)
+        if not causes:
+            return
+        wall_ns, run_ns = self._wall_ns(), self._clock.now_ns()
+        try:
+            part = self._folder.unfinished(_label(wall_ns, causes[0]))
+        except OSError as error:
+            self._failed(causes, error)
+            return
+        head = FlightHead(
+            run_id=self._context.run_dir.resolve().name,
+            robot=self._context.robot,
+            profile=self._context.profile,
+            wall_offset_ns=wall_ns - run_ns,
+            triggers=tuple(causes),
+        )
+        values, ticks = self._memory.snapshot(run_ns)
+        progress = write_flight(part, head, values, ticks, at_once=MESSAGES_AT_ONCE)
+        self._writing = _Writing(part, causes, progress)
+
+    def _finish(self) -> None:
+        while self._writing is not None:
+            self._go_on(self._writing)
+
+    def _go_on(self, writing: _Writing) -> None:
+        try:
+            for _ in writing.progress:
+                return
+            final = self._folder.publish(writing.part)
+        except OSError as error:
+            writing.part.unlink(missing_ok=True)
+            self._failed(writing.causes, error)
+        else:
+            _log.info("saved %s", final)
+            self._tell("saved", writing.causes, file=str(final))
+        self._writing = None
+
+    def _failed(self, causes: list[Trigger], error: OSError) -> None:
+        reason = f"{self._folder.path}: {error.strerror or error}"
+        _log.error("no flight saved of %s: %s; make room on that disk", causes[0].what, reason)
+        self._tell("failed", causes, reason=reason)
+
+    def _tell(self, event: str, causes: list[Trigger], **details: str) -> None:
+        whats = [cause.what for cause in causes[:_SHOWN_CAUSES]]
+        self._events.publish({"event": event, "causes": whats, **details})
+
+
+def _label(wall_ns: int, cause: Trigger) -> str:
+    what = re.sub(r"[^a-z0-9_]+", "_", cause.what.lower())[:40]
+    return f"{datetime.fromtimestamp(wall_ns / NS_PER_S, UTC):%Y%m%dT%H%M%SZ}-{what}"

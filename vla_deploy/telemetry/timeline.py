@@ -1,0 +1,84 @@
+"""Tell a flight's story: what control, the judge, the processes and the operators did, and when."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from drivers.clock import NS_PER_S
+from vla_deploy.telemetry.channels import TICKS
+from vla_deploy.telemetry.flight import Flight, Message
+
+Document = Mapping[str, Any]
+Line = dict[str, Any]
+
+
+def time_line(flight: Flight) -> list[Line]:
+    """Return the lines by time; 0 s is the first cause.
+
+    Raises:
+        FlightUnreadable: the file is cut off or spoiled.
+    """
+    zero_ns = flight.causes[0]["at_ns"] if flight.causes else flight.end_ns
+    lines = [_line(zero_ns, one["at_ns"], "recorder", _cause(one)) for one in flight.causes]
+    before: dict[str, list[str]] = {}
+    for message in flight.messages(*_TELLERS):
+        for who, text in _told(message, before):
+            lines.append(_line(zero_ns, message.stamp_ns, who, text))
+    return sorted(lines, key=lambda line: line["at_s"])
+
+
+def _line(zero_ns: int, at_ns: int, who: str, text: str) -> Line:
+    return {"at_s": (at_ns - zero_ns) / NS_PER_S, "who": who, "text": text}
+
+
+def _cause(cause: Document) -> str:
+    return f"{cause['kind']}: {cause['what']}" + (
+        f" ({cause['detail']})" if cause["detail"] else ""
+    )
+
+
+def _told(message: Message, before: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
+    """Return what a message says that the one before it in its topic did not say."""
+    who, tell, is_state = _TELLERS[message.topic]
+    texts = [text for text in tell(message.document()) if text]
+    known = before.get(message.topic, []) if is_state else []
+    before[message.topic] = texts
+    yield from ((who, text) for text in texts if text not in known)
+
+
+def _control(status: Document) -> list[str]:
+    why = ": ".join(word for word in (status["cause"], status["detail"]) if word)
+    return [status["state"] + (f" ({why})" if why else "")]
+
+
+def _processes(table: Document) -> list[str]:
+    return [
+        f"{row['name']}: {row['state']}" + (f" ({row['reason']})" if row["reason"] else "")
+        for row in table["processes"]
+    ]
+
+
+def _judge(tick: Document) -> list[str]:
+    if "cause" not in tick:
+        return []
+    return [f"{tick['reaction']} for {tick['cause']}"]
+
+
+def _operator(act: Document) -> list[str]:
+    reason = f": {act['reason']}" if act.get("reason") else ""
+    return [f"{act.get('act')} by {act.get('source')}{reason}"]
+
+
+def _task(event: Document) -> list[str]:
+    shown = {name: value for name, value in event.items() if name not in ("plan", "actions")}
+    return [json.dumps(shown)]
+
+
+# Who speaks, how, and whether only what is new of it counts.
+_TELLERS: Mapping[str, tuple[str, Callable[[Document], list[str]], bool]] = {
+    "control_status": ("control", _control, True),
+    "process_table": ("supervisor", _processes, True),
+    TICKS: ("judge", _judge, True),
+    "operator": ("operator", _operator, False),
+    "task_event": ("task", _task, False),
+}

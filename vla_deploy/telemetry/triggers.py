@@ -1,0 +1,107 @@
+"""Decide what calls for a flight to be written, and when: pure, on documents and time stamps."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from drivers.clock import NS_PER_S
+
+_IN_SERVICE = frozenset({"disarmed", "arming", "armed", "disarming"})
+_TROUBLE = frozenset({"back-off", "given up"})
+_MAX_CAUSES = 50
+
+
+class Kind(Enum):
+    """Name what calls for a flight."""
+
+    STOP = "stop"
+    CRASH = "crash"
+    REQUEST = "request"
+
+
+# How long after it the flight goes on.
+AFTER_S: Mapping[Kind, float] = {Kind.STOP: 3.0, Kind.CRASH: 3.0, Kind.REQUEST: 0.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trigger:
+    """Say what happened, and when."""
+
+    kind: Kind
+    what: str
+    at_ns: int
+    detail: str = ""
+
+
+@dataclass(slots=True)
+class Watcher:
+    """Compare control's status and the process table with what they were."""
+
+    _stopped_by: str | None = None
+    _rows: dict[str, tuple[str, int]] = field(default_factory=dict)
+    _has_status: bool = False
+
+    def status(self, document: Mapping[str, Any], at_ns: int) -> list[Trigger]:
+        """Return a trigger when the robot comes to a stop, or when its cause changes."""
+        state, cause = str(document["state"]), str(document["cause"])
+        stopped_by = None if state in _IN_SERVICE or not cause else cause  # a disarm has no cause
+        before, self._stopped_by = self._stopped_by, stopped_by
+        known, self._has_status = self._has_status, True
+        if not known or stopped_by is None or stopped_by == before:
+            return []
+        detail = str(document.get("detail", ""))
+        return [Trigger(kind=Kind.STOP, what=stopped_by, at_ns=at_ns, detail=detail)]
+
+    def table(self, document: Mapping[str, Any], at_ns: int) -> list[Trigger]:
+        """Return a trigger for each process that has ended by itself."""
+        triggers = []
+        for row in document["processes"]:
+            state, restarts = str(row["state"]), int(row["restarts"])
+            before = self._rows.get(row["name"])
+            self._rows[row["name"]] = (state, restarts)
+            if before is None or before[0] in _TROUBLE:
+                continue
+            if state in _TROUBLE or restarts > before[1]:
+                detail = f"{row['reason'] or 'ended'}, exit code {row['exit_code']}"
+                triggers.append(
+                    Trigger(kind=Kind.CRASH, what=str(row["name"]), at_ns=at_ns, detail=detail)
+                )
+        return triggers
+
+
+@dataclass(slots=True)
+class Debounce:
+    """Put triggers that come close together into one flight.
+
+    After a flight the next waits until `gap_s` have gone by, which loses nothing as long as that is
+    less than what is remembered; a request waits for nothing.
+    """
+
+    gap_s: float = 20.0
+    longest_s: float = 10.0
+    _waiting: list[Trigger] = field(default_factory=list)
+    _due_ns: float = math.inf
+    _written_ns: float = -math.inf
+
+    def add(self, trigger: Trigger) -> None:
+        """Take one trigger in."""
+        wanted_ns = trigger.at_ns + AFTER_S[trigger.kind] * NS_PER_S
+        if trigger.kind is Kind.REQUEST:
+            self._due_ns = wanted_ns
+        elif not self._waiting:
+            self._due_ns = max(wanted_ns, self._written_ns + self.gap_s * NS_PER_S)
+        else:
+            latest_ns = self._waiting[0].at_ns + self.longest_s * NS_PER_S
+            self._due_ns = max(self._due_ns, min(wanted_ns, latest_ns))
+        if len(self._waiting) < _MAX_CAUSES:
+            self._waiting.append(trigger)
+
+    def take(self, now_ns: float) -> list[Trigger]:
+        """Return what a flight is due for, once; `inf` asks for everything that waits."""
+        if not self._waiting or now_ns < self._due_ns:
+            return []
+        due, self._waiting = self._waiting, []
+        self._due_ns, self._written_ns = math.inf, now_ns
+        return due
