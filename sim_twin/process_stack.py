@@ -15,7 +15,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.faults.remote import RemoteFaults
 from sim_twin.referee import ask
 
-_COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
+_COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli")
 _POLL_NS: Final = NS_PER_S // 50
 _ANSWER_S: Final = 90.0
 _END_S: Final = 60.0

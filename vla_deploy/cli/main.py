@@ -10,10 +10,13 @@ from vla_deploy.cli import (
     bench,
     can,
     check,
+    crashes,
     demo,
     doctor,
     fault,
+    install,
     flight,
+    logs,
     operate,
     profile,
     run,
@@ -25,7 +28,24 @@ from vla_deploy.cli import (
 from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
 from vla_deploy.cli.example import OneLineParser
 
-COMMANDS = (run, demo, say, status, operate, profile, servo, can, fault, flight, check, doctor, bench, validate)
+COMMANDS = (
+    run,
+    demo,
+    say,
+    status,
+    logs,
+    crashes,
+    operate,
+    profile,
+    servo,
+    can,
+    fault,
+    flight,
+    check,
+    doctor,
+    bench,
+    validate,
+)
 EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin

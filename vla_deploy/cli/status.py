@@ -63,7 +63,10 @@ def _processes(status: dict[str, Any]) -> list[str]:
             f"{row['name']:<12} {row['state']:<10} {row['pid'] or '-':>7} {row['restarts']:>8} "
             f"{memory:>7} {share:>6}"
         )
-    return lines
+        if row["reason"]:
+            lines.append(f"  {row['name']}: {row['reason']}")
+        lines.extend(f"  alarm: {alarm}" for alarm in row["alarms"])
+    return [*lines, f"no commands: {table['refusal']}"] if table["refusal"] else lines
 
 
 def _control(status: dict[str, Any]) -> str:
