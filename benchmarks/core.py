@@ -27,12 +27,13 @@ def own_core() -> Iterator[None]:
 
 @contextmanager
 def realtime() -> Iterator[bool]:
-    """Be scheduled as control is; tell whether that is permitted.
+    """Be scheduled as control is; tell whether that is permitted. Children are not.
 
     Not for a client that spins: it would starve the kernel's own carriers of a terminal's bytes.
     """
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY))
     except PermissionError:
         yield False
         return

@@ -1,0 +1,194 @@
+"""Measure the emergency stop: from the request to the frame on the wire, and to standstill.
+
+- `request_to_frame_ticks`: real processes, whose cores are kept busy by others. A listener on the
+  CAN bus sees the quick stop that control sends to the first wheel drive; the time counts from just
+  before the request is written to the ring that every source of a stop writes to. Where the machine
+  permits, control has SCHED_FIFO, as on the robot (`realtime` tells).
+- `standstill_s_<phase>`: in lock-step, so free of the machine's noise: from the request until no
+  joint and no wheel moves faster than 0.02 rad/s, by physics.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import can
+
+from benchmarks.core import realtime
+from drivers.can_hub import HubBus
+from drivers.canopen.cia402 import ControlCommand
+from drivers.clock import NS_PER_S, MonotonicClock
+from platforms import load_profile
+from sim_twin.campaigns.phases import Phase, Stage
+from sim_twin.process_stack import ProcessStack
+from sim_twin.stack import LockstepControl
+from vla_deploy.cli.session import Session
+from vla_deploy.robots import load_robot
+
+_RPDO1: Final = 0x200
+_CONTROLWORD_BITS: Final = 0x8F
+_ANSWER_S: Final = 1.0
+_ACT_S: Final = 10.0
+_STANDSTILL_RAD_S: Final = 0.02
+_LONGEST_S: Final = 5.0
+_LOOK_S: Final = 0.004
+_REALTIME_PRIORITY: Final = 40
+_BUSY: Final = "while True: pass"
+
+
+class NoStop(Exception):
+    """Say that a stop was asked for and nothing came: worse than late."""
+
+
+def measure(requests: int, seed: int) -> dict[str, Any]:
+    """Return latencies under load and times to standstill.
+
+    Raises:
+        NoStop: a request had no effect.
+    """
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
+        report = _latencies(Path(folder), requests, seed)
+    return report | {f"standstill_s_{phase.value}": _standstill_s(phase) for phase in Phase}
+
+
+def _latencies(folder: Path, requests: int, seed: int) -> dict[str, Any]:
+    with realtime() as permitted:  # who measures must not wait for whom it keeps busy
+        profile = _write_profile(folder, priority=_REALTIME_PRIORITY if permitted else 0)
+        stack = ProcessStack(folder / "run", "--profile", str(profile))
+        try:
+            stack.wait_until_armed()
+            with busy_cores():
+                ticks = _ask_again_and_again(stack, profile, requests, random.Random(seed))
+        finally:
+            stack.close()
+    ticks.sort()
+    return {
+        "requests": requests,
+        "realtime": permitted,
+        "busy_processes": len(os.sched_getaffinity(0)),
+        "request_to_frame_ticks_median": statistics.median(ticks),
+        "request_to_frame_ticks_p99": ticks[min(len(ticks) - 1, round(0.99 * len(ticks)))],
+        "request_to_frame_ticks_max": ticks[-1],
+    }
+
+
+def _write_profile(folder: Path, priority: int) -> Path:
+    path = folder / "bench.toml"
+    path.write_text(f'inherits = "desktop"\nrealtime_priority = {priority}\n', encoding="utf-8")
+    return path
+
+
+@contextlib.contextmanager
+def busy_cores() -> Iterator[None]:
+    """Keep every core busy with a process that never pauses."""
+    spinners = [subprocess.Popen([sys.executable, "-c", _BUSY]) for _ in os.sched_getaffinity(0)]
+    try:
+        yield
+    finally:
+        for spinner in spinners:
+            spinner.kill()
+            spinner.wait()
+
+
+def _ask_again_and_again(
+    stack: ProcessStack, profile: Path, requests: int, draw: random.Random
+) -> list[float]:
+    """Return, in control ticks, how long each request took to the wire."""
+    clock = MonotonicClock()
+    robot = load_robot("butler")
+    period_ns = NS_PER_S / load_profile(profile).control_rate_hz
+    cob_id = _RPDO1 + robot.can_bus.drives[0].node_id
+    session = Session(stack.run_dir, clock)
+    ticks = []
+    with HubBus(channel=str(stack.run_dir / "dev" / robot.can_bus.device)) as bus:
+        for _ in range(requests):
+            _reach(session, "arm", "armed")
+            session.pause(draw.uniform(0.02, 0.1))
+            while bus.recv(0.0) is not None:  # what came before says nothing
+                continue
+            asked_ns = clock.now_ns()
+            session.operate("estop", "bench")
+            ticks.append((_quick_stop_ns(bus, cob_id) - asked_ns) / period_ns)
+            _reach(session, "reset", "disarmed")
+    session.close()
+    return ticks
+
+
+def _quick_stop_ns(bus: can.BusABC, cob_id: int) -> int:
+    """Return when the drive was told to stop quickly."""
+    clock = MonotonicClock()
+    deadline_ns = clock.now_ns() + round(_ANSWER_S * NS_PER_S)
+    while clock.now_ns() < deadline_ns:
+        frame = bus.recv(_ANSWER_S)
+        if frame is None or frame.arbitration_id != cob_id:
+            continue
+        if frame.data[0] & _CONTROLWORD_BITS == ControlCommand.QUICK_STOP:
+            return clock.now_ns()
+    raise NoStop(f"no quick stop on the wire within {_ANSWER_S:g} s of the request")
+
+
+def _reach(session: Session, act: str, wanted: str) -> None:
+    """Do an act until control is where it leads to."""
+    deadline_ns = session.clock.now_ns() + round(_ACT_S * NS_PER_S)
+    while session.clock.now_ns() < deadline_ns:
+        session.operate(act)
+        for _ in range(25):
+            status = session.document("control_status", age_limit_s=0.5)
+            if status is not None and status["state"] == wanted:
+                return
+            session.pause()
+    raise NoStop(f"{act}: control is not {wanted} after {_ACT_S:g} s")
+
+
+def _standstill_s(phase: Phase) -> float:
+    """Return how long everything takes to rest after a request in a phase of the work."""
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
+        stack = LockstepControl(Path(folder))
+        try:
+            stage = Stage(stack)
+            stage.begin(phase)
+            began_s = stack.lockstep.now_s
+            stack.operate("estop")
+            while stack.lockstep.now_s - began_s < _LONGEST_S:
+                stage.run_for(_LOOK_S)
+                if _fastest_rad_s(stack) < _STANDSTILL_RAD_S:
+                    return stack.lockstep.now_s - began_s
+        finally:
+            stack.close()
+    raise NoStop(f"{phase.value}: not at rest {_LONGEST_S:g} s after the request")
+
+
+def _fastest_rad_s(stack: LockstepControl) -> float:
+    joints = stack.lockstep.truth()["joints"].values()
+    return max(abs(float(joint["velocity"])) for joint in joints)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(
+        prog="bench estop",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example:\n  vla-deploy bench estop --json",
+    )
+    parser.add_argument("--requests", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    options = parser.parse_args(argv)
+    report = measure(options.requests, options.seed)
+    lines = [f"{name:34} {value}" for name, value in report.items()]
+    sys.stdout.write((json.dumps(report, indent=2) if options.json else "\n".join(lines)) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
