@@ -22,6 +22,9 @@ _IN_POSITION, _PROFILE_ONGOING, _FOLLOWING_ERROR = 0x01, 0x02, 0x08
 _PROFILE_TYPE_SHIFT: Final = 4
 
 
+EFFORT_CYCLES: Final = 4
+
+
 class Feedback:
     """Write what the servos sense into their tables."""
 
@@ -41,7 +44,8 @@ class Feedback:
         self._position_trajectory = columns.named("position_trajectory")
         self._voltage = columns.named("present_input_voltage")
         self._temperature = columns.named("present_temperature")
-        self.joint_effort: Floats = np.zeros(len(self._tick))
+        self._efforts = np.zeros((EFFORT_CYCLES, len(self._tick)))
+        self._newest_effort = 0
         self.supply_v = 12.0
         self.now_ns = 0
         self.booted_ns = np.zeros(len(self._tick), np.int64)
@@ -56,6 +60,20 @@ class Feedback:
             (144, 147, self._write_supply),
         )
         self._due = cache(self._find_due)
+
+    def sense_effort(self, joint_effort: Floats) -> None:
+        """Take in a control cycle's torque."""
+        self._newest_effort = (self._newest_effort + 1) % EFFORT_CYCLES
+        self._efforts[self._newest_effort] = joint_effort
+
+    @property
+    def joint_effort(self) -> Floats:
+        """Return the mean torque of the last control cycles, as a shunt's RC and its ADC tell it.
+
+        One cycle's would alias: duty switches from cycle to cycle in step with a host's reads.
+        """
+        mean: Floats = self._efforts.mean(axis=0)
+        return mean
 
     def refresh(self, address: int, length: int) -> None:
         """Update the registers within a range that is about to be read."""

@@ -101,7 +101,7 @@ class Firmware:
             self._take_first_pose()
         dt_s = (now_ns - self._advanced_ns) / NS_PER_S
         self._advanced_ns = now_ns
-        self._feedback.joint_effort = joint_effort
+        self._feedback.sense_effort(joint_effort)
         if supply_v != self._supply_v or now_ns - self._checked_ns >= _CHECK_PERIOD_NS:
             self._supply_v = supply_v
             self._check()
