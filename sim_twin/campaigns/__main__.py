@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import fault_matrix, kills
+from sim_twin.campaigns import fault_matrix, kills, soak
 from sim_twin.campaigns.report import Report
 
 CAMPAIGNS: Final[Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], Report]]] = {
     "faults": fault_matrix.run,
     "kills": kills.run,
+    "soak": soak.run,
 }
 _EXAMPLES: Final = """examples:
   vla-deploy validate faults --junit out/faults.xml
@@ -50,6 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("campaign", choices=tuple(CAMPAIGNS))
     parser.add_argument("--only", default="", help="play only cases whose name contains this")
     parser.add_argument("--count", type=int, help="how many injections")
+    parser.add_argument("--hours", type=float, default=1.0, help="how long to soak")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=2, help="how many cases at a time")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")

@@ -1,0 +1,156 @@
+"""Work for hours in lock-step and measure what grows: memory, open files, threads, files."""
+
+import argparse
+import os
+import tempfile
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import psutil
+
+from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.campaigns.report import Case, Report
+from sim_twin.stack import LockstepStack
+
+MOST_MIB_PER_H: Final = 1.0
+_WARM_UP_RATIO: Final = 0.25
+"""Caches of libraries fill up in the first quarter; growth is judged after it."""
+_LEAST_SAMPLES: Final = 8
+_S_PER_H: Final = 3600.0
+_MIB: Final = 1 << 20
+_IDLE_S: Final = 20.0
+JOBS: Final = (
+    "pick up the red cup and put it in the box",
+    "go to the kitchen",
+    "look left",
+    "go home",
+    "pick up the red cup and put it on the coffee table",
+    "turn around",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """Hold what the process has, at a moment of the wall clock and of the simulation."""
+
+    wall_h: float
+    sim_h: float
+    memory_mib: float
+    open_files: int
+    threads: int
+    run_files: int
+
+
+class Soak:
+    """Own one robot and let it work."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self._folder = folder
+        self._clock = MonotonicClock()
+        self._process = psutil.Process()
+        self._stack = LockstepStack(folder, seed)
+        self._stack.arm()
+        self._began_ns = self._clock.now_ns()
+        self._began_s = self._stack.lockstep.now_s
+        self.done = 0
+        self.failed: list[str] = []
+
+    def work(self, hours: float, tell: Callable[[str], None]) -> list[Sample]:
+        """Do job after job for so long on the wall clock, and take a sample after each."""
+        samples: list[Sample] = []
+        while not samples or samples[-1].wall_h < hours:
+            self._do(JOBS[self.done % len(JOBS)])
+            samples.append(self._sample())
+            tell(_row(self.done, samples[-1]))
+        return samples
+
+    def close(self) -> None:
+        """End the robot."""
+        self._stack.close()
+
+    def _do(self, job: str) -> None:
+        outcome = self._stack.say(job)
+        self._stack.events.clear()
+        self.done += 1
+        if not outcome.get("success"):
+            self.failed.append(f"{job}: {outcome.get('error') or outcome.get('reason')}")
+        self._stack.lockstep.run_for(_IDLE_S)
+
+    def _sample(self) -> Sample:
+        return Sample(
+            wall_h=(self._clock.now_ns() - self._began_ns) / NS_PER_S / _S_PER_H,
+            sim_h=(self._stack.lockstep.now_s - self._began_s) / _S_PER_H,
+            memory_mib=self._process.memory_info().rss / _MIB,
+            open_files=self._process.num_fds(),
+            threads=threading.active_count(),
+            run_files=sum(len(files) for _, _, files in os.walk(self._folder)),
+        )
+
+
+def growth(samples: Sequence[Sample], field: str, per: str = "sim_h") -> float:
+    """Return the slope of a figure after the warm-up, per hour.
+
+    Raises:
+        ValueError: there are too few samples to tell.
+    """
+    warm = samples[round(_WARM_UP_RATIO * len(samples)) :]
+    if len(warm) < _LEAST_SAMPLES:
+        raise ValueError(f"{len(warm)} samples after the warm-up, expected {_LEAST_SAMPLES}")
+    hours = np.array([getattr(sample, per) for sample in warm])
+    values = np.array([float(getattr(sample, field)) for sample in warm])
+    slope: float = np.polynomial.Polynomial.fit(hours, values, 1).convert().coef[-1]
+    return float(slope)
+
+
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+    """Work for `options.hours`, one unless told otherwise."""
+    with tempfile.TemporaryDirectory(prefix="vla-soak-") as folder:
+        soak = Soak(Path(folder), options.seed)
+        try:
+            samples = soak.work(options.hours, tell)
+        finally:
+            soak.close()
+    return Report(campaign="soak", cases=judge(samples), summary=_summary(soak, samples))
+
+
+def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
+    """Return a case for each thing that must not grow."""
+    slope = growth(samples, "memory_mib")
+    too_much = (f"grows by {slope:.2f} MiB/h, limit {MOST_MIB_PER_H:g}",)
+    cases = [
+        Case(
+            name="memory",
+            failures=too_much if slope > MOST_MIB_PER_H else (),
+            figures={
+                "mib_per_sim_h": slope,
+                "mib_per_wall_h": growth(samples, "memory_mib", "wall_h"),
+            },
+        )
+    ]
+    warm = samples[round(_WARM_UP_RATIO * len(samples)) :]
+    for field in ("open_files", "threads", "run_files"):
+        first, last = getattr(warm[0], field), getattr(samples[-1], field)
+        grown = (f"grew from {first} to {last}",) if last > first else ()
+        cases.append(Case(name=field, failures=grown, figures={"first": first, "last": last}))
+    return tuple(cases)
+
+
+def _summary(soak: Soak, samples: Sequence[Sample]) -> dict[str, Any]:
+    return {
+        "wall_h": samples[-1].wall_h,
+        "sim_h": samples[-1].sim_h,
+        "jobs": soak.done,
+        "jobs_failed": len(soak.failed),
+        "why_jobs_failed": sorted(set(soak.failed)),
+    }
+
+
+def _row(number: int, sample: Sample) -> str:
+    return (
+        f"job {number}: {sample.sim_h:.3f} h simulated, {sample.memory_mib:.1f} MiB, "
+        f"{sample.open_files} files open, {sample.threads} threads, {sample.run_files} files"
+    )

@@ -1,0 +1,40 @@
+"""The soak's judge must see growth, and not take noise for it."""
+
+import numpy as np
+import pytest
+
+from sim_twin.campaigns.soak import Sample, growth, judge
+
+
+def samples(mib_per_h: float, *, files: int = 0, count: int = 80) -> list[Sample]:
+    noise = np.random.default_rng(1).normal(0.0, 0.05, count)
+    return [
+        Sample(
+            wall_h=n / count,
+            sim_h=3.0 * n / count,
+            memory_mib=200.0 + min(n, 5) * 10.0 + mib_per_h * 3.0 * n / count + noise[n],
+            open_files=40 + (files * n) // count,
+            threads=4,
+            run_files=30,
+        )
+        for n in range(count)
+    ]
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.5, 4.0])
+def test_growth_is_the_slope_after_the_warm_up(slope: float) -> None:
+    assert growth(samples(slope), "memory_mib") == pytest.approx(slope, abs=0.1)
+
+
+def test_a_leak_and_files_left_open_are_failures() -> None:
+    failed = {case.name for case in judge(samples(2.0, files=6)) if case.failures}
+    assert failed == {"memory", "open_files"}
+
+
+def test_a_process_that_does_not_grow_passes() -> None:
+    assert not any(case.failures for case in judge(samples(0.2)))
+
+
+def test_too_few_samples_say_nothing() -> None:
+    with pytest.raises(ValueError, match="samples after the warm-up"):
+        judge(samples(0.0, count=9))
