@@ -1,9 +1,12 @@
 """Share state, events and images between the robot's processes."""
 
 from vla_deploy.ipc.cell import CellReader, CellWriter, Sample
+from vla_deploy.ipc.claim_book import ClaimBook
+from vla_deploy.ipc.claims import Book, Claim
 from vla_deploy.ipc.doorbell import Doorbell
 from vla_deploy.ipc.errors import (
     BadPayload,
+    ClaimRefused,
     IpcError,
     SchemaMismatch,
     SpaceUnavailable,
@@ -19,8 +22,12 @@ __all__ = [
     "BY_NAME",
     "TOPICS",
     "BadPayload",
+    "Book",
     "CellReader",
     "CellWriter",
+    "Claim",
+    "ClaimBook",
+    "ClaimRefused",
     "Doorbell",
     "Event",
     "Field",

@@ -4,7 +4,8 @@ IpcError
 ├── UnknownTopic        no such topic, or another kind of topic: fix the call
 ├── BadPayload          the payload does not fit the topic's declaration: fix the sender
 ├── SchemaMismatch      the file was made by another version: stop the whole run, start it again
-└── SpaceUnavailable    the directory or its memory cannot be had: free memory, check permissions
+├── SpaceUnavailable    the directory or its memory cannot be had: free memory, check permissions
+└── ClaimRefused        a resource can never be granted as it was asked for: fix the claim
 """
 
 
@@ -26,3 +27,7 @@ class SchemaMismatch(IpcError):
 
 class SpaceUnavailable(IpcError):
     """Say that the shared directory or its memory cannot be had."""
+
+
+class ClaimRefused(IpcError):
+    """Say which resource can never be granted as it was asked for."""
