@@ -11,6 +11,7 @@ from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
 from vla_deploy.logs import journal_stream
 from vla_deploy.supervisor import ProcessGivenUp, RunOptions, Supervisor
+from vla_deploy.supervisor.profile_choice import start_profile
 
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
   vla-deploy run --twin --seed 7        other places for the objects
@@ -30,6 +31,12 @@ def register(commands: Any) -> None:
         "--paced",
         action="store_true",
         help="give what is on the twin's buses the time it takes on the wire",
+    )
+    run.add_argument(
+        "--devices-dir",
+        type=lambda path: Path(path).resolve(),
+        metavar="DIR",
+        help="take every device from here: a twin that runs by itself (python -m sim_twin)",
     )
     run.add_argument(
         "--arm",
@@ -68,6 +75,9 @@ def main(arguments: argparse.Namespace) -> int:
         if vars(arguments)[option] and not arguments.twin:
             sys.stderr.write(f"run: --{option} is about the twin; add --twin\n")
             return 2
+    if arguments.twin and arguments.devices_dir is not None:
+        sys.stderr.write("run: --devices-dir is of a twin that runs by itself; leave out --twin\n")
+        return 2
     faulthandler.enable()
     if not journal_stream(os.environ, sys.stderr.fileno()):  # the supervisor logs there itself
         logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
@@ -80,6 +90,7 @@ def main(arguments: argparse.Namespace) -> int:
         robot=arguments.robot,
         profile=profile,
         twin=arguments.twin,
+        devices_dir=arguments.devices_dir,
         viewer=arguments.viewer,
         paced=arguments.paced,
         seed=arguments.seed,
