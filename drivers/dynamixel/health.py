@@ -145,6 +145,7 @@ class HealthPoll:
         self._state.temperature_c[index] = decode(
             servo, span, _CLIMATE_START, "present_temperature"
         )
+        self._state.climate_stamp_ns[index] = self._registers.link.now_ns()
 
     def _try_span(self, servo: ServoSpec, start: int, size: int) -> bytes | None:
         try:

@@ -44,6 +44,8 @@ class BusState:
     """bus_watchdog (98): 0 off, 1..127 armed in units of 20 ms, -1 tripped."""
     voltage_v: Floats
     temperature_c: Floats
+    climate_stamp_ns: NDArray[np.int64]
+    """When voltage and temperature of a polled servo came; -1 where they come with the block."""
 
     stamp_ns: int = 0
 
@@ -58,6 +60,7 @@ class BusState:
             effort_ratio=readings[2],
             voltage_v=readings[3],
             temperature_c=readings[4],
+            climate_stamp_ns=np.full(count, -1, dtype=np.int64),
             age_s=np.full(count, np.inf),
             valid=np.zeros(count, dtype=np.bool_),
             alert=np.zeros(count, dtype=np.bool_),

@@ -1,6 +1,9 @@
 """Bring the base from its present velocity to the wanted one, no faster than it can bear."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
+
+from vla_deploy.safety import Direction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +44,34 @@ class BaseRamp:
     def halt(self) -> None:
         """Forget the velocity: the drives no longer follow it."""
         self.v_m_s = self.w_rad_s = 0.0
+
+
+def permitted(
+    wanted: tuple[float, float],
+    limits: BaseLimits,
+    speed_ratio: float,
+    blocked: Collection[Direction],
+) -> tuple[float, float]:
+    """Return what remains of a wanted velocity: no blocked motion, none above the speed ratio.
+
+    Both parts shrink together, so that the base slows down on its curve instead of leaving it.
+    """
+    v_m_s, w_rad_s = wanted
+    v_m_s = 0.0 if _direction(v_m_s, Direction.FORWARD, Direction.BACKWARD) in blocked else v_m_s
+    w_rad_s = (
+        0.0
+        if _direction(w_rad_s, Direction.TURN_LEFT, Direction.TURN_RIGHT) in blocked
+        else w_rad_s
+    )
+    share = max(abs(v_m_s) / limits.speed_m_s, abs(w_rad_s) / limits.turn_rad_s)
+    scale = 1.0 if share <= speed_ratio else speed_ratio / share
+    return scale * v_m_s, scale * w_rad_s
+
+
+def _direction(speed: float, positive: Direction, negative: Direction) -> Direction | None:
+    if speed == 0.0:
+        return None
+    return positive if speed > 0.0 else negative
 
 
 def _clamp(value: float, limit: float) -> float:

@@ -1,5 +1,6 @@
 """Run control: read, judge, plan, limit, write, tell - once per tick, in this order."""
 
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -10,20 +11,23 @@ from drivers.opener import DeviceOpener
 from platforms import Profile
 from vla_deploy.control.arming import Arming
 from vla_deploy.control.axes import Flags
-from vla_deploy.control.base_motion import BaseLimits, BaseRamp
+from vla_deploy.control.base_motion import BaseLimits, BaseRamp, permitted
 from vla_deploy.control.dispatch import Dispatcher, axis_limits
 from vla_deploy.control.estop_button import EstopButton
 from vla_deploy.control.gravity import GravityOffset
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionSet
 from vla_deploy.control.operator_desk import Act, OperatorDesk
+from vla_deploy.control.payload import Payload
 from vla_deploy.control.retuning import Tuning, retuned, tuning_of
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import Mode, ModeInputs, next_mode, status_name
 from vla_deploy.control.stop_plan import StopPlan
 from vla_deploy.control.telemetry import Telemetry, TickClock
+from vla_deploy.control.thresholds import safety_limits
 from vla_deploy.control.tick_recorder import TickRecorder
-from vla_deploy.control.watch import Watch, safety_limits
+from vla_deploy.control.verdict_document import verdict_document
+from vla_deploy.control.watch import Watch
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import NodeContext
@@ -32,7 +36,6 @@ from vla_deploy.robots.description import StopCategory
 from vla_deploy.robots.model import RobotModel
 from vla_deploy.safety import (
     CLEAR,
-    Cause,
     Reaction,
     ResetOutcome,
     SafetyState,
@@ -43,6 +46,7 @@ from vla_deploy.safety import (
 _RESET_NS = 2 * NS_PER_S
 _SHUTDOWN_NS = 3 * NS_PER_S
 _AT_REST_MODES = (Mode.DISARMED, Mode.STOPPED)
+_STANDSTILL_MODES = (Mode.STOPPED, Mode.PAUSED)
 
 
 class ControlNode:
@@ -69,14 +73,13 @@ class ControlNode:
         self._motions = MotionSet(axis_limits(robot))
         self._gate = SetpointGate(robot.position_min, robot.position_max, robot.velocity_max)
         self._gravity = GravityOffset(robot, RobotModel(robot).gravity)
-        self._base = BaseRamp(
-            BaseLimits(
-                speed_m_s=robot.base.max_speed_m_s,
-                turn_rad_s=robot.base.max_turn_rad_s,
-                acceleration_m_s2=robot.base.max_acceleration_m_s2,
-                turn_acceleration_rad_s2=robot.base.max_turn_acceleration_rad_s2,
-            )
+        self._base_limits = BaseLimits(
+            speed_m_s=robot.base.max_speed_m_s,
+            turn_rad_s=robot.base.max_turn_rad_s,
+            acceleration_m_s2=robot.base.max_acceleration_m_s2,
+            turn_acceleration_rad_s2=robot.base.max_turn_acceleration_rad_s2,
         )
+        self._base = BaseRamp(self._base_limits)
         self._arming = Arming(self._servos, self._wheels, clock)
         self._plan = StopPlan(robot)
         self._dispatcher = Dispatcher(robot, self._motions, self._servos)
@@ -85,9 +88,11 @@ class ControlNode:
 
         space = SharedSpace(context.run_dir / "ipc", clock)
         self._button = EstopButton(robot, devices, clock)
-        self._desk = OperatorDesk(
-            space.ring_reader("operator", from_start=False), self._button.source
-        )
+        with closing(space.cell_reader("control_status")) as before:
+            self._desk = OperatorDesk(
+                space.ring_reader("operator", from_start=True), self._button.source, before.latest()
+            )
+        self._payload = Payload(robot, space.cell_reader("executor_status"))
         self._commands = space.ring_reader("motion_command", from_start=False)
         self._watch = Watch(space, self._servos, self._wheels, clock)
         self._telemetry = Telemetry(space, len(robot.joint_names))
@@ -145,7 +150,13 @@ class ControlNode:
         self._wheels.close()
         self._servos.close()
         self._button.close()
-        for topic in (self._telemetry, self._tick_record, self._watch, self._commands):
+        for topic in (
+            self._telemetry,
+            self._tick_record,
+            self._watch,
+            self._commands,
+            self._payload,
+        ):
             topic.close()
 
     # --- another profile ----------------------------------------------------------------------
@@ -194,6 +205,8 @@ class ControlNode:
             reset_requested=self._reset_until_ns is not None,
             setpoint=self._gate.sent,
             base_at_rest=self._base.at_rest,
+            standstill=self._mode in _STANDSTILL_MODES,
+            surroundings=self._watch.surroundings(),
         )
         before = self._safety
         self._safety, self._verdict = evaluate(before, inputs, self._limits)
@@ -256,6 +269,8 @@ class ControlNode:
                 self._arming.begin()
             case Mode.DISARMING:
                 self._telemetry.tell_results(self._motions.stop("disarmed"))
+            case Mode.PAUSING:
+                self._telemetry.tell_results(self._motions.stop(self._verdict.text))
             case Mode.STOPPING:
                 self._stopping_for = Reaction.NONE
             case Mode.STOPPED:
@@ -272,7 +287,7 @@ class ControlNode:
         """Stop by the verdict's reaction: at once where power goes now, on ramps elsewhere."""
         self._mode = Mode.STOPPING
         self._stopping_for = verdict.reaction
-        self._servos.remove_power(self._plan.unpowered_at_once(verdict.reaction))
+        self._servos.remove_power(self._plan.unpowered_at_once(verdict.reaction, self._holding()))
         self._telemetry.tell_results(self._motions.stop(verdict.text))
         match self._plan.base_category(verdict.reaction):
             case StopCategory.POWER_REMOVED:
@@ -283,11 +298,17 @@ class ControlNode:
                 self._base.halt()
 
     def _end_stop(self) -> None:
-        self._servos.remove_power(self._plan.unpowered_at_rest(self._stopping_for))
+        self._servos.remove_power(self._plan.unpowered_at_rest(self._stopping_for, self._holding()))
+
+    def _holding(self) -> frozenset[str]:
+        state = self._servos.state
+        return self._payload.holding(
+            state.position_rad, self._gate.sent, state.effort_ratio, state.torque_on
+        )
 
     def _release(self) -> None:
-        """Leave power only to groups whose stop category keeps it."""
-        self._servos.remove_power(self._plan.released)
+        """Leave power only to groups whose stop category keeps it, and to hands that hold."""
+        self._servos.remove_power(self._plan.released(self._holding()))
         if self._plan.base is not StopCategory.STOP_KEEP_POWER:
             self._wheels.disable()
 
@@ -312,6 +333,8 @@ class ControlNode:
         if self._verdict.reaction >= Reaction.HOLD:
             latched = "reset, then arm" if self._verdict.latched else "remove the cause, then arm"
             return f"stopped by {self._verdict.text}: {latched}"
+        if self._mode in (Mode.PAUSING, Mode.PAUSED):
+            return f"protective stop by {self._verdict.text or 'a cause that is gone'}: wait"
         return f"control is {self._mode.value}: arm first"
 
     def _move_joints(self, period_s: float) -> None:
@@ -332,11 +355,16 @@ class ControlNode:
         self._gate.place(measured, joints)
 
     def _move_base(self, period_s: float) -> None:
-        driving = self._mode is Mode.ARMED and self._verdict.reaction is Reaction.NONE
-        if driving and self._wheels.enabled:
-            self._ramp_base(self._watch.v_m_s, self._watch.w_rad_s, period_s)
-        else:
-            self._ramp_base(0.0, 0.0, period_s)
+        wanted = (0.0, 0.0)
+        if self._mode is Mode.ARMED and self._wheels.enabled:
+            verdict = self._verdict
+            wanted = permitted(
+                (self._watch.v_m_s, self._watch.w_rad_s),
+                self._base_limits,
+                verdict.speed_ratio,
+                verdict.blocked,
+            )
+        self._ramp_base(*wanted, period_s)
 
     def _ramp_base(self, v_m_s: float, w_rad_s: float, period_s: float) -> None:
         if not self._wheels.enabled:
@@ -359,7 +387,7 @@ class ControlNode:
         return {
             "state": status_name(self._mode, verdict.reaction),
             "estop_latched": self._safety.estop_latched,
-            "cause": "" if verdict.cause is Cause.NONE else verdict.cause.value,
+            **verdict_document(verdict),
             "detail": "; ".join(detail for detail in details if detail)[:1500],
             "tick": self._ticks.tick,
             "judged_tick": self._judged_tick,

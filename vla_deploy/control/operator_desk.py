@@ -4,7 +4,11 @@ from collections import deque
 from collections.abc import Callable
 from enum import Enum
 
-from vla_deploy.ipc import RingReader
+from vla_deploy.ipc import RingReader, Sample
+
+UNKNOWN = "unknown"
+LOST = "operator events were lost"
+LATCHED_BEFORE = "latched before control was restarted"
 
 
 class Act(Enum):
@@ -19,16 +23,24 @@ class Act(Enum):
 class OperatorDesk:
     """Drain the operator ring, and look at the robot's own button.
 
-    `button` names the button as the source of a stop for as long as it is pressed.
+    `button` names the button as the source of a stop for as long as it is pressed. `last_status` is
+    what control told before it was restarted: a latch that it had, and what was pressed since,
+    outlive it. Other acts that nobody heard are dropped.
     """
 
-    def __init__(self, ring: RingReader, button: Callable[[], str | None] = lambda: None) -> None:
+    def __init__(
+        self,
+        ring: RingReader,
+        button: Callable[[], str | None] = lambda: None,
+        last_status: Sample | None = None,
+    ) -> None:
         self._ring = ring
         self._button = button
         self._was_pressed = False
         self._waiting: deque[Act] = deque()
         self.estop_source: str | None = None
         self.complaint = ""
+        self._recalled = self._recall(last_status)
 
     def listen(self) -> None:
         """Take in what has come; `estop_source` is set for this tick only.
@@ -37,16 +49,28 @@ class OperatorDesk:
         may have held one, so they count as one.
         """
         lost_before = self._ring.lost
-        self.estop_source = None
+        self.estop_source, self._recalled = self._recalled, None
         for event in self._ring.drain():
-            self._take(event.payload.get("act"), str(event.payload.get("source", "unknown")))
+            self._take(event.payload.get("act"), str(event.payload.get("source", UNKNOWN)))
         if self._ring.lost > lost_before:
-            self._stop("operator events were lost")
+            self._stop(LOST)
         self._look_at_button()
 
     def next_act(self) -> Act | None:
         """Return the next act other than an emergency stop."""
         return self._waiting.popleft() if self._waiting else None
+
+    def _recall(self, last_status: Sample | None) -> str | None:
+        """Return who asked for a stop that no control has seen to its end."""
+        told_ns = -1 if last_status is None else last_status.stamp_ns
+        since = [event for event in self._ring.drain() if event.stamp_ns > told_ns]
+        pressed = [event for event in since if event.payload.get("act") == Act.ESTOP.value]
+        if pressed:
+            return str(pressed[-1].payload.get("source", UNKNOWN))
+        if self._ring.lost and since and since[0].sequence == self._ring.lost + 1:
+            return LOST
+        latched = last_status is not None and last_status.document().get("estop_latched")
+        return LATCHED_BEFORE if latched else None
 
     def _take(self, name: object, source: str) -> None:
         try:

@@ -13,6 +13,8 @@ class Mode(Enum):
     ARMING = "arming"
     ARMED = "armed"
     DISARMING = "disarming"
+    PAUSING = "pausing"
+    PAUSED = "paused"
     STOPPING = "stopping"
     STOPPED = "stopped"
 
@@ -33,9 +35,11 @@ def next_mode(mode: Mode, inputs: ModeInputs) -> Mode:
     """Return the mode of the next tick; a stop goes before everything else.
 
     DISARMED gets there only by arming, and STOPPED is left only when nothing demands the stop any
-    more, which for a latched cause takes a reset.
+    more, which for a latched cause takes a reset. A protective stop pauses an armed robot: once it
+    stands, it is armed again as soon as nothing demands that stop any more.
     """
     stop = inputs.reaction >= Reaction.HOLD
+    pause = inputs.reaction is Reaction.PROTECTIVE_STOP
     match mode:
         case Mode.DISARMED:
             if stop and inputs.latched:
@@ -47,10 +51,12 @@ def next_mode(mode: Mode, inputs: ModeInputs) -> Mode:
             if inputs.disarm:
                 return Mode.DISARMING
             return {None: mode, True: Mode.ARMED, False: Mode.DISARMED}[inputs.armed]
-        case Mode.ARMED:
+        case Mode.ARMED | Mode.PAUSING | Mode.PAUSED:
             if stop:
                 return Mode.STOPPING
-            return Mode.DISARMING if inputs.disarm else mode
+            if inputs.disarm:
+                return Mode.DISARMING
+            return _next_while_armed(mode, pause, inputs.at_rest)
         case Mode.DISARMING:
             if stop:
                 return Mode.STOPPING
@@ -61,8 +67,24 @@ def next_mode(mode: Mode, inputs: ModeInputs) -> Mode:
             return mode if stop else Mode.DISARMED
 
 
+def _next_while_armed(mode: Mode, pause: bool, at_rest: bool) -> Mode:
+    if mode is Mode.PAUSING:
+        return Mode.PAUSED if at_rest else mode
+    if not pause:
+        return Mode.ARMED
+    return Mode.PAUSING if mode is Mode.ARMED else mode
+
+
 def status_name(mode: Mode, reaction: Reaction) -> str:
     """Return the mode in the words of `control_status`; fault: it cannot be armed at present."""
     if mode is Mode.DISARMED and reaction >= Reaction.HOLD:
         return "fault"
-    return {Mode.ARMING: "disarmed", Mode.DISARMING: "stopping"}.get(mode, mode.value)
+    return _WORDS.get(mode, mode.value)
+
+
+_WORDS = {
+    Mode.ARMING: "disarmed",
+    Mode.DISARMING: "stopping",
+    Mode.PAUSING: "protective_stop",
+    Mode.PAUSED: "protective_stop",
+}

@@ -1,54 +1,15 @@
-"""Gather what the safety judge sees each tick, and its limits from robot and topics."""
+"""Gather what the safety judge sees each tick."""
 
 import numpy as np
 
-from drivers.clock import Clock
+from drivers.clock import NS_PER_S, Clock
 from vla_deploy.control.axes import Floats
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.wheels import Wheels
-from vla_deploy.ipc import BY_NAME, SharedSpace
-from vla_deploy.robots import RobotDescription
-from vla_deploy.safety import SafetyInputs, SafetyLimits
+from vla_deploy.ipc import CellReader, SharedSpace
+from vla_deploy.safety import SafetyInputs, Surroundings
 
-_RANGE_MARGIN = 0.02
-_OUTWARD_SHARE = 0.05
-_OVERSPEED = 2.0
-_FOLLOWING_ERROR_RAD = 0.4
-_WHEEL_ERROR_OF_TOP = 0.05
-_WHEEL_ERROR_OF_COMMAND = 0.5
-
-
-def safety_limits(robot: RobotDescription) -> SafetyLimits:
-    """Return the thresholds of the safety rules for a robot.
-
-    A gripper has no following error: closed on an object it is blocked by intent. A wheel may be
-    off by a twentieth of its top speed, at which the base creeps, and by half of what it is told:
-    it lags while it speeds up, and strains on a carpet's edge. One that stands or runs away is
-    beyond that.
-    """
-    margin = _RANGE_MARGIN * (robot.position_max - robot.position_min)
-    grippers = {
-        joint for hand in robot.hands.values() for joint in robot.group(hand.gripper).joints
-    }
-    following = [
-        np.inf if servo.joint in grippers else _FOLLOWING_ERROR_RAD * servo.travel_per_rad
-        for servo in robot.servo_bus.servos
-    ]
-    return SafetyLimits(
-        joint_names=robot.joint_names,
-        position_lower=robot.position_min - margin,
-        position_upper=robot.position_max + margin,
-        outward_velocity=_OUTWARD_SHARE * robot.velocity_max,
-        velocity=_OVERSPEED * robot.velocity_max,
-        following_error=np.array(following),
-        wheel_error_rad_s=_WHEEL_ERROR_OF_TOP
-        * robot.base.max_speed_m_s
-        / robot.base.wheel_radius_m,
-        wheel_error_ratio=_WHEEL_ERROR_OF_COMMAND,
-        servo_age_s=BY_NAME["joint_state"].deadline_s,
-        base_command_age_s=BY_NAME["base_command"].deadline_s,
-        supervisor_age_s=BY_NAME["process_table"].deadline_s,
-    )
+_NO_REASON = "a budget is exhausted"
 
 
 class Watch:
@@ -59,6 +20,8 @@ class Watch:
         self.w_rad_s = 0.0
         self._base_command = space.cell_reader("base_command")
         self._process_table = space.cell_reader("process_table")
+        self._scan = space.cell_reader("scan")
+        self._budget = BudgetWatch(space.cell_reader("budget"))
         self._servos = servos
         self._wheels = wheels
         self._clock = clock
@@ -86,6 +49,8 @@ class Watch:
         reset_requested: bool,
         setpoint: Floats,
         base_at_rest: bool,
+        standstill: bool,
+        surroundings: Surroundings,
     ) -> SafetyInputs:
         """Return the tick's measurements.
 
@@ -104,21 +69,66 @@ class Watch:
             setpoint=setpoint,
             torque_enabled=state.torque_on,
             sample_age_s=state.age_s,
+            effort_ratio=state.effort_ratio,
+            temperature_c=state.temperature_c,
+            voltage_v=state.voltage_v,
+            climate_age_s=self._climate_age_s(),
             hardware_error=state.error,
             watchdog_tripped=self._servos.watchdog_tripped if guarded else self._quiet,
             lost_servo_buses=self._servos.lost_parts,
             lost_can_buses=(self._wheels.name,) if self._wheels.lost else (),
             drives=self._wheels.samples() if energised else (),
             base_moving=energised and commanded,
+            base_powered=self._wheels.enabled,
+            standstill=standstill,
             base_command_age_s=self._base_age_s,
-            supervisor_age_s=self._supervisor_age_s(),
+            supervisor_age_s=self._age_s(self._process_table),
+            budget_stop=self._budget.reason(),
+            surroundings=surroundings,
         )
 
-    def _supervisor_age_s(self) -> float | None:
-        sample = self._process_table.latest()
+    def _climate_age_s(self) -> Floats:
+        """Return how old voltage and temperature are: polled servos tell them now and then."""
+        state = self._servos.state
+        polled = state.climate_stamp_ns >= 0
+        if not polled.any():
+            return state.age_s
+        age_s = (self._clock.now_ns() - state.climate_stamp_ns) / NS_PER_S
+        return np.where(polled, age_s, state.age_s)
+
+    def surroundings(self) -> Surroundings:
+        """Return what is known beyond joints and wheels."""
+        return Surroundings(scan_age_s=self._age_s(self._scan))
+
+    def _age_s(self, cell: CellReader) -> float | None:
+        sample = cell.latest()
         return None if sample is None else sample.age_s(self._clock.now_ns())
 
     def close(self) -> None:
         """Unmap the topics."""
         self._base_command.close()
         self._process_table.close()
+        self._scan.close()
+        self._budget.close()
+
+
+class BudgetWatch:
+    """Tell whether the supervisor's budgets demand a protective stop, and which."""
+
+    def __init__(self, cell: CellReader) -> None:
+        self._cell = cell
+        self._sequence = 0
+        self._reason: str | None = None
+
+    def reason(self) -> str | None:
+        """Return the demand as it was told last, in words, or None; silence does not end it."""
+        sample = self._cell.latest()
+        if sample is not None and sample.sequence != self._sequence:
+            self._sequence = sample.sequence
+            told = sample.document()
+            self._reason = str(told.get("reason") or _NO_REASON) if told.get("stop") else None
+        return self._reason
+
+    def close(self) -> None:
+        """Unmap the topic."""
+        self._cell.close()

@@ -163,11 +163,15 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
-    """Name joints that stop together, and how."""
+    """Name joints that stop together, and how.
+
+    A group that holds something keeps its power through a stop, unless it may `drop_payload`.
+    """
 
     name: str
     joints: tuple[str, ...]
     stop_category: StopCategory
+    drop_payload: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -176,8 +176,12 @@ def _build(document: Document, directory: Path) -> RobotDescription:
 
 
 def _group(name: str, row: Document) -> Group:
-    category = StopCategory(row["stop_category"])
-    return Group(name=name, joints=tuple(row["joints"]), stop_category=category)
+    return Group(
+        name=name,
+        joints=tuple(row["joints"]),
+        stop_category=StopCategory(row["stop_category"]),
+        drop_payload=row.get("drop_payload", False),
+    )
 
 
 def _can_bus(record: Document, directory: Path) -> CanBus:

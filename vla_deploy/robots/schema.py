@@ -191,7 +191,11 @@ LIMITS: Shape = {
     "acceleration": POSITIVE,
     "jerk": POSITIVE,
 }
-GROUP: Shape = {"joints": TEXTS, "stop_category": one_of(0, 1, 2)}
+GROUP: Shape = {
+    "joints": TEXTS,
+    "stop_category": one_of(0, 1, 2),
+    "drop_payload": one_of(False, True, is_optional=True),
+}
 HAND: Shape = {"arm": TEXT, "gripper": TEXT, "grip_site": TEXT, "opening_ratio": POSITIVE}
 HOME: Shape = {"map": TEXT, "start": TEXT, "places": TABLE, "zones": TABLES}
 FLOOR_POSE: Shape = {"x_m": NUMBER, "y_m": NUMBER, "yaw_rad": NUMBER}

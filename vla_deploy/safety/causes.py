@@ -7,24 +7,31 @@ silence where it matters, and `servo_watchdog_tripped` brings the answer back.
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
+from vla_deploy.robots.protection import ZoneKind
 from vla_deploy.safety import probes
-from vla_deploy.safety.probes import Probe
+from vla_deploy.safety import surroundings_probes as around
+from vla_deploy.safety.findings import Probe
 
 
 class Reaction(IntEnum):
     """Order what may be done about a cause, the most restrictive last.
 
-    BASE_RAMP brings the base to rest and leaves the joints alone. HOLD is stop category 2
-    everywhere: a controlled stop, power kept. BASE_OFF is HOLD for the joints, while the wheels
-    brake by themselves and lose power, for they do not do as they are told. GROUP_STOP stops every
-    joint group by the category that the robot file gives it.
+    BASE_SLOW bounds the base's speed, BASE_BLOCK forbids some of its motions as well; BASE_RAMP
+    brings it to rest; all three leave the joints alone. PROTECTIVE_STOP is a controlled stop of
+    everything under power, with monitored standstill, that ends with its cause. HOLD is the same
+    stop (category 2 everywhere) for a person to end. BASE_OFF is HOLD for the joints, while the
+    wheels brake by themselves and lose power, for they do not do as they are told. GROUP_STOP stops
+    every joint group by the category that the robot file gives it.
     """
 
     NONE = 0
-    BASE_RAMP = 1
-    HOLD = 2
-    BASE_OFF = 3
-    GROUP_STOP = 4
+    BASE_SLOW = 1
+    BASE_BLOCK = 2
+    BASE_RAMP = 3
+    PROTECTIVE_STOP = 4
+    HOLD = 5
+    BASE_OFF = 6
+    GROUP_STOP = 7
 
 
 class Cause(Enum):
@@ -32,6 +39,7 @@ class Cause(Enum):
 
     NONE = "none"
     ESTOP = "estop"
+    STANDSTILL_MOTION = "standstill_motion"
     SERVO_BUS_LOST = "servo_bus_lost"
     CAN_BUS_LOST = "can_bus_lost"
     SERVO_HARDWARE_ERROR = "servo_hardware_error"
@@ -41,8 +49,23 @@ class Cause(Enum):
     JOINT_VELOCITY_LIMIT = "joint_velocity_limit"
     FOLLOWING_ERROR = "following_error"
     WHEEL_FOLLOWING_ERROR = "wheel_following_error"
+    JOINT_CURRENT_LIMIT = "joint_current_limit"
+    JOINT_TEMPERATURE_LIMIT = "joint_temperature_limit"
+    COLLISION = "collision"
     SUPERVISOR_LOST = "supervisor_lost"
+    JOINT_VOLTAGE_LIMIT = "joint_voltage_limit"
+    SELF_COLLISION = "self_collision"
+    ENVIRONMENT_COLLISION = "environment_collision"
+    WORKSPACE = "workspace"
+    TIP_OVER = "tip_over"
+    BUDGET_EXHAUSTED = "budget_exhausted"
+    STALE_SCAN = "stale_scan"
     STALE_COMMAND = "stale_command"
+    KEEP_OUT_ZONE = "keep_out_zone"
+    OBSTACLE_STOP_ZONE = "obstacle_stop_zone"
+    OBSTACLE_SLOW_ZONE = "obstacle_slow_zone"
+    OBSTACLE_LIMIT_ZONE = "obstacle_limit_zone"
+    OBSTACLE_APPROACH = "obstacle_approach"
 
 
 class Latch(Enum):
@@ -62,12 +85,17 @@ class ResetBy(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Describe one row: `debounce_samples` consecutive findings make the cause active."""
+    """Describe one row; both counts are of control ticks.
+
+    `debounce_samples` consecutive findings make the cause active. What does not latch ends
+    `release_samples` clear ones after it was last active.
+    """
 
     cause: Cause
     reaction: Reaction
     latch: Latch
     debounce_samples: int
+    release_samples: int
     probe: Probe
     advice: str
 
@@ -78,31 +106,64 @@ class Rule:
 
 
 # Rows of equal reaction are in order of precedence: the first one found is the one reported.
+# Obstacles are debounced per scan, by the zones of the robot file; here a tick counts.
 # fmt: off
 RULES: tuple[Rule, ...] = (
-    Rule(Cause.ESTOP,                   Reaction.GROUP_STOP, Latch.ALWAYS,    1,
+    Rule(Cause.ESTOP,                   Reaction.GROUP_STOP,      Latch.ALWAYS,    1,   0,
          probes.estop, "release the button, then reset, then arm"),
-    Rule(Cause.SERVO_BUS_LOST,          Reaction.HOLD,       Latch.ENERGISED, 1,
+    Rule(Cause.STANDSTILL_MOTION,       Reaction.GROUP_STOP,      Latch.ENERGISED, 50,  0,
+         probes.standstill_motion, "something moved the robot while it had to stand: look for it"),
+    Rule(Cause.SERVO_BUS_LOST,          Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.servo_bus_lost, "check the bus cable and the servo's power"),
-    Rule(Cause.CAN_BUS_LOST,            Reaction.HOLD,       Latch.ENERGISED, 1,
+    Rule(Cause.CAN_BUS_LOST,            Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.can_bus_lost, "check the CAN cable, its termination and the drive's power"),
-    Rule(Cause.SERVO_HARDWARE_ERROR,    Reaction.HOLD,       Latch.ENERGISED, 1,
+    Rule(Cause.SERVO_HARDWARE_ERROR,    Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.servo_hardware_error, "remove the load, let the servo cool, then reboot it"),
-    Rule(Cause.DRIVE_FAULT,             Reaction.HOLD,       Latch.ENERGISED, 1,
+    Rule(Cause.DRIVE_FAULT,             Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.drive_fault, "look the code up in the drive's manual"),
-    Rule(Cause.SERVO_WATCHDOG_TRIPPED,  Reaction.HOLD,       Latch.ENERGISED, 1,
+    Rule(Cause.SERVO_WATCHDOG_TRIPPED,  Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.servo_watchdog_tripped, "control was silent on the bus: look at late_ticks"),
-    Rule(Cause.JOINT_POSITION_LIMIT,    Reaction.HOLD,       Latch.ENERGISED, 2,
+    Rule(Cause.JOINT_POSITION_LIMIT,    Reaction.HOLD,            Latch.ENERGISED, 2,   0,
          probes.joint_position_limit, "disarm and move the joint back into its range"),
-    Rule(Cause.JOINT_VELOCITY_LIMIT,    Reaction.HOLD,       Latch.ENERGISED, 5,
+    Rule(Cause.JOINT_VELOCITY_LIMIT,    Reaction.HOLD,            Latch.ENERGISED, 5,   0,
          probes.joint_velocity_limit, "something drives the joint: look for a collision or a drop"),
-    Rule(Cause.FOLLOWING_ERROR,         Reaction.HOLD,       Latch.ENERGISED, 50,
+    Rule(Cause.FOLLOWING_ERROR,         Reaction.HOLD,            Latch.ENERGISED, 50,  0,
          probes.following_error, "the joint is blocked or overloaded: disarm, then free it"),
-    Rule(Cause.WHEEL_FOLLOWING_ERROR,   Reaction.BASE_OFF,   Latch.ENERGISED, 50,
+    Rule(Cause.WHEEL_FOLLOWING_ERROR,   Reaction.BASE_OFF,        Latch.ENERGISED, 50,  0,
          probes.wheel_following_error, "look for a blocked wheel, then at its encoder's cable"),
-    Rule(Cause.SUPERVISOR_LOST,         Reaction.HOLD,       Latch.ENERGISED, 1,
+    Rule(Cause.JOINT_CURRENT_LIMIT,     Reaction.HOLD,            Latch.ENERGISED, 250, 0,
+         probes.joint_current_limit, "the joint is overloaded: disarm, then take the load off"),
+    Rule(Cause.JOINT_TEMPERATURE_LIMIT, Reaction.HOLD,            Latch.ENERGISED, 25,  0,
+         probes.joint_temperature_limit, "let the servo cool down, and give it less to hold"),
+    Rule(Cause.COLLISION,               Reaction.HOLD,            Latch.ENERGISED, 15,  0,
+         around.collision, "free whoever or whatever the arm has met"),
+    Rule(Cause.SUPERVISOR_LOST,         Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.supervisor_lost, "start the supervisor"),
-    Rule(Cause.STALE_COMMAND,           Reaction.BASE_RAMP,  Latch.NEVER,     1,
+    Rule(Cause.JOINT_VOLTAGE_LIMIT,     Reaction.PROTECTIVE_STOP, Latch.NEVER,     25,  500,
+         probes.joint_voltage_limit, "charge the battery, or check the supply"),
+    Rule(Cause.SELF_COLLISION,          Reaction.PROTECTIVE_STOP, Latch.NEVER,     2,   125,
+         around.self_collision, "move the parts away from each other"),
+    Rule(Cause.ENVIRONMENT_COLLISION,   Reaction.PROTECTIVE_STOP, Latch.NEVER,     2,   125,
+         around.environment_collision, "move the part away from what is there"),
+    Rule(Cause.WORKSPACE,               Reaction.PROTECTIVE_STOP, Latch.NEVER,     2,   125,
+         around.workspace, "bring it back into the workspace"),
+    Rule(Cause.TIP_OVER,                Reaction.PROTECTIVE_STOP, Latch.NEVER,     3,   250,
+         around.tip_over, "look at the floor, and bring the arms in"),
+    Rule(Cause.BUDGET_EXHAUSTED,        Reaction.PROTECTIVE_STOP, Latch.NEVER,     1,   250,
+         probes.budget_exhausted, "see: vla-deploy status"),
+    Rule(Cause.STALE_SCAN,              Reaction.BASE_RAMP,       Latch.NEVER,     1,   125,
+         around.stale_scan, "without its lidar the base does not drive: look at perception"),
+    Rule(Cause.STALE_COMMAND,           Reaction.BASE_RAMP,       Latch.NEVER,     1,   0,
          probes.stale_command, "the commanding process is silent"),
+    Rule(Cause.KEEP_OUT_ZONE,           Reaction.BASE_BLOCK,      Latch.NEVER,     2,   25,
+         around.keep_out, "drive out of the area"),
+    Rule(Cause.OBSTACLE_STOP_ZONE,      Reaction.BASE_BLOCK,      Latch.NEVER,     1,   25,
+         around.in_zone(ZoneKind.STOP), "clear the way, or drive the other way"),
+    Rule(Cause.OBSTACLE_SLOW_ZONE,      Reaction.BASE_SLOW,       Latch.NEVER,     1,   25,
+         around.in_zone(ZoneKind.SLOW), "clear the way"),
+    Rule(Cause.OBSTACLE_LIMIT_ZONE,     Reaction.BASE_SLOW,       Latch.NEVER,     1,   25,
+         around.in_zone(ZoneKind.LIMIT), "clear the way"),
+    Rule(Cause.OBSTACLE_APPROACH,       Reaction.BASE_SLOW,       Latch.NEVER,     1,   25,
+         around.in_zone(ZoneKind.APPROACH), "clear the way"),
 )
 # fmt: on

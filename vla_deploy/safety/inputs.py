@@ -30,7 +30,10 @@ class DriveSample:
 class SafetyInputs:
     """Carry one tick's measurements, joint arrays in the order of the robot file.
 
-    `energised` is true from arming until the robot is disarmed again.
+    `energised` is true from arming until the robot is disarmed again, `standstill` while it has to
+    stand under a stop. `effort_ratio` is of the stall current; voltage and temperature are NaN
+    before the first reading, and are read less often than the rest: `climate_age_s`.
+    `budget_stop` says which budget demands a stop.
     An age of None means that nothing has ever arrived, so there is nothing to lose yet.
     """
 
@@ -42,14 +45,21 @@ class SafetyInputs:
     setpoint: Floats
     torque_enabled: Flags
     sample_age_s: Floats
+    effort_ratio: Floats
+    temperature_c: Floats
+    voltage_v: Floats
+    climate_age_s: Floats
     hardware_error: NDArray[np.uint8]
     watchdog_tripped: Flags
     lost_servo_buses: tuple[str, ...]
     lost_can_buses: tuple[str, ...]
     drives: tuple[DriveSample, ...]
     base_moving: bool
+    base_powered: bool
+    standstill: bool
     base_command_age_s: float | None
     supervisor_age_s: float | None
+    budget_stop: str | None
     surroundings: Surroundings = NOTHING_KNOWN
 
 
@@ -59,7 +69,9 @@ class SafetyLimits:
 
     `outward_velocity` is the speed above which a joint beyond its range counts as still
     leaving it, so that the way back stays open. A wheel may be off its commanded speed by
-    `wheel_error_rad_s`, and by `wheel_error_ratio` of that speed on top.
+    `wheel_error_rad_s`, and by `wheel_error_ratio` of that speed on top. What is too close or out
+    of the workspace counts only while it gets worse by more than `approach_m_s`: the way back
+    stays open there too.
     """
 
     joint_names: tuple[str, ...]
@@ -73,3 +85,18 @@ class SafetyLimits:
     servo_age_s: float
     base_command_age_s: float
     supervisor_age_s: float
+    effort_ratio: Floats
+    temperature_c: Floats
+    voltage_min_v: Floats
+    voltage_max_v: Floats
+    standstill_velocity: Floats
+    standstill_wheel_rad_s: float
+    scan_required: bool
+    scan_age_s: float
+    keep_out_depth_m: float
+    workspace_excess_m: float
+    self_clearance_m: float
+    environment_clearance_m: float
+    approach_m_s: float
+    tip_margin_ratio: float
+    external_torque_nm: Floats

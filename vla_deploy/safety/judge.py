@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from vla_deploy.safety.causes import RULES, Cause, Latch, Reaction, Rule
+from vla_deploy.safety.findings import Finding
 from vla_deploy.safety.inputs import SafetyInputs, SafetyLimits
-from vla_deploy.safety.probes import Finding
+from vla_deploy.safety.surroundings import Direction
 
 
 class ResetOutcome(Enum):
@@ -19,7 +20,11 @@ class ResetOutcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """Say what must be done and why; `latched` stays until a person resets it."""
+    """Say what must be done and why; `latched` stays until a person resets it.
+
+    `speed_ratio` bounds the base to that share of its top speeds, `blocked` are the motions that it
+    may not make; both are what every active cause leaves, not only the one that is named.
+    """
 
     reaction: Reaction
     cause: Cause
@@ -29,6 +34,8 @@ class Verdict:
     limit: float = math.nan
     age_s: float = 0.0
     advice: str = ""
+    speed_ratio: float = 1.0
+    blocked: frozenset[Direction] = frozenset()
     reset: ResetOutcome = ResetOutcome.NOT_ASKED
 
     @property
@@ -45,16 +52,32 @@ _NO_COUNTS = (0,) * len(RULES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Lingering:
+    """Carry a verdict that ends by itself, after `left` more clear ticks."""
+
+    verdict: Verdict
+    left: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyState:
-    """Carry what outlives a tick: findings in a row per rule, and the latched verdicts in order."""
+    """Carry what outlives a tick.
+
+    `counts` are findings in a row per rule; `latched` verdicts are in the order in which they came.
+    """
 
     counts: tuple[int, ...] = _NO_COUNTS
     latched: tuple[Verdict, ...] = ()
+    lingering: tuple[Lingering, ...] = ()
 
     @property
     def estop_latched(self) -> bool:
         """Tell whether an emergency stop waits for its reset."""
         return any(verdict.cause is Cause.ESTOP for verdict in self.latched)
+
+
+_FRESH = SafetyState()
+_Found = dict[Cause, Finding]
 
 
 def evaluate(
@@ -65,34 +88,44 @@ def evaluate(
     A reset is refused while any latched cause is still found; it never arms anything.
     """
     findings = [rule.probe(inputs, limits) for rule in RULES]
-    if state == _FRESH and not any(findings) and not inputs.reset_requested:
+    if state == _FRESH and not inputs.reset_requested and not any(findings):
         return state, CLEAR
-    latched, outcome = _reset(state.latched, findings, inputs.reset_requested)
-    counts = tuple(
-        0 if finding is None else min(count + 1, rule.debounce_samples)
-        for rule, finding, count in zip(RULES, findings, state.counts, strict=True)
+    found = {
+        rule.cause: finding
+        for rule, finding in zip(RULES, findings, strict=True)
+        if finding is not None
+    }
+    counts = _counted(state.counts, found)
+    active = _active(counts, found, inputs.energised)
+    latched, outcome = _reset(state.latched, found, inputs.reset_requested)
+    latched += _newly_latched(latched, active)
+    lingering = _lingering(state.lingering, active, found)
+    in_force = (*latched, *active, *(one.verdict for one in lingering))
+    after = SafetyState(counts=counts, latched=latched, lingering=lingering)
+    return after, _merged(in_force, outcome)
+
+
+def _counted(counts: tuple[int, ...], found: _Found) -> tuple[int, ...]:
+    return tuple(
+        min(count + 1, rule.debounce_samples) if rule.cause in found else 0
+        for rule, count in zip(RULES, counts, strict=True)
     )
-    active = [
-        _verdict(rule, finding, inputs.energised)
-        for rule, finding, count in zip(RULES, findings, counts, strict=True)
-        if finding is not None and count >= rule.debounce_samples
-    ]
-    latched = latched + _newly_latched(latched, active)
-    return SafetyState(counts=counts, latched=latched), _worst((*latched, *active), outcome)
 
 
-_FRESH = SafetyState()
+def _active(counts: tuple[int, ...], found: _Found, energised: bool) -> tuple[Verdict, ...]:
+    return tuple(
+        _verdict(rule, found[rule.cause], energised)
+        for rule, count in zip(RULES, counts, strict=True)
+        if count >= rule.debounce_samples
+    )
 
 
 def _reset(
-    latched: tuple[Verdict, ...], findings: list[Finding | None], requested: bool
+    latched: tuple[Verdict, ...], found: _Found, requested: bool
 ) -> tuple[tuple[Verdict, ...], ResetOutcome]:
     if not requested:
         return latched, ResetOutcome.NOT_ASKED
-    present = {
-        rule.cause for rule, finding in zip(RULES, findings, strict=True) if finding is not None
-    }
-    if any(verdict.cause in present for verdict in latched):
+    if any(verdict.cause in found for verdict in latched):
         return latched, ResetOutcome.REFUSED
     return (), ResetOutcome.DONE
 
@@ -107,14 +140,50 @@ def _verdict(rule: Rule, finding: Finding, energised: bool) -> Verdict:
         limit=finding.limit,
         age_s=finding.age_s,
         advice=rule.advice,
+        speed_ratio=finding.speed_ratio if rule.reaction < Reaction.BASE_RAMP else 0.0,
+        blocked=finding.blocked,
     )
 
 
-def _newly_latched(latched: tuple[Verdict, ...], active: list[Verdict]) -> tuple[Verdict, ...]:
+def _newly_latched(
+    latched: tuple[Verdict, ...], active: tuple[Verdict, ...]
+) -> tuple[Verdict, ...]:
     known = {verdict.cause for verdict in latched}
     return tuple(v for v in active if v.latched and v.cause not in known)
 
 
-def _worst(verdicts: tuple[Verdict, ...], outcome: ResetOutcome) -> Verdict:
-    """Pick the most restrictive; among equals the oldest, which is the root cause."""
-    return replace(max(verdicts, key=lambda v: v.reaction, default=CLEAR), reset=outcome)
+def _lingering(
+    before: tuple[Lingering, ...], active: tuple[Verdict, ...], found: _Found
+) -> tuple[Lingering, ...]:
+    """Count each down in clear ticks in a row; a finding starts it anew."""
+    begun = tuple(
+        Lingering(verdict=verdict, left=_RELEASE[verdict.cause])
+        for verdict in active
+        if _RELEASE[verdict.cause] > 0
+    )
+    causes = {verdict.cause for verdict in active}
+    waiting = (
+        replace(
+            one, left=_RELEASE[one.verdict.cause] if one.verdict.cause in found else one.left - 1
+        )
+        for one in before
+        if one.verdict.cause not in causes
+    )
+    return begun + tuple(one for one in waiting if one.left > 0)
+
+
+_RELEASE = {rule.cause: rule.release_samples for rule in RULES}
+
+
+def _merged(verdicts: tuple[Verdict, ...], outcome: ResetOutcome) -> Verdict:
+    """Pick the most restrictive, among equals the oldest, which is the root cause.
+
+    What the others forbid the base stays forbidden.
+    """
+    worst = max(verdicts, key=lambda verdict: verdict.reaction, default=CLEAR)
+    return replace(
+        worst,
+        speed_ratio=min((verdict.speed_ratio for verdict in verdicts), default=1.0),
+        blocked=frozenset().union(*(verdict.blocked for verdict in verdicts)),
+        reset=outcome,
+    )

@@ -1,27 +1,13 @@
 """Find each cause in one tick's inputs: one pure function per cause, None when it is absent."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from vla_deploy.safety.inputs import Flags, Floats, SafetyInputs, SafetyLimits
+from vla_deploy.safety.findings import Finding, first_joint, stale
+from vla_deploy.safety.inputs import Floats, SafetyInputs, SafetyLimits
 
 EVERY_SERVO: Final = "every servo"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """Say who is affected, what was measured and what was allowed; NaN where no number applies."""
-
-    subject: str
-    measured: float = float("nan")
-    limit: float = float("nan")
-    age_s: float = 0.0
-
-
-Probe = Callable[[SafetyInputs, SafetyLimits], Finding | None]
 
 
 def estop(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
@@ -35,26 +21,55 @@ def joint_position_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding 
     below = (inputs.position < limits.position_lower) & (inputs.velocity < -limits.outward_velocity)
     outside = (above | below) & inputs.torque_enabled
     bound = np.where(above, limits.position_upper, limits.position_lower)
-    return _first_joint(outside, inputs.position, bound, limits)
+    return first_joint(outside, inputs.position, bound, inputs.sample_age_s, limits)
 
 
 def joint_velocity_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a powered joint that is faster than allowed."""
-    speed = np.abs(inputs.velocity)
-    return _first_joint(
-        (speed > limits.velocity) & inputs.torque_enabled, speed, limits.velocity, limits
-    )
+    return _powered_above(np.abs(inputs.velocity), limits.velocity, inputs, limits)
 
 
 def following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a powered joint that is too far from its setpoint."""
     error = np.abs(inputs.position - inputs.setpoint)
-    return _first_joint(
-        (error > limits.following_error) & inputs.torque_enabled,
-        error,
-        limits.following_error,
-        limits,
+    return _powered_above(error, limits.following_error, inputs, limits)
+
+
+def joint_current_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a powered joint whose motor takes more of its stall current than allowed."""
+    return _powered_above(np.abs(inputs.effort_ratio), limits.effort_ratio, inputs, limits)
+
+
+def joint_temperature_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a servo that is hotter than allowed; its own shutdown comes later."""
+    hot = inputs.temperature_c > limits.temperature_c
+    return first_joint(
+        hot, inputs.temperature_c, limits.temperature_c, inputs.climate_age_s, limits
     )
+
+
+def joint_voltage_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a servo whose supply is lower or higher than allowed."""
+    low = inputs.voltage_v < limits.voltage_min_v
+    high = inputs.voltage_v > limits.voltage_max_v
+    bound = np.where(low, limits.voltage_min_v, limits.voltage_max_v)
+    return first_joint(low | high, inputs.voltage_v, bound, inputs.climate_age_s, limits)
+
+
+def standstill_motion(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find what moves under power while the robot has to stand still."""
+    if not inputs.standstill:
+        return None
+    for drive in inputs.drives if inputs.base_powered else ():
+        speed = abs(drive.measured_rad_s)
+        if speed > limits.standstill_wheel_rad_s:
+            return Finding(
+                subject=drive.name,
+                measured=speed,
+                limit=limits.standstill_wheel_rad_s,
+                age_s=drive.age_s,
+            )
+    return _powered_above(np.abs(inputs.velocity), limits.standstill_velocity, inputs, limits)
 
 
 def wheel_following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
@@ -63,7 +78,7 @@ def wheel_following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding
         error = abs(drive.measured_rad_s - drive.commanded_rad_s)
         allowed = limits.wheel_error_rad_s + limits.wheel_error_ratio * abs(drive.commanded_rad_s)
         if error > allowed:
-            return Finding(subject=drive.name, measured=error, limit=allowed)
+            return Finding(subject=drive.name, measured=error, limit=allowed, age_s=drive.age_s)
     return None
 
 
@@ -73,7 +88,10 @@ def servo_hardware_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding 
         return None
     joint = int(inputs.hardware_error.argmax())
     return Finding(
-        subject=limits.joint_names[joint], measured=float(inputs.hardware_error[joint]), limit=0.0
+        subject=limits.joint_names[joint],
+        measured=float(inputs.hardware_error[joint]),
+        limit=0.0,
+        age_s=float(inputs.sample_age_s[joint]),
     )
 
 
@@ -101,7 +119,8 @@ def servo_watchdog_tripped(inputs: SafetyInputs, limits: SafetyLimits) -> Findin
     """Find a servo whose Bus Watchdog has stopped it."""
     if not inputs.watchdog_tripped.any():
         return None
-    return Finding(subject=limits.joint_names[int(inputs.watchdog_tripped.argmax())])
+    joint = int(inputs.watchdog_tripped.argmax())
+    return Finding(subject=limits.joint_names[joint], age_s=float(inputs.sample_age_s[joint]))
 
 
 def can_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
@@ -118,13 +137,18 @@ def drive_fault(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a wheel drive that reports a fault."""
     for drive in inputs.drives:
         if drive.fault_code != 0:
-            return Finding(subject=drive.name, measured=float(drive.fault_code), limit=0.0)
+            return Finding(
+                subject=drive.name,
+                measured=float(drive.fault_code),
+                limit=0.0,
+                age_s=drive.age_s,
+            )
     return None
 
 
 def stale_command(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a moving base whose command is too old."""
-    return _stale(
+    return stale(
         "base_command",
         inputs.base_command_age_s if inputs.base_moving else None,
         limits.base_command_age_s,
@@ -133,23 +157,16 @@ def stale_command(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 def supervisor_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a process table that its supervisor no longer refreshes."""
-    return _stale("supervisor", inputs.supervisor_age_s, limits.supervisor_age_s)
+    return stale("supervisor", inputs.supervisor_age_s, limits.supervisor_age_s)
 
 
-def _stale(subject: str, age_s: float | None, limit_s: float) -> Finding | None:
-    if age_s is None or age_s <= limit_s:
-        return None
-    return Finding(subject=subject, measured=age_s, limit=limit_s, age_s=age_s)
+def budget_exhausted(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a budget whose last step is the protective stop."""
+    return None if inputs.budget_stop is None else Finding(subject=inputs.budget_stop)
 
 
-def _first_joint(
-    mask: Flags, measured: Floats, limit: Floats, limits: SafetyLimits
+def _powered_above(
+    measured: Floats, limit: Floats, inputs: SafetyInputs, limits: SafetyLimits
 ) -> Finding | None:
-    if not mask.any():
-        return None
-    joint = int(mask.argmax())
-    return Finding(
-        subject=limits.joint_names[joint],
-        measured=float(measured[joint]),
-        limit=float(limit[joint]),
-    )
+    beyond = (measured > limit) & inputs.torque_enabled
+    return first_joint(beyond, measured, limit, inputs.sample_age_s, limits)

@@ -12,6 +12,28 @@ from platforms import load_profile
 from sim_twin.lockstep import Lockstep
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc.topics import SCAN_BEAMS
+
+
+class EmptyFloor:
+    """Tell the scan of a lidar with nothing around it, as long as it `sees`."""
+
+    period_s = 0.1
+
+    def __init__(self, space: SharedSpace) -> None:
+        self.sees = True
+        self._scan = space.cell_writer("scan")
+
+    def start(self) -> None:
+        """Have nothing to open."""
+
+    def step(self) -> None:
+        """Put one scan."""
+        if self.sees:
+            self._scan.put(range_m=np.full(SCAN_BEAMS, 8.0))
+
+    def stop(self) -> None:
+        """Have nothing to close."""
 
 
 class Rig:
@@ -29,6 +51,8 @@ class Rig:
         self._status = space.cell_reader("control_status")
         self._base_command = space.cell_writer("base_command")
         self.process_table = space.cell_writer("process_table")
+        self.lidar = EmptyFloor(space)
+        self.space = space
         self.control = self.new_control()
 
     def new_control(self) -> ControlNode:
@@ -37,6 +61,7 @@ class Rig:
 
     def boot(self) -> None:
         """Start control and let the arms, without power, come to rest."""
+        self.lockstep.add(self.lidar)
         self.lockstep.add(self.control)
         self.run(2.5)
 

@@ -17,6 +17,8 @@ CALM: dict[str, Any] = {
     "at_rest": False,
 }
 STOP: dict[str, Any] = {"reaction": Reaction.HOLD, "latched": True}
+PAUSE: dict[str, Any] = {"reaction": Reaction.PROTECTIVE_STOP}
+PAUSES = (Mode.PAUSING, Mode.PAUSED)
 
 
 @pytest.mark.parametrize(
@@ -36,6 +38,22 @@ STOP: dict[str, Any] = {"reaction": Reaction.HOLD, "latched": True}
         (Mode.ARMED, {"reaction": Reaction.BASE_RAMP}, Mode.ARMED),
         (Mode.ARMED, {"disarm": True}, Mode.DISARMING),
         (Mode.ARMED, {"disarm": True, **STOP}, Mode.STOPPING),
+        (Mode.ARMED, PAUSE, Mode.PAUSING),
+        (Mode.ARMED, {"disarm": True, **PAUSE}, Mode.DISARMING),
+        (Mode.PAUSING, PAUSE, Mode.PAUSING),
+        (Mode.PAUSING, {}, Mode.PAUSING),
+        (Mode.PAUSING, {"at_rest": True, **PAUSE}, Mode.PAUSED),
+        (Mode.PAUSING, {"at_rest": True}, Mode.PAUSED),
+        (Mode.PAUSING, {"at_rest": True, **STOP}, Mode.STOPPING),
+        (Mode.PAUSED, {"at_rest": True, **PAUSE}, Mode.PAUSED),
+        (Mode.PAUSED, {}, Mode.ARMED),
+        (Mode.PAUSED, {"reaction": Reaction.BASE_RAMP}, Mode.ARMED),
+        (Mode.PAUSED, {"arm": True, **PAUSE}, Mode.PAUSED),
+        (Mode.PAUSED, {"disarm": True, **PAUSE}, Mode.DISARMING),
+        (Mode.PAUSED, STOP, Mode.STOPPING),
+        (Mode.ARMING, {"armed": True, **PAUSE}, Mode.ARMED),
+        (Mode.DISARMED, {"arm": True, **PAUSE}, Mode.ARMING),
+        (Mode.STOPPED, PAUSE, Mode.DISARMED),
         (Mode.DISARMING, {}, Mode.DISARMING),
         (Mode.DISARMING, {"at_rest": True}, Mode.DISARMED),
         (Mode.DISARMING, {"at_rest": True, **STOP}, Mode.STOPPING),
@@ -66,10 +84,16 @@ def every_input() -> list[ModeInputs]:
     ]
 
 
-def test_only_arming_leads_to_armed() -> None:
+def test_only_arming_and_the_end_of_a_pause_lead_to_armed() -> None:
     for mode, inputs in itertools.product(Mode, every_input()):
         if next_mode(mode, inputs) is Mode.ARMED:
-            assert mode in (Mode.ARMING, Mode.ARMED)
+            assert mode in (Mode.ARMING, Mode.ARMED, Mode.PAUSED)
+
+
+def test_only_an_armed_robot_is_paused() -> None:
+    for mode, inputs in itertools.product(Mode, every_input()):
+        if next_mode(mode, inputs) in PAUSES:
+            assert mode in (Mode.ARMED, *PAUSES)
 
 
 def test_no_mode_keeps_moving_under_a_latched_stop() -> None:
@@ -80,6 +104,6 @@ def test_no_mode_keeps_moving_under_a_latched_stop() -> None:
 
 def test_the_status_speaks_the_documented_words() -> None:
     words = {status_name(mode, reaction) for mode in Mode for reaction in Reaction}
-    assert words == {"disarmed", "armed", "stopping", "stopped", "fault"}
+    assert words == {"disarmed", "armed", "stopping", "stopped", "fault", "protective_stop"}
     assert status_name(Mode.DISARMED, Reaction.HOLD) == "fault"
     assert status_name(Mode.STOPPED, Reaction.HOLD) == "stopped"

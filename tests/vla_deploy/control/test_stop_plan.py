@@ -32,7 +32,7 @@ def test_an_estop_takes_power_from_category_1_at_rest_only(robot: RobotDescripti
     assert len(plan.unpowered_at_once(Reaction.GROUP_STOP)) == 0
     head = {"head_pan", "head_tilt"}
     assert names(robot, plan.unpowered_at_rest(Reaction.GROUP_STOP)) == head
-    assert names(robot, plan.released) == head
+    assert names(robot, plan.released()) == head
     assert plan.base_category(Reaction.GROUP_STOP) is StopCategory.STOP_THEN_REMOVE_POWER
 
 

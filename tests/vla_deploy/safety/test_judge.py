@@ -9,11 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vla_deploy.robots.protection import ZoneKind
 from vla_deploy.safety import (
     CLEAR,
+    NOTHING_KNOWN,
     RULES,
     Cause,
+    Clearance,
+    Direction,
     DriveSample,
+    Excess,
+    KeepOut,
     Latch,
     Reaction,
     ResetBy,
@@ -22,7 +28,9 @@ from vla_deploy.safety import (
     SafetyInputs,
     SafetyLimits,
     SafetyState,
+    Surroundings,
     Verdict,
+    ZoneFinding,
     evaluate,
 )
 
@@ -38,6 +46,21 @@ LIMITS = SafetyLimits(
     servo_age_s=0.02,
     base_command_age_s=0.25,
     supervisor_age_s=3.0,
+    effort_ratio=np.array([0.5, 0.75]),
+    temperature_c=np.array([75.0, 67.0]),
+    voltage_min_v=np.array([9.5, 6.5]),
+    voltage_max_v=np.array([15.5, 15.75]),
+    standstill_velocity=np.array([0.125, 0.25]),
+    standstill_wheel_rad_s=0.125,
+    scan_required=True,
+    scan_age_s=0.5,
+    keep_out_depth_m=0.0,
+    workspace_excess_m=0.0,
+    self_clearance_m=0.005,
+    environment_clearance_m=0.01,
+    approach_m_s=0.005,
+    tip_margin_ratio=0.25,
+    external_torque_nm=np.array([2.0, np.inf]),
 )
 LEFT = DriveSample(
     name="left_wheel",
@@ -47,6 +70,7 @@ LEFT = DriveSample(
     commanded_rad_s=0.0,
     measured_rad_s=0.0,
 )
+SEEN = Surroundings(scan_age_s=0.0, depth_age_s=0.0)
 HEALTHY = SafetyInputs(
     energised=True,
     estop_source=None,
@@ -56,14 +80,22 @@ HEALTHY = SafetyInputs(
     setpoint=np.array([0.0, 1.0]),
     torque_enabled=np.array([True, True]),
     sample_age_s=np.zeros(2),
+    effort_ratio=np.zeros(2),
+    temperature_c=np.array([30.0, 30.0]),
+    voltage_v=np.array([12.0, 12.0]),
+    climate_age_s=np.array([0.1, 0.2]),
     hardware_error=np.zeros(2, dtype=np.uint8),
     watchdog_tripped=np.array([False, False]),
     lost_servo_buses=(),
     lost_can_buses=(),
     drives=(LEFT, replace(LEFT, name="right_wheel")),
     base_moving=True,
+    base_powered=True,
+    standstill=False,
     base_command_age_s=0.0,
     supervisor_age_s=0.0,
+    budget_stop=None,
+    surroundings=SEEN,
 )
 ULP = 1e-12
 
@@ -74,6 +106,37 @@ def right(**changes: Any) -> dict[str, Any]:
 
 def turning(commanded_rad_s: float, measured_rad_s: float) -> dict[str, Any]:
     return right(commanded_rad_s=commanded_rad_s, measured_rad_s=measured_rad_s)
+
+
+def around(**changes: Any) -> dict[str, Any]:
+    return {"around": changes}
+
+
+def zone(kind: ZoneKind, name: str = "near", **changes: Any) -> ZoneFinding:
+    fields = {"points": 3, "distance_m": 0.4, "speed_ratio": 0.5} | changes
+    return ZoneFinding(kind=kind, name=name, **fields)
+
+
+def excess(excess_m: float, rate_m_s: float) -> dict[str, Any]:
+    return around(workspace=Excess(subject="left hand", excess_m=excess_m, rate_m_s=rate_m_s))
+
+
+def close_by(which: str, distance_m: float, closing_m_s: float) -> dict[str, Any]:
+    pair = Clearance(first="hand", second="head", distance_m=distance_m, closing_m_s=closing_m_s)
+    return around(**{which: pair})
+
+
+def within(depth_m: float) -> dict[str, Any]:
+    area = KeepOut(name="pet corner", depth_m=depth_m, blocked=(Direction.FORWARD,))
+    return around(keep_out=area)
+
+
+def pushed(shoulder_nm: float, elbow_nm: float = 99.0, **changes: Any) -> dict[str, Any]:
+    return around(external_torque_nm=np.array([shoulder_nm, elbow_nm])) | changes
+
+
+def standing(**changes: Any) -> dict[str, Any]:
+    return {"standstill": True, **changes}
 
 
 def at(position: float, velocity: float) -> dict[str, Any]:
@@ -159,6 +222,129 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         {"base_command_age_s": 9.0, "base_moving": False},
         "base_command",
     ),
+    (
+        Cause.STANDSTILL_MOTION,
+        standing(velocity=np.array([0.125 + ULP, 0.25])),
+        standing(velocity=np.array([0.125, 0.25])),
+        "shoulder",
+    ),
+    (
+        Cause.STANDSTILL_MOTION,
+        standing(velocity=np.array([0.0, -0.25 - ULP])),
+        {"velocity": np.array([0.0, -0.25 - ULP])},
+        "elbow",
+    ),
+    (
+        Cause.STANDSTILL_MOTION,
+        standing(**turning(0.0, -0.125 - ULP)),
+        standing(**turning(0.0, -0.125)),
+        "right_wheel",
+    ),
+    (
+        Cause.STANDSTILL_MOTION,
+        standing(**turning(0.0, 0.2)),
+        standing(**turning(0.0, 0.2), base_powered=False),
+        "right_wheel",
+    ),
+    (
+        Cause.JOINT_CURRENT_LIMIT,
+        {"effort_ratio": np.array([-0.5 - ULP, 0.75])},
+        {"effort_ratio": np.array([-0.5, 0.75])},
+        "shoulder",
+    ),
+    (
+        Cause.JOINT_CURRENT_LIMIT,
+        {"effort_ratio": np.array([0.5, 0.75 + ULP])},
+        {"effort_ratio": np.array([0.9, 0.75]), "torque_enabled": np.array([False, True])},
+        "elbow",
+    ),
+    (
+        Cause.JOINT_TEMPERATURE_LIMIT,
+        {"temperature_c": np.array([75.0, 67.0 + ULP * 100])},
+        {"temperature_c": np.array([75.0, 67.0])},
+        "elbow",
+    ),
+    (
+        Cause.JOINT_TEMPERATURE_LIMIT,
+        {"temperature_c": np.array([80.0, np.nan])},
+        {"temperature_c": np.array([np.nan, np.nan])},
+        "shoulder",
+    ),
+    (
+        Cause.JOINT_VOLTAGE_LIMIT,
+        {"voltage_v": np.array([9.5 - ULP * 10, 12.0])},
+        {"voltage_v": np.array([9.5, 6.5])},
+        "shoulder",
+    ),
+    (
+        Cause.JOINT_VOLTAGE_LIMIT,
+        {"voltage_v": np.array([15.5, 15.75 + ULP * 10])},
+        {"voltage_v": np.array([15.5, 15.75])},
+        "elbow",
+    ),
+    (
+        Cause.JOINT_VOLTAGE_LIMIT,
+        {"voltage_v": np.array([np.nan, 0.0])},
+        {"voltage_v": np.array([np.nan, np.nan])},
+        "elbow",
+    ),
+    (Cause.BUDGET_EXHAUSTED, {"budget_stop": "memory"}, {"budget_stop": None}, "memory"),
+    (Cause.COLLISION, pushed(-2.0 - ULP), pushed(-2.0), "shoulder"),
+    (
+        Cause.COLLISION,
+        pushed(2.0 + ULP),
+        pushed(2.5, torque_enabled=np.array([False, True])),
+        "shoulder",
+    ),
+    (
+        Cause.SELF_COLLISION,
+        close_by("self_clearance", 0.005 - ULP, 0.006),
+        close_by("self_clearance", 0.005, 0.006),
+        "hand and head",
+    ),
+    (
+        Cause.SELF_COLLISION,
+        close_by("self_clearance", 0.004, 0.005 + ULP),
+        close_by("self_clearance", 0.004, 0.005),
+        "hand and head",
+    ),
+    (
+        Cause.ENVIRONMENT_COLLISION,
+        close_by("environment_clearance", 0.01 - ULP, 0.006),
+        close_by("environment_clearance", 0.01, 0.006),
+        "hand and head",
+    ),
+    (
+        Cause.ENVIRONMENT_COLLISION,
+        close_by("environment_clearance", -0.002, 0.005 + ULP),
+        close_by("environment_clearance", -0.002, 0.005),
+        "hand and head",
+    ),
+    (Cause.WORKSPACE, excess(ULP, 0.006), excess(0.0, 0.006), "left hand"),
+    (Cause.WORKSPACE, excess(0.1, 0.005 + ULP), excess(0.1, 0.005), "left hand"),
+    (
+        Cause.TIP_OVER,
+        around(tip_margin_ratio=0.25 - ULP),
+        around(tip_margin_ratio=0.25),
+        "balance",
+    ),
+    (Cause.STALE_SCAN, around(scan_age_s=0.5 + ULP), around(scan_age_s=0.5), "scan"),
+    (
+        Cause.STALE_SCAN,
+        around(scan_age_s=None),
+        around(scan_age_s=None) | {"base_moving": False},
+        "scan",
+    ),
+    (Cause.KEEP_OUT_ZONE, within(ULP), within(0.0), "pet corner"),
+    (
+        Cause.OBSTACLE_STOP_ZONE,
+        around(zones=(zone(ZoneKind.STOP, blocked=(Direction.FORWARD,)),)),
+        around(zones=()),
+        "near",
+    ),
+    (Cause.OBSTACLE_SLOW_ZONE, around(zones=(zone(ZoneKind.SLOW),)), around(zones=()), "near"),
+    (Cause.OBSTACLE_LIMIT_ZONE, around(zones=(zone(ZoneKind.LIMIT),)), around(zones=()), "near"),
+    (Cause.OBSTACLE_APPROACH, around(zones=(zone(ZoneKind.APPROACH),)), around(zones=()), "near"),
 )
 BY_CAUSE = {rule.cause: rule for rule in RULES}
 SPOILERS = {cause: changes for cause, changes, _, _ in reversed(BOUNDARIES)}
@@ -166,8 +352,14 @@ cases = pytest.mark.parametrize(("cause", "bad", "good", "subject"), BOUNDARIES)
 rules = pytest.mark.parametrize("rule", RULES, ids=[rule.cause.value for rule in RULES])
 
 
+def inputs_with(changes: dict[str, Any]) -> SafetyInputs:
+    own = {name: value for name, value in changes.items() if name != "around"}
+    surroundings = replace(SEEN, **changes.get("around", {}))
+    return replace(HEALTHY, **own, surroundings=surroundings)
+
+
 def tick(state: SafetyState, **changes: Any) -> tuple[SafetyState, Verdict]:
-    return evaluate(state, replace(HEALTHY, **changes), LIMITS)
+    return evaluate(state, inputs_with(changes), LIMITS)
 
 
 def ticks(state: SafetyState, count: int, **changes: Any) -> tuple[SafetyState, Verdict]:
@@ -206,7 +398,7 @@ def test_a_cause_is_found_just_beyond_its_limit(
 def test_a_cause_is_not_found_at_its_limit(
     cause: Cause, bad: dict[str, Any], good: dict[str, Any], subject: str
 ) -> None:
-    _, verdict = ticks(SafetyState(), 60, **good)
+    _, verdict = ticks(SafetyState(), BY_CAUSE[cause].debounce_samples, **good)
     assert verdict is CLEAR
 
 
@@ -229,7 +421,7 @@ def test_one_good_sample_starts_the_debounce_again(rule: Rule) -> None:
 @rules
 def test_a_latched_cause_outlives_itself_until_reset(rule: Rule) -> None:
     state, _ = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
-    state, verdict = ticks(state, 100)
+    state, verdict = ticks(state, max(100, rule.release_samples))
     latches = rule.latch is not Latch.NEVER
     assert verdict.cause is (rule.cause if latches else Cause.NONE)
     assert verdict.latched is latches
@@ -259,7 +451,125 @@ def test_only_the_estop_latches_while_nothing_is_energised(rule: Rule) -> None:
 
 def test_what_latches_waits_for_the_operator_and_the_rest_does_not() -> None:
     automatic = {rule.cause for rule in RULES if rule.reset_by is ResetBy.AUTOMATIC}
-    assert automatic == {Cause.STALE_COMMAND}
+    assert automatic == {
+        rule.cause
+        for rule in RULES
+        if rule.reaction in range(Reaction.BASE_SLOW, Reaction.PROTECTIVE_STOP + 1)
+    }
+    assert {rule.cause for rule in RULES if rule.latch is Latch.ALWAYS} == {Cause.ESTOP}
+
+
+automatic_rules = pytest.mark.parametrize(
+    "rule",
+    [rule for rule in RULES if rule.release_samples > 0],
+    ids=lambda rule: rule.cause.value,
+)
+
+
+@automatic_rules
+def test_what_ends_by_itself_ends_when_it_was_gone_for_its_time(rule: Rule) -> None:
+    state, _ = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
+    state, verdict = ticks(state, rule.release_samples - 1)
+    assert (verdict.cause, verdict.latched) == (rule.cause, False)
+    state, verdict = tick(state)
+    assert verdict == CLEAR
+    assert state == SafetyState()
+
+
+@automatic_rules
+def test_a_cause_that_comes_back_starts_its_release_again(rule: Rule) -> None:
+    state, _ = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
+    state, _ = ticks(state, rule.release_samples - 1)
+    state, _ = ticks(state, rule.debounce_samples, **SPOILERS[rule.cause])
+    state, verdict = ticks(state, rule.release_samples - 1)
+    assert verdict.cause is rule.cause
+
+
+def test_a_flickering_cause_does_not_run_its_release_down() -> None:
+    state, _ = ticks(SafetyState(), 25, **SPOILERS[Cause.JOINT_VOLTAGE_LIMIT])
+    for _ in range(20):
+        state, _ = tick(state, **SPOILERS[Cause.JOINT_VOLTAGE_LIMIT])
+        state, verdict = tick(state)
+        assert verdict.cause is Cause.JOINT_VOLTAGE_LIMIT
+    left = [one.left for one in state.lingering]
+    assert left == [499]
+
+
+def test_a_flicker_below_the_debounce_starts_the_release_again() -> None:
+    state, _ = ticks(SafetyState(), 25, **SPOILERS[Cause.JOINT_VOLTAGE_LIMIT])
+    state, _ = ticks(state, 10)
+    assert [one.left for one in state.lingering] == [490]
+    state, _ = ticks(state, 24, **SPOILERS[Cause.JOINT_VOLTAGE_LIMIT])
+    assert [one.left for one in state.lingering] == [500]
+
+
+def test_a_reset_does_not_end_what_ends_by_itself() -> None:
+    state, _ = tick(SafetyState(), budget_stop="memory")
+    _, verdict = tick(state, reset_requested=True)
+    assert (verdict.cause, verdict.reset) == (Cause.BUDGET_EXHAUSTED, ResetOutcome.DONE)
+
+
+@rules
+def test_what_brings_the_base_to_rest_leaves_it_no_speed(rule: Rule) -> None:
+    _, verdict = ticks(SafetyState(), rule.debounce_samples, **SPOILERS[rule.cause])
+    assert (verdict.speed_ratio == 0.0) is (rule.reaction >= Reaction.BASE_RAMP)
+
+
+def test_zones_of_one_kind_leave_the_least_speed_and_name_the_nearest() -> None:
+    far = zone(ZoneKind.SLOW, "far", distance_m=0.9, speed_ratio=0.2)
+    near = zone(ZoneKind.SLOW, "near", distance_m=0.3, speed_ratio=0.6)
+    _, verdict = tick(SafetyState(), **around(zones=(far, near), scan_age_s=0.2))
+    assert (verdict.subject, verdict.measured, verdict.speed_ratio) == ("near", 0.3, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("scan_age_s", "depth_age_s", "age_s"), [(0.2, 0.1, 0.1), (0.2, None, 0.2), (None, None, 0.0)]
+)
+def test_a_zone_tells_the_age_of_the_newest_points(
+    scan_age_s: float | None, depth_age_s: float | None, age_s: float
+) -> None:
+    ages = {"scan_age_s": scan_age_s, "depth_age_s": depth_age_s}
+    changes = around(zones=(zone(ZoneKind.SLOW),), **ages) | {"base_moving": False}
+    assert tick(SafetyState(), **changes)[1].age_s == age_s
+
+
+def test_every_active_zone_bounds_the_base_whichever_is_named() -> None:
+    ahead = zone(ZoneKind.STOP, blocked=(Direction.FORWARD,), speed_ratio=1.0)
+    beside = zone(ZoneKind.STOP, blocked=(Direction.TURN_LEFT,), speed_ratio=1.0)
+    slow = zone(ZoneKind.SLOW, speed_ratio=0.3)
+    _, verdict = tick(SafetyState(), **around(zones=(slow, ahead, beside)))
+    assert verdict.cause is Cause.OBSTACLE_STOP_ZONE
+    assert verdict.speed_ratio == 0.3
+    assert verdict.blocked == {Direction.FORWARD, Direction.TURN_LEFT}
+
+
+def test_the_way_out_of_a_keep_out_area_stays_open() -> None:
+    _, verdict = ticks(SafetyState(), 2, **within(0.1))
+    assert verdict.blocked == {Direction.FORWARD}
+    assert verdict.speed_ratio == 1.0
+
+
+def test_a_robot_without_a_lidar_may_drive() -> None:
+    blind = inputs_with(around(scan_age_s=None))
+    _, verdict = evaluate(SafetyState(), blind, replace(LIMITS, scan_required=False))
+    assert verdict is CLEAR
+
+
+def test_a_scan_that_never_came_is_infinitely_old() -> None:
+    _, verdict = tick(SafetyState(), **around(scan_age_s=None))
+    assert verdict.measured == verdict.age_s == np.inf
+
+
+def test_nothing_known_of_the_surroundings_forbids_nothing_but_driving_blind() -> None:
+    nothing = replace(HEALTHY, surroundings=NOTHING_KNOWN)
+    assert evaluate(SafetyState(), nothing, LIMITS)[1].cause is Cause.STALE_SCAN
+    standing_still = replace(nothing, base_moving=False)
+    assert evaluate(SafetyState(), standing_still, LIMITS)[1] is CLEAR
+
+
+def test_a_loose_joint_may_move_during_standstill() -> None:
+    loose = {"torque_enabled": np.array([False, True]), "velocity": np.array([9.0, 0.0])}
+    assert ticks(SafetyState(), 100, **standing(**loose))[1] is CLEAR
 
 
 @pytest.mark.parametrize("cause", [Cause.JOINT_POSITION_LIMIT, Cause.JOINT_VELOCITY_LIMIT])
@@ -289,12 +599,44 @@ def test_the_numbers_of_a_finding_reach_its_text() -> None:
         (right(lost=True, age_s=0.75), 0.75),
         ({"base_command_age_s": 1.5}, 1.5),
         ({"supervisor_age_s": 4.0}, 4.0),
+        (around(scan_age_s=0.75), 0.75),
     ],
 )
 def test_a_stale_cause_tells_its_age(changes: dict[str, Any], age_s: float) -> None:
     _, verdict = tick(SafetyState(), **changes)
     assert (verdict.age_s, verdict.measured) == (age_s, age_s)
     assert not verdict.limit >= age_s
+
+
+OLD = {"sample_age_s": np.array([0.0, 0.015]), "climate_age_s": np.array([0.0, 0.6])}
+
+
+@pytest.mark.parametrize(
+    ("changes", "age_s"),
+    [
+        ({"velocity": np.array([0.0, 4.0])}, 0.015),
+        ({"hardware_error": np.array([0, 1], dtype=np.uint8)}, 0.015),
+        ({"watchdog_tripped": np.array([False, True])}, 0.015),
+        ({"temperature_c": np.array([30.0, 90.0])}, 0.6),
+        ({"voltage_v": np.array([12.0, 5.0])}, 0.6),
+        (right(fault_code=3, age_s=0.05), 0.05),
+        (right(measured_rad_s=5.0, age_s=0.05), 0.05),
+        (standing(**right(measured_rad_s=0.2, age_s=0.05)), 0.05),
+        (close_by("environment_clearance", 0.0, 0.1), 0.0),
+    ],
+)
+def test_a_measured_cause_tells_how_old_its_sample_is(
+    changes: dict[str, Any], age_s: float
+) -> None:
+    _, verdict = ticks(SafetyState(), 50, **OLD, **changes)
+    assert verdict.cause is not Cause.NONE
+    assert verdict.age_s == age_s
+
+
+def test_what_the_camera_saw_tells_its_age() -> None:
+    pair = Clearance(first="hand", second="floor", distance_m=0.0, closing_m_s=0.1)
+    _, verdict = ticks(SafetyState(), 2, **around(environment_clearance=pair, depth_age_s=0.3))
+    assert (verdict.age_s, verdict.limit) == (0.3, 0.01)
 
 
 def test_among_equal_reactions_the_first_latched_is_reported_as_the_root_cause() -> None:
@@ -313,7 +655,14 @@ causes = st.sets(st.sampled_from(sorted(SPOILERS, key=lambda cause: cause.value)
 
 
 def spoiled(present: set[Cause]) -> dict[str, Any]:
-    return {key: value for cause in present for key, value in SPOILERS[cause].items()}
+    changes: dict[str, Any] = {}
+    outside: dict[str, Any] = {"zones": ()}
+    for cause in present:
+        spoiler = SPOILERS[cause]
+        more = spoiler.get("around", {})
+        outside |= more | {"zones": outside["zones"] + more.get("zones", ())}
+        changes |= spoiler
+    return changes | {"around": outside}
 
 
 def walk(history: list[set[Cause]]) -> Iterator[tuple[SafetyState, Verdict]]:
@@ -343,6 +692,21 @@ independent = st.sets(
             Cause.SERVO_WATCHDOG_TRIPPED,
             Cause.SUPERVISOR_LOST,
             Cause.STALE_COMMAND,
+            Cause.JOINT_CURRENT_LIMIT,
+            Cause.JOINT_TEMPERATURE_LIMIT,
+            Cause.JOINT_VOLTAGE_LIMIT,
+            Cause.BUDGET_EXHAUSTED,
+            Cause.COLLISION,
+            Cause.SELF_COLLISION,
+            Cause.ENVIRONMENT_COLLISION,
+            Cause.WORKSPACE,
+            Cause.TIP_OVER,
+            Cause.STALE_SCAN,
+            Cause.KEEP_OUT_ZONE,
+            Cause.OBSTACLE_STOP_ZONE,
+            Cause.OBSTACLE_SLOW_ZONE,
+            Cause.OBSTACLE_LIMIT_ZONE,
+            Cause.OBSTACLE_APPROACH,
         ]
     )
 )
@@ -356,6 +720,8 @@ def test_adding_a_cause_never_makes_the_verdict_less_restrictive(
     more = walk([few | extra for few, extra in history])
     for (_, mild), (_, strict) in zip(fewer, more, strict=True):
         assert strict.reaction >= mild.reaction
+        assert strict.speed_ratio <= mild.speed_ratio
+        assert strict.blocked >= mild.blocked
 
 
 @given(st.lists(causes, max_size=6), causes)
@@ -366,3 +732,17 @@ def test_a_reset_clears_all_latches_or_none(history: list[set[Cause]], present: 
         assert after.latched[: len(state.latched)] == state.latched
     else:
         assert {v.cause for v in after.latched} <= present
+
+
+@given(st.lists(causes, max_size=8))
+def test_judging_the_same_again_gives_the_same(history: list[set[Cause]]) -> None:
+    assert list(walk(history)) == list(walk(history))
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=6))
+def test_the_speed_that_is_left_is_the_least_of_all_zones(ratios: list[float]) -> None:
+    kinds = (ZoneKind.SLOW, ZoneKind.LIMIT, ZoneKind.APPROACH)
+    zones = tuple(
+        zone(kinds[n % 3], f"zone {n}", speed_ratio=ratio) for n, ratio in enumerate(ratios)
+    )
+    assert tick(SafetyState(), **around(zones=zones))[1].speed_ratio == min(ratios)

@@ -1,0 +1,47 @@
+"""Say what a probe has found: who, what was measured, what was allowed, how old that is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from vla_deploy.safety.inputs import Flags, Floats, SafetyInputs, SafetyLimits
+from vla_deploy.safety.surroundings import Direction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Tell one cause's numbers; NaN where no number applies.
+
+    `speed_ratio` and `blocked` bound the base where the reaction leaves it moving.
+    """
+
+    subject: str
+    measured: float = float("nan")
+    limit: float = float("nan")
+    age_s: float = 0.0
+    speed_ratio: float = 1.0
+    blocked: frozenset[Direction] = frozenset()
+
+
+Probe = Callable[[SafetyInputs, SafetyLimits], Finding | None]
+
+
+def first_joint(
+    mask: Flags, measured: Floats, limit: Floats, age_s: Floats, limits: SafetyLimits
+) -> Finding | None:
+    """Return the finding of the first joint that a mask names."""
+    if not mask.any():
+        return None
+    joint = int(mask.argmax())
+    return Finding(
+        subject=limits.joint_names[joint],
+        measured=float(measured[joint]),
+        limit=float(limit[joint]),
+        age_s=float(age_s[joint]),
+    )
+
+
+def stale(subject: str, age_s: float | None, limit_s: float) -> Finding | None:
+    """Find what is older than allowed; what never came cannot be."""
+    if age_s is None or age_s <= limit_s:
+        return None
+    return Finding(subject=subject, measured=age_s, limit=limit_s, age_s=age_s)

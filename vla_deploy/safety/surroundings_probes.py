@@ -1,0 +1,123 @@
+"""Find each cause that lies around the robot or in its pose: one pure function per cause."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from vla_deploy.robots.protection import ZoneKind
+from vla_deploy.safety.findings import Finding, Probe, first_joint
+from vla_deploy.safety.inputs import SafetyInputs, SafetyLimits
+from vla_deploy.safety.surroundings import Clearance, Surroundings
+
+NEVER_SEEN = math.inf
+
+
+def stale_scan(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a base that moves while its lidar has told nothing for too long, or nothing ever."""
+    if not (inputs.base_moving and limits.scan_required):
+        return None
+    age_s = inputs.surroundings.scan_age_s
+    age_s = NEVER_SEEN if age_s is None else age_s
+    if age_s <= limits.scan_age_s:
+        return None
+    return Finding(subject="scan", measured=age_s, limit=limits.scan_age_s, age_s=age_s)
+
+
+def in_zone(kind: ZoneKind) -> Probe:
+    """Return the probe that finds something in the zones of one kind."""
+
+    def probe(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+        """Find the nearest of them, with what all of them allow."""
+        around = inputs.surroundings
+        zones = [zone for zone in around.zones if zone.kind is kind]
+        if not zones:
+            return None
+        nearest = min(zones, key=lambda zone: zone.distance_m)
+        return Finding(
+            subject=nearest.name,
+            measured=nearest.distance_m,
+            age_s=_seen_age_s(around),
+            speed_ratio=min(zone.speed_ratio for zone in zones),
+            blocked=frozenset().union(*(zone.blocked for zone in zones)),
+        )
+
+    return probe
+
+
+def keep_out(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a base that stands deeper in a keep-out area than allowed."""
+    area = inputs.surroundings.keep_out
+    if area is None or area.depth_m <= limits.keep_out_depth_m:
+        return None
+    return Finding(
+        subject=area.name,
+        measured=area.depth_m,
+        limit=limits.keep_out_depth_m,
+        blocked=frozenset(area.blocked),
+    )
+
+
+def workspace(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a group that is outside the workspace and still on its way out."""
+    excess = inputs.surroundings.workspace
+    if excess is None or excess.excess_m <= limits.workspace_excess_m:
+        return None
+    if excess.rate_m_s <= limits.approach_m_s:
+        return None
+    return Finding(
+        subject=excess.subject, measured=excess.excess_m, limit=limits.workspace_excess_m
+    )
+
+
+def self_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find two parts of the robot that are too close and come closer."""
+    pair = inputs.surroundings.self_clearance
+    return _too_close(pair, limits.self_clearance_m, 0.0, limits)
+
+
+def environment_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a part of the robot that is too close to something around it and comes closer."""
+    around = inputs.surroundings
+    allowed_m = limits.environment_clearance_m
+    return _too_close(around.environment_clearance, allowed_m, around.depth_age_s or 0.0, limits)
+
+
+def tip_over(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a robot whose margin against tipping over is used up but for the rest it must keep."""
+    margin = inputs.surroundings.tip_margin_ratio
+    if margin is None or margin >= limits.tip_margin_ratio:
+        return None
+    return Finding(subject="balance", measured=margin, limit=limits.tip_margin_ratio)
+
+
+def collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a powered joint that something outside the robot pushes harder than allowed."""
+    torque = inputs.surroundings.external_torque_nm
+    if torque is None:
+        return None
+    push = np.abs(torque)
+    pushed = (push > limits.external_torque_nm) & inputs.torque_enabled
+    return first_joint(pushed, push, limits.external_torque_nm, inputs.sample_age_s, limits)
+
+
+def _too_close(
+    pair: Clearance | None, allowed_m: float, age_s: float, limits: SafetyLimits
+) -> Finding | None:
+    if pair is None or pair.distance_m >= allowed_m or pair.closing_m_s <= limits.approach_m_s:
+        return None
+    return Finding(
+        subject=f"{pair.first} and {pair.second}",
+        measured=pair.distance_m,
+        limit=allowed_m,
+        age_s=age_s,
+    )
+
+
+def _seen_age_s(around: Surroundings) -> float:
+    """Return the age of the newest of what the zones were judged by."""
+    return min(_known(around.scan_age_s, around.depth_age_s), default=0.0)
+
+
+def _known(*ages_s: float | None) -> Iterator[float]:
+    return (age_s for age_s in ages_s if age_s is not None)
