@@ -129,7 +129,7 @@ def _memory_bytes(tree: Tree, reasons: list[str]) -> int | None:
     except Missing as missing:
         reasons.append(f"the memory's size is missing, because {missing}")
         return None
-    found = re.search(r"^MemTotal:\s+(\d+) kB", text, re.MULTILINE)
+    found = re.search(r"^MemTotal:\s+(\d{1,15}) kB", text, re.MULTILINE)
     if found is None:
         reasons.append("the memory's size is missing, because /proc/meminfo has no MemTotal")
         return None

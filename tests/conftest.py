@@ -1,3 +1,10 @@
+import errno
+import os
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
 from hypothesis import HealthCheck, settings
 
 # How long an example takes tells how busy the machine is, not whether the code is right.
@@ -5,3 +12,39 @@ settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any machine")
+
+TREES = Path(__file__).parent / "platforms" / "trees"
+
+
+@pytest.fixture
+def failing_reads(monkeypatch: pytest.MonkeyPatch) -> dict[Path, int]:
+    """Reading a file named here fails with its errno, as no file on a disk would."""
+    failures: dict[Path, int] = {}
+    pread = os.pread
+
+    def pread_or_fail(handle: int, count: int, offset: int) -> bytes:
+        number = failures.get(Path(f"/proc/self/fd/{handle}").readlink())
+        if number is not None:
+            raise OSError(number, os.strerror(number))
+        return pread(handle, count, offset)
+
+    monkeypatch.setattr(os, "pread", pread_or_fail)
+    return failures
+
+
+@pytest.fixture
+def board_tree(tmp_path: Path, failing_reads: dict[Path, int]) -> Callable[[str], Path]:
+    """Lay out the files of a board described in tests/platforms/trees; return their root."""
+
+    def lay_out(name: str) -> Path:
+        description = tomllib.loads((TREES / f"{name}.toml").read_text())
+        root = tmp_path / name
+        for path, text in description["files"].items():
+            file = root / path.lstrip("/")
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+        for path in description.get("asleep", ()):
+            failing_reads[root / path.lstrip("/")] = errno.EAGAIN
+        return root
+
+    return lay_out

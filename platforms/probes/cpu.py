@@ -10,6 +10,7 @@ from platforms.tree import Missing, SystemFile, Tree
 CPUFREQ = "/sys/devices/system/cpu/cpufreq"
 PRESSURES = ("cpu", "memory", "io")
 _IDLE, _IOWAIT, _STEAL = 3, 4, 7
+_MOST_DIGITS = 20  # of a 64-bit counter
 
 
 class CpuSource:
@@ -42,7 +43,7 @@ class CpuSource:
     def _counters(self) -> tuple[int, int]:
         lines = self._stat.text().splitlines()
         try:
-            ticks = [int(word) for word in lines[0].split()[1 : _STEAL + 1]]
+            ticks = [int(word[:_MOST_DIGITS]) for word in lines[0].split()[1 : _STEAL + 1]]
             idle = ticks[_IDLE] + ticks[_IOWAIT]
         except (ValueError, IndexError) as error:
             raise Missing("/proc/stat does not begin with a line of counters") from error

@@ -1,13 +1,19 @@
 """Read memory from /proc/meminfo, and the GPU's part of it, which a Jetson shares, from nvmap."""
 
+import re
 from collections.abc import Iterator, Mapping
+from typing import Final
 
 from platforms.probes.reading import Reading, lacking, measure
 from platforms.tree import Missing, Tree
 
-CLIENTS = "/sys/kernel/debug/nvmap/iovmm/clients"
-_UNITS: Mapping[str, int] = {"": 1, "B": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
-_ROW_WORDS = 4  # client, process, pid, size
+CLIENTS: Final = "/sys/kernel/debug/nvmap/iovmm/clients"
+_SIZE_ROW: Final = re.compile(r"^(\w+):\s+(\d{1,15}) kB$", re.MULTILINE | re.ASCII)
+_CLIENT_ROW: Final = re.compile(
+    r"^[ \t]*\S+[ \t]+\S+[ \t]+(\d{1,9})[ \t]+(\S+)[ \t]*$", re.MULTILINE | re.ASCII
+)
+_CLIENT_SIZE: Final = re.compile(r"(\d{1,15})([KMG]?)B?", re.ASCII)
+_FACTORS: Mapping[str, int] = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
 
 
 class MemorySource:
@@ -39,13 +45,7 @@ class MemorySource:
 
 def meminfo_bytes(text: str) -> dict[str, float]:
     """Return the rows of /proc/meminfo that are sizes; others are passed over."""
-    rows: dict[str, float] = {}
-    for line in text.splitlines():
-        key, _, rest = line.partition(":")
-        words = rest.split()
-        if len(words) == 2 and words[1] == "kB" and words[0].isdecimal():
-            rows[key] = int(words[0]) * 1024.0
-    return rows
+    return {key: int(size) * 1024.0 for key, size in _SIZE_ROW.findall(text)}
 
 
 class NvmapSource:
@@ -73,16 +73,11 @@ def nvmap_bytes(text: str) -> dict[int, float]:
         Missing: a row is not of that kind.
     """
     sizes: dict[int, float] = {}
-    for line in text.splitlines():
-        words = line.split()
-        if len(words) != _ROW_WORDS or not words[2].isdecimal():
-            continue  # the head, the total, and a blank line
-        number = words[3].rstrip("BKMG")
-        factor = _UNITS.get(words[3][len(number) :].removesuffix("B") or "B")
-        if factor is None or not number.isdecimal():
-            raise Missing(f"{CLIENTS} holds the size {words[3]!r}")
-        pid = int(words[2])
-        sizes[pid] = sizes.get(pid, 0.0) + int(number) * factor
+    for pid, size in _CLIENT_ROW.findall(text):  # neither the head nor the total has a pid
+        found = _CLIENT_SIZE.fullmatch(size)
+        if found is None:
+            raise Missing(f"{CLIENTS} holds the size {size!r}")
+        sizes[int(pid)] = sizes.get(int(pid), 0.0) + int(found[1]) * _FACTORS[found[2]]
     if not sizes and "CLIENT" not in text:
         raise Missing(f"{CLIENTS} holds no table of clients")
     return sizes

@@ -10,9 +10,9 @@ from platforms.tree import Missing, SystemFile, Tree
 
 CONFIGURATION: Final = "/etc/nvpmodel.conf"
 STATUS: Final = "/var/lib/nvpmodel/status"
-_MODE: Final = re.compile(r"^\s*<\s*POWER_MODEL\s+ID=(\d+)\s+NAME=(\S+?)\s*>", re.MULTILINE)
-_DEFAULT: Final = re.compile(r"^\s*<\s*PM_CONFIG\s+DEFAULT=(\d+)\s*>", re.MULTILINE)
-_CURRENT: Final = re.compile(r"\bpmode:\s*(\d+)")
+_MODE: Final = re.compile(r"^\s*<\s*POWER_MODEL\s+ID=(\d{1,4})\s+NAME=(\S+?)\s*>", re.MULTILINE)
+_DEFAULT: Final = re.compile(r"^\s*<\s*PM_CONFIG\s+DEFAULT=(\d{1,4})\s*>", re.MULTILINE)
+_CURRENT: Final = re.compile(r"\bpmode:\s*(\d{1,9})\b")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
