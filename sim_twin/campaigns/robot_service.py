@@ -15,8 +15,8 @@ from drivers.clock import NS_PER_S, Clock
 from sim_twin.service_runner import ServiceRunner
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
+from vla_deploy.logs import RUN_ID_VARIABLE
 from vla_deploy.supervisor import running
-from vla_deploy.supervisor.orphans import RUN_ID_VARIABLE
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
 _READY_S: Final = 120.0

@@ -5,6 +5,7 @@ import faulthandler
 import logging
 import os
 import sys
+from pathlib import Path
 from typing import Any
 
 from vla_deploy.cli.errors import CommandFailed

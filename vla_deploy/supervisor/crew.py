@@ -125,7 +125,7 @@ class Crew:
     def _spawn(self, name: str) -> None:
         self._readiness[name].forget()
         spec = self._specs[name]
-        command = spec.command + (spec.twin_command if self._options.twin else ())
+        command = spec.command + (spec.devices_command if self._options.takes_devices else ())
         command += spec.viewer_command if self._options.viewer else ()
         command += spec.paced_command if self._options.paced else ()
         child = ChildProcess(

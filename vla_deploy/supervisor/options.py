@@ -9,6 +9,7 @@ class RunOptions:
     """Choose robot, profile and world; `arm` arms the robot once everything is ready.
 
     `viewer` shows the twin in a window; `paced` gives what is on its buses the time it takes.
+    `devices_dir` replaces the hardware by what is served there, as by a twin that runs by itself.
     """
 
     robot: str = "butler"
@@ -18,8 +19,14 @@ class RunOptions:
     paced: bool = False
     seed: int = 0
     world: str = "flat"
+    devices_dir: Path | None = None
     runtime_base: Path | None = None
     arm: bool = False
+
+    @property
+    def takes_devices(self) -> bool:
+        """Tell whether device paths of the robot file are replaced."""
+        return self.twin or self.devices_dir is not None
 
     def fill(self, command: tuple[str, ...], run_dir: Path) -> list[str]:
         """Replace the `{...}` of a table's command."""
@@ -29,5 +36,6 @@ class RunOptions:
             "profile": self.profile,
             "world": self.world,
             "seed": self.seed,
+            "devices_dir": self.devices_dir or run_dir / "dev",
         }
         return [part.format_map(values) for part in command]

@@ -59,15 +59,15 @@ class ProcessSpec:
     """Declare one process.
 
     `command` follows the Python interpreter, `{...}` are filled from the run's options;
-    `twin_command` is added in twin mode, `viewer_command` with a viewer, `paced_command` where
-    buses take their time. It runs while `when` has nothing against it. It is ready when
+    `devices_command` is added where devices are served elsewhere, `viewer_command` with a viewer,
+    `paced_command` where buses take their time. It runs while `when` has nothing against it. It is ready when
     `ready_topic` is fresh from its own pid and all `ready_files`, relative to the run directory,
     exist. `watched` are the topics it writes whatever its devices do.
     """
 
     name: str
     command: tuple[str, ...]
-    twin_command: tuple[str, ...] = ()
+    devices_command: tuple[str, ...] = ()
     viewer_command: tuple[str, ...] = ()
     paced_command: tuple[str, ...] = ()
     when: Predicate = always
@@ -82,7 +82,7 @@ class ProcessSpec:
 
 _NODE = ("--run-dir", "{run_dir}", "--robot", "{robot}", "--profile", "{profile}")
 _TWIN = ("--robot", "{robot}", "--world", "{world}", "--seed", "{seed}", "--run-dir", "{run_dir}")
-_DEVICES = ("--devices-dir", "{run_dir}/dev")
+_DEVICES = ("--devices-dir", "{devices_dir}")
 
 TABLE: tuple[ProcessSpec, ...] = (
     ProcessSpec(
@@ -99,7 +99,7 @@ TABLE: tuple[ProcessSpec, ...] = (
     ProcessSpec(
         name="control",
         command=("-m", "vla_deploy.control", *_NODE),
-        twin_command=_DEVICES,
+        devices_command=_DEVICES,
         ready_topic="joint_state",
         ready_files=("ready/control",),
         stop_timeout_s=5.0,
@@ -112,7 +112,7 @@ TABLE: tuple[ProcessSpec, ...] = (
     ProcessSpec(
         name="perception",
         command=("-m", "vla_deploy.perception", *_NODE),
-        twin_command=_DEVICES,
+        devices_command=_DEVICES,
         when=all_of(budgeted("perception"), not_suspended("perception")),
         ready_topic="scan",
         ready_files=("ready/perception",),
@@ -122,7 +122,7 @@ TABLE: tuple[ProcessSpec, ...] = (
     ProcessSpec(
         name="planner",
         command=("-m", "vla_deploy.planning", *_NODE),
-        twin_command=_DEVICES,
+        devices_command=_DEVICES,
         when=all_of(budgeted("planner"), not_suspended("planner")),
         ready_files=("ready/planner",),
         watched=(Watched(topic="planner_status", silence_limit_s=5.0),),
@@ -130,7 +130,7 @@ TABLE: tuple[ProcessSpec, ...] = (
     ProcessSpec(
         name="executor",
         command=("-m", "vla_deploy.skills", *_NODE),
-        twin_command=_DEVICES,
+        devices_command=_DEVICES,
         when=all_of(budgeted("executor"), not_suspended("executor")),
         ready_topic="executor_status",
         ready_files=("ready/executor",),
