@@ -60,9 +60,9 @@ class ProcessSpec:
 
     `command` follows the Python interpreter, `{...}` are filled from the run's options;
     `devices_command` is added where devices are served elsewhere, `viewer_command` with a viewer,
-    `paced_command` where buses take their time. It runs while `when` has nothing against it. It is ready when
-    `ready_topic` is fresh from its own pid and all `ready_files`, relative to the run directory,
-    exist. `watched` are the topics it writes whatever its devices do.
+    `paced_command` where buses take their time. It runs while `when` has nothing against it. It
+    is ready when `ready_topic` is fresh from its own pid and all `ready_files`, relative to the run
+    directory, exist. `watched` are the topics it writes whatever its devices do.
     """
 
     name: str
