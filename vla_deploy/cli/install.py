@@ -1,0 +1,176 @@
+"""`vla-deploy install` and `uninstall`: put the robot's service on this computer, or take it off."""
+
+import argparse
+import difflib
+import json
+import os
+import shlex
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from platforms import load_profile
+from vla_deploy.cli.errors import UsageError
+from vla_deploy.cli.example import add_command
+from vla_deploy.install import (
+    Change,
+    Credential,
+    Kind,
+    Layout,
+    ServiceChoice,
+    install_changes,
+    system_files,
+    uninstall_changes,
+)
+from vla_deploy.install.changes import paths_of
+from vla_deploy.install.commands import (
+    Command,
+    after_install,
+    after_uninstall,
+    before_uninstall,
+    run_command,
+)
+from vla_deploy.install.disk import apply_changes, read_files
+from vla_deploy.install.manifest import afterwards, during, read_manifest, write_manifest
+from vla_deploy.robots import load_robot
+
+INSTALL_EXAMPLES = """  vla-deploy install --robot butler --profile jetson_orin_nx --dry-run
+  sudo vla-deploy install --robot butler --profile jetson_orin_nx
+  vla-deploy install --root /tmp/image        into a folder that stands for the computer
+"""
+UNINSTALL_EXAMPLES = """  vla-deploy uninstall --dry-run
+  sudo vla-deploy uninstall                   logs, state and releases stay
+  sudo vla-deploy uninstall --purge           they go, too
+"""
+
+
+def register(commands: Any) -> None:
+    """Add the commands."""
+    install = add_command(
+        commands, "install", "install the robot as a service of this computer", INSTALL_EXAMPLES
+    )
+    add_layout_arguments(install)
+    install.add_argument("--robot", default="butler", help="name or folder (default: butler)")
+    install.add_argument("--profile", default="desktop", help="platform profile")
+    install.add_argument("--twin", action="store_true", help="run the twin, not the hardware")
+    install.add_argument(
+        "--credential",
+        type=_credential,
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        help="give the service a secret from a file that only root can read",
+    )
+    install.set_defaults(run=run_install)
+    uninstall = add_command(
+        commands, "uninstall", "remove exactly what install wrote", UNINSTALL_EXAMPLES
+    )
+    add_layout_arguments(uninstall)
+    uninstall.add_argument(
+        "--purge", action="store_true", help="remove state, logs, releases and the user, too"
+    )
+    uninstall.set_defaults(run=run_uninstall)
+
+
+def add_layout_arguments(command: argparse.ArgumentParser) -> None:
+    """Add what says where things lie and how to report."""
+    command.add_argument("--root", type=Path, default=Path("/"), help="a folder to install into")
+    command.add_argument("--prefix", type=Path, default=Path("/opt/vla-deploy"), help="of releases")
+    command.add_argument(
+        "--dry-run", action="store_true", help="say what would be done, do nothing"
+    )
+    command.add_argument("--json", action="store_true", help="print what is done as JSON")
+
+
+def layout_of(arguments: argparse.Namespace) -> Layout:
+    """Return the layout that the arguments ask for.
+
+    Raises:
+        UsageError: a path is not absolute, or this computer may only be changed by root.
+    """
+    if not arguments.prefix.is_absolute():
+        raise UsageError(f"--prefix {arguments.prefix}: expected an absolute path")
+    layout = Layout(root=arguments.root.absolute(), prefix=arguments.prefix)
+    if layout.is_this_computer and not arguments.dry_run and os.geteuid() != 0:
+        raise UsageError(
+            f"{arguments.command} changes this computer, which only root may: use sudo; "
+            "look first with --dry-run, or write into a folder with --root DIR"
+        )
+    return layout
+
+
+def run_install(arguments: argparse.Namespace) -> int:
+    """Write what is missing or out of date."""
+    layout = layout_of(arguments)
+    choice = ServiceChoice(
+        robot=arguments.robot,
+        profile=arguments.profile,
+        twin=arguments.twin,
+        credentials=tuple(arguments.credential),
+    )
+    files = system_files(load_robot(choice.robot), load_profile(choice.profile), choice, layout)
+    known = read_manifest(layout)
+    changes = install_changes(files, known, read_files(layout, paths_of(files, known)))
+    commands = after_install(files) if layout.is_this_computer else ()
+    _report(arguments, changes, commands)
+    if not arguments.dry_run:
+        write_manifest(layout, during(known, changes))
+        apply_changes(layout, changes)
+        write_manifest(layout, afterwards(known, changes))
+        _run(commands)
+    return 0
+
+
+def run_uninstall(arguments: argparse.Namespace) -> int:
+    """Remove what install wrote and nobody has edited since."""
+    layout = layout_of(arguments)
+    known = read_manifest(layout)
+    changes = uninstall_changes(known, read_files(layout, known))
+    before = before_uninstall(known) if known and layout.is_this_computer else ()
+    after = after_uninstall(layout, purge=arguments.purge)
+    after = after if layout.is_this_computer or arguments.purge else ()
+    _report(arguments, changes, (*before, *after))
+    if not arguments.dry_run:
+        _run(before)
+        apply_changes(layout, changes)
+        write_manifest(layout, {})
+        _run(after)
+    return 0
+
+
+def _credential(text: str) -> Credential:
+    name, found, path = text.partition("=")
+    if not found or not Path(path).is_absolute():
+        raise argparse.ArgumentTypeError(f"expected NAME=/path/of/file, got {text!r}")
+    return Credential(name=name, path=Path(path))
+
+
+def _run(commands: Iterable[Command]) -> None:
+    for command in commands:
+        run_command(command)
+
+
+def _report(
+    arguments: argparse.Namespace, changes: tuple[Change, ...], commands: tuple[Command, ...]
+) -> None:
+    if arguments.json:
+        files = [{"path": str(change.path), "change": change.kind.value} for change in changes]
+        print(json.dumps({"files": files, "commands": [list(line) for line in commands]}, indent=2))
+        return
+    for change in changes:
+        print(f"{change.kind.value}: {change.path}")
+        if arguments.dry_run and change.kind not in (Kind.SAME, Kind.FORGET, Kind.KEEP):
+            print("".join(_diff(change)), end="")
+    for command in commands:
+        print(f"run: {shlex.join(command)}")
+    if arguments.dry_run:
+        print("nothing was changed: this was a dry run")
+
+
+def _diff(change: Change) -> Iterable[str]:
+    return difflib.unified_diff(
+        (change.before or "").splitlines(keepends=True),
+        (change.after or "").splitlines(keepends=True),
+        "/dev/null" if change.before is None else f"a{change.path}",
+        "/dev/null" if change.after is None else f"b{change.path}",
+    )

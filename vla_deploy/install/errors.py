@@ -1,0 +1,38 @@
+"""Say what keeps the robot's service from being installed or updated.
+
+InstallError
+├── TemplateBroken    a template of ours names what nobody fills in
+├── ArgumentRefused   a name or path cannot stand in a unit
+├── NotPermitted      writing there needs another user
+├── ReleaseRefused    the release cannot be added, used or removed as asked; nothing was changed
+├── CommandFailed     a program of the system did not do what it was asked
+└── SwitchFailed      the new release did not prove itself; the one before is back in use
+"""
+
+
+class InstallError(Exception):
+    """Say what is wrong, where, and what to try."""
+
+
+class TemplateBroken(InstallError):
+    """Name the placeholder and the template."""
+
+
+class ArgumentRefused(InstallError):
+    """Say which, and what may stand there."""
+
+
+class NotPermitted(InstallError):
+    """Say who may, and how to look without it."""
+
+
+class ReleaseRefused(InstallError):
+    """Say which release, and why not."""
+
+
+class SwitchFailed(InstallError):
+    """Say which step failed, and what is in use now."""
+
+
+class CommandFailed(InstallError):
+    """Say which command, and what it answered."""

@@ -1,0 +1,170 @@
+"""Fill the templates in `systemd/` from robot file, profile and layout."""
+
+import re
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from platforms import Profile
+from vla_deploy.install.errors import ArgumentRefused, TemplateBroken
+from vla_deploy.install.layout import Layout
+from vla_deploy.robots import RobotDescription
+
+# In the source tree, or where a wheel puts it.
+_IN_SOURCE: Final = Path(__file__).parents[2] / "systemd"
+_INSTALLED: Final = Path(sys.prefix) / "share" / "vla-deploy" / "systemd"
+_PLACEHOLDER: Final = re.compile(r"@([A-Z][A-Z0-9_]*)@")
+_INTERFACE: Final = re.compile(r"[A-Za-z][A-Za-z0-9._-]{0,14}")
+_BY_ID: Final = re.compile(r"/dev/(?P<kind>serial|input)/by-id/usb-(?P<serial>.+?)(?:-if\d|-event)")
+_SUBSYSTEMS: Final = {"serial": ("tty", "tty*"), "input": ("input", "event*")}
+_ARGUMENT: Final = re.compile(r"[A-Za-z0-9_./-]+")
+_MAX_OVER_HIGH: Final = 1.25
+_CONTROL_HEADROOM: Final = 10
+_LIBEXEC: Final = ("release-guard", "wait-for-children")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Credential:
+    """Name a secret that the service reads from a file only root can read."""
+
+    name: str
+    path: Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServiceChoice:
+    """Choose what the service runs; robot and profile as `vla-deploy run` takes them."""
+
+    robot: str = "butler"
+    profile: str = "desktop"
+    twin: bool = False
+    watchdog_s: int = 5
+    credentials: tuple[Credential, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SystemFile:
+    """Hold one file as it should be on the robot's computer."""
+
+    path: Path
+    text: str
+    mode: int = 0o644
+
+
+def system_files(
+    robot: RobotDescription, profile: Profile, choice: ServiceChoice, layout: Layout
+) -> tuple[SystemFile, ...]:
+    """Return every file that the service needs, in the order in which they are written.
+
+    Raises:
+        ArgumentRefused: a name or path cannot stand in a unit.
+        TemplateBroken: a template is missing or names what is not filled in.
+    """
+    values = _values(robot, profile, choice, layout)
+    units = Path("/etc/systemd/system")
+    names = ["vla-deploy.service", "vla-deploy.slice", "vla-deploy-gave-up.service"]
+    if values["CAN_INTERFACE"]:
+        names.append("vla-deploy-can.service")
+    return (
+        *(_file(layout.prefix / "libexec" / name, name, values, 0o755) for name in _LIBEXEC),
+        _file(Path("/usr/local/bin/vla-deploy"), "vla-deploy.sh", values, 0o755),
+        _file(Path("/usr/lib/sysusers.d/vla-deploy.conf"), "vla-deploy.sysusers", values),
+        _file(Path("/usr/lib/tmpfiles.d/vla-deploy.conf"), "vla-deploy.tmpfiles", values),
+        _file(Path("/etc/udev/rules.d/70-vla-deploy.rules"), "vla-deploy.rules", values),
+        *(_file(units / name, name, values) for name in names),
+    )
+
+
+def filled(text: str, values: Mapping[str, str], name: str) -> str:
+    """Return a template with every `@NAME@` replaced; a line left empty by it is dropped.
+
+    Raises:
+        TemplateBroken: nobody fills a placeholder in.
+    """
+    unknown = sorted({found for found in _PLACEHOLDER.findall(text) if found not in values})
+    if unknown:
+        raise TemplateBroken(f"template {name}: nobody fills in {', '.join(unknown)}")
+    lines = []
+    for line in text.splitlines():
+        full = _PLACEHOLDER.sub(lambda match: values[match[1]], line).rstrip()
+        if full or not line:
+            lines.append(full)
+    return "\n".join(lines) + "\n"
+
+
+def _values(
+    robot: RobotDescription, profile: Profile, choice: ServiceChoice, layout: Layout
+) -> dict[str, str]:
+    interface = _can_interface(robot)
+    memory_mb = profile.total.memory_mb
+    return {
+        "ROBOT": robot.name,
+        "ROBOT_ARGUMENT": _argument(choice.robot),
+        "PROFILE": profile.name,
+        "PROFILE_ARGUMENT": _argument(choice.profile),
+        "RUN_OPTIONS": " --twin" if choice.twin else "",
+        "PREFIX": _argument(str(layout.prefix)),
+        "USER": _argument(layout.user),
+        "IP": layout.ip,
+        "WATCHDOG_S": str(choice.watchdog_s),
+        "RT_PRIORITY": str(profile.realtime_priority + _CONTROL_HEADROOM),
+        "MEMORY_HIGH_MB": f"{memory_mb:.0f}",
+        "MEMORY_MAX_MB": f"{memory_mb * _MAX_OVER_HIGH:.0f}",
+        "CAN_INTERFACE": interface,
+        "CAN_BITRATE": str(robot.can_bus.bitrate),
+        "CAN_UNIT": "vla-deploy-can.service" if interface else "",
+        "CREDENTIALS": "\n".join(
+            f"LoadCredential={_argument(credential.name)}:{_argument(str(credential.path))}"
+            for credential in choice.credentials
+        ),
+        "LINKS": "\n".join(_links(robot)),
+    }
+
+
+def _argument(text: str) -> str:
+    if not _ARGUMENT.fullmatch(text):
+        raise ArgumentRefused(
+            f"{text!r} cannot stand in a unit: expected letters, digits and _ . / - only; "
+            "move or rename it"
+        )
+    return text
+
+
+def _can_interface(robot: RobotDescription) -> str:
+    """Return the network interface; none for a serial adapter or a socket."""
+    path = robot.can_bus.path
+    return path if _INTERFACE.fullmatch(path) else ""
+
+
+def _links(robot: RobotDescription) -> list[str]:
+    """Return one rule per USB device that the robot file names: `/dev/vla-deploy/<device>`."""
+    sensors = [robot.lidar, robot.imu]
+    paths = {robot.servo_bus.device: robot.servo_bus.path}
+    paths |= {sensor.device: sensor.path for sensor in sensors}
+    if robot.estop is not None:
+        paths[robot.estop.device] = robot.estop.path
+    matches = {name: _BY_ID.match(path) for name, path in paths.items()}
+    return [_link(name, match) for name, match in matches.items() if match]
+
+
+def _link(name: str, match: re.Match[str]) -> str:
+    subsystem, kernel = _SUBSYSTEMS[match["kind"]]
+    conditions = (
+        f'SUBSYSTEM=="{subsystem}"',
+        f'KERNEL=="{kernel}"',
+        f'ENV{{ID_SERIAL}}=="{match["serial"]}"',
+    )
+    return ", ".join((*conditions, f'SYMLINK+="vla-deploy/{name}"'))
+
+
+def _file(path: Path, name: str, values: Mapping[str, str], mode: int = 0o644) -> SystemFile:
+    return SystemFile(path=path, text=filled(_template(name), values, name), mode=mode)
+
+
+def _template(name: str) -> str:
+    for folder in (_IN_SOURCE, _INSTALLED):
+        if (folder / name).is_file():
+            return (folder / name).read_text()
+    raise TemplateBroken(f"template {name}: expected in {_IN_SOURCE} or {_INSTALLED}; reinstall")

@@ -1,0 +1,38 @@
+"""Say where everything lies on the robot's computer."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+SERVICE = "vla-deploy.service"
+STATE_FOLDERS = (
+    Path("/var/lib/vla-deploy"),
+    Path("/var/log/vla-deploy"),
+    Path("/etc/vla-deploy"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Name the folders; `root` is put in front of each when it is written, never into a text.
+
+    `ip` is the program that sets network links up.
+    """
+
+    root: Path = Path("/")
+    prefix: Path = Path("/opt/vla-deploy")
+    user: str = "vla-deploy"
+    ip: str = "/sbin/ip"
+
+    def on_disk(self, path: Path) -> Path:
+        """Return where a file of the robot lies as seen from here."""
+        return self.root / path.relative_to("/")
+
+    @property
+    def is_this_computer(self) -> bool:
+        """Tell whether this is the running system, not a folder that stands for one."""
+        return self.root == Path("/")
+
+    @property
+    def manifest(self) -> Path:
+        """Return the file that says what was installed."""
+        return self.prefix / "manifest.json"

@@ -1,0 +1,84 @@
+"""Ask systemd about the service, restart it, and judge over a while whether it is well."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.install.commands import run_command
+from vla_deploy.install.errors import CommandFailed
+from vla_deploy.install.layout import SERVICE
+
+_POLL_NS = NS_PER_S // 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServiceState:
+    """Say whether the service is ready, and which process it is after how many restarts."""
+
+    active: str
+    main_pid: int
+    restarts: int
+
+
+class ServiceControl(Protocol):
+    """Restart one service and tell its state."""
+
+    def restart(self) -> None:
+        """Restart it; return when it is ready.
+
+        Raises:
+            CommandFailed: it did not become ready.
+        """
+
+    def state(self) -> ServiceState:
+        """Tell its state.
+
+        Raises:
+            CommandFailed: the service manager does not answer.
+        """
+
+
+class SystemdService:
+    """Restart the robot's service by systemctl."""
+
+    def __init__(self, unit: str = SERVICE) -> None:
+        self._unit = unit
+
+    def restart(self) -> None:
+        """Restart it, also when it had been given up; return when it is ready."""
+        run_command(["systemctl", "reset-failed", self._unit])
+        run_command(["systemctl", "restart", self._unit])
+
+    def state(self) -> ServiceState:
+        """Tell its state."""
+        properties = "--property=ActiveState,MainPID,NRestarts"
+        text = run_command(["systemctl", "show", properties, self._unit])
+        values = dict(line.split("=", 1) for line in text.splitlines() if "=" in line)
+        try:
+            return ServiceState(
+                active=values["ActiveState"],
+                main_pid=int(values["MainPID"]),
+                restarts=int(values["NRestarts"]),
+            )
+        except (KeyError, ValueError) as error:
+            raise CommandFailed(f"systemctl show {self._unit}: cannot read {text!r}") from error
+
+
+def trouble_within(service: ServiceControl, clock: Clock, healthy_s: float) -> str:
+    """Watch a service that is ready; return what went wrong, empty when it stays as it is.
+
+    systemd restarts what fails or misses its watchdog: another process is a failure.
+
+    Raises:
+        CommandFailed: the service manager does not answer.
+    """
+    first = service.state()
+    if first.active != "active":
+        return f"the service is {first.active}, expected active"
+    end_ns = clock.now_ns() + round(healthy_s * NS_PER_S)
+    while clock.now_ns() < end_ns:
+        clock.sleep_until(clock.now_ns() + _POLL_NS)
+        now = service.state()
+        if now != first:
+            return f"it became {now.active} after {now.restarts - first.restarts} restarts"
+    return ""
