@@ -6,6 +6,7 @@ UsageError      the request cannot be carried out as it is: exit code 2
 
 from drivers.errors import DriverError
 from platforms.errors import ProfileError
+from vla_deploy.install import InstallError
 from vla_deploy.ipc import IpcError
 from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.planning.errors import PlanningError
@@ -26,6 +27,7 @@ class CommandFailed(Exception):
 USER_ERRORS = (
     UsageError,
     DriverError,
+    InstallError,
     IpcError,
     NavigationError,
     PlanningError,

@@ -1,4 +1,4 @@
-"""`vla-deploy install` and `uninstall`: put the robot's service on this computer, or take it off."""
+"""`vla-deploy install` and `uninstall`: put the service on this computer, or take it off."""
 
 import argparse
 import difflib

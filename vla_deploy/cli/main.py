@@ -14,11 +14,12 @@ from vla_deploy.cli import (
     demo,
     doctor,
     fault,
-    install,
     flight,
+    install,
     logs,
     operate,
     profile,
+    release,
     run,
     say,
     servo,
@@ -45,6 +46,8 @@ COMMANDS = (
     doctor,
     bench,
     validate,
+    install,
+    release,
 )
 EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
 EPILOG = """examples:
