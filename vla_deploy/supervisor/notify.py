@@ -88,10 +88,10 @@ class Notifier:
     def step(self, *, ready: bool, stopping: bool, status: str, troubles: tuple[str, ...]) -> None:
         """Tell what has changed; call it at every step."""
         now_ns = self._clock.now_ns()
-        if stopping or not self._ready:
-            self._extend(now_ns)
         if ready and not stopping and not self._ready:
             self._ready = self._socket.send(READY="1")
+        if stopping or not self._ready:
+            self._extend(now_ns)
         self._tell(status if not troubles else f"{status}; not in time: {troubles[0]}", now_ns)
         self._feed(troubles, now_ns, stopping=stopping)
 

@@ -1,0 +1,229 @@
+"""The notify protocol against a real socket, with a clock that only the test moves."""
+
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.clock import NS_PER_S
+from vla_deploy.supervisor.notify import (
+    Notifier,
+    NotifySocket,
+    NotifyTarget,
+    hide_from_children,
+    notify_target,
+)
+
+WATCHDOG_NS = 10 * NS_PER_S
+
+
+class StepClock:
+    time_ns = 100 * NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = deadline_ns
+
+    def pass_s(self, seconds: float) -> None:
+        self.time_ns += round(seconds * NS_PER_S)
+
+
+class Systemd:
+    """Listen where systemd would."""
+
+    def __init__(self, address: str) -> None:
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(address)
+        self.socket.setblocking(False)
+
+    def heard(self) -> list[str]:
+        messages = []
+        while True:
+            try:
+                messages.append(self.socket.recv(4096).decode())
+            except BlockingIOError:
+                return messages
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> str:
+    return str(tmp_path / "notify")
+
+
+@pytest.fixture
+def systemd(address: str) -> Iterator[Systemd]:
+    listening = Systemd(address)
+    yield listening
+    listening.socket.close()
+
+
+@pytest.fixture
+def clock() -> StepClock:
+    return StepClock()
+
+
+@pytest.fixture
+def notifier(systemd: Systemd, address: str, clock: StepClock) -> Iterator[Notifier]:
+    made = Notifier(NotifyTarget(address=address, watchdog_ns=WATCHDOG_NS), clock)
+    yield made
+    made.close()
+
+
+def step(notifier: Notifier, *troubles: str, ready: bool = True, stopping: bool = False) -> None:
+    notifier.step(ready=ready, stopping=stopping, status="fine", troubles=troubles)
+
+
+def test_the_target_is_what_systemd_has_set_for_this_process():
+    environment = {"NOTIFY_SOCKET": "/run/n", "WATCHDOG_USEC": "5000000", "WATCHDOG_PID": "7"}
+    assert notify_target(environment, 7) == NotifyTarget(address="/run/n", watchdog_ns=5 * NS_PER_S)
+
+
+def test_a_watchdog_meant_for_another_process_is_not_fed():
+    environment = {"NOTIFY_SOCKET": "/run/n", "WATCHDOG_USEC": "5000000", "WATCHDOG_PID": "7"}
+    assert notify_target(environment, 8).watchdog_ns == 0
+
+
+def test_a_watchdog_without_a_pid_is_for_whoever_reads_it():
+    assert notify_target({"WATCHDOG_USEC": "1000"}, 8).watchdog_ns == 1_000_000
+
+
+def test_without_systemd_there_is_no_target():
+    assert notify_target({}, 1) == NotifyTarget()
+
+
+def test_children_do_not_learn_of_systemd():
+    environment = dict.fromkeys(("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "HOME"), "x")
+    hide_from_children(environment)
+    assert environment == {"HOME": "x"}
+
+
+def test_an_address_with_an_at_sign_is_in_the_abstract_namespace():
+    name = f"vla-test-{os.getpid()}"
+    listening = Systemd(f"\0{name}")
+    sender = NotifySocket(f"@{name}")
+    assert sender.send(READY="1")
+    assert listening.heard() == ["READY=1"]
+    sender.close()
+    listening.socket.close()
+
+
+def test_several_assignments_are_lines_of_one_datagram_and_values_stay_in_theirs(systemd, address):
+    sender = NotifySocket(address)
+    sender.send(STATUS="two\nlines", MAINPID="1")
+    assert systemd.heard() == ["STATUS=two lines\nMAINPID=1"]
+    sender.close()
+
+
+def test_nobody_listening_is_counted_and_raises_nothing(tmp_path):
+    sender = NotifySocket(str(tmp_path / "nobody"))
+    assert not sender.send(READY="1")
+    assert sender.refused == 1
+    sender.close()
+
+
+def test_a_full_socket_does_not_hold_the_caller_up(systemd, address):
+    sender = NotifySocket(address)
+    while sender.send(STATUS="x" * 1000):
+        pass
+    assert sender.refused == 1
+    sender.close()
+
+
+def test_without_an_address_nothing_is_sent(clock):
+    notifier = Notifier(NotifyTarget(), clock)
+    step(notifier)
+    notifier.stopping()
+    notifier.close()
+
+
+def test_ready_is_told_once_when_everything_is_ready(systemd, notifier, clock):
+    step(notifier, ready=False)
+    assert "READY=1" not in systemd.heard()
+    step(notifier)
+    assert "READY=1" in systemd.heard()
+    clock.pass_s(30)
+    step(notifier)
+    assert "READY=1" not in systemd.heard()
+
+
+def test_the_status_is_told_when_it_changes_and_at_most_once_a_second(systemd, notifier, clock):
+    step(notifier)
+    assert "STATUS=fine" in systemd.heard()
+    step(notifier, "bus lost")
+    assert not [text for text in systemd.heard() if text.startswith("STATUS")]
+    clock.pass_s(1)
+    step(notifier, "bus lost")
+    assert "STATUS=fine; not in time: bus lost" in systemd.heard()
+
+
+def test_a_long_start_asks_for_time_every_five_seconds(systemd, notifier, clock):
+    asked = 0
+    for _ in range(40):  # 20 s
+        step(notifier, "control: has not told its status yet", ready=False)
+        asked += systemd.heard().count("EXTEND_TIMEOUT_USEC=15000000")
+        clock.pass_s(0.5)
+    assert asked == 4
+    step(notifier)
+    assert "EXTEND_TIMEOUT_USEC=15000000" not in systemd.heard()
+
+
+def test_a_stop_is_told_and_asks_for_time(systemd, notifier, clock):
+    step(notifier)
+    systemd.heard()
+    notifier.stopping()
+    clock.pass_s(5)
+    step(notifier, "control: age", stopping=True, ready=False)
+    heard = systemd.heard()
+    assert heard[0] == "STOPPING=1"
+    assert "EXTEND_TIMEOUT_USEC=15000000" in heard
+    assert "READY=1" not in heard
+
+
+def test_the_watchdog_is_fed_at_half_its_interval(systemd, notifier, clock):
+    fed_at_s = []
+    start_ns = clock.time_ns
+    for _ in range(400):  # 20 s in steps of 50 ms
+        step(notifier)
+        if "WATCHDOG=1" in systemd.heard():
+            fed_at_s.append((clock.time_ns - start_ns) / NS_PER_S)
+        clock.pass_s(0.05)
+    assert fed_at_s == pytest.approx([0.0, 5.0, 10.0, 15.0])
+
+
+def test_in_trouble_the_watchdog_is_not_fed_and_afterwards_at_once(systemd, notifier, clock):
+    step(notifier)
+    systemd.heard()
+    for _ in range(400):
+        clock.pass_s(0.05)
+        step(notifier, "control: tick rate 10 Hz, limit 125 Hz")
+        assert "WATCHDOG=1" not in systemd.heard()
+    step(notifier)
+    assert "WATCHDOG=1" in systemd.heard()
+
+
+def test_a_stop_goes_on_feeding_since_control_ends_before_the_run_does(systemd, notifier, clock):
+    step(notifier)
+    clock.pass_s(5)
+    systemd.heard()
+    step(notifier, "control: age", stopping=True, ready=False)
+    assert "WATCHDOG=1" in systemd.heard()
+
+
+def test_without_a_watchdog_nothing_is_fed(systemd, address, clock):
+    notifier = Notifier(NotifyTarget(address=address), clock)
+    step(notifier)
+    assert "WATCHDOG=1" not in systemd.heard()
+    notifier.close()
+
+
+def test_reloading_carries_the_time_and_ready_follows(systemd, notifier, clock):
+    step(notifier)
+    systemd.heard()
+    notifier.reloading()
+    assert systemd.heard() == [f"RELOADING=1\nMONOTONIC_USEC={clock.time_ns // 1000}"]
+    step(notifier)
+    assert "READY=1" in systemd.heard()
