@@ -7,8 +7,15 @@ from typing import Final, Protocol
 from platforms.ladder import LadderAction
 from platforms.profile_source import Table
 
-PROCESSES: Final = ("supervisor", "control", "perception", "planner", "executor", "twin")
-NODES: Final = ("control", "perception", "planner", "executor")
+PROCESSES: Final[tuple[str, ...]] = (
+    "supervisor",
+    "control",
+    "perception",
+    "planner",
+    "executor",
+    "twin",
+)
+NODES: Final[tuple[str, ...]] = ("control", "perception", "planner", "executor")
 ROLES: Final = ("detector", "planner", "key_words", "speech_to_text", "text_to_speech")
 PROVIDERS: Final = (
     "TensorrtExecutionProvider",

@@ -2,9 +2,11 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from drivers.clock import Clock
+from platforms import load_profile
 from vla_deploy.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
 from vla_deploy.supervisor.lifecycle import Act, Action, Seen
 from vla_deploy.supervisor.liveness import Liveness, Vital
@@ -15,6 +17,7 @@ from vla_deploy.supervisor.orphans import PROCESS_VARIABLE, end_leftovers
 from vla_deploy.supervisor.process import ChildProcess
 from vla_deploy.supervisor.readiness import Readiness
 from vla_deploy.supervisor.table import ProcessSpec
+from vla_deploy.supervisor.thread_limits import thread_limits
 
 _STDERR = 2
 _MOST_OUTPUT_BYTES = 4_000_000
@@ -34,6 +37,10 @@ class Crew:
     ) -> None:
         self.started: dict[str, tuple[int, int]] = {}
         """The pid of each child that was ever started, and when."""
+        self.profile, self.in_force = options.profile, load_profile(options.profile)
+        """The name of the profile that a child is started with, and the profile."""
+        self.started_under: dict[str, str] = {}
+        """The profile that each child was started with."""
         self._specs = {spec.name: spec for spec in table}
         self._options = options
         self._run_dir = run_dir
@@ -129,12 +136,17 @@ class Crew:
         command += spec.viewer_command if self._options.viewer else ()
         command += spec.paced_command if self._options.paced else ()
         child = ChildProcess(
-            self._options.fill(command, self._run_dir),
-            {**self._environment, PROCESS_VARIABLE: name},
+            replace(self._options, profile=self.profile).fill(command, self._run_dir),
+            {
+                **self._environment,
+                **thread_limits(self.in_force, name),
+                PROCESS_VARIABLE: name,
+            },
             self._output_path(name),
         )
         self._children[name] = child
         self._unswept.add(name)
+        self.started_under[name] = self.profile
         self.started[name] = (child.pid, self._clock.now_ns())
 
     def _output_path(self, name: str) -> Path:

@@ -6,7 +6,10 @@ from pathlib import Path
 from typing import Final
 
 from platforms.board import identify
+from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.supervisor.state_folder import state_dir_of
 
+_SYSTEM_STATE: Final = Path("/var/lib/vla-deploy")
 _NAME: Final = "profile.json"
 _FALLBACK: Final = "desktop"
 
@@ -40,8 +43,10 @@ class ProfileChoice:
 
 
 def choice_of(runtime_base: Path | None) -> ProfileChoice:
-    """Return where the choice is kept: beside the runs of a chosen base, else with the state."""
-    return ProfileChoice((runtime_base or _state_folder()) / _NAME)
+    """Return where the choice is kept: with what outlives the runs, or /var/lib of the system."""
+    base = runtime_base or default_base()
+    system = os.getuid() == 0 and runtime_base is None
+    return ProfileChoice((_SYSTEM_STATE if system else state_dir_of(base)) / _NAME)
 
 
 def start_profile(runtime_base: Path | None, root: Path = Path("/")) -> tuple[str, str]:
@@ -59,10 +64,3 @@ def detect(root: Path = Path("/")) -> tuple[str, str]:
     if board.profile_name is None:
         return _FALLBACK, f"{board.name} is not known: {reasons}"
     return board.profile_name, f"{board.name}" + (f": {reasons}" if reasons else "")
-
-
-def _state_folder() -> Path:
-    if os.getuid() == 0:
-        return Path("/var/lib/vla-deploy")
-    home = os.environ.get("XDG_STATE_HOME")
-    return (Path(home) if home else Path.home() / ".local" / "state") / "vla-deploy"

@@ -27,7 +27,7 @@ _log = logging.getLogger(__name__)
 
 
 class ProfileSwitch:
-    """Own the profile that is in force; `profile` is what a process that starts now gets.
+    """Own the profile that is in force; `profile` names what a process that starts now gets.
 
     All or none of the processes change. Until a change is kept nothing is written down, so that a
     supervisor that ends meanwhile leaves the old profile.
@@ -35,15 +35,16 @@ class ProfileSwitch:
 
     def __init__(
         self,
-        profile: str,
+        name: str,
+        profile: Profile,
         space: SharedSpace,
         clock: Clock,
         choice: ProfileChoice,
         power: PowerSwitch,
         aside: Executor,
     ) -> None:
-        self.profile = profile
-        self._kept = profile
+        self.profile = self._kept = name
+        self.in_force = self._kept_profile = profile
         self._clock = clock
         self._choice = choice
         self._power = power
@@ -182,7 +183,7 @@ class ProfileSwitch:
 
     def _commit(self, change: Change) -> None:
         change.committed = True
-        self.profile = change.request.profile
+        self.profile, self.in_force = change.request.profile, change.target
         limit_s = profile_change.RESTART_S if change.restarts else profile_change.COMMIT_S
         change.enter(Phase.COMMIT, self._clock.now_ns(), _ns(limit_s))
         self._publish(change, "commit")
@@ -224,7 +225,7 @@ class ProfileSwitch:
             self._go_back(change, f"{self._choice.path}: {error.strerror}")
             return
         self._publish(change, "keep")
-        self._kept = self.profile
+        self._kept, self._kept_profile = self.profile, self.in_force
         self._adopted = {name: member.pid for name, member in members.items()}
         self._doubtful = {}
         self._end(change, Outcome.KEPT, "")
@@ -249,7 +250,7 @@ class ProfileSwitch:
 
     def _go_back(self, change: Change, failure: str) -> None:
         change.failure = failure
-        self.profile = self._kept
+        self.profile, self.in_force = self._kept, self._kept_profile
         self._power_set = (
             self._aside.submit(self._power.set, change.power_before)
             if change.power_before

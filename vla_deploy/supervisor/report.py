@@ -39,6 +39,7 @@ class Report:
         refusal: str,
     ) -> None:
         """Measure every process and publish the table; `refusal` is why no command is taken."""
+        self._head["profile"] = crew.profile
         pids = crew.pids()
         measured = self._meter.sample({_SUPERVISOR: os.getpid(), **pids}, self._clock.now_ns())
         usages = {
