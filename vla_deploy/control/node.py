@@ -23,6 +23,7 @@ from vla_deploy.control.retuning import Tuning, retuned, tuning_of
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import Mode, ModeInputs, next_mode, status_name
 from vla_deploy.control.stop_plan import StopPlan
+from vla_deploy.control.surroundings import SurroundingsWatch
 from vla_deploy.control.telemetry import Telemetry, TickClock
 from vla_deploy.control.thresholds import safety_limits
 from vla_deploy.control.tick_recorder import TickRecorder
@@ -92,6 +93,7 @@ class ControlNode:
             self._desk = OperatorDesk(
                 space.ring_reader("operator", from_start=True), self._button.source, before.latest()
             )
+        self._surroundings = SurroundingsWatch(space, robot)
         self._payload = Payload(robot, space.cell_reader("executor_status"))
         self._commands = space.ring_reader("motion_command", from_start=False)
         self._watch = Watch(space, self._servos, self._wheels, clock)
@@ -154,6 +156,7 @@ class ControlNode:
             self._telemetry,
             self._tick_record,
             self._watch,
+            self._surroundings,
             self._commands,
             self._payload,
         ):
@@ -199,6 +202,7 @@ class ControlNode:
         self._act = self._desk.next_act() if self._reset_until_ns is None else None
         if self._act is Act.RESET:
             self._begin_reset(now_ns)
+        state = self._servos.state
         inputs = self._watch.inputs(
             energised=self._mode is not Mode.DISARMED,
             estop_source=self._desk.estop_source,
@@ -206,7 +210,14 @@ class ControlNode:
             setpoint=self._gate.sent,
             base_at_rest=self._base.at_rest,
             standstill=self._mode in _STANDSTILL_MODES,
-            surroundings=self._watch.surroundings(),
+            surroundings=self._surroundings.refresh(
+                now_ns,
+                state.position_rad,
+                state.velocity_rad_s,
+                state.effort_ratio,
+                self._wheels.v_m_s,
+                self._wheels.w_rad_s,
+            ),
         )
         before = self._safety
         self._safety, self._verdict = evaluate(before, inputs, self._limits)

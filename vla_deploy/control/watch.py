@@ -20,7 +20,6 @@ class Watch:
         self.w_rad_s = 0.0
         self._base_command = space.cell_reader("base_command")
         self._process_table = space.cell_reader("process_table")
-        self._scan = space.cell_reader("scan")
         self._budget = BudgetWatch(space.cell_reader("budget"))
         self._servos = servos
         self._wheels = wheels
@@ -96,10 +95,6 @@ class Watch:
         age_s = (self._clock.now_ns() - state.climate_stamp_ns) / NS_PER_S
         return np.where(polled, age_s, state.age_s)
 
-    def surroundings(self) -> Surroundings:
-        """Return what is known beyond joints and wheels."""
-        return Surroundings(scan_age_s=self._age_s(self._scan))
-
     def _age_s(self, cell: CellReader) -> float | None:
         sample = cell.latest()
         return None if sample is None else sample.age_s(self._clock.now_ns())
@@ -108,7 +103,6 @@ class Watch:
         """Unmap the topics."""
         self._base_command.close()
         self._process_table.close()
-        self._scan.close()
         self._budget.close()
 
 

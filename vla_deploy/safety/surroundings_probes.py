@@ -61,9 +61,9 @@ def keep_out(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 def workspace(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a group that is outside the workspace and still on its way out."""
     excess = inputs.surroundings.workspace
-    if excess is None or excess.excess_m <= limits.workspace_excess_m:
+    if excess is None or not inputs.energised:
         return None
-    if excess.rate_m_s <= limits.approach_m_s:
+    if excess.excess_m <= limits.workspace_excess_m or excess.rate_m_s <= limits.approach_m_s:
         return None
     return Finding(
         subject=excess.subject, measured=excess.excess_m, limit=limits.workspace_excess_m
@@ -72,15 +72,15 @@ def workspace(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 def self_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find two parts of the robot that are too close and come closer."""
-    pair = inputs.surroundings.self_clearance
+    pair = inputs.surroundings.self_clearance if inputs.energised else None
     return _too_close(pair, limits.self_clearance_m, 0.0, limits)
 
 
 def environment_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a part of the robot that is too close to something around it and comes closer."""
     around = inputs.surroundings
-    allowed_m = limits.environment_clearance_m
-    return _too_close(around.environment_clearance, allowed_m, around.depth_age_s or 0.0, limits)
+    pair = around.environment_clearance if inputs.energised else None
+    return _too_close(pair, limits.environment_clearance_m, around.depth_age_s or 0.0, limits)
 
 
 def tip_over(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
