@@ -163,19 +163,20 @@ def _watch(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
         ready = replace(record, state=State.READY, ready_ns=now_ns, was_ready=True, reason="")
         return ready, None
     if now_ns >= record.until_ns:
-        return _abort(record, f"not ready within {spec.ready_timeout_s:g} s", now_ns)
+        return abort(record, f"not ready within {spec.ready_timeout_s:g} s", now_ns)
     return record, None
 
 
 def _watch_ready(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
     if seen.silence:
-        return _abort(record, seen.silence, now_ns)
+        return abort(record, seen.silence, now_ns)
     if record.failures_ns and now_ns - record.ready_ns >= spec.restart.stable_s * NS_PER_S:
         return replace(record, failures_ns=()), None
     return record, None
 
 
-def _abort(record: Record, reason: str, now_ns: int) -> Step:
+def abort(record: Record, reason: str, now_ns: int) -> Step:
+    """End a running process for a reason; it is started again like one that has failed."""
     until_ns = now_ns + ABORT_GRACE_NS
     return replace(record, state=State.ABORTING, until_ns=until_ns, reason=reason), Act.ABORT
 

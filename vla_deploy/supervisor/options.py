@@ -22,6 +22,12 @@ class RunOptions:
     devices_dir: Path | None = None
     runtime_base: Path | None = None
     arm: bool = False
+    probe_root: Path = Path("/")
+
+    def __post_init__(self) -> None:
+        """Refuse what only the twin can do."""
+        if self.probe_root != Path("/") and not self.twin:
+            raise ValueError(f"probe_root {self.probe_root}: expected / without the twin")
 
     @property
     def takes_devices(self) -> bool:

@@ -11,6 +11,7 @@ from platforms import Profile
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.journal import JOURNAL_SOCKET
 from vla_deploy.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
+from vla_deploy.supervisor.budgets import open_keeper
 from vla_deploy.supervisor.crash_reports import CrashReports, crash_folder
 from vla_deploy.supervisor.crew import Crew
 from vla_deploy.supervisor.directives import Directives
@@ -72,6 +73,14 @@ class Run:
             clock,
         )
         self.report = Report(self.runtime.run_id, options, self.space, clock)
+        self.budgets = open_keeper(
+            profile,
+            self.space,
+            clock,
+            run_dir=run_dir,
+            state_dir=self.runtime.state_dir,
+            probe_root=options.probe_root,
+        )
         self.directives = Directives(self.space)
         self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
         self.notifier = Notifier(notify, clock)
@@ -88,6 +97,7 @@ class Run:
     def close(self) -> None:
         """End whoever is left, keep the logs, remove the run, give the signals back."""
         self.crew.kill_all()
+        self.budgets.close()
         self.notifier.close()
         self.space.close()
         self._log.close()

@@ -12,7 +12,7 @@ from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.consequences import Consequences
 from vla_deploy.supervisor.errors import ProcessGivenUp, StartFailed, SupervisorError
 from vla_deploy.supervisor.last_words import complaint, last_words
-from vla_deploy.supervisor.lifecycle import Action, Record, State, reconcile, wind_down
+from vla_deploy.supervisor.lifecycle import Action, Record, State, abort, reconcile, wind_down
 from vla_deploy.supervisor.liveness import Vital
 from vla_deploy.supervisor.notify import NotifyTarget, own_target
 from vla_deploy.supervisor.options import RunOptions
@@ -167,7 +167,7 @@ class Supervisor:
         run, now_ns, before = self._started(), self._clock.now_ns(), self._records
         self._forgive_when_held_up(now_ns)
         self._records, actions = self._decide(stopping=stopping, now_ns=now_ns)
-        run.crew.perform(actions)
+        run.crew.perform((*actions, *self._end_offenders(run, now_ns)))
         run.crashes.note(before, self._records, run.crew.started)
         changed = _log_changes(before, self._records)
         if changed:
@@ -191,6 +191,15 @@ class Supervisor:
         return reconcile(
             self._table, self._records, seen, unwanted=self._unwanted(run), now_ns=now_ns
         )
+
+    def _end_offenders(self, run: Run, now_ns: int) -> list[Action]:
+        """End those that the budgets want started anew."""
+        actions: list[Action] = []
+        for name, reason in run.budgets.step(run.crew.pids()).restart.items():
+            if self._records[name].state in (State.STARTING, State.READY):
+                self._records[name], act = abort(self._records[name], reason, now_ns)
+                actions += [(act, name)] if act else []
+        return actions
 
     def _unwanted(self, run: Run) -> dict[str, str]:
         run.directives.refresh()

@@ -1,14 +1,15 @@
 """Keep the budgets of one run: judge what was measured, take and undo steps, tell everyone."""
 
 import logging
+import os
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from platforms import LadderAction, Profile
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import ClaimBook, SharedSpace
 from vla_deploy.supervisor.budgets.documents import (
     directives,
     enforcement_rows,
@@ -19,7 +20,7 @@ from vla_deploy.supervisor.budgets.documents import (
 )
 from vla_deploy.supervisor.budgets.emergency import Emergencies
 from vla_deploy.supervisor.budgets.enforcement import Enforcer
-from vla_deploy.supervisor.budgets.judge import Finding, Measurement, judge
+from vla_deploy.supervisor.budgets.judge import Finding, Findings, Measurement, judge
 from vla_deploy.supervisor.budgets.ladder import EMERGENCY, Change, LadderState, Pressure, climb
 from vla_deploy.supervisor.budgets.lines import Line, lines_of
 from vla_deploy.supervisor.budgets.measure import Measurements, Measurer
@@ -28,6 +29,9 @@ from vla_deploy.supervisor.budgets.sampler import Feed, Snapshot
 TELL_PERIOD_NS: Final = NS_PER_S // 2
 STALE_AFTER_NS: Final = 5 * NS_PER_S
 KEPT_CHANGES: Final = 20
+WARNED_ONLY: Final = frozenset({"disk_free_mb"})
+"""What no step of the ladder relieves."""
+_SUPERVISOR: Final = "supervisor"
 _log = logging.getLogger(__name__)
 
 
@@ -47,14 +51,17 @@ class BudgetKeeper:
 
     def __init__(
         self,
-        profile: Profile,
+        profile: Callable[[], Profile],
         space: SharedSpace,
         clock: Clock,
         feed: Feed,
         emergencies: Emergencies,
         enforcer: Enforcer,
+        claims: ClaimBook,
     ) -> None:
         self.counts: Counter[str] = Counter()
+        self._profile_now = profile
+        self._claims = claims
         self._clock = clock
         self._feed = feed
         self._emergencies = emergencies
@@ -69,9 +76,9 @@ class BudgetKeeper:
         self._seen_ns = clock.now_ns()
         self._stale = False
         self._told_ns = 0
-        self.adopt(profile)
+        self._adopt(profile())
 
-    def adopt(self, profile: Profile) -> None:
+    def _adopt(self, profile: Profile) -> None:
         """Go on with the budgets of another profile; steps that it does not declare are undone."""
         self._profile = profile
         self._lines: tuple[Line, ...] = lines_of(profile.budgets, profile.total)
@@ -79,17 +86,21 @@ class BudgetKeeper:
         kept = tuple(one for one in self._ladder.taken if one.step in known)
         self._ladder = replace(self._ladder, taken=kept)
         self._enforcer.adopt(profile.budgets)
+        self._claims.declare(_memory_of(profile))
 
     def step(self, pids: Mapping[str, int]) -> Orders:
         """Judge the newest measurement, if there is a new one, and return what is to be done."""
         now_ns = self._clock.now_ns()
-        self._feed.watch(pids)
+        if self._profile_now() is not self._profile:
+            self._adopt(self._profile_now())
+        everyone = {_SUPERVISOR: os.getpid(), **pids}
+        self._feed.watch(everyone)
         restart: dict[str, str] = {}
         snapshot = self._feed.latest()
         if snapshot is not None and snapshot.stamp_ns > self._seen_ns:
             self._seen_ns, self._stale = snapshot.stamp_ns, False
             restart = self._judge(self._measure(snapshot), now_ns)
-            self._enforcer.enforce(pids, self._findings.values())
+            self._enforcer.enforce(everyone, self._findings.values())
         elif now_ns - self._seen_ns > STALE_AFTER_NS and not self._stale:
             self._stale = True
             self._judge(self._unknown(), now_ns)
@@ -112,9 +123,13 @@ class BudgetKeeper:
         return {line.key: Measurement(value=None, reason=reason) for line in self._lines}
 
     def _judge(self, measured: Measurements, now_ns: int) -> dict[str, str]:
-        timing = self._profile.ladder_timing
-        self._findings = judge(self._lines, self._findings, measured, timing, now_ns)
-        pressure = Pressure(findings=tuple(self._findings.values()), emergency=self._emergency)
+        timing, before = self._profile.ladder_timing, self._findings
+        self._findings = judge(self._lines, before, measured, timing, now_ns)
+        _log_excesses(before, self._findings)
+        relievable = tuple(
+            one for one in self._findings.values() if one.line.metric not in WARNED_ONLY
+        )
+        pressure = Pressure(findings=relievable, emergency=self._emergency)
         self._ladder, change = climb(self._profile.ladder, timing, self._ladder, pressure, now_ns)
         if change is None:
             return {}
@@ -156,3 +171,19 @@ class BudgetKeeper:
                 "reason": stop,
             }
         )
+
+
+def _memory_of(profile: Profile) -> dict[str, int]:
+    """Return the memory that may be claimed, as resources."""
+    gpu_mb = profile.total.gpu_memory_mb
+    memory = {"ram_mb": int(profile.total.memory_mb)}
+    return memory if gpu_mb is None else {**memory, "gpu_memory_mb": int(gpu_mb)}
+
+
+def _log_excesses(before: Findings, after: Findings) -> None:
+    for key, finding in after.items():
+        was_over = key in before and before[key].over
+        if finding.over and not was_over:
+            _log.warning("budgets: %s", finding)
+        elif was_over and not finding.over:
+            _log.info("budgets: %s keeps its budget again", " ".join(filter(None, reversed(key))))

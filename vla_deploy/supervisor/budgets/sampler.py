@@ -1,7 +1,7 @@
 """Measure the board and the processes beside the supervisor's loop, never in it."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -17,6 +17,10 @@ class Probes(Protocol):
 
     def read(self) -> Mapping[str, Reading]:
         """Return every reading by name."""
+        ...
+
+    def close(self) -> None:
+        """Give all handles back."""
         ...
 
 
@@ -52,8 +56,10 @@ class BackgroundSampler:
     Some sensors take milliseconds to answer, and one that hangs must not hold the supervisor up.
     """
 
-    def __init__(self, probes: Probes, clock: Clock, period_s: float = SAMPLE_PERIOD_S) -> None:
-        self._probes = probes
+    def __init__(
+        self, open_probes: Callable[[], Probes], clock: Clock, period_s: float = SAMPLE_PERIOD_S
+    ) -> None:
+        self._open_probes = open_probes
         self._clock = clock
         self._period_s = period_s
         self._meter = UsageMeter(clock.now_ns())
@@ -77,12 +83,18 @@ class BackgroundSampler:
         self._thread.join(timeout=2 * self._period_s)
 
     def _run(self) -> None:
-        while not self._closing.wait(self._period_s):
-            pids = self._pids
-            stamp_ns = self._clock.now_ns()
-            self._latest = Snapshot(
-                stamp_ns=stamp_ns,
-                readings=self._probes.read(),
-                usages=self._meter.sample(pids, stamp_ns),
-                pids=pids,
-            )
+        probes = self._open_probes()
+        try:
+            while not self._closing.wait(self._period_s):
+                self._latest = self._sample(probes)
+        finally:
+            probes.close()
+
+    def _sample(self, probes: Probes) -> Snapshot:
+        pids, stamp_ns = self._pids, self._clock.now_ns()
+        return Snapshot(
+            stamp_ns=stamp_ns,
+            readings=probes.read(),
+            usages=self._meter.sample(pids, stamp_ns),
+            pids=pids,
+        )

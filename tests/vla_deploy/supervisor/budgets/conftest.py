@@ -7,7 +7,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep, LadderTiming, Profile, load_profile
 from platforms.probes import Reading
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import ClaimBook, SharedSpace
 from vla_deploy.supervisor.budgets import BudgetKeeper, Orders, Snapshot
 from vla_deploy.supervisor.budgets.cgroup import CgroupTree
 from vla_deploy.supervisor.budgets.emergency import Emergencies
@@ -59,13 +59,15 @@ class World:
         self.running = dict(self.pids)
         self.restarted: list[str] = []
         self._cpu_s = dict.fromkeys(self.pids, 0.0)
+        self.profile = profile
         self.keeper = BudgetKeeper(
-            profile,
+            lambda: self.profile,
             self.space,
             self.clock,
             self.feed,
             Emergencies({"tj-thermal": 104.5}),
             Enforcer(CgroupTree(directory)),
+            ClaimBook(directory, self.clock),
         )
 
     def go(self, seconds: float, *, measured: bool = True) -> Orders:

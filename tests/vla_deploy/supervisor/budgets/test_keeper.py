@@ -3,6 +3,8 @@ from dataclasses import replace
 
 import pytest
 
+from vla_deploy.ipc import ClaimBook
+
 GB = 1_000_000_000
 
 
@@ -172,15 +174,15 @@ def test_every_step_is_logged(world, caplog):
     world.memory_mb["planner"] = 500.0
     world.go(4)
     world.go(20)
-    told = [record.message for record in caplog.records if "budgets:" in record.message]
-    assert told[0].startswith("budgets: took suspend of planner: planner: memory_mb 500")
+    told = [record.message for record in caplog.records]
+    assert any("took suspend of planner: planner: memory_mb 500" in line for line in told)
     assert any("undid suspend of planner" in line for line in told)
 
 
 def test_another_profile_undoes_the_steps_that_it_does_not_declare(world, profile):
     world.memory_mb["perception"] = 1000.0
     world.go(5)
-    world.keeper.adopt(replace(profile, ladder=profile.ladder[1:]))
+    world.profile = replace(profile, ladder=profile.ladder[1:])
     world.go(0.5)
     assert world.cell("resource_directives")["rate_ratio"] == {"perception": 0.25}
 
@@ -195,3 +197,22 @@ def test_every_row_says_how_its_budget_is_enforced(world):
 def test_closing_ends_the_measuring(world):
     world.keeper.close()
     assert world.feed.closed
+
+
+def test_a_full_disk_is_warned_of_and_slows_nobody(world, caplog):
+    world.readings = {"disk_free_bytes": 0.1 * GB}
+    world.go(30)
+    budget = world.cell("budget")
+    assert row_of(budget, "disk_free_mb")["over"]
+    assert budget["ladder"]["step"] == 0
+    assert [one.message for one in caplog.records] == [
+        "budgets: disk_free_mb 100 below its budget of 500"
+    ]
+
+
+def test_memory_may_be_claimed_up_to_the_profiles_total(world, profile, tmp_path):
+    book = ClaimBook(tmp_path, world.clock)
+    assert book.look().capacities == {"ram_mb": int(profile.total.memory_mb)}
+    world.profile = replace(profile, total=replace(profile.total, gpu_memory_mb=800))
+    world.go(0.5)
+    assert book.look().capacities["gpu_memory_mb"] == 800
