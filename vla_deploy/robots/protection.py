@@ -80,9 +80,11 @@ class TipOver:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactLimits:
-    """Say which torque, beyond what motion, weight and payload explain, counts as a contact."""
+    """Say which torque, beyond what motion and own weight explain, counts as a contact.
 
-    payload_kg: float
+    It must leave room for friction and the heaviest payload.
+    """
+
     torque_nm: Mapping[str, float]
 
 

@@ -80,7 +80,7 @@ ZONE: Shape = {
 WORKSPACE: Shape = {"min_m": POINT_3, "max_m": POINT_3}
 CLEARANCE: Shape = {"self_m": NOT_NEGATIVE, "floor_m": NOT_NEGATIVE, "allow": PAIRS}
 TIP_OVER: Shape = {"support_m": POLYGON, "max_lean_rad": LEAN, "min_ratio": RATIO}
-CONTACT: Shape = {"payload_kg": NOT_NEGATIVE, "torque_nm": TABLE}
+CONTACT: Shape = {"torque_nm": TABLE}
 
 # What a kind of zone cannot do without, and what it has no use for.
 _NEEDS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -221,4 +221,4 @@ def _tip_over(row: Document) -> TipOver:
 
 
 def _contact(row: Document) -> ContactLimits:
-    return ContactLimits(payload_kg=row.get("payload_kg", 0.0), torque_nm=dict(row["torque_nm"]))
+    return ContactLimits(torque_nm=dict(row["torque_nm"]))
