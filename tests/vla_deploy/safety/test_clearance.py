@@ -1,0 +1,102 @@
+"""Clearances where the joints come to rest, and points beyond their boxes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from vla_deploy.safety.clearance import (
+    JointBounds,
+    beyond_box,
+    nearest_pair,
+    stopping,
+)
+
+BOUNDS = JointBounds(
+    lower=np.array([-1.0, 0.0]),
+    upper=np.array([1.0, 0.04]),
+    velocity=np.array([1.0, 0.1]),
+    acceleration=np.array([4.0, 0.5]),
+    reaction_s=0.1,
+)
+PAIRS = (("hand", "torso"), ("hand", "head"), ("elbow", "torso"))
+LOW, HIGH = np.array([[-1.0, -1.0, 0.0]] * 2), np.array([[1.0, 1.0, 1.0]] * 2)
+
+speeds = arrays(np.float64, 2, elements=st.floats(-2.0, 2.0))
+
+
+def test_standing_joints_stay_where_they_are() -> None:
+    here = np.array([0.2, 0.01])
+    at_rest = stopping(here, np.array([0.02, -0.002]), BOUNDS)
+    assert at_rest.position.tolist() == here.tolist()
+    assert at_rest.time_s == BOUNDS.reaction_s
+
+
+def test_a_moving_joint_needs_its_reaction_and_braking_way() -> None:
+    at_rest = stopping(np.array([0.0, 0.02]), np.array([-0.8, 0.0]), BOUNDS)
+    assert at_rest.position[0] == pytest.approx(-(0.08 + 0.64 / 8.0))
+    assert at_rest.time_s == pytest.approx(0.1 + 0.8 / 4.0)
+
+
+def test_no_joint_stops_beyond_its_range_but_one_may_stand_there() -> None:
+    at_rest = stopping(np.array([0.95, -0.01]), np.array([1.0, -0.05]), BOUNDS)
+    assert at_rest.position.tolist() == [1.0, -0.01]
+
+
+@given(speeds, st.floats(1.0, 3.0))
+def test_a_faster_joint_never_stops_sooner(velocity: np.ndarray, factor: float) -> None:
+    here = np.array([0.0, 0.02])
+    slow, fast = stopping(here, velocity, BOUNDS), stopping(here, velocity * factor, BOUNDS)
+    assert (np.abs(fast.position - here) >= np.abs(slow.position - here) - 1e-12).all()
+    assert fast.time_s >= slow.time_s
+
+
+def test_the_nearest_pair_is_told_while_none_closes() -> None:
+    found = nearest_pair(PAIRS, np.array([0.3, 0.1, 0.2]), np.array([0.3, 0.1, 0.2]), 0.2)
+    assert found is not None
+    assert (found.first, found.second) == ("hand", "head")
+    assert (found.distance_m, found.closing_m_s) == (0.1, 0.0)
+
+
+def test_a_pair_that_closes_goes_before_one_that_rests_nearer() -> None:
+    found = nearest_pair(PAIRS, np.array([0.3, 0.0, 0.2]), np.array([0.25, 0.0, 0.1]), 0.5)
+    assert found is not None
+    assert (found.first, found.second) == ("elbow", "torso")
+    assert found.distance_m == 0.1
+    assert found.closing_m_s == pytest.approx(0.2)
+
+
+def test_a_pair_that_opens_does_not_close() -> None:
+    found = nearest_pair(PAIRS[:1], np.array([0.01]), np.array([0.05]), 0.2)
+    assert found is not None
+    assert found.closing_m_s == 0.0
+
+
+def test_without_pairs_there_is_no_clearance() -> None:
+    assert nearest_pair((), np.zeros(0), np.zeros(0), 0.1) is None
+
+
+def test_inside_the_box_there_is_no_excess() -> None:
+    inside = np.array([[0.0, 0.0, 0.5], [0.9, -0.9, 0.1]])
+    assert beyond_box(("left", "right"), inside, inside, LOW, HIGH, 0.2) is None
+
+
+def test_without_boxes_there_is_no_excess() -> None:
+    assert beyond_box((), np.zeros((0, 3)), np.zeros((0, 3)), LOW[:0], HIGH[:0], 0.2) is None
+
+
+def test_who_leaves_the_box_goes_before_who_is_further_out_and_comes_back() -> None:
+    now = np.array([[1.0, 0.0, 0.5], [0.0, -1.5, 0.5]])
+    ahead = np.array([[1.1, 0.0, 0.5], [0.0, -1.4, 0.5]])
+    found = beyond_box(("left", "right"), now, ahead, LOW, HIGH, 0.2)
+    assert found is not None
+    assert found.subject == "left"
+    assert found.excess_m == pytest.approx(0.1)
+    assert found.rate_m_s == pytest.approx(0.5)
+    found = beyond_box(("left", "right"), ahead, now, LOW, HIGH, 0.2)
+    assert found is not None
+    assert (found.subject, found.excess_m) == ("right", pytest.approx(0.5))
+    found = beyond_box(("left", "right"), ahead, ahead, LOW, HIGH, 0.2)
+    assert found is not None
+    assert (found.subject, found.rate_m_s) == ("right", 0.0)
