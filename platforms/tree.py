@@ -109,6 +109,14 @@ class Tree:
         finally:
             file.close()
 
+    def number(self, path: str) -> float:
+        """Return the number in a file once.
+
+        Raises:
+            Missing: see `SystemFile.number`.
+        """
+        return number_in(self.text(path), path)
+
     def names(self, folder: str) -> tuple[str, ...]:
         """Return what a folder holds, sorted; nothing where it cannot be listed."""
         try:

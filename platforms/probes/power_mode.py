@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from platforms.probes.reading import Reading, measure
-from platforms.tree import Missing, SystemFile, Tree
+from platforms.tree import Missing, Tree
 
 CONFIGURATION: Final = "/etc/nvpmodel.conf"
 STATUS: Final = "/var/lib/nvpmodel/status"
@@ -38,7 +38,7 @@ class PowerModeSource:
 
     def readings(self) -> Iterator[Reading]:
         """Return the id of the mode."""
-        yield measure("power_mode_id", "id", lambda: float(_current(self._status)))
+        yield measure("power_mode_id", "id", lambda: float(_current(self._status.text())))
 
 
 def read_power_modes(tree: Tree) -> PowerModes:
@@ -54,7 +54,7 @@ def read_power_modes(tree: Tree) -> PowerModes:
         reasons.append(f"{CONFIGURATION} declares no POWER_MODEL")
     default = _DEFAULT.search(text)
     try:
-        current = _current(tree.file(STATUS))
+        current = _current(tree.text(STATUS))
     except Missing as missing:
         current = None
         reasons.append(str(missing))
@@ -66,8 +66,8 @@ def read_power_modes(tree: Tree) -> PowerModes:
     )
 
 
-def _current(status: SystemFile) -> int:
-    found = _CURRENT.search(status.text())
+def _current(status: str) -> int:
+    found = _CURRENT.search(status)
     if found is None:
-        raise Missing(f"{status} names no pmode")
+        raise Missing(f"{STATUS} names no pmode")
     return int(found.group(1))

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -9,13 +10,13 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import Profile, load_profile
-from platforms.board import identify
 from platforms.probes import ProbeSet, Reading, open_probes, read_power_modes
 from platforms.tree import Tree
 from vla_deploy import doctor
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
 from vla_deploy.robots import load_robot
+from vla_deploy.supervisor.profile_choice import detect, start_profile
 
 LIVE_ROOT = Path("/")
 FIRST_LOOK_S = 0.5  # what is counted needs two looks
@@ -38,7 +39,7 @@ def register(commands: Any) -> None:
     )
     examined.add_argument("--robot", metavar="NAME", help="check the devices of this robot, too")
     examined.add_argument(
-        "--profile", metavar="NAME", help="what is needed (default: the profile made for the board)"
+        "--profile", metavar="NAME", help="what is needed (default: as run has it)"
     )
     _add_common(examined)
     examined.set_defaults(run=run)
@@ -75,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the findings; return 1 where one is a failure."""
     root = _root(arguments)
     robot = None if arguments.robot is None else load_robot(arguments.robot)
-    profile = _profile(arguments.profile, root)
+    profile = _profile(arguments.profile, root, arguments.runtime_base)
     if root == LIVE_ROOT:
         context = doctor.live_context(profile, robot)
     else:
@@ -95,9 +96,10 @@ def _root(arguments: argparse.Namespace) -> Path:
     return root
 
 
-def _profile(name: str | None, root: Path) -> Profile | None:
-    name = name or identify(root).profile_name
-    return None if name is None else load_profile(name)
+def _profile(name: str | None, root: Path, base: Path | None) -> Profile:
+    if name is None:
+        name, _ = start_profile(base) if root == LIVE_ROOT else detect(root)
+    return load_profile(name)
 
 
 def run_probes(arguments: argparse.Namespace) -> int:
@@ -131,11 +133,15 @@ def _without_name(reading: Reading) -> dict[str, Any]:
 
 def _lines(readings: Mapping[str, Reading]) -> Iterator[str]:
     for name, reading in readings.items():
-        if reading.value is None:
-            yield f"{name:<34}        -      {reading.reason}"
-        else:
+        if reading.value is not None:
             factor, unit = _SCALES.get(reading.unit, (1.0, reading.unit))
             yield f"{name:<34} {reading.value * factor:>12.6g} {unit}"
+    by_reason: dict[str, list[str]] = {}
+    for name, reading in readings.items():
+        if reading.value is None:
+            by_reason.setdefault(reading.reason, []).append(name)
+    for reason, names in by_reason.items():
+        yield from textwrap.wrap(f"{', '.join(names)}: {reason}", 100, subsequent_indent="    ")
 
 
 def _mode_line(root: Path) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from platforms.tree import Missing
 from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from vla_deploy.doctor.finding import Finding, missing, ok, warn
 
 _GB = 1e9
 _MB = 1e6
@@ -20,6 +20,11 @@ def board(context: Context) -> Iterator[Finding]:
         yield warn("board", f"{found.name}: {found.reasons[-1]}", "vla-deploy profile list")
     else:
         yield ok("board", f"{found.name}{module}{release}")
+
+
+def user(context: Context) -> Iterator[Finding]:
+    """Tell whose rights are examined: the service has its own user."""
+    yield ok("examined as", "root" if context.rights.uid == 0 else f"user {context.rights.uid}")
 
 
 def profile(context: Context) -> Iterator[Finding]:
@@ -38,12 +43,15 @@ def profile(context: Context) -> Iterator[Finding]:
 def memory(context: Context) -> Iterator[Finding]:
     """Compare processors and memory with what the profile needs."""
     if context.board.memory_bytes is None:
-        raise Missing(next(iter(context.board.reasons), "nothing tells its size"))
+        raise Missing("; ".join(one for one in context.board.reasons if "memory" in one))
     cpus = os.cpu_count() if context.is_live else None
     measured = f"{context.board.memory_bytes / _GB:.1f} GB" + (f", {cpus} CPUs" if cpus else "")
-    needs = None if context.profile is None else context.profile.total.memory_mb
-    if needs is not None and context.board.memory_bytes < needs * _MB:
-        measured = f"{measured}, the profile needs {needs / 1000:.1f} GB"
-        yield fail("memory", measured, "vla-deploy profile detect")
+    needs = None if context.profile is None else context.profile.board
+    if needs is not None and (
+        context.board.memory_bytes < needs.memory_mb * _MB
+        or (cpus or needs.cpu_count) < needs.cpu_count
+    ):
+        wanted = f"{needs.memory_mb / 1000:.1f} GB, {needs.cpu_count} CPUs"
+        yield warn("memory", f"{measured}; the profile needs {wanted}", "vla-deploy profile detect")
     else:
         yield ok("memory", measured)

@@ -13,7 +13,6 @@ from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
 from vla_deploy.robots import RobotDescription
 
 LATENCY_MS: Final = 1
-_NO_ROBOT: Final = "no robot was named"
 _NAME_ONE: Final = "vla-deploy doctor --robot butler"
 _OS_ACCESS: Final = os.R_OK | os.W_OK
 _GOOD_CAN_STATES: Final = frozenset({"ERROR-ACTIVE"})
@@ -44,7 +43,7 @@ _READ_ONLY: Final = frozenset({"estop"})
 def device_files(context: Context) -> Iterator[Finding]:
     """Check that each device file of the robot is there and open to us."""
     if context.robot is None:
-        yield missing("device files", _NO_ROBOT, _NAME_ONE)
+        yield missing("devices", "no robot was named", _NAME_ONE)
         return
     for node in _nodes(context.robot):
         yield _judged(context, node)
@@ -60,14 +59,13 @@ def _nodes(robot: RobotDescription) -> Iterator[Node]:
 
 def _judged(context: Context, node: Node) -> Finding:
     path = context.tree.root / node.path.lstrip("/")
-    if not os.access(path, os.F_OK):
-        folder = node.path.rpartition("/")[0]
-        return fail(node.name, f"there is no {node.path}", f"ls -l {folder}   # is it plugged in?")
-    if not os.access(path, node.access):
-        return fail(
-            node.name, f"no right to open {node.path}", f"sudo usermod -aG {node.group} $USER"
-        )
-    return ok(node.name, node.path)
+    folder, _, file = node.path.rpartition("/")
+    if not os.access(path, os.F_OK, effective_ids=True):
+        return fail(node.name, f"there is no {file}", f"ls -l {folder}   # is it plugged in?")
+    if not os.access(path, node.access, effective_ids=True):
+        remedy = f"sudo usermod -aG {node.group} $USER   # then log in anew"
+        return fail(node.name, f"no right to open {file}", remedy)
+    return ok(node.name, file)
 
 
 def latency_timers(context: Context) -> Iterator[Finding]:
@@ -79,7 +77,7 @@ def latency_timers(context: Context) -> Iterator[Finding]:
             continue
         name = f"{port} latency"
         try:
-            wait_ms = context.tree.file(path).number()
+            wait_ms = context.tree.number(path)
         except Missing as gone:
             yield missing(name, str(gone))
             continue
@@ -99,7 +97,6 @@ def _late_adapter(context: Context, name: str, wait_ms: float, path: str) -> Fin
 def can_link(context: Context) -> Iterator[Finding]:
     """Check that the wheel drives' CAN link is up, in good health, and has the right bit rate."""
     if context.robot is None:
-        yield missing("CAN link", _NO_ROBOT, _NAME_ONE)
         return
     name, bitrate = context.robot.can_bus.path, context.robot.can_bus.bitrate
     up = f"sudo ip link set {name} up type can bitrate {bitrate} restart-ms 100"

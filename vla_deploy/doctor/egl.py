@@ -1,4 +1,4 @@
-"""Print the version of EGL: `python -m vla_deploy.doctor.egl`; fails where nothing can be drawn."""
+"""Print the version of EGL; a script of its own, which fails where nothing can be drawn."""
 
 import ctypes
 import sys

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from platforms.probes import read_cgroup
+from vla_deploy.doctor.boot import boot_option
 from vla_deploy.doctor.context import Context
 from vla_deploy.doctor.finding import Finding, ok, warn
 
@@ -24,7 +25,11 @@ def control_groups(context: Context) -> Iterator[Finding]:
     if cgroup.version != 2 or CONTROLLERS.keys().isdisjoint(cgroup.controllers):
         had = f"version {cgroup.version}" if cgroup.version else "none"
         because = f" ({cgroup.reason})" if cgroup.reason else ""
-        yield warn("control groups", f"{had}{because}: no limit is real", _boot_switch(context))
+        yield warn(
+            "control groups",
+            f"{had}{because}: no limit is real",
+            boot_option(context.tree, _SWITCH),
+        )
         return
     yield ok("control groups", "version 2")
     for name, (what, instead) in CONTROLLERS.items():
@@ -34,9 +39,3 @@ def control_groups(context: Context) -> Iterator[Finding]:
         else:
             remedy = f"echo +{name} | sudo tee /sys/fs/cgroup/cgroup.subtree_control"
             yield warn(f"limit of {name}", f"not real: {instead} instead", remedy)
-
-
-def _boot_switch(context: Context) -> str:
-    if context.tree.exists("/boot/extlinux/extlinux.conf"):
-        return f"sudoedit /boot/extlinux/extlinux.conf   # add {_SWITCH} to APPEND, reboot"
-    return f"sudoedit /etc/default/grub   # add {_SWITCH}; sudo update-grub; reboot"

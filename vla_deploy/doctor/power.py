@@ -6,6 +6,7 @@ from typing import Final
 from platforms.probes import open_probes, read_power_modes
 from platforms.probes.thermal import ZONES
 from platforms.tree import Missing, Tree, number_in
+from vla_deploy.doctor.boot import boot_option
 from vla_deploy.doctor.context import Context
 from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
 
@@ -79,18 +80,23 @@ def power_mode(context: Context) -> Iterator[Finding]:
     """Compare the board's power mode with the one that the profile asks for."""
     modes = read_power_modes(context.tree)
     wanted = context.profile.power_mode if context.profile else ""
-    ids = {name: number for number, name in modes.names.items()}
+    ids = {_plain(name): number for number, name in modes.names.items()}
+    current = _plain(modes.current_name or "")
     if modes.current is None:
         yield missing("power mode", modes.reason)
-    elif not wanted or modes.current_name == wanted:
+    elif not wanted or current == _plain(wanted):
         asked = "" if wanted else ", the profile asks for none"
         yield ok("power mode", f"{modes.current_name}{asked}")
-    elif wanted not in ids:
+    elif _plain(wanted) not in ids:
         measured = f"the board has no mode {wanted}, only {', '.join(ids)}"
         yield fail("power mode", measured, "vla-deploy profile detect")
     else:
         measured = f"{modes.current_name}, expected {wanted}"
-        yield warn("power mode", measured, f"sudo nvpmodel -m {ids[wanted]}")
+        yield warn("power mode", measured, f"sudo nvpmodel -m {ids[_plain(wanted)]}")
+
+
+def _plain(mode: str) -> str:
+    return mode.removeprefix("MODE_")  # which some releases write before it
 
 
 def governor(context: Context) -> Iterator[Finding]:
@@ -119,5 +125,5 @@ def isolated_processors(context: Context) -> Iterator[Finding]:
         yield ok("isolated CPUs", isolated or "none, and the profile needs none")
     else:
         listed = ",".join(str(cpu) for cpu in wanted)
-        remedy = f"sudoedit /boot/extlinux/extlinux.conf   # add isolcpus={listed} to APPEND"
+        remedy = boot_option(context.tree, f"isolcpus={listed}")
         yield warn("isolated CPUs", f"none; control runs on {listed} beside others", remedy)

@@ -10,7 +10,7 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from platforms.tree import Missing
 from vla_deploy.doctor.context import UNLIMITED, Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from vla_deploy.doctor.finding import Finding, fail, ok, warn
 
 LIMITS_FILE: Final = "/etc/security/limits.d/90-vla-deploy.conf"
 MEMORY_LOCK_BYTES: Final = 512 << 20
@@ -54,8 +54,8 @@ def fifo(context: Context) -> Iterator[Finding]:
 
 def realtime_share(context: Context) -> Iterator[Finding]:
     """Check how much of each period real-time processes may use."""
-    runtime_us = context.tree.file("/proc/sys/kernel/sched_rt_runtime_us").number()
-    period_us = context.tree.file("/proc/sys/kernel/sched_rt_period_us").number()
+    runtime_us = context.tree.number("/proc/sys/kernel/sched_rt_runtime_us")
+    period_us = context.tree.number("/proc/sys/kernel/sched_rt_period_us")
     remedy = "sudo sysctl -w kernel.sched_rt_runtime_us=950000"
     if runtime_us < 0:
         yield ok("real-time share", "no limit")
@@ -111,9 +111,6 @@ def memory_lock(context: Context) -> Iterator[Finding]:
 
 def wake_up(context: Context) -> Iterator[Finding]:
     """Measure for a second how late this computer wakes a process at the control rate."""
-    if not context.is_live:
-        yield missing("wake-up", "measured on the computer itself only")
-        return
     rate_hz = context.profile.control_rate_hz if context.profile else 250.0
     priority = _wanted(context)
     with _scheduled(priority) as how:

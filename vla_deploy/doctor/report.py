@@ -51,7 +51,7 @@ def _section(section: Section) -> Iterator[str]:
 def _lines(finding: Finding) -> Iterator[str]:
     head = f"  {finding.level:<{len(Level.MISSING)}}  {finding.name:<{_NAME_COLUMNS}} "
     room = COLUMNS - _INDENT
-    first, *rest = textwrap.wrap(finding.measured, room) or [""]
+    first, *rest = textwrap.wrap(finding.measured, room, break_on_hyphens=False) or [""]
     yield f"{head}{first}"
     yield from (" " * _INDENT + line for line in rest)
     if finding.remedy:
@@ -60,8 +60,12 @@ def _lines(finding: Finding) -> Iterator[str]:
 
 def _remedy(command: str) -> Iterator[str]:
     """Keep a command whole, even where it is long: it is there to be copied."""
-    command, _, comment = command.partition("   # ")
-    yield f"{' ' * (_INDENT - len(_ARROW))}{_ARROW}{command}"
+    line = f"{' ' * (_INDENT - len(_ARROW))}{_ARROW}{command}"
+    if len(line) <= COLUMNS:
+        yield line
+        return
+    line, _, comment = line.partition("   # ")
+    yield line
     if comment:
         yield from textwrap.wrap(
             comment, COLUMNS, initial_indent=" " * _INDENT, subsequent_indent=" " * _INDENT

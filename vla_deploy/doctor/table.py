@@ -19,38 +19,50 @@ from vla_deploy.doctor.finding import Finding, missing
 
 Examination = Callable[[Context], Iterator[Finding]]
 
-CHECKS: tuple[tuple[str, str, Examination], ...] = (
-    ("Computer", "board", computer.board),
-    ("Computer", "profile", computer.profile),
-    ("Computer", "memory", computer.memory),
-    ("Devices", "device files", devices.device_files),
-    ("Devices", "latency timers", devices.latency_timers),
-    ("Devices", "CAN link", devices.can_link),
-    ("Devices", "sound", devices.sound),
-    ("Real time", "kernel", realtime.preempt_rt),
-    ("Real time", "SCHED_FIFO", realtime.fifo),
-    ("Real time", "real-time share", realtime.realtime_share),
-    ("Real time", "RT_GROUP_SCHED", realtime.group_scheduling),
-    ("Real time", "memory lock", realtime.memory_lock),
-    ("Real time", "wake-up", realtime.wake_up),
-    ("Limits", "control groups", limits.control_groups),
-    ("Clocks", "clock source", clocks.clock_source),
-    ("Clocks", "wall time", clocks.wall_time),
-    ("Clocks", "jump since boot", clocks.jump_since_boot),
-    ("Power", "temperature", power.heat),
-    ("Power", "throttling", power.throttling),
-    ("Power", "power mode", power.power_mode),
-    ("Power", "CPU governor", power.governor),
-    ("Power", "isolated CPUs", power.isolated_processors),
-    ("Storage", "disk", storage.disks),
-    ("Storage", "shared memory", storage.shared_memory),
-    ("Storage", "swap", storage.swap),
-    ("Software", "Python", software.python),
-    ("Software", "packages", software.packages),
-    ("Software", "models", software.models),
-    ("Software", "OpenGL (EGL)", software.open_gl),
-    ("Software", "ROS", software.ros),
-    ("Software", "service", software.service),
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Name one check; those that are `live` look at this process or measure this computer."""
+
+    topic: str
+    name: str
+    run: Examination
+    live: bool = False
+
+
+CHECKS: tuple[Check, ...] = (
+    Check("Computer", "board", computer.board),
+    Check("Computer", "profile", computer.profile),
+    Check("Computer", "memory", computer.memory),
+    Check("Computer", "user", computer.user, live=True),
+    Check("Devices", "device files", devices.device_files),
+    Check("Devices", "latency timers", devices.latency_timers),
+    Check("Devices", "CAN link", devices.can_link),
+    Check("Devices", "sound", devices.sound),
+    Check("Real time", "kernel", realtime.preempt_rt),
+    Check("Real time", "SCHED_FIFO", realtime.fifo, live=True),
+    Check("Real time", "real-time share", realtime.realtime_share),
+    Check("Real time", "RT_GROUP_SCHED", realtime.group_scheduling),
+    Check("Real time", "memory lock", realtime.memory_lock, live=True),
+    Check("Real time", "wake-up", realtime.wake_up, live=True),
+    Check("Limits", "control groups", limits.control_groups),
+    Check("Clocks", "clock source", clocks.clock_source),
+    Check("Clocks", "wall time", clocks.wall_time, live=True),
+    Check("Clocks", "jump since boot", clocks.jump_since_boot),
+    Check("Power", "temperature", power.heat),
+    Check("Power", "throttling", power.throttling),
+    Check("Power", "power mode", power.power_mode),
+    Check("Power", "CPU governor", power.governor),
+    Check("Power", "isolated CPUs", power.isolated_processors),
+    Check("Storage", "disk", storage.disks, live=True),
+    Check("Storage", "shared memory", storage.shared_memory, live=True),
+    Check("Storage", "swap", storage.swap),
+    Check("Software", "Python", software.python, live=True),
+    Check("Software", "packages", software.packages, live=True),
+    Check("Software", "models", software.models, live=True),
+    Check("Software", "OpenGL (EGL)", software.open_gl, live=True),
+    Check("Software", "ROS", software.ros),
+    Check("Software", "service", software.service),
 )
 
 
@@ -65,15 +77,17 @@ class Section:
 def examine(context: Context) -> tuple[Section, ...]:
     """Carry out every check; what cannot be looked at is a finding of its own."""
     found: dict[str, list[Finding]] = {}
-    for topic, name, check in CHECKS:
-        found.setdefault(topic, []).extend(_findings(context, name, check))
+    for check in CHECKS:
+        found.setdefault(check.topic, []).extend(_findings(context, check))
     return tuple(Section(topic=topic, findings=tuple(rows)) for topic, rows in found.items())
 
 
-def _findings(context: Context, name: str, check: Examination) -> list[Finding]:
+def _findings(context: Context, check: Check) -> list[Finding]:
+    if check.live and not context.is_live:
+        return [missing(check.name, "to be examined on the computer itself")]
     findings: list[Finding] = []
     try:
-        findings.extend(check(context))
+        findings.extend(check.run(context))
     except (Missing, OSError) as error:
-        findings.append(missing(name, str(error)))
+        findings.append(missing(check.name, str(error)))
     return findings

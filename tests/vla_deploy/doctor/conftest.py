@@ -1,0 +1,95 @@
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+
+from platforms import load_profile
+from platforms.board import identify
+from platforms.tree import Missing, Tree
+from vla_deploy.doctor import Context, Finding
+from vla_deploy.doctor.context import UNLIMITED, Rights
+from vla_deploy.robots import load_robot
+
+ALL_RIGHTS = Rights(
+    uid=1000,
+    fifo_refusal="",
+    realtime_priority_limit=80,
+    memory_lock_bytes=UNLIMITED,
+    may_lock_all=False,
+)
+
+
+@dataclass
+class LateClock:
+    """Wakes up as late as it is told, one wake-up after the other."""
+
+    late_ns: Callable[[int], int] = lambda _: 0
+    time_ns: int = 0
+    wake_ups: int = 0
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = deadline_ns + self.late_ns(self.wake_ups)
+        self.wake_ups += 1
+
+
+@dataclass
+class Computer:
+    """A computer laid out in a folder, whose commands answer what they are told to."""
+
+    root: Path
+    answers: dict[str, str] = field(default_factory=dict)
+
+    def write(self, path: str, text: str = "") -> Path:
+        file = self.root / path.lstrip("/")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+        return file
+
+    def ask(self, command: Sequence[str]) -> str:
+        if command[0] not in self.answers:
+            raise Missing(f"`{command[0]}` is not installed")
+        return self.answers[command[0]]
+
+    def context(self, profile: str = "desktop", *, robot: str | None = None) -> Context:
+        return Context(
+            tree=Tree(self.root),
+            is_live=True,
+            board=identify(self.root),
+            profile=load_profile(profile),
+            robot=None if robot is None else load_robot(robot),
+            rights=ALL_RIGHTS,
+            ask=self.ask,
+            clock=LateClock(),
+        )
+
+
+@pytest.fixture
+def computer(tmp_path: Path) -> Computer:
+    return Computer(tmp_path)
+
+
+def without_rights(context: Context) -> Context:
+    return replace(
+        context,
+        rights=Rights(
+            uid=1000,
+            fifo_refusal="Operation not permitted",
+            realtime_priority_limit=0,
+            memory_lock_bytes=8 << 20,
+            may_lock_all=False,
+        ),
+    )
+
+
+@pytest.fixture
+def stripped() -> Callable[[Context], Context]:
+    return without_rights
+
+
+def one(findings: Sequence[Finding]) -> Finding:
+    assert len(findings) == 1
+    return findings[0]

@@ -1,0 +1,126 @@
+import struct
+
+import pytest
+
+from vla_deploy.doctor import Level, clocks, power
+from vla_deploy.doctor import computer as machine
+
+BOOT_S = 1_763_700_000
+ZONE = "/sys/class/thermal/thermal_zone0"
+
+
+@pytest.mark.parametrize(
+    "layout", ["<hxxi32s4s32s256shhiii16x20x", "<hxxi32s4s32s256shhqqq16x20x4x"]
+)
+@pytest.mark.parametrize(("jump_s", "level"), [(0, Level.OK), (-5, Level.OK), (6, Level.WARN)])
+def test_a_jump_since_boot_is_found_in_either_layout_of_utmp(
+    computer, layout, jump_s, level
+) -> None:
+    names = (b"~", b"", b"reboot", b"6.8.0", 0, 0, 0)
+    records = [struct.pack(layout, kind, 0, *names, BOOT_S, 0) for kind in (1, 2)]
+    computer.write("/run/utmp").write_bytes(b"".join(records))
+    computer.write("/proc/stat", f"cpu 1\nbtime {BOOT_S + jump_s}\n")
+    (finding,) = clocks.jump_since_boot(computer.context())
+    assert finding.level is level
+    assert f"{jump_s:+.0f} s" in finding.measured
+
+
+@pytest.mark.parametrize(("source", "level"), [("tsc", Level.OK), ("hpet", Level.WARN)])
+def test_a_slow_clock_source_is_told(computer, source, level) -> None:
+    computer.write("/sys/devices/system/clocksource/clocksource0/current_clocksource", source)
+    (finding,) = clocks.clock_source(computer.context())
+    assert finding.level is level
+
+
+def test_the_wall_clock_of_this_machine_is_judged(computer) -> None:
+    (finding,) = clocks.wall_time(computer.context())
+    assert finding.level in (Level.OK, Level.WARN)
+
+
+@pytest.mark.parametrize(
+    ("millidegrees", "level"),
+    [("89000", Level.OK), ("89001", Level.WARN), ("99000", Level.FAIL), ("\n", Level.MISSING)],
+)
+def test_heat_is_judged_by_the_zones_own_trip_point(computer, millidegrees, level) -> None:
+    computer.write(f"{ZONE}/type", "cpu-thermal\n")
+    computer.write(f"{ZONE}/temp", millidegrees)
+    for number, (kind, value) in enumerate((("active", 50000), ("passive", 99000), ("hot", 0))):
+        computer.write(f"{ZONE}/trip_point_{number}_type", kind)
+        computer.write(f"{ZONE}/trip_point_{number}_temp", str(value))
+    (finding,) = power.heat(computer.context())
+    assert finding.level is level
+
+
+def test_the_supply_faults_since_boot_are_told(board_tree, computer) -> None:
+    computer.root = board_tree("orin_nx_16gb")
+    (finding,) = power.throttling(computer.context())
+    assert finding.level is Level.WARN
+    assert finding.measured == "2 times under-voltage, 1 times average over-current since boot"
+    computer.root = board_tree("orin_nano_8gb_super")
+    (finding,) = power.throttling(computer.context())
+    assert finding.level is Level.OK
+
+
+@pytest.mark.parametrize(
+    ("board", "profile", "level", "words"),
+    [
+        ("orin_nx_16gb", "jetson_orin_nx", Level.OK, "25W"),
+        ("orin_nx_16gb", "desktop", Level.OK, "the profile asks for none"),
+        ("thor_t5000", "jetson_thor", Level.WARN, "120W, expected 70W"),
+        ("agx_orin_64gb", "jetson_orin_nx", Level.FAIL, "no mode 25W, only MAXN, 15W, 30W, 50W"),
+        ("desktop", "desktop", Level.MISSING, "there is no /etc/nvpmodel.conf"),
+    ],
+)
+def test_the_power_mode_is_compared_with_the_profiles(
+    board_tree, computer, board, profile, level, words
+) -> None:
+    computer.root = board_tree(board)
+    (finding,) = power.power_mode(computer.context(profile))
+    assert finding.level is level
+    assert words in finding.measured
+    if level is Level.WARN:
+        assert finding.remedy == "sudo nvpmodel -m 3"
+
+
+@pytest.mark.parametrize(
+    ("found", "level"),
+    [(("performance",) * 2, Level.OK), (("performance", "schedutil"), Level.WARN)],
+)
+def test_every_governor_counts(computer, found, level) -> None:
+    for number, name in enumerate(found):
+        path = f"/sys/devices/system/cpu/cpufreq/policy{number}/scaling_governor"
+        computer.write(path, f"{name}\n")
+    (finding,) = power.governor(computer.context())
+    assert finding.level is level
+
+
+@pytest.mark.parametrize(
+    ("isolated", "profile", "level"),
+    [
+        ("\n", "desktop", Level.OK),
+        ("\n", "jetson_orin_nx", Level.WARN),
+        ("5\n", "jetson_orin_nx", Level.OK),
+    ],
+)
+def test_isolated_processors_matter_where_control_has_its_own(
+    computer, isolated, profile, level
+) -> None:
+    computer.write("/sys/devices/system/cpu/isolated", isolated)
+    (finding,) = power.isolated_processors(computer.context(profile))
+    assert finding.level is level
+
+
+@pytest.mark.parametrize(
+    ("board", "profile", "level"),
+    [
+        ("thor_t5000", "jetson_thor", Level.OK),
+        ("thor_t5000", "desktop", Level.WARN),
+        ("desktop", "desktop", Level.OK),
+    ],
+)
+def test_the_profile_is_compared_with_the_one_made_for_the_board(
+    board_tree, computer, board, profile, level
+) -> None:
+    computer.root = board_tree(board)
+    (finding,) = machine.profile(computer.context(profile))
+    assert finding.level is level

@@ -1,0 +1,134 @@
+import gzip
+import os
+from dataclasses import replace
+
+import pytest
+
+from vla_deploy.doctor import Level
+from vla_deploy.doctor import realtime as checks
+from vla_deploy.doctor.context import UNLIMITED
+
+PROFILES = (("desktop", Level.WARN), ("jetson_orin_nx", Level.FAIL))
+MS = 1_000_000
+
+
+@pytest.mark.parametrize(("profile", "level"), PROFILES)
+def test_refused_rights_fail_where_the_profile_needs_them(
+    computer, stripped, profile, level
+) -> None:
+    context = stripped(computer.context(profile))
+    (fifo,) = checks.fifo(context)
+    (lock,) = checks.memory_lock(context)
+    assert (fifo.level, lock.level) == (level, level)
+    assert "RLIMIT_RTPRIO is 0" in fifo.measured
+    assert "rtprio 80" in fifo.remedy
+    assert "memlock unlimited" in lock.remedy
+
+
+def test_granted_rights_are_fine(computer) -> None:
+    context = computer.context("jetson_orin_nx")
+    (fifo,) = checks.fifo(context)
+    (lock,) = checks.memory_lock(context)
+    assert (fifo.level, lock.level) == (Level.OK, Level.OK)
+
+
+@pytest.mark.parametrize(
+    ("limit", "may_lock_all", "level"),
+    [
+        (512 << 20, False, Level.OK),
+        ((512 << 20) - 1, False, Level.FAIL),
+        (0, True, Level.OK),
+        (UNLIMITED, False, Level.OK),
+    ],
+)
+def test_memory_lock_is_judged_by_limit_or_capability(computer, limit, may_lock_all, level) -> None:
+    context = computer.context("jetson_orin_nx")
+    rights = replace(context.rights, memory_lock_bytes=limit, may_lock_all=may_lock_all)
+    (finding,) = checks.memory_lock(replace(context, rights=rights))
+    assert finding.level is level
+
+
+@pytest.mark.parametrize(
+    ("version", "profile", "level"),
+    [
+        ("Linux version 5.15.148-rt SMP PREEMPT_RT", "jetson_orin_nx", Level.OK),
+        ("Linux version 5.15.148-tegra SMP PREEMPT", "jetson_orin_nx", Level.WARN),
+        ("Linux version 6.8.0 SMP PREEMPT_DYNAMIC", "desktop", Level.OK),
+    ],
+)
+def test_preempt_rt_matters_where_the_profile_is_real_time(
+    computer, version, profile, level
+) -> None:
+    computer.write("/proc/version", version)
+    (finding,) = checks.preempt_rt(computer.context(profile))
+    assert finding.level is level
+
+
+@pytest.mark.parametrize(
+    ("runtime_us", "level", "words"),
+    [
+        ("950000", Level.OK, "95 %"),
+        ("-1", Level.OK, "no limit"),
+        ("0", Level.FAIL, "no real-time process may run"),
+    ],
+)
+def test_the_real_time_share_is_told(computer, runtime_us, level, words) -> None:
+    computer.write("/proc/sys/kernel/sched_rt_runtime_us", runtime_us)
+    computer.write("/proc/sys/kernel/sched_rt_period_us", "1000000")
+    (finding,) = checks.realtime_share(computer.context())
+    assert finding.level is level
+    assert words in finding.measured
+
+
+@pytest.mark.parametrize(
+    ("path", "content"),
+    [
+        ("/sys/fs/cgroup/cpu/cpu.rt_runtime_us", b"950000"),
+        ("/proc/config.gz", gzip.compress(b"CONFIG_SMP=y\nCONFIG_RT_GROUP_SCHED=y\n")),
+        ("/boot/config-5.15.148-tegra", b"CONFIG_RT_GROUP_SCHED=y\n"),
+    ],
+)
+def test_group_scheduling_is_found_wherever_the_kernel_tells_it(
+    computer, stripped, path, content
+) -> None:
+    computer.write("/proc/sys/kernel/osrelease", "5.15.148-tegra\n")
+    (before,) = checks.group_scheduling(stripped(computer.context()))
+    assert before.level is Level.OK
+    computer.write(path).write_bytes(content)
+    (finding,) = checks.group_scheduling(stripped(computer.context()))
+    assert finding.level is Level.WARN
+    (granted,) = checks.group_scheduling(computer.context())
+    assert granted.level is Level.OK
+
+
+def test_a_damaged_kernel_configuration_harms_nothing(computer) -> None:
+    computer.write("/proc/config.gz").write_bytes(b"\x1f\x8b garbage")
+    (finding,) = checks.group_scheduling(computer.context())
+    assert finding.level is Level.OK
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "desktop", "real_time"),
+    [(0.0, Level.OK, Level.OK), (0.8, Level.OK, Level.OK), (0.9, Level.WARN, Level.FAIL)],
+)
+def test_wake_ups_are_judged_by_their_lateness(computer, late_ms, desktop, real_time) -> None:
+    for profile, level in (("desktop", desktop), ("jetson_orin_nx", real_time)):
+        context = computer.context(profile)
+        context.clock.late_ns = lambda _: round(late_ms * MS)
+        (finding,) = checks.wake_up(context)
+        assert finding.level is level
+        assert f"p99 {late_ms:.2f} ms" in finding.measured
+
+
+def test_one_late_wake_up_in_two_hundred_and_fifty_is_told_but_not_judged(computer) -> None:
+    context = computer.context()
+    context.clock.late_ns = lambda number: 40 * MS if number == 100 else 0
+    (finding,) = checks.wake_up(context)
+    assert finding.level is Level.OK
+    assert "worst 40.00 ms" in finding.measured
+
+
+def test_the_measurement_leaves_the_scheduling_as_it_was(computer) -> None:
+    before = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
+    list(checks.wake_up(computer.context("jetson_orin_nx")))
+    assert (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) == before

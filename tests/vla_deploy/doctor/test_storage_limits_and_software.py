@@ -1,0 +1,148 @@
+import sys
+from collections import namedtuple
+
+import pytest
+
+from vla_deploy.doctor import Level, limits, software, storage
+
+Room = namedtuple("Room", "f_bavail f_frsize")
+CGROUP = "/sys/fs/cgroup/cgroup.controllers"
+
+
+@pytest.mark.parametrize(
+    ("free_mb", "level"),
+    [(2000, Level.OK), (1999, Level.WARN), (500, Level.WARN), (499, Level.FAIL)],
+)
+def test_disks_are_judged_by_what_the_profile_keeps_free(
+    computer, monkeypatch, free_mb, level
+) -> None:
+    monkeypatch.setattr(storage.os, "statvfs", lambda path: Room(free_mb * 1000, 1000))
+    findings = list(storage.disks(computer.context()))
+    assert [one.level for one in findings] == [level, level]
+    assert "/var/lib/vla-deploy" in findings[0].measured
+
+
+@pytest.mark.parametrize(("free_mb", "level"), [(300, Level.OK), (268, Level.FAIL)])
+def test_shared_memory_needs_room(computer, monkeypatch, free_mb, level) -> None:
+    monkeypatch.setattr(storage.os, "statvfs", lambda path: Room(free_mb * 1000, 1000))
+    (finding,) = storage.shared_memory(computer.context())
+    assert finding.level is level
+
+
+@pytest.mark.parametrize(
+    ("total", "free", "swaps", "level", "words"),
+    [
+        (0, 0, "", Level.OK, "none"),
+        (1000000, 500000, "/dev/zram0 partition 1 1 5\n", Level.OK, "zram, 512 of 1024 MB used"),
+        (1000000, 1000000, "/swapfile file 1 0 -2\n", Level.OK, "0 of 1024 MB used"),
+        (1000000, 999000, "/swapfile file 1 1 -2\n", Level.WARN, "/swapfile, 1 of 1024 MB used"),
+    ],
+)
+def test_swap_on_a_disk_that_is_used_is_told(computer, total, free, swaps, level, words) -> None:
+    computer.write("/proc/meminfo", f"SwapTotal:  {total} kB\nSwapFree:  {free} kB\n")
+    computer.write("/proc/swaps", f"Filename Type Size Used Priority\n{swaps}")
+    (finding,) = storage.swap(computer.context())
+    assert finding.level is level
+    assert words in finding.measured
+
+
+def test_each_controller_is_told_real_or_not(computer) -> None:
+    computer.write("/proc/self/cgroup", "0::/\n")
+    computer.write(CGROUP, "memory pids\n")
+    found = {one.name: one for one in limits.control_groups(computer.context())}
+    assert found["limit of memory"].level is Level.OK
+    assert found["limit of cpu"].level is Level.WARN
+    assert "nice and affinity instead" in found["limit of cpu"].measured
+    assert found["limit of cpu"].remedy.startswith("echo +cpu")
+
+
+def test_a_jetson_is_told_that_cuda_memory_is_not_counted(board_tree, computer) -> None:
+    computer.root = board_tree("orin_nano_8gb_super")
+    found = {one.name: one for one in limits.control_groups(computer.context())}
+    assert found["limit of memory"].measured == "real: memory, but not of CUDA memory"
+
+
+@pytest.mark.parametrize("boot", ["/boot/extlinux/extlinux.conf", "/etc/default/grub"])
+def test_old_control_groups_limit_nothing_and_the_remedy_fits_the_boot_loader(
+    computer, boot
+) -> None:
+    computer.write("/proc/self/cgroup", "3:memory:/\n")
+    computer.write(boot)
+    (finding,) = limits.control_groups(computer.context())
+    assert finding.level is Level.WARN
+    assert f"sudoedit {boot}" in finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("version", "level"),
+    [
+        ((3, 10, 12), Level.FAIL),
+        ((3, 11, 0), Level.OK),
+        ((3, 13, 9), Level.OK),
+        ((3, 14, 0), Level.FAIL),
+    ],
+)
+def test_the_interpreter_is_one_that_is_supported(computer, monkeypatch, version, level) -> None:
+    monkeypatch.setattr(sys, "version_info", version)
+    (finding,) = software.python(computer.context())
+    assert finding.level is level
+
+
+def test_every_required_package_is_installed_here(computer) -> None:
+    findings = list(software.packages(computer.context()))
+    assert findings[0].level is Level.OK
+    assert int(findings[0].measured.split()[1]) >= 10
+
+
+def test_a_package_that_is_not_there_fails_with_the_line_that_installs_it(
+    computer, monkeypatch
+) -> None:
+    rows = ["numpy>=2", "no-such-package-of-ours>=1,<2", "gpiod; extra == 'gpio'"]
+    monkeypatch.setattr(software.importlib.metadata, "requires", lambda name: rows)
+    finding = next(software.packages(computer.context()))
+    assert (finding.level, finding.remedy) == (Level.FAIL, "pip install no-such-package-of-ours")
+
+
+def test_models_that_are_not_there_are_named(computer, monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr(software, "MODELS", tmp_path)
+    for tier in ("detector_medium", "detector_small"):
+        (tmp_path / tier).mkdir()
+    found = {one.name: one for one in software.models(computer.context("jetson_orin_nx"))}
+    assert found["detector"].level is Level.OK
+    assert found["planner"].level is Level.WARN
+    assert "planner_1b" in found["planner"].measured
+
+
+@pytest.mark.parametrize(
+    ("answer", "level"),
+    [
+        ("ActiveState=active\nNRestarts=0\nResult=success\n", Level.OK),
+        ("ActiveState=failed\nNRestarts=5\nResult=watchdog\n", Level.FAIL),
+        ("ActiveState=inactive\nNRestarts=0\nResult=success\n", Level.WARN),
+        ("", Level.WARN),
+    ],
+)
+def test_the_service_is_judged_by_what_systemd_says(computer, answer, level) -> None:
+    (absent,) = software.service(computer.context())
+    assert (absent.level, absent.remedy) == (Level.MISSING, "sudo vla-deploy install")
+    computer.write("/etc/systemd/system/vla-deploy.service", "[Unit]\n")
+    computer.answers["systemctl"] = answer
+    (finding,) = software.service(computer.context())
+    assert finding.level is level
+
+
+def test_without_egl_the_packages_are_named(computer) -> None:
+    (finding,) = software.open_gl(computer.context())
+    assert finding.level is Level.WARN
+    assert "apt-get install -y libegl1" in finding.remedy
+    computer.answers[sys.executable] = "EGL 1.5\n"
+    (finding,) = software.open_gl(computer.context())
+    assert (finding.level, finding.measured) == (Level.OK, "EGL 1.5")
+
+
+def test_ros_without_its_setup_is_told(computer) -> None:
+    (absent,) = software.ros(computer.context())
+    assert absent.level is Level.MISSING
+    computer.write("/opt/ros/jazzy/setup.bash")
+    (finding,) = software.ros(computer.context())
+    assert finding.remedy == "source /opt/ros/jazzy/setup.bash"
