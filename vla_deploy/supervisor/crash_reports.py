@@ -18,6 +18,7 @@ from vla_deploy.supervisor.state_folder import BoundedFolder
 
 KEEP = 50
 LAST_LINES = 40
+_TRACEBACK_LINES = 400  # the interpreter tells up to 100 frames of each thread
 _TRACEBACK_STARTS = ("Fatal Python error", "Traceback (most recent call last)", "Current thread")
 _ENDED = frozenset({State.BACKOFF, State.GIVEN_UP})
 _log = logging.getLogger(__name__)
@@ -69,7 +70,7 @@ class CrashReports:
     def _report(self, name: str, record: Record, pid: int, started_ns: int) -> dict[str, Any]:
         now_ns = self._clock.now_ns()
         lines = [line for line in read_log(self._logs, name) if line["pid"] == pid]
-        output = last_output(self._logs, name, LAST_LINES)
+        output = last_output(self._logs, name, _TRACEBACK_LINES)
         return {
             "time": datetime.now(UTC).isoformat(timespec="milliseconds"),
             "stamp_ns": now_ns,
@@ -84,7 +85,7 @@ class CrashReports:
             "restarts": record.restarts,
             "traceback": traceback_of(lines, output),
             "last_log": [as_line(line) for line in lines[-LAST_LINES:]],
-            "last_output": output,
+            "last_output": output[-LAST_LINES:],
             "topics": self._topics(now_ns),
         }
 

@@ -32,8 +32,17 @@ if behaviour == "family":
     )
     with events.open("a") as file:
         file.write(f"grandchild started {grandchild.pid}\n")
+if behaviour == "abort-deaf":
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGABRT})
+if behaviour in ("base", "control"):
+    from beating import beat
+
+    beat(run_dir, behaviour, announce)
 if behaviour != "never-ready":
     announce()
+if behaviour == "crash-later":
+    signal.sigtimedwait(set(), 0.3)
+    raise KeyError("elbow")
 while True:
     signal.sigwait({signal.SIGTERM, signal.SIGINT})
     tell("asked to stop")

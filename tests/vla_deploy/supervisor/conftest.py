@@ -8,6 +8,7 @@ import psutil
 import pytest
 
 from vla_deploy.supervisor import ProcessSpec, RestartPolicy, RunOptions, Supervisor
+from vla_deploy.supervisor.notify import NotifyTarget
 
 CHILD = str(Path(__file__).with_name("child.py"))
 QUICK = RestartPolicy(initial_s=0.05, cap_s=0.1, max_restarts=3)
@@ -29,8 +30,14 @@ class Stage:
             **changes,
         )
 
-    def supervisor(self, *table: ProcessSpec, **options: object) -> Supervisor:
-        return Supervisor(RunOptions(runtime_base=self.base, **options), table)
+    def supervisor(
+        self, *table: ProcessSpec, notify: NotifyTarget | None = None, **options: object
+    ) -> Supervisor:
+        return Supervisor(RunOptions(runtime_base=self.base, **options), table, notify=notify)
+
+    @property
+    def state_dir(self) -> Path:
+        return self.base.with_name("base-state")
 
     def events(self) -> list[str]:
         return [line.rpartition(" ")[0] for line in self._lines()]
