@@ -42,13 +42,16 @@ class ProfileSwitch:
         choice: ProfileChoice,
         power: PowerSwitch,
         aside: Executor,
+        watch_s: float = profile_change.WATCH_S,
     ) -> None:
+        """Listen from now on; after a commit everything is watched for `watch_s`."""
         self.profile = self._kept = name
         self.in_force = self._kept_profile = profile
         self._clock = clock
         self._choice = choice
         self._power = power
         self._aside = aside
+        self._watch_ns = _ns(watch_s)
         self._power_set: Future[str] | None = None
         self._requests = space.ring_reader("profile_request", from_start=False)
         self._changes = space.ring_writer("profile_change")
@@ -200,7 +203,7 @@ class ProfileSwitch:
             self._go_back(change, _listed(change.refusals))
             return
         self._trial.begin()
-        change.enter(Phase.WATCH, self._clock.now_ns(), _ns(profile_change.WATCH_S))
+        change.enter(Phase.WATCH, self._clock.now_ns(), self._watch_ns)
 
     def _watching(self, change: Change, _: Mapping[str, Member]) -> None:
         if self._clock.now_ns() >= change.deadline_ns:

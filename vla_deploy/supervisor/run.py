@@ -8,6 +8,8 @@ from typing import Any
 
 from drivers.clock import Clock
 from platforms import Profile
+from platforms.power_switch import PowerSwitch
+from vla_deploy.aside import background
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.journal import JOURNAL_SOCKET
 from vla_deploy.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
@@ -19,6 +21,8 @@ from vla_deploy.supervisor.health import Health
 from vla_deploy.supervisor.liveness import liveness_of
 from vla_deploy.supervisor.notify import Notifier, NotifyTarget
 from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.profile_choice import choice_of
+from vla_deploy.supervisor.profile_switch import ProfileSwitch
 from vla_deploy.supervisor.readiness import readiness_of
 from vla_deploy.supervisor.report import Report
 from vla_deploy.supervisor.runtime import Runtime, default_base
@@ -82,6 +86,15 @@ class Run:
             probe_root=options.probe_root,
         )
         self.directives = Directives(self.space)
+        self.switch = ProfileSwitch(
+            options.profile,
+            profile(),
+            self.space,
+            clock,
+            choice_of(options.runtime_base),
+            PowerSwitch(),
+            background(),
+        )
         self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
         self.notifier = Notifier(notify, clock)
         self.crashes = CrashReports(
@@ -98,6 +111,7 @@ class Run:
         """End whoever is left, keep the logs, remove the run, give the signals back."""
         self.crew.kill_all()
         self.budgets.close()
+        self.switch.close()
         self.notifier.close()
         self.space.close()
         self._log.close()

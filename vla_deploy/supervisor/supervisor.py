@@ -6,6 +6,7 @@ from pathlib import Path
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import load_profile
+from platforms.profile_schema import NODES
 from vla_deploy.exit_codes import EXIT_CONFIGURATION
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
@@ -17,6 +18,7 @@ from vla_deploy.supervisor.liveness import Vital
 from vla_deploy.supervisor.notify import NotifyTarget, own_target
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.predicates import RunContext
+from vla_deploy.supervisor.profile_change import Member
 from vla_deploy.supervisor.run import Run
 from vla_deploy.supervisor.status_line import status_line
 from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec
@@ -25,6 +27,7 @@ _PERIOD_NS = NS_PER_S // 20
 _REPORT_NS = NS_PER_S // 2
 _HELD_UP_NS = NS_PER_S
 _TROUBLE = frozenset({State.BACKOFF, State.GIVEN_UP, State.ABORTING})
+_ON_THE_WAY = frozenset({State.WAITING, State.STARTING, State.BACKOFF, State.ABORTING})
 _log = logging.getLogger(__name__)
 
 
@@ -44,7 +47,7 @@ class Supervisor:
     ) -> None:
         self.stop_requested = False
         self.profile = load_profile(options.profile)
-        """The profile in force; who switches it puts the new one here."""
+        """The profile in force."""
         self._robot = load_robot(options.robot)
         self._options = options
         self._table = table
@@ -210,7 +213,25 @@ class Supervisor:
             suspended=run.directives.suspended,
         )
         reasons = {spec.name: spec.when(context) for spec in self._table}
-        return {name: reason for name, reason in reasons.items() if reason}
+        return {
+            **dict.fromkeys(self._follow_profile(run), "started again for another profile"),
+            **{name: reason for name, reason in reasons.items() if reason},
+        }
+
+    def _follow_profile(self, run: Run) -> tuple[str, ...]:
+        """Let a profile change go on, and return which processes are started again for it."""
+        states = {name: self._records[name].state for name in NODES if name in self._records}
+        pids = run.crew.pids()
+        members = {
+            name: Member(pid=pids[name], started_under=run.crew.started_under[name])
+            for name, state in states.items()
+            if state is State.READY and name in pids
+        }
+        absent = {name: state.value for name, state in states.items() if state in _ON_THE_WAY}
+        restarts = run.switch.step(members, absent)
+        self.profile = run.crew.in_force = run.switch.in_force
+        run.crew.profile = run.switch.profile
+        return restarts
 
     def _report(self, now_ns: int) -> None:
         run = self._started()
