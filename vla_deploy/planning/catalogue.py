@@ -41,7 +41,10 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkillSpec:
-    """Describe one skill; `one_of` names parameter groups of which exactly one must be given."""
+    """Describe one skill; `one_of` names parameter groups of which exactly one must be given.
+
+    `resources` are what no two skills use at a time; "arm" is the arm that the action names.
+    """
 
     summary: str
     parameters: dict[str, Parameter]
@@ -69,7 +72,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
                 ),
             },
             one_of=(("place",), ("object",), ("x_m", "y_m")),
-            resources=("base",),
+            resources=("base", "head", "camera", "arms"),
             timeout_s=NAVIGATION_TIMEOUT_S,
             estimated_duration_s=15.0,
             retryable=True,
@@ -99,13 +102,13 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
                 ),
             },
             one_of=(("object",), ("direction",)),
-            resources=("head",),
+            resources=("head", "camera"),
             estimated_duration_s=2.0,
         ),
         "find_object": SkillSpec(
             summary="look for an object, from here and then from each viewpoint",
             parameters={"object": _OBJECT},
-            resources=("base", "head"),
+            resources=("base", "head", "camera", "arms"),
             timeout_s=NAVIGATION_TIMEOUT_S,
             estimated_duration_s=10.0,
             retryable=True,
@@ -113,7 +116,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         "pick_up": SkillSpec(
             summary="grasp an object within reach and verify the grasp",
             parameters={"object": _OBJECT, "arm": _ARM},
-            resources=("base", "head", "arm"),
+            resources=("base", "head", "camera", "arms"),
             timeout_s=MANIPULATION_TIMEOUT_S,
             estimated_duration_s=15.0,
             retryable=True,
@@ -125,7 +128,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
                 "relation": Parameter(type=Type.CHOICE, choices=RELATIONS),
                 "arm": _ARM,
             },
-            resources=("base", "head", "arm"),
+            resources=("base", "head", "camera", "arms"),
             timeout_s=MANIPULATION_TIMEOUT_S,
             estimated_duration_s=12.0,
             retryable=True,
@@ -151,6 +154,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         "speak": SkillSpec(
             summary="say a sentence",
             parameters={"text": Parameter(type=Type.TEXT)},
+            resources=("speaker",),
             estimated_duration_s=1.0,
         ),
         "wait": SkillSpec(
@@ -162,7 +166,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         "stop": SkillSpec(
             summary="bring the base and the arms to rest",
             parameters={},
-            resources=("base", "head", "arm"),
+            resources=("base", "head", "arms"),
             estimated_duration_s=1.0,
         ),
     }

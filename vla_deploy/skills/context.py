@@ -4,6 +4,7 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from vla_deploy.ipc import ClaimBook
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription
@@ -36,6 +37,7 @@ class SkillContext:
     planner: PathPlanner
     arms: Mapping[str, ArmKinematics]
     say: Callable[[str], None]
+    claims: ClaimBook
     hands: dict[str, Held | None] = field(default_factory=dict)
 
     def holding_hand(self, wanted: str | None = None) -> str:

@@ -1,17 +1,19 @@
-"""Run one plan: actions in dependency order, each bounded in time, retried where that may help."""
+"""Run one plan: actions as their dependencies allow, each bounded in time, some tried twice."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import IpcError
+from vla_deploy.ipc import Book, ClaimRefused, IpcError
+from vla_deploy.ipc.claims import obstacles
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.graph import execution_order
 from vla_deploy.planning.plan import Action, ActionStatus, Plan
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import RobotNotReady, SkillFailed, TryAgain
+from vla_deploy.skills.resources import PRIORITIES, WAIT_LIMIT_S, needs_of
 from vla_deploy.skills.table import SKILL_FUNCTIONS
 
 MAX_RETRIES = 1
@@ -43,18 +45,36 @@ class ActionRecord:
         }
 
 
+@dataclass(slots=True, kw_only=True)
+class _Branch:
+    """Hold one action under way; `skill` is None before its first step and between two tries."""
+
+    record: ActionRecord
+    skill: Skill | None = None
+    resume_ns: int = 0
+
+
 class PlanExecution:
-    """Advance one plan by one step at a time; `cancel` may be called at any moment."""
+    """Advance one plan by one step at a time; `cancel` may be called at any moment.
+
+    Actions that need neither each other nor the same parts of the robot go on side by side. Every
+    action holds all it needs from its start to its end, or waits for it.
+    """
 
     def __init__(
-        self, plan: Plan, context: SkillContext, tell: Callable[[ActionRecord], None]
+        self,
+        plan: Plan,
+        context: SkillContext,
+        tell: Callable[[ActionRecord], None],
+        command_id: str = "",
     ) -> None:
         self.plan = plan
         self.records = [ActionRecord(action=action) for action in execution_order(plan.actions)]
         self._context = context
         self._tell = tell
-        self._skill: Skill | None = None
-        self._resume_ns = 0
+        self._command_id = command_id
+        self._branches: dict[str, _Branch] = {}
+        self._asked: set[str] = set()
 
     @property
     def finished(self) -> bool:
@@ -68,80 +88,127 @@ class PlanExecution:
 
     @property
     def active(self) -> ActionRecord | None:
-        """Return the action under way."""
-        return next((one for one in self.records if one.status is ActionStatus.ACTIVE), None)
+        """Return the action that has been under way for longest."""
+        return next((branch.record for branch in self._branches.values()), None)
 
     def step(self) -> None:
-        """Advance the active action, or start the next one."""
+        """Start what may start, and advance every action under way."""
         now_ns = self._context.link.clock.now_ns()
-        if now_ns < self._resume_ns:
-            return
-        record = self.active or self._start_next(now_ns)
-        if record is None:
-            return
-        record.execution_time_s = (now_ns - record.started_ns) / NS_PER_S
-        try:
-            self._advance(record)
-        except StopIteration:
-            self._end(record, ActionStatus.SUCCEEDED, "")
-        except SkillFailed as error:
-            self._failed(record, error, now_ns)
-        except IpcError as error:
-            self._failed(record, TryAgain(str(error)), now_ns)
+        self._start_ready(now_ns)
+        for branch in list(self._branches.values()):
+            if branch.record.status not in FINAL and now_ns >= branch.resume_ns:
+                self._step_branch(branch, now_ns)
 
     def cancel(self, reason: str) -> None:
-        """Stop the active action's motion now and cancel the rest."""
-        self._drop_skill()
+        """Stop every motion now and cancel what has not ended."""
+        for branch in self._branches.values():
+            _drop(branch)
+        self._context.link.halt()
         for record in self.records:
             if record.status not in FINAL:
                 self._end(record, ActionStatus.CANCELLED, reason)
 
-    def _start_next(self, now_ns: int) -> ActionRecord | None:
-        record = next((one for one in self.records if one.status is ActionStatus.PENDING), None)
-        if record is not None:
+    def _start_ready(self, now_ns: int) -> None:
+        done = {one.action.id for one in self.records if one.status is ActionStatus.SUCCEEDED}
+        ready = [
+            one
+            for one in self.records
+            if one.status is ActionStatus.PENDING and done.issuperset(one.action.depends_on)
+        ]
+        for record in ready:
+            self._ask_once(record)
+        book = self._context.claims.look() if ready else None
+        for record in ready:
+            if book is not None and record.status is ActionStatus.PENDING:
+                self._start_if_granted(record, book, now_ns)
+
+    def _ask_once(self, record: ActionRecord) -> None:
+        action = record.action
+        if action.id in self._asked or record.status in FINAL:
+            return
+        self._asked.add(action.id)
+        try:
+            self._context.claims.ask(
+                self._holder(action),
+                needs_of(action, self._context.robot),
+                priority=PRIORITIES[action.priority],
+                timeout_s=WAIT_LIMIT_S,
+            )
+        except ClaimRefused as error:
+            self._give_up(record, str(error))
+
+    def _start_if_granted(self, record: ActionRecord, book: Book, now_ns: int) -> None:
+        holder = self._holder(record.action)
+        if book.holds(holder):
+            self._branches[record.action.id] = _Branch(record=record)
             record.status = ActionStatus.ACTIVE
             record.started_ns = now_ns
             self._tell(record)
-        return record
+        elif not book.waits(holder):
+            needs = needs_of(record.action, self._context.robot)
+            why = obstacles(book, needs) or "others came first"
+            self._give_up(record, f"waited {WAIT_LIMIT_S:g} s: {why}")
 
-    def _advance(self, record: ActionRecord) -> None:
+    def _step_branch(self, branch: _Branch, now_ns: int) -> None:
+        record = branch.record
+        record.execution_time_s = (now_ns - record.started_ns) / NS_PER_S
+        self._context.link.acting = record.action.id
+        try:
+            self._advance(branch)
+        except StopIteration:
+            branch.skill = None
+            self._end(record, ActionStatus.SUCCEEDED, "")
+        except SkillFailed as error:
+            self._failed(branch, error, now_ns)
+        except IpcError as error:
+            self._failed(branch, TryAgain(str(error)), now_ns)
+
+    def _advance(self, branch: _Branch) -> None:
+        action = branch.record.action
         refusal = refusal_of(self._context.link.control_status)
         if refusal:
             raise RobotNotReady(refusal)
-        timeout_s = SKILLS[record.action.skill].timeout_s
-        if record.execution_time_s > timeout_s:
-            raise TryAgain(f"{record.action.skill} took longer than {timeout_s:g} s")
+        timeout_s = SKILLS[action.skill].timeout_s
+        if branch.record.execution_time_s > timeout_s:
+            raise TryAgain(f"{action.skill} took longer than {timeout_s:g} s")
         if self._context.link.is_blind:
             self._context.link.rest_base()
             return
-        if self._skill is None:
-            function = SKILL_FUNCTIONS[record.action.skill]
-            self._skill = function(self._context, record.action.parameters)
-        next(self._skill)
+        if branch.skill is None:
+            branch.skill = SKILL_FUNCTIONS[action.skill](self._context, action.parameters)
+        next(branch.skill)
 
-    def _failed(self, record: ActionRecord, error: SkillFailed, now_ns: int) -> None:
-        self._drop_skill()
+    def _failed(self, branch: _Branch, error: SkillFailed, now_ns: int) -> None:
+        record = branch.record
+        _drop(branch)
+        self._context.link.halt_actor(record.action.id)
         retryable = isinstance(error, TryAgain) and SKILLS[record.action.skill].retryable
         if retryable and record.retries < MAX_RETRIES:
             record.retries += 1
             record.error = f"trying again after: {error}"
             self._tell(record)
-            self._resume_ns = now_ns + round(BACK_OFF_S * NS_PER_S)
+            branch.resume_ns = now_ns + round(BACK_OFF_S * NS_PER_S)
             return
-        self._end(record, ActionStatus.ABORTED, str(error))
-        for later in self.records:
-            if later.status is ActionStatus.PENDING:
-                self._end(later, ActionStatus.CANCELLED, f"{record.action.id} failed")
+        self._give_up(record, str(error))
 
-    def _drop_skill(self) -> None:
-        if self._skill is not None:
-            self._skill.close()
-            self._skill = None
-        self._context.link.halt()
+    def _give_up(self, record: ActionRecord, error: str) -> None:
+        """End an action without success, and with it the rest of the plan."""
+        self._end(record, ActionStatus.ABORTED, error)
+        self.cancel(f"{record.action.id} failed")
 
     def _end(self, record: ActionRecord, status: ActionStatus, error: str) -> None:
-        if status is ActionStatus.SUCCEEDED:
-            self._skill = None
+        self._branches.pop(record.action.id, None)
+        if record.action.id in self._asked:
+            self._context.claims.release(self._holder(record.action))
         record.status = status
         record.error = error
         self._tell(record)
+
+    def _holder(self, action: Action) -> str:
+        return f"{action.skill} ({self._command_id or 'a plan'}, {action.id})"
+
+
+def _drop(branch: _Branch) -> None:
+    if branch.skill is not None:
+        branch.skill.close()
+        branch.skill = None

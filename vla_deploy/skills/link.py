@@ -44,9 +44,11 @@ class RobotLink:
         self._commands = space.ring_writer("motion_command")
         self._base = space.cell_writer("base_command")
         self._ids = itertools.count(clock.now_ns() // 1000 + 1)
-        self._active: set[int] = set()
+        self.acting = ""
+        """Whose motions are sent now: one of several actions that go on side by side."""
+        self._active: dict[int, str] = {}
         self._ended: dict[int, MotionResult] = {}
-        self._driving = False
+        self._driver: str | None = None
 
     def refresh(self) -> None:
         """Take in the motions that have ended."""
@@ -56,7 +58,7 @@ class RobotLink:
             )
             motion_id = int(event.payload["motion_id"])
             if motion_id in self._active:
-                self._active.discard(motion_id)
+                del self._active[motion_id]
                 self._ended[motion_id] = ended
 
     @property
@@ -170,7 +172,7 @@ class RobotLink:
     def drive(self, twist: Twist) -> None:
         """Ask for a base velocity; it must be repeated, control lets it go stale."""
         self._base.put(v_m_s=twist.v_m_s, w_rad_s=twist.w_rad_s)
-        self._driving = twist != AT_REST
+        self._driver = self.acting if twist != AT_REST else None
 
     def send_goal(
         self,
@@ -203,7 +205,7 @@ class RobotLink:
 
     def _send(self, command: dict[str, Any]) -> int:
         motion_id = next(self._ids)
-        self._active.add(motion_id)
+        self._active[motion_id] = self.acting
         self._commands.publish(command | {"motion_id": motion_id})
         return motion_id
 
@@ -218,7 +220,15 @@ class RobotLink:
         self._active.clear()
         self.rest_base()
 
+    def halt_actor(self, actor: str) -> None:
+        """Cancel the motions of one action, and bring the base to rest if it drives."""
+        for motion_id in sorted(one for one, whose in self._active.items() if whose == actor):
+            self._commands.publish({"kind": "cancel", "motion_id": motion_id})
+            del self._active[motion_id]
+        if self._driver == actor:
+            self.drive(AT_REST)
+
     def rest_base(self) -> None:
         """Bring the base to rest if this executor moves it."""
-        if self._driving:
+        if self._driver is not None:
             self.drive(AT_REST)

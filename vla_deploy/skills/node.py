@@ -5,7 +5,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.ipc import CellWriter, RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc import CellWriter, ClaimBook, RingReader, RingWriter, SharedSpace
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.grid_map import load_map
 from vla_deploy.navigation.path_planning import PathPlanner
@@ -18,6 +18,7 @@ from vla_deploy.skills.arms import recall_hands
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.executor import ActionRecord, PlanExecution
 from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.resources import body_of
 
 CLEARANCE_MARGIN_M = 0.03
 STATUS_PERIOD_NS = NS_PER_S // 10
@@ -30,6 +31,7 @@ class ExecutorNode:
         self.period_s = 1.0 / rate_hz
         self._clock = context.clock
         self._robot = robot
+        self._run_dir = context.run_dir
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._skills: SkillContext
         self._plans: RingReader
@@ -51,7 +53,9 @@ class ExecutorNode:
             ),
             arms={name: ArmKinematics(self._robot, name) for name in self._robot.hands},
             say=self._say,
+            claims=ClaimBook(self._run_dir, self._clock),
         )
+        self._skills.claims.declare(body_of(self._robot))
         self._plans = self._space.ring_reader("plan", from_start=False)
         self._events = self._space.ring_writer("task_event")
         self._status = self._space.cell_writer("executor_status")
@@ -104,7 +108,7 @@ class ExecutorNode:
             return
         self._command_id = command_id
         plan = Plan.model_validate(message["plan"])
-        self._execution = PlanExecution(plan, self._skills, self._tell_action)
+        self._execution = PlanExecution(plan, self._skills, self._tell_action, command_id)
 
     def _conclude(self) -> None:
         execution = self._execution

@@ -1,11 +1,14 @@
 """A skill context with a robot that stands where a test says, on an empty floor with one table."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from drivers.clock import MonotonicClock
+from vla_deploy.ipc import ClaimBook
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
@@ -46,7 +49,7 @@ def standing() -> StandingLink:
 
 
 @pytest.fixture
-def context(standing: StandingLink) -> SkillContext:
+def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
     """A 6 x 4 m room with a table of 1.0 x 0.4 m around (3.0, 1.0)."""
     blocked = np.zeros((80, 120), dtype=bool)
     blocked[[0, -1], :] = blocked[:, [0, -1]] = True
@@ -58,5 +61,6 @@ def context(standing: StandingLink) -> SkillContext:
         planner=PathPlanner(grid, BODY_RADIUS_M),
         arms={},
         say=lambda _: None,
+        claims=ClaimBook(tmp_path, MonotonicClock()),
         hands={"left": None, "right": None},
     )

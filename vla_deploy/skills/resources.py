@@ -1,0 +1,52 @@
+"""Say which parts of the robot an action needs, and how much of each there is."""
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from vla_deploy.planning.catalogue import NAVIGATION_TIMEOUT_S, SKILLS
+from vla_deploy.planning.plan import Action, Priority
+from vla_deploy.robots import RobotDescription
+
+ARMS: Final = "arms"
+ONE_ARM: Final = "arm"
+SENSES: Final = ("camera", "speaker")
+# Whoever waits longer than the longest skill takes waits for something that will not end.
+WAIT_LIMIT_S: Final = NAVIGATION_TIMEOUT_S
+PRIORITIES: Final[Mapping[Priority, int]] = {
+    Priority.HIGH: 2,
+    Priority.MEDIUM: 1,
+    Priority.LOW: 0,
+}
+
+
+def body_of(robot: RobotDescription) -> dict[str, int]:
+    """Return the robot's parts that one action at a time may use: its groups and its senses."""
+    return dict.fromkeys((*robot.groups, *SENSES), 1)
+
+
+def needs_of(action: Action, robot: RobotDescription) -> dict[str, int]:
+    """Return what an action needs, by the catalogue; "arm" is the chosen one, or all of them."""
+    needed: dict[str, int] = {}
+    for resource in SKILLS[action.skill].resources:
+        needed |= dict.fromkeys(_parts(resource, action, robot), 1)
+    posed = robot.poses.get(str(action.parameters.get("pose")), {})
+    chosen = action.parameters.get("arm") is None
+    return needed | dict.fromkeys(_groups_of(posed, robot) if chosen else (), 1)
+
+
+def _parts(resource: str, action: Action, robot: RobotDescription) -> tuple[str, ...]:
+    if resource not in (ARMS, ONE_ARM):
+        return (resource,)
+    chosen = action.parameters.get("arm") if resource == ONE_ARM else None
+    return tuple(
+        group
+        for name, hand in robot.hands.items()
+        if chosen in (None, name)
+        for group in (hand.arm, *_groups_of((hand.gripper,), robot))
+    )
+
+
+def _groups_of(joints: Iterable[str], robot: RobotDescription) -> tuple[str, ...]:
+    """Return the groups that move any of these joints."""
+    moved = frozenset(joints)
+    return tuple(name for name, group in robot.groups.items() if moved & set(group.joints))
