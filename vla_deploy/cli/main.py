@@ -8,6 +8,7 @@ from pathlib import Path
 
 from vla_deploy.cli import (
     bench,
+    budget,
     can,
     check,
     crashes,
@@ -34,6 +35,7 @@ COMMANDS = (
     demo,
     say,
     status,
+    budget,
     logs,
     crashes,
     operate,
