@@ -34,6 +34,7 @@ class NvmlSource:
                 yield lacking(name, unit, self._reason)
             return
         yield measure("gpu_load_ratio", "ratio", self._load_ratio)
+        yield from self._of_processes()
         yield measure("gpu_memory_used_bytes", "bytes", partial(self._memory, "used"))
         yield measure("gpu_memory_total_bytes", "bytes", partial(self._memory, "total"))
         for index, device in enumerate(self._devices):
@@ -81,6 +82,19 @@ class NvmlSource:
         infos = [self._ask("nvmlDeviceGetMemoryInfo", one) for one in self._devices]
         return float(sum(getattr(info, field) for info in infos))
 
+    def _of_processes(self) -> Iterator[Reading]:
+        """Give each process' memory; their sum stands in where a GPU shares the main memory."""
+        sizes: dict[int, float] = {}
+        try:
+            for device in self._devices:
+                for one in self._ask("nvmlDeviceGetComputeRunningProcesses", device):
+                    sizes[one.pid] = sizes.get(one.pid, 0.0) + float(one.usedGpuMemory or 0)
+            self._memory("used")
+        except Missing:
+            yield measure("gpu_memory_used_bytes", "bytes", partial(_sum_of, sizes))
+        for pid, size in sizes.items():
+            yield Reading(name=f"gpu_memory_used_bytes.{pid}", value=size, unit="bytes")
+
     def _of_device(self, index: int, device: Any) -> Iterator[Reading]:
         name = f"gpu{index}"
         yield measure(f"power_w.{name}", "W", partial(self._power_w, device))
@@ -91,3 +105,9 @@ class NvmlSource:
 
     def _celsius(self, device: Any) -> float:
         return float(self._ask("nvmlDeviceGetTemperature", device, _GPU_SENSOR))
+
+
+def _sum_of(sizes: dict[int, float]) -> float:
+    if not sizes:
+        raise Missing("NVML names no process with GPU memory")
+    return sum(sizes.values())
