@@ -10,6 +10,7 @@ from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.follow import follow_command
 from vla_deploy.ipc import CellReader, Sample, SharedSpace
+from vla_deploy.safety.stop_button import ESTOP, StopButton
 from vla_deploy.supervisor import default_base, running
 
 POLL_NS = NS_PER_S // 50
@@ -45,6 +46,9 @@ class Session:
 
     def operate(self, act: str, reason: str = "") -> None:
         """Publish an operator's act: estop, reset, arm or disarm; control reads it directly."""
+        if act == ESTOP:
+            StopButton(self._space, "cli", self.clock).press(reason)
+            return
         message = {"act": act, "source": "cli", "reason": reason}
         self._space.ring_writer("operator").publish(message)
 

@@ -21,8 +21,8 @@ _VOLTAGE_UNIT_V = 0.1
 _EFFORT_RATIO = 0.9
 _STANDSTILL_SHARE = 0.1
 _STANDSTILL_WHEEL_M_S = 0.01
-# A servo tells its speed in steps of 0.024 rad/s, which at the hand is 0.015 m/s of noise.
-_APPROACH_M_S = 0.03
+# Slower than this it does not approach: it is the play of what is measured.
+_APPROACH_M_S = 0.01
 
 
 def safety_limits(robot: RobotDescription) -> SafetyLimits:
