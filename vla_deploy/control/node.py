@@ -215,6 +215,7 @@ class ControlNode:
                 state.position_rad,
                 state.velocity_rad_s,
                 state.effort_ratio,
+                self._gate.sent,
                 self._wheels.v_m_s,
                 self._wheels.w_rad_s,
             ),

@@ -14,21 +14,31 @@ from vla_deploy.control.axes import Floats
 from vla_deploy.control.body_shapes import BodyShapes
 from vla_deploy.control.contact_torque import ContactTorque
 from vla_deploy.control.nearby import Nearby
+from vla_deploy.control.setpoint_rates import SetpointRates
 from vla_deploy.ipc import BY_NAME, SharedSpace
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
 from vla_deploy.robots.protection import ZoneSource
 from vla_deploy.safety.balance import tip_margin_ratio
-from vla_deploy.safety.clearance import JointBounds, Stopping, beyond_box, nearest_pair, stopping
+from vla_deploy.safety.clearance import (
+    JointBounds,
+    JointMotion,
+    Stopping,
+    beyond_box,
+    nearest_pair,
+    stopping,
+)
 from vla_deploy.safety.keep_out import judge_keep_out, seen_from
 from vla_deploy.safety.surroundings import NOTHING_KNOWN, Surroundings, ZoneFinding
 from vla_deploy.safety.zones import IDLE, Footprint, Motion, Points, Trigger, judge_zone
 
-# From a reading to the first braking setpoint: this part's period, a tick and the servos' lag.
-ARM_REACTION_S = 0.08
+# From one look ahead to the next one's first braking setpoint.
+ARM_REACTION_S = 0.024
+# Beyond this a joint, in rad of its servo, does not do as its setpoint says.
+_FOLLOWS_RAD = 0.15
 BASE_REACTION_S = 0.1
-# Of each new sample, 25 times a second: a low-pass of 0.1 s.
-_IMU_SHARE = 0.3
+# Of each new sample, 10 times a second: a low-pass of 0.1 s.
+_IMU_SHARE = 0.5
 _MAX_POSE_AGE_NS = round(BY_NAME["pose"].deadline_s * NS_PER_S)
 _MAX_IMU_AGE_NS = round(BY_NAME["imu"].deadline_s * NS_PER_S)
 
@@ -41,6 +51,7 @@ class _Body:
     position: Floats
     velocity: Floats
     effort_ratio: Floats
+    setpoint: Floats
     motion: Motion
 
 
@@ -82,18 +93,23 @@ class SurroundingsWatch:
             upper=robot.position_max,
             velocity=robot.velocity_max,
             acceleration=robot.acceleration_max,
+            jerk=robot.jerk_max,
+            following=np.array(
+                [_FOLLOWS_RAD * servo.travel_per_rad for servo in robot.servo_bus.servos]
+            ),
             reaction_s=ARM_REACTION_S,
         )
         self._ahead: tuple[Stopping, Floats, Floats] | None = None
+        self._setpoints = SetpointRates()
         self._parts = [_Part(work, NS_PER_S // rate_hz) for work, rate_hz in self._declared_rates()]
 
     def _declared_rates(self) -> tuple[tuple[Callable[[_Body], None], int], ...]:
         return (
             (self._look_at_contact, 50),
-            (self._look_ahead, 25),
+            (self._look_ahead, 50),
             (self._look_at_zones, 25),
             (self._look_at_keep_out, 10),
-            (self._look_at_balance, 25),
+            (self._look_at_balance, 10),
         )
 
     def refresh(
@@ -102,6 +118,7 @@ class SurroundingsWatch:
         position: Floats,
         velocity: Floats,
         effort_ratio: Floats,
+        setpoint: Floats,
         v_m_s: float,
         w_rad_s: float,
     ) -> Surroundings:
@@ -114,7 +131,7 @@ class SurroundingsWatch:
             part.due_ns = max(part.due_ns, now_ns - part.period_ns) + part.period_ns
             deceleration = self._robot.base.max_acceleration_m_s2
             motion = Motion(v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=deceleration)
-            part.work(_Body(now_ns, position, velocity, effort_ratio, motion))
+            part.work(_Body(now_ns, position, velocity, effort_ratio, setpoint, motion))
         return self._known
 
     def close(self) -> None:
@@ -130,7 +147,15 @@ class SurroundingsWatch:
 
     def _look_ahead(self, body: _Body) -> None:
         """Measure where the joints come to rest; the next tick measures where they are."""
-        ahead = stopping(body.position, body.velocity, self._bounds)
+        velocity, acceleration = self._setpoints.rates(body.now_ns, body.setpoint)
+        motion = JointMotion(
+            position=body.position,
+            velocity=body.velocity,
+            setpoint=body.setpoint,
+            setpoint_velocity=velocity,
+            setpoint_acceleration=acceleration,
+        )
+        ahead = stopping(motion, self._bounds)
         self._ahead = (ahead, *self._body.distances(ahead.position))
 
     def _look_at_clearance(self, position: Floats) -> None:

@@ -1,7 +1,7 @@
 """Judge distances of bodies where they will be once the joints have come to rest: pure arithmetic.
 
-What counts is the pose one braking distance ahead, reckoned from measured positions and
-velocities: a setpoint says nothing about a joint that is pushed or falls.
+What counts is the pose one braking distance ahead. It is reckoned from the setpoints, which know
+whether a motion is braking already, and for a joint that does not follow them from where it is.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,20 @@ class JointBounds:
     upper: Floats
     velocity: Floats
     acceleration: Floats
+    jerk: Floats
+    following: Floats
     reaction_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointMotion:
+    """Carry how the joints move: `velocity` is measured, the others are the setpoints'."""
+
+    position: Floats
+    velocity: Floats
+    setpoint: Floats
+    setpoint_velocity: Floats
+    setpoint_acceleration: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,16 +52,24 @@ class Stopping:
     time_s: float
 
 
-def stopping(position: Floats, velocity: Floats, bounds: JointBounds) -> Stopping:
-    """Return where the joints come to rest if they brake after the reaction time."""
+def stopping(motion: JointMotion, bounds: JointBounds) -> Stopping:
+    """Return where the joints come to rest if they brake after the reaction time.
+
+    The way of a jerk-limited stop is v^2 / 2a, and v / 2 times what it takes to begin braking.
+    """
+    follows = np.abs(motion.setpoint - motion.position) <= bounds.following
+    start = np.where(follows, motion.setpoint, motion.position)
+    velocity = np.where(follows, motion.setpoint_velocity, motion.velocity)
+    acceleration = np.where(follows, motion.setpoint_acceleration, 0.0)
     moving = np.abs(velocity) > STANDING_SHARE * bounds.velocity
-    speed = np.where(moving, velocity, 0.0)
-    way = speed * bounds.reaction_s + speed * np.abs(speed) / (2.0 * bounds.acceleration)
-    low, high = np.minimum(bounds.lower, position), np.maximum(bounds.upper, position)
-    braking_s = float((np.abs(speed) / bounds.acceleration).max())
-    return Stopping(
-        position=np.clip(position + way, low, high), time_s=bounds.reaction_s + braking_s
-    )
+    speed = np.where(moving, np.abs(velocity), 0.0)
+    gain = np.clip(acceleration * np.sign(velocity), -bounds.acceleration, bounds.acceleration)
+    onset_s = (bounds.acceleration + gain) / bounds.jerk
+    braking_s = speed / bounds.acceleration
+    way = np.sign(velocity) * speed * (bounds.reaction_s + 0.5 * onset_s + 0.5 * braking_s)
+    low, high = np.minimum(bounds.lower, start), np.maximum(bounds.upper, start)
+    slowest_s = float(np.where(moving, onset_s + braking_s, 0.0).max())
+    return Stopping(position=np.clip(start + way, low, high), time_s=bounds.reaction_s + slowest_s)
 
 
 def nearest_pair(

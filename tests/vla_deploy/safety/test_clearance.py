@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from vla_deploy.safety.clearance import (
     JointBounds,
+    JointMotion,
     beyond_box,
     nearest_pair,
     stopping,
@@ -18,6 +19,8 @@ BOUNDS = JointBounds(
     upper=np.array([1.0, 0.04]),
     velocity=np.array([1.0, 0.1]),
     acceleration=np.array([4.0, 0.5]),
+    jerk=np.array([40.0, 5.0]),
+    following=np.array([0.15, 0.002]),
     reaction_s=0.1,
 )
 PAIRS = (("hand", "torso"), ("hand", "head"), ("elbow", "torso"))
@@ -26,28 +29,63 @@ LOW, HIGH = np.array([[-1.0, -1.0, 0.0]] * 2), np.array([[1.0, 1.0, 1.0]] * 2)
 speeds = arrays(np.float64, 2, elements=st.floats(-2.0, 2.0))
 
 
+def driven(
+    position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray | None = None
+) -> JointMotion:
+    """Return the motion of joints that follow their setpoints exactly."""
+    return JointMotion(
+        position=position,
+        velocity=velocity,
+        setpoint=position,
+        setpoint_velocity=velocity,
+        setpoint_acceleration=np.zeros(2) if acceleration is None else acceleration,
+    )
+
+
 def test_standing_joints_stay_where_they_are() -> None:
     here = np.array([0.2, 0.01])
-    at_rest = stopping(here, np.array([0.02, -0.002]), BOUNDS)
+    at_rest = stopping(driven(here, np.array([0.02, -0.002])), BOUNDS)
     assert at_rest.position.tolist() == here.tolist()
     assert at_rest.time_s == BOUNDS.reaction_s
 
 
-def test_a_moving_joint_needs_its_reaction_and_braking_way() -> None:
-    at_rest = stopping(np.array([0.0, 0.02]), np.array([-0.8, 0.0]), BOUNDS)
-    assert at_rest.position[0] == pytest.approx(-(0.08 + 0.64 / 8.0))
-    assert at_rest.time_s == pytest.approx(0.1 + 0.8 / 4.0)
+def test_a_moving_joint_needs_its_reaction_onset_and_braking_way() -> None:
+    at_rest = stopping(driven(np.array([0.0, 0.02]), np.array([-0.8, 0.0])), BOUNDS)
+    onset_s = 4.0 / 40.0
+    assert at_rest.position[0] == pytest.approx(-0.8 * (0.1 + 0.5 * onset_s + 0.5 * 0.8 / 4.0))
+    assert at_rest.time_s == pytest.approx(0.1 + onset_s + 0.8 / 4.0)
+
+
+@pytest.mark.parametrize(("acceleration", "onset_s"), [(-4.0, 0.2), (4.0, 0.0), (9.0, 0.0)])
+def test_a_joint_that_brakes_already_needs_less_way_and_one_that_speeds_up_more(
+    acceleration: float, onset_s: float
+) -> None:
+    velocity, gain = np.array([-0.8, 0.0]), np.array([acceleration, 0.0])
+    at_rest = stopping(driven(np.array([0.0, 0.02]), velocity, gain), BOUNDS)
+    assert at_rest.position[0] == pytest.approx(-0.8 * (0.1 + 0.5 * onset_s + 0.1))
+
+
+def test_a_joint_that_does_not_follow_counts_from_where_it_is() -> None:
+    motion = JointMotion(
+        position=np.array([0.5, 0.02]),
+        velocity=np.array([0.8, 0.0]),
+        setpoint=np.array([0.0, 0.02]),
+        setpoint_velocity=np.array([-0.8, 0.0]),
+        setpoint_acceleration=np.zeros(2),
+    )
+    assert stopping(motion, BOUNDS).position[0] == pytest.approx(0.5 + 0.8 * 0.25)
 
 
 def test_no_joint_stops_beyond_its_range_but_one_may_stand_there() -> None:
-    at_rest = stopping(np.array([0.95, -0.01]), np.array([1.0, -0.05]), BOUNDS)
+    at_rest = stopping(driven(np.array([0.95, -0.01]), np.array([1.0, -0.05])), BOUNDS)
     assert at_rest.position.tolist() == [1.0, -0.01]
 
 
 @given(speeds, st.floats(1.0, 3.0))
 def test_a_faster_joint_never_stops_sooner(velocity: np.ndarray, factor: float) -> None:
     here = np.array([0.0, 0.02])
-    slow, fast = stopping(here, velocity, BOUNDS), stopping(here, velocity * factor, BOUNDS)
+    slow = stopping(driven(here, velocity), BOUNDS)
+    fast = stopping(driven(here, velocity * factor), BOUNDS)
     assert (np.abs(fast.position - here) >= np.abs(slow.position - here) - 1e-12).all()
     assert fast.time_s >= slow.time_s
 
