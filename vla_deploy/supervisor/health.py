@@ -19,7 +19,7 @@ class HealthLimits:
     status_age_s: float = 1.0
     tick_rate_ratio: float = 0.5
     late_ratio: float = 0.5
-    loop_age_s: float = 1.0
+    loop_age_s: float = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,7 @@ from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec
 
 _PERIOD_NS = NS_PER_S // 20
 _REPORT_NS = NS_PER_S // 2
-_HELD_UP_NS = NS_PER_S
+_HELD_UP_NS = 3 * NS_PER_S  # longer than any load explains, shorter than any silence allowed
 _TROUBLE = frozenset({State.BACKOFF, State.GIVEN_UP, State.ABORTING})
 _ON_THE_WAY = frozenset({State.WAITING, State.STARTING, State.BACKOFF, State.ABORTING})
 _log = logging.getLogger(__name__)

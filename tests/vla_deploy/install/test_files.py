@@ -1,0 +1,133 @@
+"""What is written follows robot file, profile and layout, and systemd accepts it."""
+
+import json
+import os
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from platforms import load_profile
+from vla_deploy.cli.main import main
+from vla_deploy.install import Credential, InstallError, Layout, ServiceChoice, system_files
+from vla_deploy.install.errors import TemplateBroken
+from vla_deploy.install.files import filled
+from vla_deploy.robots import load_robot
+
+ROBOT = load_robot("butler")
+PROFILE = load_profile("desktop")
+MOST_EXPOSURE = 4.0
+SERVICES = ("vla-deploy.service", "vla-deploy-can.service", "vla-deploy-gave-up.service")
+
+
+def texts(choice: ServiceChoice | None = None, **robot: object) -> dict[str, str]:
+    changed = replace(ROBOT, **robot)  # type: ignore[arg-type]
+    files = system_files(changed, PROFILE, choice or ServiceChoice(), Layout())
+    return {file.path.name: file.text for file in files}
+
+
+@pytest.fixture(scope="module")
+def units(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install into a prefix that is really there, so that systemd finds every program."""
+    root = tmp_path_factory.mktemp("computer")
+    program = root / "opt/current/bin/vla-deploy"
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    layout = Layout(prefix=root / "opt")
+    for file in system_files(ROBOT, PROFILE, ServiceChoice(), layout):
+        inside = file.path.is_relative_to(root)
+        path = file.path if inside else root / file.path.relative_to("/")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(file.text)
+        path.chmod(file.mode)
+    return root / "etc/systemd/system"
+
+
+def test_systemd_finds_nothing_wrong_with_the_units(units: Path) -> None:
+    environment = {**os.environ, "SYSTEMD_UNIT_PATH": f"{units}:"}
+    paths = [str(path) for path in sorted(units.iterdir())]
+    done = subprocess.run(
+        ["systemd-analyze", "verify", *paths], env=environment, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_a_unit_exposes_little(units: Path, name: str) -> None:
+    command = ["systemd-analyze", "security", "--offline=yes", "--json=short"]
+    limit = [f"--threshold={round(MOST_EXPOSURE * 10) - 1}"]
+    done = subprocess.run([*command, *limit, str(units / name)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-300:]
+    assert len(json.loads(done.stdout)) > 50
+
+
+def test_the_unit_runs_what_was_chosen() -> None:
+    choice = ServiceChoice(
+        robot="/etc/vla-deploy/robots/mine",
+        profile="jetson_orin_nx",
+        watchdog_s=7,
+        credentials=(Credential(name="planner_key", path=Path("/etc/vla-deploy/key")),),
+    )
+    unit = texts(choice)["vla-deploy.service"]
+    assert "run --robot /etc/vla-deploy/robots/mine --profile jetson_orin_nx\n" in unit
+    assert "WatchdogSec=7\n" in unit
+    assert "LoadCredential=planner_key:/etc/vla-deploy/key\n" in unit
+
+
+def test_the_slice_follows_the_profiles_budget() -> None:
+    high = round(PROFILE.total.memory_mb)
+    assert f"MemoryHigh={high}M\nMemoryMax={round(high * 1.25)}M\n" in texts()["vla-deploy.slice"]
+
+
+def test_the_can_link_has_the_robots_bitrate() -> None:
+    assert "link set can0 up type can bitrate 1000000 " in texts()["vla-deploy-can.service"]
+
+
+@pytest.mark.parametrize("path", ["slcan:/dev/serial/by-id/usb-x-if00", "/run/can-hub"])
+def test_a_bus_that_is_no_network_interface_needs_no_link(path: str) -> None:
+    files = texts(can_bus=replace(ROBOT.can_bus, path=path))
+    assert "vla-deploy-can.service" not in files
+
+
+def test_the_twin_needs_neither_link_nor_devices() -> None:
+    files = texts(ServiceChoice(twin=True))
+    assert "vla-deploy-can.service" not in files
+    assert "SYMLINK" not in files["70-vla-deploy.rules"]
+    assert "--profile desktop --twin\n" in files["vla-deploy.service"]
+
+
+def test_every_usb_device_gets_a_name_that_stays() -> None:
+    rules = texts()["70-vla-deploy.rules"]
+    for name in ("servos", "lidar", "estop"):
+        assert f'SYMLINK+="vla-deploy/{name}"' in rules
+    assert 'ENV{ID_SERIAL}=="FTDI_USB__-__Serial_Converter_FT6S4DSP", SYMLINK' in rules
+    assert 'ATTR{latency_timer}="1"' in rules
+
+
+def test_the_user_exists_with_its_groups_and_nothing_else(tmp_path: Path) -> None:
+    assert main(["install", "--root", str(tmp_path)]) == 0
+    (tmp_path / "etc").mkdir(exist_ok=True)
+    command = ["systemd-sysusers", f"--root={tmp_path}", "vla-deploy.conf"]
+    subprocess.run(command, check=True, capture_output=True)
+    groups = (tmp_path / "etc/group").read_text().splitlines()
+    mine = {line.split(":")[0] for line in groups if line.endswith("vla-deploy")}
+    assert mine == {"dialout", "video", "audio", "input", "gpio", "render"}
+
+
+@pytest.mark.parametrize("name", ["two words", "a%b", "a\nExecStartPost=/bin/sh", ""])
+def test_what_cannot_stand_in_a_unit_is_refused(name: str) -> None:
+    with pytest.raises(InstallError, match="cannot stand in a unit"):
+        texts(ServiceChoice(robot=name))
+
+
+def test_a_template_with_an_unknown_name_is_refused() -> None:
+    with pytest.raises(TemplateBroken, match="x: nobody fills in NEW"):
+        filled("User=@USER@\nGroup=@NEW@\n", {"USER": "me"}, "x")
+
+
+def test_system_call_groups_are_no_placeholders() -> None:
+    assert filled("SystemCallFilter=@system-service\n", {}, "x") == (
+        "SystemCallFilter=@system-service\n"
+    )

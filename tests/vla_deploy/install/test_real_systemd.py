@@ -1,0 +1,115 @@
+"""The unit does under a real systemd what it says."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vla_deploy.cli.main import main
+from vla_deploy.install.release_build import LAUNCHER
+from vla_deploy.install.release_store import ReleaseStore
+
+pytestmark = [pytest.mark.stack, pytest.mark.timeout(150)]
+TRIAL = "/opt/vla-deploy/trial"
+UNIT = "vla-deploy.service"
+# Comes to rest half a second after it was told to stop, as control does, and says so.
+CHILD = """
+import pathlib, signal, sys, time
+def come_to_rest(*_):
+    time.sleep(0.5)
+    pathlib.Path("/var/log/vla-deploy/at-rest").touch()
+    sys.exit()
+signal.signal(signal.SIGTERM, come_to_rest)
+time.sleep(99)
+"""
+# A main process with the product's own notifier, and a child that ends as control does.
+TINY = f"""
+import ctypes, signal, subprocess, sys
+from drivers.clock import MonotonicClock
+from vla_deploy.supervisor.notify import Notifier, own_target
+def end_with_me():
+    ctypes.CDLL(None).prctl(1, 15)
+clock, stop = MonotonicClock(), []
+notifier = Notifier(own_target(), clock)
+signal.signal(signal.SIGTERM, lambda *_: stop.append(1))
+child = subprocess.Popen([sys.executable, "-c", {CHILD!r}], preexec_fn=end_with_me)
+while not stop:
+    notifier.step(ready=True, stopping=False, status="at work", troubles=())
+    clock.sleep_until(clock.now_ns() + 20_000_000)
+notifier.stopping()
+"""
+
+
+@pytest.fixture(scope="module")
+def computer(image: Path, boot: Callable[[], Any], add_environment: Callable[[Path], None]) -> Any:
+    assert main(["install", "--root", str(image), "--twin"]) == 0
+    release = image / "opt/vla-deploy/releases/tiny"
+    add_environment(release)
+    (release / "tiny.py").write_text(TINY)
+    launcher = LAUNCHER.replace('-I -m vla_deploy.cli "$@"', '"$here/../tiny.py"')
+    (release / "bin/vla-deploy").write_text(launcher)
+    (release / "bin/vla-deploy").chmod(0o755)
+    (image / "opt/vla-deploy/current").symlink_to("releases/tiny")
+    subprocess.run(
+        ["systemd-sysusers", f"--root={image}", "vla-deploy.conf"], check=True, capture_output=True
+    )
+    # A drop-in as a person would write it, so that the test need not wait for long.
+    extra = image / "etc/systemd/system/vla-deploy.service.d/quick.conf"
+    extra.parent.mkdir()
+    extra.write_text("[Service]\nWatchdogSec=1\nTimeoutAbortSec=1\nRestartSec=0.2\n")
+    computer = boot()
+    up = ("running", "degraded", "starting")
+    state = ("systemctl", "is-system-running")
+    computer.await_that(lambda: computer.run(*state, check=False).strip() in up)
+    return computer
+
+
+def restarts(computer: Any) -> int:
+    return int(computer.show(UNIT, "NRestarts"))
+
+
+def test_the_unit_lives_by_its_rules(computer: Any) -> None:
+    computer.run("systemctl", "start", UNIT)
+    assert computer.show(UNIT, "ActiveState") == "active"
+    assert computer.show(UNIT, "StatusText") == "at work"
+    assert computer.show(UNIT, "Slice") == "vla-deploy.slice"
+    pid = computer.show(UNIT, "MainPID")
+    status = computer.run("cat", f"/proc/{pid}/status")
+    assert "CapAmb:\t0000000000800000" in status  # CAP_SYS_NICE, nothing else
+    assert "NoNewPrivs:\t1" in status
+    computer.run("kill", "-STOP", pid)
+    computer.await_that(lambda: restarts(computer) == 1)
+    computer.await_that(lambda: computer.show(UNIT, "ActiveState") == "active")
+    at_rest = ("/usr/bin/test", "-e", "/var/log/vla-deploy/at-rest")
+    computer.run("rm", "-f", "/var/log/vla-deploy/at-rest")
+    computer.run("kill", "-KILL", computer.show(UNIT, "MainPID"))
+    computer.await_that(lambda: restarts(computer) == 2)
+    computer.run(*at_rest)  # nobody killed the child before its time
+    computer.await_that(lambda: computer.show(UNIT, "ActiveState") == "active")
+
+
+def test_a_release_on_trial_that_dies_is_taken_back_at_its_next_start(computer: Any) -> None:
+    prefix = computer.image / "opt/vla-deploy"
+    (prefix / "releases/new").symlink_to("tiny")
+    store = ReleaseStore(prefix)
+    store.begin_trial("new")
+    store.use("new")
+    computer.run("sh", "-c", f"sed -i s/^watcher=.*/watcher=1/ {TRIAL}")  # a process in there
+    computer.run("systemctl", "restart", UNIT)
+    assert store.current() == "new"
+    computer.run("kill", "-KILL", computer.show(UNIT, "MainPID"))
+    computer.await_that(lambda: store.current() == "tiny")
+    assert "had to be started again" in store.last_rollback()
+    assert store.trial() is None
+
+
+def test_a_service_that_keeps_failing_is_given_up(computer: Any) -> None:
+    def is_given_up() -> bool:
+        computer.run("systemctl", "kill", "--signal=KILL", UNIT, check=False)
+        return computer.show(UNIT, "ActiveState") == "failed"
+
+    computer.await_that(is_given_up)
+    assert computer.show(UNIT, "Result") in ("start-limit-hit", "signal")
+    assert computer.show("vla-deploy-gave-up.service", "ExecMainStartTimestampMonotonic") != "0"
