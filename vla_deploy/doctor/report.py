@@ -12,7 +12,9 @@ from vla_deploy.doctor.table import Section
 COLUMNS: Final = 100
 _NAME_COLUMNS: Final = 18
 _INDENT: Final = 2 + len(Level.MISSING) + 2 + _NAME_COLUMNS + 1
+_LEAST_INDENT: Final = 7
 _ARROW: Final = "-> "
+_COMMENT: Final = "   # "
 
 
 def succeeded(sections: Sequence[Section]) -> bool:
@@ -58,15 +60,14 @@ def _lines(finding: Finding) -> Iterator[str]:
         yield from _remedy(finding.remedy)
 
 
-def _remedy(command: str) -> Iterator[str]:
+def _remedy(remedy: str) -> Iterator[str]:
     """Keep a command whole, even where it is long: it is there to be copied."""
-    line = f"{' ' * (_INDENT - len(_ARROW))}{_ARROW}{command}"
+    line = f"{' ' * (_INDENT - len(_ARROW))}{_ARROW}{remedy}"
     if len(line) <= COLUMNS:
         yield line
         return
-    line, _, comment = line.partition("   # ")
-    yield line
-    if comment:
-        yield from textwrap.wrap(
-            comment, COLUMNS, initial_indent=" " * _INDENT, subsequent_indent=" " * _INDENT
-        )
+    command, _, comment = remedy.partition(_COMMENT)
+    indent = _INDENT if _INDENT + len(command) <= COLUMNS else _LEAST_INDENT
+    yield f"{' ' * (indent - len(_ARROW))}{_ARROW}{command}"
+    margin = " " * indent
+    yield from textwrap.wrap(comment, COLUMNS, initial_indent=margin, subsequent_indent=margin)
