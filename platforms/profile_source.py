@@ -26,9 +26,10 @@ class Source:
     parents: tuple[str, ...] = ()
 
     @classmethod
-    def of_values(cls, name: str, values: Table) -> "Source":
+    def of_values(cls, name_or_path: str, values: Table) -> "Source":
         """Return what another process has read."""
-        return cls(name=name, path=Path(name), values=values, origins={})
+        path = Path(name_or_path)
+        return cls(name=path.stem, path=path, values=values, origins={})
 
     def file_of(self, key: str) -> Path:
         """Return the file that a value stands in, or the profile's own for one that is missing."""

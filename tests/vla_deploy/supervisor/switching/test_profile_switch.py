@@ -1,0 +1,221 @@
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+from vla_deploy.node import NeedsRestart
+from vla_deploy.supervisor.profile_change import Member
+
+NAMES = ("control", "perception", "planner", "executor")
+
+
+class Never(Executor):
+    """Take work and never do it, as a load that hangs."""
+
+    def submit(self, *_: Any, **__: Any) -> "Future[Any]":
+        future: Future[Any] = Future()
+        future.set_running_or_notify_cancel()
+        return future
+
+
+def keeps_swift(bench: Any) -> None:
+    """Check that nothing is left of a change."""
+    assert bench.names() == {"swift"}
+    assert bench.choice.load() is None
+    assert bench.desk.status["phase"] == ""
+    for worker in bench.workers.values():
+        assert worker.alive == {worker.content} == {"first"}
+
+
+def test_every_process_switches_and_the_choice_is_kept(bench, profiles):
+    last = bench.desk.use(profiles["calm"])
+    assert (last["outcome"], last["reason"]) == ("kept", "")
+    assert bench.names() == {"calm"}
+    assert bench.choice.load() == bench.desk.status["profile"] == profiles["calm"]
+    bench.tick()
+    for worker in bench.workers.values():
+        assert worker.alive == {worker.content} != {"first"}
+    for kernel in bench.kernels.values():
+        assert kernel.applied == ["calm"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_profile_that_one_process_refuses_changes_nothing(bench, profiles, hinder, name):
+    reason = hinder(bench, name)
+    last = bench.desk.use(profiles["calm"])
+    assert (last["outcome"], last["reason"]) == ("refused", f"{name}: {reason}")
+    keeps_swift(bench)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_process_that_is_too_slow_after_the_switch_takes_all_of_them_back(bench, profiles, name):
+    bench.workers[name].is_slow = True
+    last = bench.desk.use(profiles["calm"])
+    assert last["outcome"] == "rolled back"
+    assert last["reason"].startswith(f"{name}: steps at 20.")
+    assert "expected 1000.0 Hz" in last["reason"]
+    keeps_swift(bench)
+    assert all(kernel.applied == ["calm", "swift"] for kernel in bench.kernels.values())
+
+
+def test_late_ticks_take_all_of_them_back(bench, profiles):
+    bench.desk.request(profiles["calm"])
+    bench.reach("watch")
+    bench.late_ticks = 60
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "rolled back"
+    assert "ticks late, expected 5% at most" in bench.desk.last["reason"]
+    keeps_swift(bench)
+
+
+def test_a_process_over_its_memory_takes_all_of_them_back(bench, profiles):
+    bench.desk.request(profiles["calm"])
+    bench.reach("watch")
+    bench.table.put_document({"processes": [{"name": "planner", "memory_mb": 151.0}]})
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "rolled back"
+    assert bench.desk.last["reason"] == "planner: 151 MB, expected 150 MB at most"
+    keeps_swift(bench)
+
+
+def test_a_dry_run_prepares_and_changes_nothing(bench, profiles):
+    assert bench.desk.use(profiles["calm"], dry_run=True)["outcome"] == "would work"
+    keeps_swift(bench)
+
+
+def test_a_preparation_that_hangs_is_given_up_in_time(bench, profiles):
+    bench.asides["planner"] = Never()
+    bench.start("planner", profiles["swift"])
+    last = bench.desk.use(profiles["calm"])
+    assert (last["outcome"], last["reason"]) == (
+        "refused",
+        "planner: no answer to prepare in time",
+    )
+    assert 29.0 < last["took_s"] < 32.0
+    assert bench.workers["planner"].steps > 500, "its steps go on meanwhile"
+
+
+def test_a_preparation_that_comes_too_late_is_discarded(bench, profiles):
+    pool = ThreadPoolExecutor(1)
+    gate: Future[None] = Future()
+    waiting = pool.submit(gate.result)
+    bench.asides["planner"] = pool
+    bench.start("planner", profiles["swift"])
+    assert bench.desk.use(profiles["calm"])["outcome"] == "refused"
+    gate.set_result(None)
+    waiting.result()
+    pool.shutdown(wait=True)
+    assert bench.workers["planner"].alive == {"first"}
+
+
+@pytest.mark.parametrize("phase", ["prepare", "commit", "watch"])
+def test_a_process_that_dies_meanwhile_takes_all_of_them_back(bench, profiles, phase):
+    if phase == "prepare":
+        bench.asides["executor"] = Never()
+        bench.start("executor", profiles["swift"])
+    bench.desk.request(profiles["calm"])
+    bench.reach("watch" if phase == "watch" else "prepare")
+    if phase == "commit":
+        bench.dead.add("planner")
+        assert bench.run_until(lambda: bench.desk.status["phase"] in ("commit", "rollback"), 60.0)
+    bench.dead.add("planner")
+    del bench.supervision.members["planner"]
+    assert bench.run_until(lambda: bench.desk.last, 60.0)
+    assert bench.desk.last["reason"].startswith("planner ended meanwhile")
+    assert bench.supervision.switch.profile == profiles["swift"]
+    assert {bench.nodes[name].profile.name for name in NAMES if name != "planner"} == {"swift"}
+
+
+def test_a_supervisor_that_ends_in_mid_switch_leaves_the_old_choice(bench, profiles):
+    bench.desk.request(profiles["calm"])
+    bench.reach("watch")
+    assert bench.names() == {"calm"}
+    assert bench.choice.load() is None
+
+
+def test_a_process_that_starts_after_the_switch_gets_the_new_profile(bench, profiles):
+    switch = bench.supervision.switch
+    assert switch.profile == profiles["swift"]
+    bench.desk.use(profiles["calm"])
+    assert (switch.profile, switch.in_force.name) == (profiles["calm"], "calm")
+
+
+def test_a_process_that_started_under_a_profile_that_was_rolled_back_is_started_again(
+    bench, profiles
+):
+    stranger = Member(pid=2, started_under=profiles["calm"])
+    bench.supervision.members["planner"] = stranger
+    bench.tick()
+    assert bench.supervision.restarts == ["planner"]
+
+
+def test_control_is_started_again_only_when_disarmed(bench, profiles):
+    bench.tick()
+    bench.supervision.members["control"] = Member(pid=2, started_under=profiles["calm"])
+    bench.tick()
+    assert bench.supervision.restarts == []
+    bench.state = "disarmed"
+    bench.tick()
+    assert bench.supervision.restarts == ["control"]
+
+
+def restart_on_request(bench: Any, name: str) -> None:
+    """Do as the supervisor: end the process, and start it under the profile in force."""
+    if name in bench.supervision.restarts:
+        bench.supervision.restarts.clear()
+        profile = bench.supervision.switch.profile
+        bench.start(name, profile)
+        bench.supervision.members[name] = Member(pid=2, started_under=profile)
+
+
+def test_a_process_that_needs_it_is_restarted_when_that_is_allowed(bench, profiles):
+    bench.workers["planner"].refusal = NeedsRestart("other threads")
+    bench.desk.request(profiles["calm"], allow_restart=True)
+
+    def ended() -> bool:
+        restart_on_request(bench, "planner")
+        return bool(bench.desk.last)
+
+    assert bench.run_until(ended, 60.0)
+    assert (bench.desk.last["outcome"], bench.names()) == ("kept", {"calm"})
+
+
+def test_control_is_not_restarted_while_it_is_armed(bench, profiles):
+    bench.workers["control"].refusal = NeedsRestart("bus_watchdog_s")
+    last = bench.desk.use(profiles["calm"], allow_restart=True)
+    assert (last["outcome"], last["reason"]) == (
+        "refused",
+        "control: needs a restart: bus_watchdog_s; disarm first",
+    )
+    keeps_swift(bench)
+
+
+def test_a_faulty_profile_never_reaches_a_process(bench, profiles, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text('inherits = "desktop"\ncontrol_rate_hz = 5000\n')
+    last = bench.desk.use(str(path))
+    assert last["outcome"] == "refused"
+    assert f"{path}: control_rate_hz: expected a number from 50 to 1000 Hz" in last["reason"]
+    keeps_swift(bench)
+
+
+def test_a_profile_for_more_memory_than_there_is_never_reaches_a_process(bench, tmp_path):
+    path = tmp_path / "huge.toml"
+    path.write_text(
+        'inherits = "desktop"\nboard.memory_mb = 250000\nbudgets.total.memory_mb = 240000000e-3\n'
+    )
+    last = bench.desk.use(str(path))
+    assert last["outcome"] == "refused"
+    assert "that this computer has, got 240000" in last["reason"]
+
+
+def test_one_change_at_a_time_and_only_when_everyone_is_ready(bench, profiles):
+    first = bench.desk.request(profiles["calm"])
+    bench.reach("watch")
+    second = bench.desk.use(profiles["swift"])
+    assert second["outcome"] == "refused"
+    assert "is under way: wait for its end" in second["reason"]
+    assert bench.run_until(lambda: bench.desk.last["request_id"] == first, 20.0)
+    bench.supervision.absent = {"planner": "starting"}
+    last = bench.desk.use(profiles["swift"])
+    assert last["reason"] == "planner is starting: wait until it is ready"
