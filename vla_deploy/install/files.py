@@ -97,7 +97,6 @@ def filled(text: str, values: Mapping[str, str], name: str) -> str:
 def _values(
     robot: RobotDescription, profile: Profile, choice: ServiceChoice, layout: Layout
 ) -> dict[str, str]:
-    interface = _can_interface(robot)
     memory_mb = profile.total.memory_mb
     return {
         "ROBOT": robot.name,
@@ -112,14 +111,13 @@ def _values(
         "RT_PRIORITY": str(profile.realtime_priority + _CONTROL_HEADROOM),
         "MEMORY_HIGH_MB": f"{memory_mb:.0f}",
         "MEMORY_MAX_MB": f"{memory_mb * _MAX_OVER_HIGH:.0f}",
-        "CAN_INTERFACE": interface,
+        "CAN_INTERFACE": "" if choice.twin else _can_interface(robot),
         "CAN_BITRATE": str(robot.can_bus.bitrate),
-        "CAN_UNIT": "vla-deploy-can.service" if interface else "",
         "CREDENTIALS": "\n".join(
             f"LoadCredential={_argument(credential.name)}:{_argument(str(credential.path))}"
             for credential in choice.credentials
         ),
-        "LINKS": "\n".join(_links(robot)),
+        "LINKS": "" if choice.twin else "\n".join(_links(robot)),
     }
 
 

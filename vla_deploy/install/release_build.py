@@ -12,7 +12,7 @@ from vla_deploy.install.errors import ReleaseRefused
 from vla_deploy.install.release_store import ReleaseStore
 
 # A robot that runs keeps the release that it was started from, whatever `current` says later.
-_LAUNCHER = """#!/bin/sh
+LAUNCHER = """#!/bin/sh
 here=$(dirname "$(readlink -f "$0")")
 exec "$here/../venv/bin/python" -I -m vla_deploy.cli "$@"
 """
@@ -67,7 +67,7 @@ def add_release(store: ReleaseStore, release_id: str, source: Source) -> Path:
     if source.packages_of is not None:
         write_file(_site_packages(venv) / "shared.pth", f"{source.packages_of}\n", 0o644)
     run_command(_pip_install(python, source))
-    write_file(folder / "bin" / "vla-deploy", _LAUNCHER, 0o755)
+    write_file(folder / "bin" / "vla-deploy", LAUNCHER, 0o755)
     return store.accept(release_id)
 
 

@@ -27,8 +27,8 @@ mount --bind {image}/etc /etc
 mount -t tmpfs tmpfs /run
 mount -t tmpfs tmpfs /var/lib
 mount -t tmpfs tmpfs /var/log
-exec env -i container=test PATH=/usr/sbin:/usr/bin:/sbin:/bin SYSTEMD_UNIT_PATH=/etc/systemd/system \
-  /lib/systemd/systemd --system --unit=test.target --log-target=console --log-level=info \
+exec env -i container=test PATH=/usr/sbin:/usr/bin:/sbin:/bin \
+  SYSTEMD_UNIT_PATH=/etc/systemd/system /lib/systemd/systemd --system --unit=test.target --log-target=console --log-level=info \
   --show-status=0
 """
 TARGETS = ("sysinit", "basic", "shutdown", "local-fs", "network", "multi-user", "test")

@@ -1,4 +1,4 @@
-"""Installing twice changes nothing, edits are kept, and uninstalling takes away what was written."""
+"""Installing twice changes nothing, edits are kept, uninstalling takes away what was written."""
 
 import json
 from pathlib import Path
@@ -97,7 +97,7 @@ def test_a_file_of_someone_else_is_neither_overwritten_nor_removed(
     wrapper.write_text("mine\n")
     run(capsys, "install", "--root", str(tmp_path))
     run(capsys, "uninstall", "--root", str(tmp_path))
-    assert [path for path in tree(tmp_path)] == [str(wrapper)]
+    assert list(tree(tmp_path)) == [str(wrapper)]
     assert wrapper.read_text() == "mine\n"
 
 
