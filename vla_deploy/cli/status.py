@@ -7,6 +7,7 @@ from typing import Any
 
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.supervisor.profile_change import Outcome
 
 
 def register(commands: Any) -> None:
@@ -40,6 +41,7 @@ def collect(session: Session) -> dict[str, Any]:
         if pose is None
         else {name: float(pose.data[name]) for name in ("x_m", "y_m", "yaw_rad", "match_ratio")},
         "scene": session.document("scene", age_limit_s=5.0),
+        "profile": session.document("profile_status", age_limit_s=3.0),
         "dashboard_url": None,
     }
 
@@ -47,7 +49,14 @@ def collect(session: Session) -> dict[str, Any]:
 def as_text(status: dict[str, Any]) -> str:
     """Return the status as lines for a person."""
     return "\n".join(
-        [*_processes(status), _control(status), _pose(status), _task(status), _scene(status)]
+        [
+            *_processes(status),
+            _profile(status),
+            _control(status),
+            _pose(status),
+            _task(status),
+            _scene(status),
+        ]
     )
 
 
@@ -69,13 +78,36 @@ def _processes(status: dict[str, Any]) -> list[str]:
     return [*lines, f"no commands: {table['refusal']}"] if table["refusal"] else lines
 
 
+def _profile(status: dict[str, Any]) -> str:
+    profile = status["profile"]
+    if profile is None:
+        return "profile: unknown"
+    change = f", on its way to {profile['target']}: {profile['phase']}" if profile["phase"] else ""
+    last = profile["last"]
+    failed = last.get("outcome") in (Outcome.REFUSED, Outcome.ROLLED_BACK)
+    refused = f" ({last['profile']} {last['outcome']}: {last['reason']})" if failed else ""
+    return f"profile: {profile['profile']}{change}{refused}"
+
+
 def _control(status: dict[str, Any]) -> str:
     control = status["control"]
     if control is None:
         return "control: silent"
     why = ": ".join(word for word in (control["cause"], control["detail"]) if word)
     latched = ", emergency stop latched" if control["estop_latched"] else ""
-    return f"control: {control['state']}{latched}" + (f" ({why})" if why else "")
+    return f"control: {control['state']}{latched}{_bounds(control)}" + (f" ({why})" if why else "")
+
+
+def _bounds(control: dict[str, Any]) -> str:
+    """Say what the safety rules leave the base, and how old the measurement behind it is."""
+    words = []
+    if control.get("speed_ratio", 1.0) < 1.0:
+        words.append(f"base at most {100 * control['speed_ratio']:.0f} % of its speed")
+    if control.get("blocked"):
+        words.append(f"base not {', '.join(control['blocked'])}".replace("_", " "))
+    if control.get("cause") and control.get("age_s"):
+        words.append(f"measured {control['age_s']:.2f} s ago")
+    return "".join(f", {word}" for word in words)
 
 
 def _pose(status: dict[str, Any]) -> str:

@@ -1,0 +1,118 @@
+import errno
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from platforms import load_profile
+from vla_deploy import host_settings
+from vla_deploy.host_settings import HostSettings
+
+
+@pytest.fixture
+def profile_of(tmp_path):
+    def profile_of(text: str):
+        path = tmp_path / "mine.toml"
+        path.write_text(f'inherits = "desktop"\n{text}')
+        return load_profile(path)
+
+    return profile_of
+
+
+@pytest.fixture
+def powerless(monkeypatch):
+    """Take every right away that a profile may need."""
+    monkeypatch.setattr(host_settings, "_may", lambda _: False)
+    limits = {resource.RLIMIT_RTPRIO: 0, resource.RLIMIT_NICE: 20, resource.RLIMIT_MEMLOCK: 65536}
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (limits[which], limits[which]))
+    for name in ("sched_setscheduler", "setpriority"):
+        monkeypatch.setattr(os, name, _refuse)
+
+
+def _refuse(*_: object) -> None:
+    raise PermissionError(errno.EPERM, "Operation not permitted")
+
+
+@pytest.mark.parametrize(
+    ("text", "refusal"),
+    [
+        ("realtime_priority = 40", "no SCHED_FIFO priority 40 (grant CAP_SYS_NICE or LimitRTPRIO)"),
+        ("processes.control.nice = -5", "no nice -5 after 0 (grant CAP_SYS_NICE or LimitNICE)"),
+        ("memory_lock = true", "no memory lock (grant CAP_IPC_LOCK or LimitMEMLOCK=infinity)"),
+        (
+            "board.cpu_count = 256\nprocesses.control.affinity = [255]",
+            "no CPU [255] (this computer",
+        ),
+    ],
+)
+def test_what_the_kernel_refuses_is_told_with_its_remedy(powerless, profile_of, text, refusal):
+    host, profile = HostSettings("control"), profile_of(text)
+    (obstacle,) = host.obstacles(profile)
+    assert obstacle.startswith(refusal)
+    assert host.apply(profile) == (obstacle,)
+
+
+def test_a_profile_that_asks_for_nothing_is_never_refused(powerless, profile_of):
+    assert HostSettings("control").apply(profile_of("")) == ()
+
+
+def test_only_control_asks_for_realtime_and_a_memory_lock(powerless, profile_of):
+    profile = profile_of("realtime_priority = 40\nmemory_lock = true")
+    assert HostSettings("planner").obstacles(profile) == ()
+
+
+def test_control_gets_the_profiles_realtime_priority(monkeypatch, profile_of):
+    asked = []
+    monkeypatch.setattr(host_settings, "_may", lambda _: True)
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *given: asked.append(given))
+    assert HostSettings("control").apply(profile_of("realtime_priority = 40")) == ()
+    assert asked == [(0, os.SCHED_FIFO, os.sched_param(40))]
+
+
+SCRIPT = """
+import os, sys, threading
+from platforms import load_profile
+from vla_deploy.host_settings import HostSettings
+
+gate = threading.Event()
+thread = threading.Thread(target=gate.wait)
+thread.start()
+host = HostSettings("planner")
+for path in sys.argv[1:]:
+    print(host.apply(load_profile(path)))
+    tids = [0, thread.native_id]
+    print([sorted(os.sched_getaffinity(tid)) for tid in tids])
+    print([os.getpriority(os.PRIO_PROCESS, tid) for tid in tids])
+gate.set()
+"""
+
+
+@pytest.mark.stack
+def test_every_thread_of_a_real_process_gets_its_cpus_and_its_nice(tmp_path: Path):
+    every = sorted(os.sched_getaffinity(0))
+    first = every[0]
+    for name, text in {
+        "narrow": (
+            f"board.cpu_count = 256\nprocesses.planner = {{ affinity = [{first}], nice = 3 }}"
+        ),
+        "wide": "processes.planner.nice = 7",
+    }.items():
+        (tmp_path / f"{name}.toml").write_text(f'inherits = "desktop"\n{text}\n')
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, str(tmp_path / "narrow.toml"), str(tmp_path / "wide.toml")],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=30,
+    )
+    assert done.stdout.splitlines() == [
+        "()",
+        f"[[{first}], [{first}]]",
+        "[3, 3]",
+        "()",
+        f"[{every}, {every}]",
+        "[7, 7]",
+    ]
