@@ -129,13 +129,19 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
 
 
 def turn(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
-    """Turn on the spot by an angle, counter-clockwise positive, also beyond half a turn."""
+    """Turn on the spot by an angle, counter-clockwise positive, also beyond half a turn.
+
+    Raises:
+        TryAgain: control did not let the base turn for too long.
+    """
     limits = limits_of(context)
     left_rad = float(parameters["angle_rad"])
     before_rad = context.link.pose.yaw_rad
+    patience = _Patience(context)
     while abs(left_rad) > 0.02:
         rate = min(limits.turn_rate_rad_s, 2.0 * abs(left_rad))
-        context.link.drive(Twist(0.0, math.copysign(max(rate, 0.06), left_rad)))
+        twist = Twist(0.0, math.copysign(max(rate, 0.06), left_rad))
+        context.link.drive(patience.pass_on(twist, ""))
         yield
         yaw_rad = context.link.pose.yaw_rad
         left_rad -= wrap_angle(yaw_rad - before_rad)
@@ -153,7 +159,10 @@ def stand_still(context: SkillContext, duration_s: float = 0.4) -> Skill:
 
 
 class _Patience:
-    """Hold the base while something hinders it, and give up when that stays."""
+    """Hold the base while something hinders it, and give up when that stays.
+
+    What control holds back by itself is asked for on and on: it goes on as soon as control lets it.
+    """
 
     def __init__(self, context: SkillContext) -> None:
         self._link = context.link
@@ -166,13 +175,14 @@ class _Patience:
             TryAgain: the hindrance stayed; the base is at rest.
         """
         now_ns = self._link.clock.now_ns()
-        if not hindrance:
+        reason = hindrance or self._link.held_by_control(twist)
+        if not reason:
             self._clear_ns = now_ns
             return twist
         if now_ns - self._clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
             self._link.drive(AT_REST)
-            raise TryAgain(hindrance)
-        return AT_REST
+            raise TryAgain(reason)
+        return AT_REST if hindrance else twist
 
 
 def _hindrance(

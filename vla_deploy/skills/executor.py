@@ -171,7 +171,7 @@ class PlanExecution:
         timeout_s = SKILLS[action.skill].timeout_s
         if branch.record.execution_time_s > timeout_s:
             raise TryAgain(f"{action.skill} took longer than {timeout_s:g} s")
-        if self._context.link.is_blind:
+        if self._context.link.is_blind or self._context.link.is_paused:
             self._context.link.rest_base()
             return
         if branch.skill is None:

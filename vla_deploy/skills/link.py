@@ -13,6 +13,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import FloorPose
+from vla_deploy.safety import Direction
 from vla_deploy.skills.errors import TryAgain
 
 POSE_AGE_S = 0.5
@@ -27,6 +28,12 @@ class MotionResult:
 
     status: str
     reason: str
+
+
+def _direction(twist: Twist) -> Direction:
+    if twist.v_m_s:
+        return Direction.FORWARD if twist.v_m_s > 0.0 else Direction.BACKWARD
+    return Direction.TURN_LEFT if twist.w_rad_s > 0.0 else Direction.TURN_RIGHT
 
 
 class RobotLink:
@@ -168,6 +175,22 @@ class RobotLink:
         if sample is None or self.clock.now_ns() - sample.stamp_ns > NS_PER_S:
             return None
         return sample.document()
+
+    @property
+    def is_paused(self) -> bool:
+        """Tell whether control has paused the robot by a protective stop, which ends by itself."""
+        status = self.control_status
+        return status is not None and status["state"] == "protective_stop"
+
+    def held_by_control(self, twist: Twist) -> str:
+        """Say why control does not let the base make a motion now; "" when it does."""
+        status = self.control_status
+        if status is None or twist == AT_REST:
+            return ""
+        blocked = status.get("blocked", ())
+        if status.get("speed_ratio", 1.0) > 0.0 and _direction(twist) not in blocked:
+            return ""
+        return f"control holds the base: {status['detail'] or status['cause']}"
 
     def drive(self, twist: Twist) -> None:
         """Ask for a base velocity; it must be repeated, control lets it go stale."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import RobotNotReady, TryAgain
 
@@ -33,7 +34,7 @@ def wait_until(context: SkillContext, done: Callable[[], bool], timeout_s: float
 def _finish(context: SkillContext, motion_id: int, what: str) -> Skill:
     while (result := context.link.ended(motion_id)) is None:
         yield
-    if result.status == "stopped":
+    if result.status == "stopped" and refusal_of(context.link.control_status):
         raise RobotNotReady(f"{what}: stopped by control: {result.reason}")
     if result.status != "done":
         raise TryAgain(f"{what}: {result.status}: {result.reason}")
@@ -48,8 +49,8 @@ def move_joints(
     """Bring joints to targets, all arriving together.
 
     Raises:
-        TryAgain: control refused or cancelled the motion.
-        RobotNotReady: a stop ended it.
+        TryAgain: control refused or cancelled the motion, or a stop that ends by itself ended it.
+        RobotNotReady: another stop ended it.
     """
     motion_id = context.link.send_goal(targets, speed_ratio, effort_ratio)
     yield from _finish(context, motion_id, f"moving {_named(targets)}")
@@ -61,8 +62,8 @@ def follow_joints(
     """Move through joint waypoints (n, joints) from rest to rest with minimum-jerk timing.
 
     Raises:
-        TryAgain: control refused or cancelled the motion.
-        RobotNotReady: a stop ended it.
+        TryAgain: control refused or cancelled the motion, or a stop that ends by itself ended it.
+        RobotNotReady: another stop ended it.
     """
     limits = [context.robot.limits[name] for name in joints]
     times_s, positions = minimum_jerk(

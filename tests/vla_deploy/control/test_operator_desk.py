@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.control.operator_desk import Act, OperatorDesk
+from vla_deploy.control.operator_desk import LATCHED_BEFORE, LOST, Act, OperatorDesk
 from vla_deploy.ipc import RingWriter, SharedSpace
 
 
@@ -58,3 +58,57 @@ def test_an_unknown_act_is_told_and_does_nothing(ring: tuple[OperatorDesk, RingW
     assert desk.complaint == (
         "operator act 'dance' from page: expected one of estop, reset, arm, disarm"
     )
+
+
+def reopened(tmp_path: Path, *, latched: bool | None, before: bool) -> OperatorDesk:
+    """Return the desk of a control that starts after a press, told of `before` it or not."""
+    space = SharedSpace(tmp_path, MonotonicClock())
+    writer, status = space.ring_writer("operator"), space.cell_writer("control_status")
+    if latched is not None and not before:
+        status.put_document({"estop_latched": latched})
+    ask(writer, "estop", "arm")
+    if latched is not None and before:
+        status.put_document({"estop_latched": latched})
+    ring = space.ring_reader("operator", from_start=True)
+    return OperatorDesk(ring, last_status=space.cell_reader("control_status").latest())
+
+
+@pytest.mark.parametrize(
+    ("latched", "before", "source"),
+    [
+        (None, False, "page"),
+        (False, False, "page"),
+        (True, False, "page"),
+        (True, True, LATCHED_BEFORE),
+        (False, True, None),
+    ],
+)
+def test_a_stop_that_no_control_saw_to_its_end_outlives_a_restart(
+    tmp_path: Path, latched: bool | None, before: bool, source: str | None
+) -> None:
+    desk = reopened(tmp_path, latched=latched, before=before)
+    desk.listen()
+    assert desk.estop_source == source
+    assert desk.next_act() is None
+    desk.listen()
+    assert desk.estop_source is None
+
+
+def test_events_lost_while_control_was_away_count_as_an_estop(tmp_path: Path) -> None:
+    space = SharedSpace(tmp_path, MonotonicClock())
+    ask(space.ring_writer("operator"), *["arm"] * 100)
+    desk = OperatorDesk(space.ring_reader("operator", from_start=True))
+    desk.listen()
+    assert desk.estop_source == LOST
+
+
+def test_a_long_history_that_control_had_seen_is_no_loss(tmp_path: Path) -> None:
+    space = SharedSpace(tmp_path, MonotonicClock())
+    ask(space.ring_writer("operator"), *["arm"] * 100)
+    space.cell_writer("control_status").put_document({"estop_latched": False})
+    last = space.cell_reader("control_status").latest()
+    desk = OperatorDesk(space.ring_reader("operator", from_start=True), last_status=last)
+    ask(space.ring_writer("operator"), "arm")
+    desk.listen()
+    assert desk.estop_source is None
+    assert desk.next_act() is Act.ARM

@@ -88,3 +88,47 @@ def test_the_offset_is_bounded_whatever_the_model_says(robot: RobotDescription) 
     offset = dict(zip(robot.joint_names, heavy.at(np.zeros(16)), strict=True))
     assert offset["left_elbow"] == pytest.approx(0.2)
     assert offset["left_gripper"] == pytest.approx(0.2 * 0.012)
+
+
+def with_arm(
+    robot: RobotDescription, category: StopCategory, drop_payload: bool = False
+) -> RobotDescription:
+    names = ("left_arm", "left_gripper")
+    changed = {
+        name: replace(robot.groups[name], stop_category=category, drop_payload=drop_payload)
+        for name in names
+    }
+    return replace(robot, groups={**robot.groups, **changed})
+
+
+def left_side(robot: RobotDescription) -> set[str]:
+    return {*robot.groups["left_arm"].joints, *robot.groups["left_gripper"].joints}
+
+
+@pytest.mark.parametrize("category", [StopCategory.POWER_REMOVED, StopCategory(1)])
+def test_an_arm_that_holds_something_keeps_its_power(
+    robot: RobotDescription, category: StopCategory
+) -> None:
+    changed = with_arm(robot, category)
+    plan = StopPlan(changed)
+    assert names(changed, plan.unpowered_at_rest(Reaction.GROUP_STOP)) == left_side(changed)
+    assert names(changed, plan.unpowered_at_rest(Reaction.GROUP_STOP, {"right"})) == left_side(
+        changed
+    )
+    assert len(plan.unpowered_at_once(Reaction.GROUP_STOP, {"left"})) == 0
+    assert len(plan.unpowered_at_rest(Reaction.GROUP_STOP, {"left"})) == 0
+    assert len(plan.released({"left"})) == 0
+
+
+def test_an_arm_that_may_drop_its_payload_loses_power_all_the_same(robot: RobotDescription) -> None:
+    changed = with_arm(robot, StopCategory.POWER_REMOVED, drop_payload=True)
+    plan = StopPlan(changed)
+    assert names(changed, plan.unpowered_at_once(Reaction.GROUP_STOP, {"left"})) == left_side(
+        changed
+    )
+
+
+def test_a_pause_takes_no_power_from_anything(robot: RobotDescription) -> None:
+    plan = StopPlan(with_arm(robot, StopCategory.POWER_REMOVED))
+    assert len(plan.unpowered_at_once(Reaction.PROTECTIVE_STOP)) == 0
+    assert plan.base_category(Reaction.PROTECTIVE_STOP) is StopCategory.STOP_KEEP_POWER

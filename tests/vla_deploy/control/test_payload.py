@@ -1,0 +1,75 @@
+"""Hold that a hand which carries something is known by what was told and by what it feels."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.clock import MonotonicClock
+from vla_deploy.control.payload import PRESSING_RATIO, SHORT_OF_GOAL_M, Payload
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.robots import load_robot
+
+ROBOT = load_robot("butler")
+GRIPPER = ROBOT.joint_index["left_gripper"]
+
+
+@pytest.fixture
+def space(tmp_path: Path) -> SharedSpace:
+    return SharedSpace(tmp_path, MonotonicClock())
+
+
+@pytest.fixture
+def payload(space: SharedSpace) -> Iterator[Payload]:
+    watched = Payload(ROBOT, space.cell_reader("executor_status"))
+    yield watched
+    watched.close()
+
+
+def told(space: SharedSpace, **holding: str | None) -> None:
+    space.cell_writer("executor_status").put_document({"state": "idle", "holding": holding})
+
+
+def felt(
+    payload: Payload, *, short_m: float = 0.0, effort: float = 0.0, torque: bool = True
+) -> frozenset[str]:
+    count = len(ROBOT.joint_names)
+    position, setpoint = np.full(count, 0.02), np.full(count, 0.02)
+    setpoint[GRIPPER] -= short_m
+    efforts = np.zeros(count)
+    efforts[GRIPPER] = effort
+    return payload.holding(position, setpoint, efforts, np.full(count, torque))
+
+
+def test_an_idle_robot_of_which_nothing_is_told_holds_nothing(payload: Payload) -> None:
+    assert felt(payload) == frozenset()
+
+
+def test_what_the_executor_told_last_stays_held(space: SharedSpace, payload: Payload) -> None:
+    told(space, left="cup", right=None)
+    assert felt(payload) == {"left"}
+
+
+def test_a_hand_that_the_robot_does_not_have_is_not_held(
+    space: SharedSpace, payload: Payload
+) -> None:
+    told(space, third="cup")
+    assert felt(payload) == frozenset()
+
+
+@pytest.mark.parametrize("effort", [2 * PRESSING_RATIO, -2 * PRESSING_RATIO])
+def test_fingers_that_press_short_of_their_goal_hold_something(
+    payload: Payload, effort: float
+) -> None:
+    assert felt(payload, short_m=2 * SHORT_OF_GOAL_M, effort=effort) == {"left"}
+
+
+@pytest.mark.parametrize(
+    ("short_m", "effort", "torque"),
+    [(0.5 * SHORT_OF_GOAL_M, 0.5, True), (0.01, 0.5 * PRESSING_RATIO, True), (0.01, 0.5, False)],
+)
+def test_fingers_that_do_not_press_hold_nothing(
+    payload: Payload, short_m: float, effort: float, torque: bool
+) -> None:
+    assert felt(payload, short_m=short_m, effort=effort, torque=torque) == frozenset()
