@@ -1,0 +1,28 @@
+"""Use as much memory and CPU as a file says: `hog.py RUN_DIR NAME WISH`, a process of the table."""
+
+import json
+import logging
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+run_dir, name, wish = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
+stopping: list[int] = []
+signal.signal(signal.SIGTERM, lambda number, _: stopping.append(number))
+(run_dir / "ready").mkdir(exist_ok=True)
+(run_dir / "ready" / name).write_text(str(os.getpid()))
+kept = bytearray()
+while not stopping:
+    wanted = json.loads(wish.read_text()).get(name, {})
+    size = wanted.get("memory_mb", 0) * 1_000_000
+    if len(kept) != size:
+        kept = bytearray(os.urandom(4096)) * (size // 4096) if size else bytearray()
+    for line in range(wanted.get("lines", 0)):
+        logging.warning("line %d of a talkative process", line)
+    busy_until_ns = time.monotonic_ns() + (20_000_000 if wanted.get("busy") else 0)
+    while time.monotonic_ns() < busy_until_ns:
+        pass
+    if not wanted.get("busy"):
+        time.sleep(0.05)
