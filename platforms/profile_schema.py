@@ -13,9 +13,10 @@ PROCESSES: Final[tuple[str, ...]] = (
     "perception",
     "planner",
     "executor",
+    "recorder",
     "twin",
 )
-NODES: Final[tuple[str, ...]] = ("control", "perception", "planner", "executor")
+NODES: Final[tuple[str, ...]] = ("control", "perception", "planner", "executor", "recorder")
 ROLES: Final = ("detector", "planner", "key_words", "speech_to_text", "text_to_speech")
 PROVIDERS: Final = (
     "TensorrtExecutionProvider",

@@ -1,9 +1,16 @@
 import pytest
 
 from platforms import ProfileError, load_profile
+from platforms.board import MODULES
 from platforms.ladder import LadderAction, LadderStep
-from platforms.profile import PROFILES, profile_names
-from platforms.profile_schema import PROCESSES
+from platforms.profile import PROFILES, profile_from, profile_names
+from platforms.profile_schema import NODES, PROCESSES
+from platforms.profile_source import read_source
+
+BUDGETS = {name: budget for name, budget in load_profile("base").budgets.items() if name != "twin"}
+MEMORY_MB = sum(budget.memory_mb for budget in BUDGETS.values())
+CORES = sum(budget.cpu_ratio for budget in BUDGETS.values())
+LADDER_PROCESSES = ", ".join(name for name in NODES if name != "control")
 
 TEN_FAULTS = """
 inherits = "base"
@@ -103,12 +110,14 @@ def test_ten_faults_are_reported_as_ten(faults_of):
             "processes.control.affinity: expected CPUs of the board, 0 to 3, got [4]",
         ),
         (
-            "budgets.total.memory_mb = 1129",
-            "budgets.total.memory_mb: expected at least the 1130 MB of all processes, got 1129",
+            "budgets.total.memory_mb = 500",
+            f"budgets.total.memory_mb: expected at least the {MEMORY_MB:g} MB of all processes, "
+            "got 500",
         ),
         (
-            "budgets.total.cpu_ratio = 2.3",
-            "budgets.total.cpu_ratio: expected at least the 2.4 cores of all processes, got 2.3",
+            "budgets.total.cpu_ratio = 1.5",
+            f"budgets.total.cpu_ratio: expected at least the {CORES:g} cores of all processes, "
+            "got 1.5",
         ),
         (
             "board.memory_mb = 2048\nbudgets.total.memory_mb = 2500",
@@ -135,11 +144,11 @@ def step(action: str, **values: object) -> str:
         ),
         (
             step("slow", process="control", ratio=0.5),
-            "ladder[0].process: expected one of perception, planner, executor, got 'control'",
+            f"ladder[0].process: expected one of {LADDER_PROCESSES}, got 'control'",
         ),
         (
             step("restart"),
-            "ladder[0].process: expected one of perception, planner, executor, got 'nothing'",
+            f"ladder[0].process: expected one of {LADDER_PROCESSES}, got 'nothing'",
         ),
         (
             step("protective_stop", process="planner"),
@@ -193,3 +202,47 @@ def test_every_shipped_profile_file_is_named(tmp_path):
     assert {f"{name}.toml" for name in profile_names()} == {
         path.name for path in PROFILES.iterdir() if path.suffix == ".toml"
     }
+
+
+def test_what_is_inherited_melts_together_and_says_where_it_stands(write, tmp_path):
+    write('inherits = "base"\nboard.memory_mb = 5000\nprocesses.planner.nice = 4', "middle")
+    source = read_source(write('inherits = "middle"\nprocesses.planner.threads = 3'))
+    planner = profile_from(source).processes["planner"]
+    assert (planner.nice, planner.threads, planner.affinity) == (4, 3, ())
+    assert source.parents == ("middle", "base")
+    assert source.file_of("processes.planner.threads") == tmp_path / "mine.toml"
+    assert source.file_of("board.memory_mb") == tmp_path / "middle.toml"
+    assert source.file_of("processes.planner.affinity") == PROFILES / "base.toml"
+
+
+def test_a_fault_names_the_file_that_it_stands_in(write, tmp_path):
+    write('inherits = "base"\nboard.memory_mb = 0', "middle")
+    with pytest.raises(ProfileError) as caught:
+        load_profile(write('inherits = "middle"\nprocesses.planner.nice = 30'))
+    assert sorted(caught.value.faults) == [
+        f"{tmp_path / 'middle.toml'}: board.memory_mb: "
+        "expected a number from 1 to 262144 MB, got 0",
+        f"{tmp_path / 'mine.toml'}: processes.planner.nice: "
+        "expected an integer from -20 to 19, got 30",
+    ]
+
+
+def test_inheritance_in_a_circle_is_shown(write, tmp_path):
+    write('inherits = "second"', "first")
+    write('inherits = "first"', "second")
+    with pytest.raises(ProfileError, match="inherits: expected an end, got mine -> first -> seco"):
+        load_profile(write('inherits = "first"'))
+
+
+@pytest.mark.parametrize("parent", ['"bse"', "7", '"../base"'])
+def test_an_unknown_parent_is_a_fault(write, parent):
+    with pytest.raises(ProfileError, match=r"mine\.toml: inherits: expected "):
+        load_profile(write(f"inherits = {parent}"))
+
+
+def test_every_board_that_is_known_has_its_profile():
+    modules = MODULES.values()
+    wanted = {module.profile for module in modules} | {
+        module.super_profile for module in modules if module.super_profile
+    }
+    assert wanted <= set(profile_names())
