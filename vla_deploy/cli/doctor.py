@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from platforms import Profile, load_profile
+from platforms import Profile, ProfileError, load_profile
 from platforms.probes import ProbeSet, Reading, open_probes, read_power_modes
 from platforms.tree import Tree
 from vla_deploy import doctor
@@ -96,10 +96,15 @@ def _root(arguments: argparse.Namespace) -> Path:
     return root
 
 
-def _profile(name: str | None, root: Path, base: Path | None) -> Profile:
-    if name is None:
-        name, _ = start_profile(base) if root == LIVE_ROOT else detect(root)
-    return load_profile(name)
+def _profile(name: str | None, root: Path, base: Path | None) -> Profile | None:
+    """Return the profile that is named, or that a run would take; None where that has faults."""
+    if name is not None:
+        return load_profile(name)
+    name, _ = start_profile(base) if root == LIVE_ROOT else detect(root)
+    try:
+        return load_profile(name)
+    except ProfileError:
+        return None
 
 
 def run_probes(arguments: argparse.Namespace) -> int:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from platforms.tree import Missing
 from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, missing, ok, warn
+from vla_deploy.doctor.finding import Finding, fail, ok, warn
 
 _GB = 1e9
 _MB = 1e6
@@ -31,7 +31,7 @@ def profile(context: Context) -> Iterator[Finding]:
     """Compare the profile in use with the one made for this board."""
     made, used = context.board.profile_name, context.profile
     if used is None:
-        yield missing("profile", f"{made or 'none'} cannot be loaded", "vla-deploy profile list")
+        yield fail("profile", "the chosen one has faults", "vla-deploy profile show")
     elif made is None or used.name == made:
         yield ok("profile", used.name)
     else:

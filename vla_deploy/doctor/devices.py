@@ -1,15 +1,16 @@
 """Check the robot's devices: are they there, may we use them, are they set up for 250 Hz."""
 
+import grp
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from platforms.tree import Missing
 from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from vla_deploy.doctor.finding import Finding, fail, missing, ok, trouble, warn
 from vla_deploy.robots import RobotDescription
 
 LATENCY_MS: Final = 1
@@ -63,9 +64,18 @@ def _judged(context: Context, node: Node) -> Finding:
     if not os.access(path, os.F_OK, effective_ids=True):
         return fail(node.name, f"there is no {file}", f"ls -l {folder}   # is it plugged in?")
     if not os.access(path, node.access, effective_ids=True):
-        remedy = f"sudo usermod -aG {node.group} $USER   # then log in anew"
+        remedy = f"sudo usermod -aG {_group(path, node.group)} $USER   # then log in anew"
         return fail(node.name, f"no right to open {file}", remedy)
     return ok(node.name, file)
+
+
+def _group(path: Path, usual: str) -> str:
+    """Return the group that the device file has, or the usual one where that is root's."""
+    try:
+        owner = grp.getgrgid(path.stat().st_gid).gr_name
+    except (OSError, KeyError):
+        return usual
+    return usual if owner == "root" else owner
 
 
 def latency_timers(context: Context) -> Iterator[Finding]:
@@ -89,9 +99,9 @@ def latency_timers(context: Context) -> Iterator[Finding]:
 
 def _late_adapter(context: Context, name: str, wait_ms: float, path: str) -> Finding:
     rate_hz = context.profile.control_rate_hz if context.profile else 250.0
-    level: Callable[[str, str, str], Finding] = fail if wait_ms >= 1000 / rate_hz else warn
     measured = f"{wait_ms:g} ms, expected {LATENCY_MS} ms at {rate_hz:g} Hz"
-    return level(name, measured, f"echo {LATENCY_MS} | sudo tee {path}")
+    remedy = f"echo {LATENCY_MS} | sudo tee {path}"
+    return trouble(name, measured, remedy, fatal=wait_ms >= 1000 / rate_hz)
 
 
 def can_link(context: Context) -> Iterator[Finding]:
@@ -103,7 +113,8 @@ def can_link(context: Context) -> Iterator[Finding]:
     if "/" in name or ":" in name:
         yield missing("CAN link", f"{name} is no network link; its driver opens it")
     elif not context.tree.exists(f"/sys/class/net/{name}"):
-        yield fail("CAN link", f"there is no link {name}", "sudo modprobe mttcan; ip link")
+        driver = "sudo modprobe mttcan; ip link" if context.board.l4t else "ip -details link"
+        yield fail("CAN link", f"there is no link {name}", f"{driver}   # is it plugged in?")
     else:
         yield _link(context, name, bitrate, up)
 

@@ -38,6 +38,11 @@ def fail(name: str, measured: str, remedy: str) -> Finding:
     return Finding(name=name, level=Level.FAIL, measured=measured, remedy=remedy)
 
 
+def trouble(name: str, measured: str, remedy: str, *, fatal: bool) -> Finding:
+    """Return a failure where it is `fatal` to what the profile promises, else a warning."""
+    return fail(name, measured, remedy) if fatal else warn(name, measured, remedy)
+
+
 def missing(name: str, why: str, remedy: str = "") -> Finding:
     """Return a finding that could not be made."""
     return Finding(name=name, level=Level.MISSING, measured=why, remedy=remedy)

@@ -3,14 +3,14 @@
 import gzip
 import os
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
 from drivers.clock import NS_PER_S
 from platforms.tree import Missing
 from vla_deploy.doctor.context import UNLIMITED, Context
-from vla_deploy.doctor.finding import Finding, fail, ok, warn
+from vla_deploy.doctor.finding import Finding, fail, ok, trouble, warn
 
 LIMITS_FILE: Final = "/etc/security/limits.d/90-vla-deploy.conf"
 MEMORY_LOCK_BYTES: Final = 512 << 20
@@ -48,8 +48,7 @@ def fifo(context: Context) -> Iterator[Finding]:
         return
     measured = f"{rights.fifo_refusal}; RLIMIT_RTPRIO is {rights.realtime_priority_limit}"
     remedy = f'echo "$USER - rtprio 80" | sudo tee -a {LIMITS_FILE}   # then log in anew'
-    level: Callable[[str, str, str], Finding] = fail if _wanted(context) else warn
-    yield level(name, measured, remedy)
+    yield trouble(name, measured, remedy, fatal=bool(_wanted(context)))
 
 
 def realtime_share(context: Context) -> Iterator[Finding]:
@@ -80,18 +79,25 @@ def group_scheduling(context: Context) -> Iterator[Finding]:
 
 
 def _has_group_scheduling(context: Context) -> bool:
-    if context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us"):
-        return True
+    old_groups = context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us")
+    return old_groups or _SWITCH in _kernel_options(context)
+
+
+def _kernel_options(context: Context) -> str:
+    """Return how the kernel was configured: it may carry that itself, or /boot has it."""
     try:
         packed = (context.tree.root / "proc/config.gz").read_bytes()
-        return _SWITCH in gzip.decompress(packed).decode(errors="replace")
+        return gzip.decompress(packed).decode(errors="replace")
     except (OSError, EOFError, zlib.error):
-        pass  # seldom there: distributions keep it in /boot
+        return _options_in_boot(context)
+
+
+def _options_in_boot(context: Context) -> str:
     try:
         release = context.tree.text("/proc/sys/kernel/osrelease")
-        return _SWITCH in context.tree.text(f"/boot/config-{release}")
+        return context.tree.text(f"/boot/config-{release}")
     except Missing:
-        return False
+        return ""
 
 
 def memory_lock(context: Context) -> Iterator[Finding]:
@@ -103,10 +109,10 @@ def memory_lock(context: Context) -> Iterator[Finding]:
     elif limit >= MEMORY_LOCK_BYTES:
         yield ok(name, f"{limit >> 20} MiB")
     else:
-        needs = context.profile is not None and context.profile.memory_lock
-        level: Callable[[str, str, str], Finding] = fail if needs else warn
         remedy = f'echo "$USER - memlock unlimited" | sudo tee -a {LIMITS_FILE}   # log in anew'
-        yield level(name, f"{limit >> 10} KiB, expected {MEMORY_LOCK_BYTES >> 20} MiB", remedy)
+        measured = f"{limit >> 10} KiB, expected {MEMORY_LOCK_BYTES >> 20} MiB"
+        needed = context.profile is not None and context.profile.memory_lock
+        yield trouble(name, measured, remedy, fatal=needed)
 
 
 def wake_up(context: Context) -> Iterator[Finding]:
@@ -122,8 +128,8 @@ def wake_up(context: Context) -> Iterator[Finding]:
         yield ok("wake-up", measured)
     else:
         remedy = "vla-deploy doctor   # again while the computer is idle; then see SCHED_FIFO"
-        level: Callable[[str, str, str], Finding] = fail if priority else warn
-        yield level("wake-up", f"{measured}, expected {limit_ms:.2g} ms", remedy)
+        measured = f"{measured}, expected {limit_ms:.2g} ms"
+        yield trouble("wake-up", measured, remedy, fatal=bool(priority))
 
 
 def _lateness_ns(context: Context, period_ns: int) -> list[int]:

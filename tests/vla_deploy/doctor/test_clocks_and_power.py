@@ -64,10 +64,9 @@ def test_the_supply_faults_since_boot_are_told(board_tree, computer) -> None:
 @pytest.mark.parametrize(
     ("board", "profile", "level", "words"),
     [
-        ("orin_nx_16gb", "jetson_orin_nx", Level.OK, "25W"),
+        ("orin_nx_16gb", "robot", Level.OK, "25W"),
         ("orin_nx_16gb", "desktop", Level.OK, "the profile asks for none"),
-        ("thor_t5000", "jetson_thor", Level.WARN, "120W, expected 70W"),
-        ("agx_orin_64gb", "jetson_orin_nx", Level.FAIL, "no mode 25W, only MAXN, 15W, 30W, 50W"),
+        ("agx_orin_64gb", "robot", Level.FAIL, "no mode 25W, only MAXN, 15W, 30W, 50W"),
         ("desktop", "desktop", Level.MISSING, "there is no /etc/nvpmodel.conf"),
     ],
 )
@@ -78,8 +77,14 @@ def test_the_power_mode_is_compared_with_the_profiles(
     (finding,) = power.power_mode(computer.context(profile))
     assert finding.level is level
     assert words in finding.measured
-    if level is Level.WARN:
-        assert finding.remedy == "sudo nvpmodel -m 3"
+
+
+def test_another_power_mode_is_a_warning_with_the_id_on_this_board(board_tree, computer) -> None:
+    computer.root = board_tree("orin_nx_16gb")
+    computer.write("/var/lib/nvpmodel/status", "pmode:0001\n")
+    (finding,) = power.power_mode(computer.context("robot"))
+    assert (finding.level, finding.measured) == (Level.WARN, "10W, expected 25W")
+    assert finding.remedy == "sudo nvpmodel -m 3"
 
 
 @pytest.mark.parametrize(
@@ -98,8 +103,8 @@ def test_every_governor_counts(computer, found, level) -> None:
     ("isolated", "profile", "level"),
     [
         ("\n", "desktop", Level.OK),
-        ("\n", "jetson_orin_nx", Level.WARN),
-        ("5\n", "jetson_orin_nx", Level.OK),
+        ("\n", "robot", Level.WARN),
+        ("5\n", "robot", Level.OK),
     ],
 )
 def test_isolated_processors_matter_where_control_has_its_own(
@@ -113,8 +118,8 @@ def test_isolated_processors_matter_where_control_has_its_own(
 @pytest.mark.parametrize(
     ("board", "profile", "level"),
     [
-        ("thor_t5000", "jetson_thor", Level.OK),
         ("thor_t5000", "desktop", Level.WARN),
+        ("desktop", "robot", Level.WARN),
         ("desktop", "desktop", Level.OK),
     ],
 )

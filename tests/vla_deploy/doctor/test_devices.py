@@ -1,3 +1,4 @@
+import grp
 import json
 import os
 from typing import Any
@@ -51,6 +52,13 @@ def test_the_latency_timer_is_judged_by_the_control_period(computer, text, level
         assert finding.remedy == f"echo 1 | sudo tee {TIMER}"
 
 
+def test_the_group_of_the_device_file_itself_is_named(computer, monkeypatch) -> None:
+    os.chown(computer.write(SERVOS), -1, grp.getgrnam("daemon").gr_gid)
+    monkeypatch.setattr(os, "access", lambda path, mode, *, effective_ids: mode == os.F_OK)
+    findings = {one.name: one for one in device_files(computer.context(robot="butler"))}
+    assert "usermod -aG daemon" in findings["servos"].remedy
+
+
 def test_an_adapter_without_latency_timer_is_passed_over(computer) -> None:
     computer.write("/sys/bus/usb-serial/devices/ttyUSB0/port_number", "0")
     assert list(latency_timers(computer.context())) == []
@@ -95,6 +103,7 @@ def test_the_can_link_is_judged_by_state_and_bit_rate(computer, answer, level, w
 def test_a_can_link_that_is_not_there_fails(computer) -> None:
     (finding,) = can_link(computer.context(robot="butler"))
     assert (finding.level, finding.measured) == (Level.FAIL, "there is no link can0")
+    assert finding.remedy == "ip -details link   # is it plugged in?"
 
 
 def test_sound_cards_are_found_by_their_name(computer) -> None:

@@ -3,6 +3,7 @@ import random
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from vla_deploy.doctor import (
 from vla_deploy.doctor.context import ask_command
 from vla_deploy.doctor.software import EGL_SCRIPT
 from vla_deploy.robots import load_robot
+from vla_deploy.supervisor.profile_choice import choice_of
 
 TREES = sorted(path.stem for path in (Path(__file__).parents[2] / "platforms/trees").glob("*"))
 GARBAGE = (b"", b"\xff\xfe\x00", b"-1\n", b"nan", b"9" * 5000, b"a b c\n\n:\n")
@@ -36,8 +38,9 @@ def all_findings(sections: tuple[Section, ...]) -> list[Finding]:
     return [finding for section in sections for finding in section.findings]
 
 
-def examined(root: Path, profile: str = "desktop") -> tuple[Section, ...]:
-    return examine(recorded_context(root, load_profile(profile), load_robot("butler")))
+def examined(root: Path) -> tuple[Section, ...]:
+    profile = replace(load_profile("desktop"), realtime_priority=50, power_mode="25W")
+    return examine(recorded_context(root, profile, load_robot("butler")))
 
 
 def test_each_topic_stands_together_in_the_table() -> None:
@@ -48,7 +51,7 @@ def test_each_topic_stands_together_in_the_table() -> None:
 
 @pytest.mark.parametrize("tree", TREES)
 def test_every_trouble_has_a_remedy_and_every_line_fits(board_tree: BoardTree, tree: str) -> None:
-    sections = examined(board_tree(tree), "jetson_orin_nx")
+    sections = examined(board_tree(tree))
     for finding in all_findings(sections):
         assert finding.measured
         assert finding.remedy or finding.level in (Level.OK, Level.MISSING)
@@ -125,7 +128,7 @@ def test_the_command_examines_a_recorded_tree(
     board_tree: BoardTree, capsys: pytest.CaptureFixture[str]
 ) -> None:
     root = str(board_tree("orin_nano_8gb_super"))
-    assert main(["doctor", "--root", root]) == 0
+    assert main(["doctor", "--root", root, "--profile", "desktop"]) == 0
     assert "NVIDIA Jetson Orin Nano" in capsys.readouterr().out
     assert main(["doctor", "--root", root, "--robot", "butler", "--json"]) == 1
     document = json.loads(capsys.readouterr().out)
@@ -139,6 +142,19 @@ def test_the_command_examines_this_computer(capsys: pytest.CaptureFixture[str]) 
     assert code == (0 if document["ok"] else 1)
     (wake_up,) = (row for row in document["findings"] if row["name"] == "wake-up")
     assert "at 250 Hz" in wake_up["measured"]
+
+
+def test_a_chosen_profile_with_faults_is_a_finding(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    base = tmp_path / "run"
+    faulty = tmp_path / "faulty.toml"
+    faulty.write_text("control_rate_hz = 1\n")
+    choice_of(base).save(str(faulty))
+    assert main(["--runtime-base", str(base), "doctor", "--json"]) == 1
+    rows = json.loads(capsys.readouterr().out)["findings"]
+    (profile,) = (row for row in rows if row["name"] == "profile")
+    assert (profile["level"], profile["measured"]) == ("fail", "the chosen one has faults")
 
 
 def test_a_root_that_is_no_folder_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ from vla_deploy.doctor import Level
 from vla_deploy.doctor import realtime as checks
 from vla_deploy.doctor.context import UNLIMITED
 
-PROFILES = (("desktop", Level.WARN), ("jetson_orin_nx", Level.FAIL))
+PROFILES = (("desktop", Level.WARN), ("robot", Level.FAIL))
 MS = 1_000_000
 
 
@@ -26,7 +26,7 @@ def test_refused_rights_fail_where_the_profile_needs_them(
 
 
 def test_granted_rights_are_fine(computer) -> None:
-    context = computer.context("jetson_orin_nx")
+    context = computer.context("robot")
     (fifo,) = checks.fifo(context)
     (lock,) = checks.memory_lock(context)
     assert (fifo.level, lock.level) == (Level.OK, Level.OK)
@@ -42,7 +42,7 @@ def test_granted_rights_are_fine(computer) -> None:
     ],
 )
 def test_memory_lock_is_judged_by_limit_or_capability(computer, limit, may_lock_all, level) -> None:
-    context = computer.context("jetson_orin_nx")
+    context = computer.context("robot")
     rights = replace(context.rights, memory_lock_bytes=limit, may_lock_all=may_lock_all)
     (finding,) = checks.memory_lock(replace(context, rights=rights))
     assert finding.level is level
@@ -51,8 +51,8 @@ def test_memory_lock_is_judged_by_limit_or_capability(computer, limit, may_lock_
 @pytest.mark.parametrize(
     ("version", "profile", "level"),
     [
-        ("Linux version 5.15.148-rt SMP PREEMPT_RT", "jetson_orin_nx", Level.OK),
-        ("Linux version 5.15.148-tegra SMP PREEMPT", "jetson_orin_nx", Level.WARN),
+        ("Linux version 5.15.148-rt SMP PREEMPT_RT", "robot", Level.OK),
+        ("Linux version 5.15.148-tegra SMP PREEMPT", "robot", Level.WARN),
         ("Linux version 6.8.0 SMP PREEMPT_DYNAMIC", "desktop", Level.OK),
     ],
 )
@@ -112,7 +112,7 @@ def test_a_damaged_kernel_configuration_harms_nothing(computer) -> None:
     [(0.0, Level.OK, Level.OK), (0.8, Level.OK, Level.OK), (0.9, Level.WARN, Level.FAIL)],
 )
 def test_wake_ups_are_judged_by_their_lateness(computer, late_ms, desktop, real_time) -> None:
-    for profile, level in (("desktop", desktop), ("jetson_orin_nx", real_time)):
+    for profile, level in (("desktop", desktop), ("robot", real_time)):
         context = computer.context(profile)
         context.clock.late_ns = lambda _: round(late_ms * MS)
         (finding,) = checks.wake_up(context)
@@ -130,5 +130,5 @@ def test_one_late_wake_up_in_two_hundred_and_fifty_is_told_but_not_judged(comput
 
 def test_the_measurement_leaves_the_scheduling_as_it_was(computer) -> None:
     before = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
-    list(checks.wake_up(computer.context("jetson_orin_nx")))
+    list(checks.wake_up(computer.context("robot")))
     assert (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) == before

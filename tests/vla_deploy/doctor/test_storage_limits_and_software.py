@@ -105,9 +105,9 @@ def test_a_package_that_is_not_there_fails_with_the_line_that_installs_it(
 
 def test_models_that_are_not_there_are_named(computer, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(software, "MODELS", tmp_path)
-    for tier in ("detector_medium", "detector_small"):
+    for tier in ("medium", "small"):
         (tmp_path / tier).mkdir()
-    found = {one.name: one for one in software.models(computer.context("jetson_orin_nx"))}
+    found = {one.name: one for one in software.models(computer.context("robot"))}
     assert found["detector"].level is Level.OK
     assert found["planner"].level is Level.WARN
     assert "planner_1b" in found["planner"].measured
