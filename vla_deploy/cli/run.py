@@ -21,6 +21,8 @@ EXAMPLES = """  vla-deploy run --twin                 the robot butler in the fl
   vla-deploy run --robot butler         the real robot; arm it when it is safe: vla-deploy arm
 """
 
+_STDERR = 2
+
 
 def register(commands: Any) -> None:
     """Add the command."""
@@ -79,8 +81,8 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.twin and arguments.devices_dir is not None:
         sys.stderr.write("run: --devices-dir is of a twin that runs by itself; leave out --twin\n")
         return 2
-    faulthandler.enable()
-    if not journal_stream(os.environ, sys.stderr.fileno()):  # the supervisor logs there itself
+    faulthandler.enable(_STDERR)
+    if not journal_stream(os.environ, _STDERR):  # the supervisor logs there itself
         logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
     arm = arguments.twin if arguments.arm is None else arguments.arm
     profile = arguments.profile
