@@ -28,7 +28,8 @@ mount -t tmpfs tmpfs /run
 mount -t tmpfs tmpfs /var/lib
 mount -t tmpfs tmpfs /var/log
 exec env -i container=test PATH=/usr/sbin:/usr/bin:/sbin:/bin \
-  SYSTEMD_UNIT_PATH=/etc/systemd/system /lib/systemd/systemd --system --unit=test.target --log-target=console --log-level=info \
+  SYSTEMD_UNIT_PATH=/etc/systemd/system /lib/systemd/systemd \
+  --system --unit=test.target --log-target=console --log-level=info \
   --show-status=0
 """
 TARGETS = ("sysinit", "basic", "shutdown", "local-fs", "network", "multi-user", "test")

@@ -1,0 +1,204 @@
+"""A switch ends with a release that works, whatever fails and wherever it is cut off."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from drivers.clock import NS_PER_S
+from vla_deploy.install.errors import CommandFailed, ReleaseRefused
+from vla_deploy.install.release_store import ReleaseStore
+from vla_deploy.install.service_control import ServiceState, trouble_within
+from vla_deploy.install.switch import NEXT, End, Step, Switch, SwitchPlan, recover
+
+GUARD = Path(__file__).parents[3] / "systemd" / "release-guard"
+PROGRAM = '#!/bin/sh\ntest ! -e "$(dirname "$0")/broken"\n'
+
+
+class ManualClock:
+    """Time passes when somebody waits."""
+
+    def __init__(self) -> None:
+        self.time_ns = 0
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+
+
+class RecordedService:
+    """Answer as systemd does for a unit whose release is well, or fails as told."""
+
+    def __init__(self, store: ReleaseStore, fails: dict[str, str] | None = None) -> None:
+        self.started: list[str] = []
+        self._store = store
+        self._fails = fails or {}  # release -> "start" or "later"
+        self._asked = 0
+
+    def restart(self) -> None:
+        self.started.append(self._store.current())
+        self._asked = 0
+        if self._fails.get(self.started[-1]) == "start":
+            raise CommandFailed("`systemctl restart vla-deploy.service` ended with 1")
+
+    def state(self) -> ServiceState:
+        self._asked += 1
+        died = self._fails.get(self.started[-1]) == "later" and self._asked > 5
+        return ServiceState(active="active", main_pid=2 if died else 1, restarts=int(died))
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> ReleaseStore:
+    (tmp_path / "boot").write_text("boot-1\n")
+    for number, name in enumerate(("oldest", "old", "new")):
+        program = tmp_path / "releases" / name / "bin" / "vla-deploy"
+        program.parent.mkdir(parents=True)
+        program.write_text(PROGRAM)
+        program.chmod(0o755)
+        os.utime(tmp_path / "releases" / name, (number, number))
+    made = ReleaseStore(tmp_path, tmp_path / "boot")
+    made.use("old")
+    return made
+
+
+def switch_of(store: ReleaseStore, service: RecordedService | None = None) -> Switch:
+    plan = SwitchPlan(to="new", robot="butler", profile="desktop")
+    return Switch(store, plan, service or RecordedService(store), ManualClock())
+
+
+def guard(prefix: Path) -> None:
+    """Run what systemd runs before each start."""
+    subprocess.run(["sh", GUARD, prefix, prefix / "boot"], check=True, capture_output=True)
+
+
+def test_every_step_leads_somewhere_and_every_end_is_reached() -> None:
+    assert set(NEXT) == set(Step)
+    reached = {follower for pair in NEXT.values() for follower in pair}
+    assert reached == (set(Step) | set(End)) - {Step.CHECK}
+
+
+def test_a_good_release_is_used_and_the_one_before_is_remembered(store: ReleaseStore) -> None:
+    service = RecordedService(store)
+    report = switch_of(store, service).run()
+    assert (report.end, report.current, report.failures) == (End.SWITCHED, "new", ())
+    assert (store.previous(), store.trial(), service.started) == ("old", None, ["new"])
+
+
+def test_a_release_that_does_not_run_changes_nothing(store: ReleaseStore) -> None:
+    (store.folder("new") / "bin" / "broken").touch()
+    service = RecordedService(store)
+    report = switch_of(store, service).run()
+    assert (report.end, report.current, service.started) == (End.REFUSED, "old", [])
+    assert report.failures[0].startswith("check that the new release runs: ")
+
+
+@pytest.mark.parametrize("when", ["start", "later"])
+def test_a_release_that_does_not_stay_well_is_taken_back(store: ReleaseStore, when: str) -> None:
+    service = RecordedService(store, {"new": when})
+    report = switch_of(store, service).run()
+    assert (report.end, report.current) == (End.ROLLED_BACK, "old")
+    assert service.started == ["new", "old"]
+    assert store.trial() is None
+
+
+def test_a_service_that_is_down_with_either_release_is_reported(store: ReleaseStore) -> None:
+    service = RecordedService(store, {"new": "start", "old": "start"})
+    report = switch_of(store, service).run()
+    assert (report.end, report.current, len(report.failures)) == (End.DOWN, "old", 2)
+
+
+@pytest.mark.parametrize("step", [step for step in Step if not step.name.endswith("_BACK")])
+def test_a_step_that_fails_ends_with_a_release_that_works(store: ReleaseStore, step: Step) -> None:
+    def fail() -> None:
+        raise OSError(28, "No space left on device")
+
+    switch = switch_of(store)
+    switch.do[step] = fail
+    report = switch.run()
+    assert report.current == ("new" if step is Step.PRUNE else "old")
+    assert store.trial() is None
+    assert "No space left on device" in report.failures[0]
+
+
+CUT = [(step, after) for step in Step for after in (False, True)]
+
+
+@pytest.mark.parametrize(("step", "after"), CUT)
+@pytest.mark.parametrize("is_reboot", [False, True], ids=["killed", "power cut"])
+def test_a_switch_cut_off_at_any_step_is_ended_by_the_next_start(
+    store: ReleaseStore, step: Step, after: bool, is_reboot: bool
+) -> None:
+    fails = {"new": "later"} if step.name.endswith("_BACK") else {}
+    child = os.fork()
+    if child == 0:  # pragma: no cover - the process that is cut off
+        switch = switch_of(store, RecordedService(store, fails))
+        act = switch.do[step]
+        switch.do[step] = lambda: (act() if after else None, os.kill(os.getpid(), 9))  # type: ignore[assignment, func-returns-value]
+        switch.run()
+        os._exit(0)
+    _, status = os.waitpid(child, 0)
+    assert os.WTERMSIG(status) == 9
+    if is_reboot:
+        (store.prefix / "boot").write_text("boot-2\n")
+    guard(store.prefix)
+    kept = step is Step.PRUNE or (step is Step.CONFIRM and after)
+    assert store.current() == ("new" if kept else "old")
+    assert store.trial() is None
+    assert (store.folder(store.current()) / "bin" / "vla-deploy").exists()
+    recover(store, lambda pid: False)
+    assert switch_of(store).run().end is End.SWITCHED if not kept else True
+
+
+def test_the_guard_lets_a_watched_trial_start_once(store: ReleaseStore) -> None:
+    store.begin_trial("new")
+    store.use("new")
+    guard(store.prefix)
+    assert store.current() == "new"
+    guard(store.prefix)
+    assert store.current() == "old"
+    assert store.last_rollback() == (
+        "new: went back to old: the release on trial had to be started again"
+    )
+
+
+def test_the_guard_does_nothing_without_a_trial(store: ReleaseStore) -> None:
+    guard(store.prefix)
+    assert (store.current(), store.last_rollback()) == ("old", "")
+
+
+def test_a_switch_that_goes_on_is_not_disturbed(store: ReleaseStore) -> None:
+    store.begin_trial("new")
+    with pytest.raises(ReleaseRefused, match="is going on"):
+        recover(store, lambda pid: pid == os.getpid())
+    assert store.trial() is not None
+
+
+@pytest.mark.parametrize(("to", "words"), [("old", "in use already"), ("none", "no release")])
+def test_an_impossible_switch_is_refused(store: ReleaseStore, to: str, words: str) -> None:
+    plan = SwitchPlan(to=to, robot="butler", profile="desktop")
+    with pytest.raises(ReleaseRefused, match=words):
+        Switch(store, plan, None, ManualClock()).run()
+
+
+def test_old_releases_go_but_never_the_two_in_use(store: ReleaseStore) -> None:
+    store.use("oldest")
+    store.remember_previous("old")
+    assert store.prune(keep=1) == ("new",)
+    assert store.ids() == ("oldest", "old")
+
+
+@pytest.mark.parametrize("release", ["old", "oldest"])
+def test_what_is_in_use_cannot_be_removed(store: ReleaseStore, release: str) -> None:
+    store.remember_previous("oldest")
+    with pytest.raises(ReleaseRefused, match="switch to another first"):
+        store.remove(release)
+
+
+def test_health_is_watched_for_the_whole_time(store: ReleaseStore) -> None:
+    clock, service = ManualClock(), RecordedService(store)
+    service.restart()
+    assert trouble_within(service, clock, 20.0) == ""
+    assert clock.time_ns >= 20 * NS_PER_S
