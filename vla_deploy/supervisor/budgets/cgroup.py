@@ -122,10 +122,10 @@ class CgroupTree:
 
 
 def _objection(found: Cgroup, controller: str) -> str:
-    if found.folder in (MOUNT, UNIFIED):
-        return "the supervisor runs in the root group: start it as a service with Delegate=yes"
     if controller not in found.controllers:
         return found.reason or f"{found.folder} does not offer the controller {controller}"
+    if found.folder in (MOUNT, UNIFIED):
+        return "the supervisor runs in the root group: start it as a service with Delegate=yes"
     return ""
 
 

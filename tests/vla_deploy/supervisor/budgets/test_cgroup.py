@@ -1,7 +1,12 @@
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from platforms.probes.cgroup import MOUNT, UNIFIED
 from vla_deploy.supervisor.budgets.cgroup import (
     CgroupRefused,
     CgroupTree,
@@ -105,6 +110,63 @@ def test_this_machine_answers_for_every_controller():
     cgroups.close()
     assert set(cgroups.usable) | set(cgroups.refusals) == {"memory", "cpu", "pids"}
     assert all(cgroups.refusals.values())
+
+
+WORKER = """
+import os, subprocess, sys
+from vla_deploy.supervisor.budgets.cgroup import CgroupRefused, CgroupTree
+sys.stdin.readline()  # until the test has moved this process into its group
+cgroups = CgroupTree(controllers=("hugetlb", "memory"))
+print(cgroups.usable, cgroups.refusals)
+with subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"],
+                      stdin=subprocess.PIPE) as child:
+    cgroups.limit("worker", "hugetlb.2MB.max", "4194304")
+    cgroups.place("worker", child.pid)
+    print(open(f"/proc/{child.pid}/cgroup").read().split("0::")[1].strip())
+try:
+    cgroups.limit("worker", "memory.max", "4096")
+except CgroupRefused as refusal:
+    print(refusal)
+cgroups.close()
+print(open("/proc/self/cgroup").read().split("0::")[1].strip())
+"""
+
+
+@pytest.fixture
+def delegated() -> Iterator[Path]:
+    """Make a real control group, as a service manager does, with the controllers this one has."""
+    mount = next(
+        (one for one in (Path(UNIFIED), Path(MOUNT)) if (one / "cgroup.subtree_control").exists()),
+        None,
+    )
+    if os.geteuid() != 0 or mount is None:
+        pytest.skip("only root may make control groups, where there is version 2")
+    if "hugetlb" not in (mount / "cgroup.controllers").read_text():
+        pytest.skip("the controller that this test borrows belongs to others here")
+    before = (mount / "cgroup.subtree_control").read_text().split()
+    group = mount / f"vla-deploy-test-{os.getpid()}"
+    group.mkdir()
+    (mount / "cgroup.subtree_control").write_text("+hugetlb")
+    yield group
+    for folder in (*(one for one in group.iterdir() if one.is_dir()), group):
+        folder.rmdir()
+    if "hugetlb" not in before:
+        (mount / "cgroup.subtree_control").write_text("-hugetlb")
+
+
+@pytest.mark.stack
+def test_a_real_group_is_left_for_a_leaf_and_takes_limits_that_read_back(delegated: Path):
+    with subprocess.Popen(
+        [sys.executable, "-c", WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as worker:
+        (delegated / "cgroup.procs").write_text(str(worker.pid))
+        told, _ = worker.communicate("go\n", timeout=60)
+    usable, child, refusal, own = told.splitlines()
+    assert usable.startswith("('hugetlb',) {'memory': ")
+    assert child == f"/{delegated.name}/worker"
+    assert refusal.startswith("there is no memory.max")
+    assert own == f"/{delegated.name}/supervisor"
+    assert not (delegated / "worker").exists()
 
 
 def test_limits_are_whole_pages_and_periods():
