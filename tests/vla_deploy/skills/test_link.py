@@ -1,14 +1,20 @@
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import ClaimBook, Event, SharedSpace
 from vla_deploy.navigation.follower import Twist
+from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.robots import load_robot
-from vla_deploy.skills.errors import TryAgain
+from vla_deploy.skills.context import SkillContext
+from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S, turn
+from vla_deploy.skills.errors import RobotNotReady, TryAgain
 from vla_deploy.skills.link import PATIENCE_S, POSE_AGE_S, RobotLink
+from vla_deploy.skills.motion import move_joints
 
 
 class SteppedClock:
@@ -70,3 +76,102 @@ def test_a_halt_rests_the_base_only_if_it_was_driven(
     sample = commands.latest()
     assert sample is not None
     assert (sample.data["v_m_s"], sample.data["w_rad_s"]) == (0.0, 0.0)
+
+
+def control_says(space: SharedSpace, **status: object) -> None:
+    calm = {"state": "armed", "cause": "", "detail": "", "speed_ratio": 1.0, "blocked": []}
+    space.cell_writer("control_status").put_document(calm | status)
+
+
+@pytest.mark.parametrize(
+    ("twist", "status", "held"),
+    [
+        (Twist(0.3, 0.0), {}, False),
+        (Twist(0.3, 0.0), {"speed_ratio": 0.2}, False),
+        (Twist(0.3, 0.0), {"speed_ratio": 0.0}, True),
+        (Twist(0.3, 0.5), {"blocked": ["forward"]}, True),
+        (Twist(-0.3, 0.0), {"blocked": ["forward"]}, False),
+        (Twist(-0.3, 0.0), {"blocked": ["backward"]}, True),
+        (Twist(0.0, 0.5), {"blocked": ["turn_left"]}, True),
+        (Twist(0.0, -0.5), {"blocked": ["turn_left"]}, False),
+        (Twist(0.0, -0.5), {"blocked": ["turn_right"]}, True),
+        (Twist(0.0, 0.0), {"speed_ratio": 0.0}, False),
+    ],
+)
+def test_a_motion_that_control_holds_back_is_known_with_its_cause(
+    space: SharedSpace, clock: SteppedClock, twist: Twist, status: dict[str, object], held: bool
+) -> None:
+    link = RobotLink(space, clock, load_robot("butler"))
+    assert link.held_by_control(twist) == ""
+    control_says(space, cause="obstacle_stop_zone", detail="a chair", **status)
+    assert link.held_by_control(twist) == ("control holds the base: a chair" if held else "")
+
+
+def test_a_protective_stop_is_a_pause_and_no_refusal(
+    space: SharedSpace, clock: SteppedClock
+) -> None:
+    link = RobotLink(space, clock, load_robot("butler"))
+    silent = link.is_paused
+    control_says(space, state="protective_stop")
+    paused, refusal = link.is_paused, refusal_of(link.control_status)
+    control_says(space, state="armed")
+    assert (silent, paused, refusal, link.is_paused) == (False, True, None, False)
+
+
+def context_of(link: RobotLink) -> SkillContext:
+    robot = load_robot("butler")
+    book = cast("ClaimBook", None)  # the pieces under test claim nothing
+    return SkillContext(
+        robot=robot,
+        link=link,
+        planner=cast("PathPlanner", None),
+        arms={},
+        say=lambda text: None,
+        claims=book,
+    )
+
+
+def test_a_motion_that_a_pause_ended_is_tried_again_and_one_that_a_stop_ended_is_not(
+    space: SharedSpace, clock: SteppedClock
+) -> None:
+    link = RobotLink(space, clock, load_robot("butler"))
+    results = space.ring_writer("motion_result")
+    for state, expected in (("protective_stop", TryAgain), ("stopped", RobotNotReady)):
+        control_says(space, state=state)
+        skill = move_joints(context_of(link), {"head_pan": 0.1})
+        next(skill)
+        (sent,) = [one.payload["motion_id"] for one in _commands(space)][-1:]
+        results.publish({"motion_id": sent, "status": "stopped", "reason": "why"})
+        link.refresh()
+        with pytest.raises(expected, match="why"):
+            next(skill)
+
+
+def _commands(space: SharedSpace) -> list[Event]:
+    return space.ring_reader("motion_command", from_start=True).drain()
+
+
+def test_a_turn_that_control_holds_back_is_asked_for_until_it_is_given_up(
+    space: SharedSpace, clock: SteppedClock
+) -> None:
+    link = RobotLink(space, clock, load_robot("butler"))
+    poses, commands = space.cell_writer("pose"), space.cell_reader("base_command")
+    skill = turn(context_of(link), {"angle_rad": 1.0})
+
+    def step() -> float:
+        poses.put(x_m=0.0, y_m=0.0, yaw_rad=0.0, match_ratio=1.0)
+        control_says(space, cause="keep_out_zone", blocked=["turn_left"])
+        next(skill)
+        clock.step(0.1)
+        sample = commands.latest()
+        assert sample is not None
+        return float(sample.data["w_rad_s"])
+
+    asked = [step() for _ in range(round(BLOCKED_TIMEOUT_S / 0.1))]
+    assert min(asked) > 0.0
+    with pytest.raises(TryAgain, match="keep_out_zone"):
+        for _ in range(3):
+            step()
+    sample = commands.latest()
+    assert sample is not None
+    assert sample.data["w_rad_s"] == 0.0
