@@ -18,6 +18,8 @@ Mask = NDArray[np.bool_]
 
 # A motion brings a point nearer when it takes more than this share of its own way off the distance.
 NEARER_SHARE = 0.1
+# An approach zone slows; it is stop zones that stop, and they know the way out.
+LEAST_RATIO = 0.05
 _PROBE_M = 0.01
 _PROBE_RAD = 0.02
 _ARC_STEP_S = 0.05
@@ -203,7 +205,7 @@ def _finding(
 ) -> ZoneFinding:
     ratio = zone.speed_ratio
     if zone.kind is ZoneKind.APPROACH:
-        ratio = min(1.0, collision_s / zone.time_before_collision_s)
+        ratio = min(1.0, max(LEAST_RATIO, collision_s / zone.time_before_collision_s))
     return ZoneFinding(
         kind=zone.kind,
         name=zone.name,

@@ -12,6 +12,7 @@ from vla_deploy.robots.protection import Zone, ZoneKind, ZoneSource
 from vla_deploy.safety.surroundings import Direction
 from vla_deploy.safety.zones import (
     IDLE,
+    LEAST_RATIO,
     Footprint,
     Motion,
     Points,
@@ -162,6 +163,9 @@ def test_an_approach_zone_slows_by_the_share_of_time_that_is_left() -> None:
     trigger, found = judge_zone(APPROACH, IDLE, cloud((0.465, 0.0)), ROUND, CRUISING, fresh=True)
     assert found is not None
     assert found.speed_ratio == pytest.approx(0.5, abs=0.01)
+    _, touching = judge_zone(APPROACH, IDLE, cloud((0.23, 0.0)), ROUND, CRUISING, fresh=True)
+    assert touching is not None
+    assert touching.speed_ratio == LEAST_RATIO
     _, found = judge_zone(APPROACH, trigger, cloud((0.465, 0.0)), ROUND, STANDING, fresh=False)
     assert found is not None
     assert found.speed_ratio == 1.0
