@@ -3,12 +3,19 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from vla_deploy.supervisor import AlreadyRunning, RuntimeUnavailable, default_base, running
-from vla_deploy.supervisor.runtime import Runtime
+from vla_deploy.supervisor import (
+    AlreadyRunning,
+    Owner,
+    RuntimeUnavailable,
+    default_base,
+    running,
+)
+from vla_deploy.supervisor.runtime import Runtime, old_logs, own_start_ticks
 
 
 @pytest.fixture
@@ -134,3 +141,31 @@ def test_runs_live_where_the_user_may_write(monkeypatch, uid, variable, expected
     if variable:
         monkeypatch.setenv("XDG_RUNTIME_DIR", variable)
     assert default_base() == Path(expected)
+
+
+def test_an_owner_is_told_from_a_later_process_of_its_pid_by_ticks_since_boot(tmp_path):
+    ticks = own_start_ticks()
+    mine = Owner(pid=os.getpid(), start_ticks=ticks, run_id="run", run_dir=str(tmp_path))
+    assert mine.is_alive()
+    assert not replace(mine, start_ticks=ticks + 1).is_alive()
+    assert not replace(mine, pid=2**22 + 1).is_alive()
+
+
+def test_the_logs_of_a_dead_run_are_kept_by_the_next_start(tmp_path, shared):
+    base = tmp_path / "base"
+    logs = base / "dead-run" / "logs"
+    logs.mkdir(parents=True)
+    (logs / "control.log").write_text("{}\n")
+    Runtime(base, shared).close()
+    (kept,) = old_logs(tmp_path / "base-state").entries()
+    assert kept.name == "000001-dead-run"
+    assert (kept / "control.log").read_text() == "{}\n"
+
+
+def test_logs_that_cannot_be_kept_are_told_and_hold_nobody_up(tmp_path, shared, caplog):
+    runtime = Runtime(tmp_path / "base", shared)
+    (runtime.run_dir / "logs").mkdir()
+    (tmp_path / "base-state").write_text("no folder")
+    runtime.close()
+    assert f"the logs of run {runtime.run_id} are lost" in caplog.text
+    assert not runtime.run_dir.exists()
