@@ -66,8 +66,7 @@ class SwitchPlan:
 
     def self_tests(self) -> tuple[tuple[str, ...], ...]:
         """Return what the new release must be able to do, as its arguments."""
-        chosen = ("--robot", self.robot, "--profile", self.profile)
-        return (("--help",), ("check", *chosen))
+        return (("check", "--robot", self.robot, "--profile", self.profile),)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
