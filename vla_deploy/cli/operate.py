@@ -25,7 +25,10 @@ ACTS: Mapping[str, tuple[str, Reached]] = {
     ),
     "reset": (
         "release a latched stop; nothing moves, arm the robot next",
-        lambda status: status["state"] in ("disarmed", "armed") and not status["estop_latched"],
+        lambda status: (
+            status["state"] in ("disarmed", "armed", "protective_stop")
+            and not status["estop_latched"]
+        ),
     ),
     "arm": (
         "put power on the joints where they are, so that commands may move them",

@@ -15,7 +15,10 @@ SILENT = "control does not answer; see: vla-deploy status"
 
 
 def refusal_of(status: Mapping[str, Any] | None) -> str | None:
-    """Return why motion is refused, or None when the robot is armed."""
+    """Return why motion is refused, or None when the robot is armed.
+
+    A protective stop is no refusal: it ends by itself, and the executor waits for that.
+    """
     if status is None:
         return SILENT
     remedy = REMEDIES.get(str(status["state"]))

@@ -16,12 +16,13 @@ from vla_deploy.ipc.topics import SCAN_BEAMS
 
 
 class EmptyFloor:
-    """Tell the scan of a lidar with nothing around it, as long as it `sees`."""
+    """Tell the scan of a lidar, with nothing around it at first, as long as it `sees`."""
 
     period_s = 0.1
 
     def __init__(self, space: SharedSpace) -> None:
         self.sees = True
+        self.ranges_m = np.full(SCAN_BEAMS, 8.0)
         self._scan = space.cell_writer("scan")
 
     def start(self) -> None:
@@ -30,7 +31,7 @@ class EmptyFloor:
     def step(self) -> None:
         """Put one scan."""
         if self.sees:
-            self._scan.put(range_m=np.full(SCAN_BEAMS, 8.0))
+            self._scan.put(range_m=self.ranges_m)
 
     def stop(self) -> None:
         """Have nothing to close."""
