@@ -118,7 +118,9 @@ class BudgetKeeper:
         return self._measurer.measure(snapshot, frozenset(self._profile.budgets))
 
     def _unknown(self) -> Measurements:
-        reason = f"nothing was measured for {STALE_AFTER_NS / NS_PER_S:g} s: a sensor hangs"
+        reason = (
+            f"nothing was measured for {STALE_AFTER_NS / NS_PER_S:g} s: a sensor hangs, or failed"
+        )
         _log.warning("budgets: %s", reason)
         return {line.key: Measurement(value=None, reason=reason) for line in self._lines}
 

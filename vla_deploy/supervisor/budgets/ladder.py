@@ -88,9 +88,8 @@ def _presses(finding: Finding, state: LadderState, timing: LadderTiming, now_ns:
 def _next_step(
     ladder: Sequence[LadderStep], state: LadderState, pressing: Sequence[Finding]
 ) -> LadderStep | None:
-    in_force = [one.step for one in state.taken]
     offenders = {one.line.process for one in pressing} - {TOTAL}
-    free = [step for step in ladder if step not in in_force]
+    free = _free(ladder, state)
     own = [step for step in free if step.process in offenders]
     if own:
         return own[0]
@@ -98,6 +97,18 @@ def _next_step(
         return None
     # Restarting one that keeps its budget would help nobody.
     return next((step for step in free if step.action is not LadderAction.RESTART), None)
+
+
+def _free(ladder: Sequence[LadderStep], state: LadderState) -> list[LadderStep]:
+    """Return the steps not in force; a ladder may declare the same one twice, one tier each."""
+    in_force = [one.step for one in state.taken]
+    free = []
+    for step in ladder:
+        if step in in_force:
+            in_force.remove(step)
+        else:
+            free.append(step)
+    return free
 
 
 def _why(pressing: Iterable[Finding], step: LadderStep) -> str:

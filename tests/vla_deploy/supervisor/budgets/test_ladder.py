@@ -27,7 +27,8 @@ LINES = {
 class Climber:
     """Step judge and ladder once a second with what each line is said to use."""
 
-    def __init__(self) -> None:
+    def __init__(self, ladder: tuple[LadderStep, ...] = LADDER) -> None:
+        self.ladder = ladder
         self.state = LadderState()
         self.changes: list[Change] = []
         self.second = 0
@@ -42,7 +43,7 @@ class Climber:
             now_ns = self.second * NS_PER_S
             self._findings = judge(LINES.values(), self._findings, measured, TIMING, now_ns)
             pressure = Pressure(findings=tuple(self._findings.values()), emergency=emergency)
-            self.state, change = climb(LADDER, TIMING, self.state, pressure, now_ns)
+            self.state, change = climb(self.ladder, TIMING, self.state, pressure, now_ns)
             self.changes += [change] if change else []
             self.second += 1
         return [change.step for change in self.changes[start:]]
@@ -79,6 +80,14 @@ def test_one_without_steps_of_its_own_disturbs_nobody(climber):
 
 def test_the_offenders_steps_come_first_when_the_whole_robot_is_under_pressure(climber):
     assert climber.go(30, total=101, planner=101) == [SUSPEND, SLOW, SMALLER, EMERGENCY]
+
+
+def test_a_step_that_is_declared_twice_is_taken_twice():
+    climber = Climber((SMALLER, SMALLER))
+    assert climber.go(30, perception=101) == [SMALLER, SMALLER]
+    assert climber.in_force == [SMALLER, SMALLER]
+    climber.go(60)
+    assert climber.in_force == []
 
 
 def test_steps_are_undone_in_reverse_order_when_the_pressure_goes(climber):
