@@ -11,7 +11,7 @@ from typing import Any
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
 from vla_deploy.logs import journal_stream
-from vla_deploy.supervisor import ProcessGivenUp, RunOptions, Supervisor
+from vla_deploy.supervisor import ProcessGivenUp, RunOptions, StartCrashed, Supervisor
 from vla_deploy.supervisor.profile_choice import start_profile
 
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
@@ -101,13 +101,17 @@ def main(arguments: argparse.Namespace) -> int:
         runtime_base=arguments.runtime_base,
         arm=arm,
     )
+    try:
+        _keep_running(options)
+    except (ProcessGivenUp, StartCrashed) as error:
+        raise CommandFailed(str(error)) from error
+    print("stopped in order")
+    return 0
+
+
+def _keep_running(options: RunOptions) -> None:
     with Supervisor(options) as supervisor:
         supervisor.start()
         if not supervisor.stop_requested:
             print('ready; in another terminal: vla-deploy say "go to the kitchen"', flush=True)
-        try:
-            supervisor.run_until_stopped()
-        except ProcessGivenUp as error:
-            raise CommandFailed(str(error)) from error
-    print("stopped in order")
-    return 0
+        supervisor.run_until_stopped()

@@ -4,6 +4,7 @@ from vla_deploy.supervisor.errors import (
     AlreadyRunning,
     ProcessGivenUp,
     RuntimeUnavailable,
+    StartCrashed,
     StartFailed,
     SupervisorError,
 )
@@ -22,6 +23,7 @@ __all__ = [
     "RestartPolicy",
     "RunOptions",
     "RuntimeUnavailable",
+    "StartCrashed",
     "StartFailed",
     "Supervisor",
     "SupervisorError",

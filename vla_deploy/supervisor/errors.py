@@ -5,6 +5,7 @@ SupervisorError
 ├── RuntimeUnavailable  the runtime directory cannot be used: fix its path or permissions
 ├── ProcessGivenUp      the robot cannot go on without that process: the run ends
 └── StartFailed         a process did not become ready: its last words are in the message
+    └── StartCrashed    it crashed or hung on its way: another try may help
 """
 
 
@@ -22,6 +23,10 @@ class RuntimeUnavailable(SupervisorError):
 
 class StartFailed(SupervisorError):
     """Say which process did not become ready, and why."""
+
+
+class StartCrashed(StartFailed):
+    """Say which process crashed or hung before it was ready: no fault of file or wiring."""
 
 
 class ProcessGivenUp(SupervisorError):

@@ -11,7 +11,7 @@ from vla_deploy.exit_codes import EXIT_CONFIGURATION
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.consequences import Consequences
-from vla_deploy.supervisor.errors import ProcessGivenUp, StartFailed, SupervisorError
+from vla_deploy.supervisor.errors import ProcessGivenUp, StartCrashed, StartFailed, SupervisorError
 from vla_deploy.supervisor.last_words import complaint, last_words
 from vla_deploy.supervisor.lifecycle import Action, Record, State, abort, reconcile, wind_down
 from vla_deploy.supervisor.liveness import Vital
@@ -91,7 +91,8 @@ class Supervisor:
         Raises:
             AlreadyRunning: another supervisor holds the runtime directory.
             RuntimeUnavailable: the runtime directory cannot be used.
-            StartFailed: a process was given up; everything is stopped again.
+            StartFailed: a process refused to start; everything is stopped again.
+            StartCrashed: a process was given up before it was ready; all is stopped again.
         """
         self._run = Run(
             self._options,
@@ -148,7 +149,7 @@ class Supervisor:
             for spec in self._table:
                 record = self._records[spec.name]
                 if record.state is State.GIVEN_UP and spec.giving_up is not GivingUp.CARRY_ON:
-                    raise StartFailed(self._failure(spec.name, record))
+                    raise self._failure(spec.name, record)
             if self._is_ready():
                 return
             self._pause()
@@ -160,11 +161,12 @@ class Supervisor:
             for spec in self._table
         )
 
-    def _failure(self, name: str, record: Record) -> str:
+    def _failure(self, name: str, record: Record) -> StartFailed:
         words = last_words(self.run_dir, name)
-        if record.exit_code == EXIT_CONFIGURATION and words:
-            return f"{name} did not start: {complaint(self.run_dir, name)}"
-        return "\n".join([f"{name} did not start: {record.reason}", *words])
+        if record.exit_code == EXIT_CONFIGURATION:
+            why = complaint(self.run_dir, name) or record.reason
+            return StartFailed(f"{name} did not start: {why}")
+        return StartCrashed("\n".join([f"{name} did not start: {record.reason}", *words]))
 
     def _step(self, *, stopping: bool) -> None:
         run, now_ns, before = self._started(), self._clock.now_ns(), self._records

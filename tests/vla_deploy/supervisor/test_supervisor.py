@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 from platforms import ProfileError
-from vla_deploy.supervisor import AlreadyRunning, StartFailed, Supervisor, running
+from vla_deploy.supervisor import AlreadyRunning, StartCrashed, StartFailed, Supervisor, running
 
 pytestmark = pytest.mark.stack
 
@@ -85,7 +85,7 @@ def test_the_table_reports_memory_and_cpu_of_every_process(stage, eventually):
 
 def test_a_process_that_keeps_crashing_fails_the_start(stage):
     supervisor = stage.supervisor(stage.row("a"), stage.row("b", "crash"), stage.row("c"))
-    with pytest.raises(StartFailed, match=r"b did not start: exit code 3; given up after 4 fail"):
+    with pytest.raises(StartCrashed, match=r"b did not start: exit code 3; given up after 4 fail"):
         supervisor.start()
     assert stage.events().count("b started") == 4
     assert "c started" not in stage.events()
@@ -94,14 +94,15 @@ def test_a_process_that_keeps_crashing_fails_the_start(stage):
 
 
 def test_a_refusal_fails_the_start_at_once_with_the_process_own_words(stage):
-    with pytest.raises(StartFailed, match=r"^b did not start: robot\.toml: servo 3"):
+    with pytest.raises(StartFailed, match=r"^b did not start: robot\.toml: servo 3") as refusal:
         stage.supervisor(stage.row("a"), stage.row("b", "refuse")).start()
+    assert refusal.type is StartFailed
     assert stage.events().count("b started") == 1
 
 
 def test_a_process_that_never_gets_ready_fails_the_start(stage):
     row = stage.row("a", "never-ready", ready_timeout_s=0.1)
-    with pytest.raises(StartFailed, match=r"not ready within 0\.1 s"):
+    with pytest.raises(StartCrashed, match=r"not ready within 0\.1 s"):
         stage.supervisor(row).start()
 
 
