@@ -134,6 +134,15 @@ TOPICS: tuple[Topic, ...] = (
         slot_bytes=4096,
     ),
     Topic(
+        name="recorder_status",
+        kind=Kind.CELL,
+        owner="recorder",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="what the flight recorder holds and whether it writes, as JSON",
+        fields=(Field("document", "json", 256),),
+    ),
+    Topic(
         name="motion_command",
         kind=Kind.RING,
         owner="executor",

@@ -136,4 +136,13 @@ TABLE: tuple[ProcessSpec, ...] = (
         ready_files=("ready/executor",),
         watched=(Watched(topic="executor_status", silence_limit_s=5.0),),
     ),
+    ProcessSpec(
+        name="recorder",
+        command=("-m", "vla_deploy.telemetry", *_NODE),
+        ready_topic="recorder_status",
+        ready_files=("ready/recorder",),
+        watched=(Watched(topic="recorder_status", silence_limit_s=5.0),),
+        stop_timeout_s=10.0,  # what waits to be written is written first
+        giving_up=GivingUp.CARRY_ON,
+    ),
 )

@@ -1,6 +1,5 @@
 """Run the flight recorder: `python -m vla_deploy.telemetry --run-dir D --robot butler`."""
 
-import os
 import sys
 import time
 
@@ -9,12 +8,9 @@ from vla_deploy.process_main import main
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.node import RecorderNode
 
-_NICE = 10
-
 
 def build(context: NodeContext) -> RecorderNode:
-    """Build the node; it gives way to everybody else."""
-    os.nice(_NICE)
+    """Build the node from what the process was started with."""
     return RecorderNode(context, FlightFolder(folder_of(context.run_dir.parent)), time.time_ns)
 
 

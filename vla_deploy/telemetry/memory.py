@@ -55,6 +55,11 @@ class Memory:
         """Return all values and all ticks, by time."""
         return self._history.snapshot(), self._ticks.held(now_ns - _KEPT_NS)
 
+    @property
+    def held_bytes(self) -> int:
+        """Return how many bytes are remembered; ticks are not among them."""
+        return self._history.size_bytes
+
     def _new_values(self) -> Iterator[Value]:
         for name, cell in self._cells.items():
             sample = cell.latest()

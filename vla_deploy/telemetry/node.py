@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import RingWriter, SharedSpace
+from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.memory import Memory
@@ -58,6 +58,8 @@ class RecorderNode:
         self._writing: _Writing | None = None
         self._memory: Memory
         self._events: RingWriter
+        self._status: CellWriter
+        self._status_due_ns = 0
         self._started_ns = 0
         self._parent_pid = os.getppid()
 
@@ -66,6 +68,7 @@ class RecorderNode:
         self._started_ns = self._clock.now_ns()
         self._memory = Memory(self._space)
         self._events = self._space.ring_writer("flight_event")
+        self._status = self._space.cell_writer("recorder_status")
 
     def step(self) -> None:
         """Remember what is new, look for a reason to write, and write a bit."""
@@ -75,6 +78,7 @@ class RecorderNode:
             self._begin(now_ns)
         else:
             self._go_on(self._writing)
+        self._tell_status(now_ns)
 
     def stop(self) -> None:
         """Write what waits to be written, and close the topics.
@@ -157,6 +161,14 @@ class RecorderNode:
         reason = f"{self._folder.path}: {error.strerror or error}"
         _log.error("no flight saved of %s: %s; make room on that disk", causes[0].what, reason)
         self._tell("failed", causes, reason=reason)
+
+    def _tell_status(self, now_ns: int) -> None:
+        if now_ns < self._status_due_ns:
+            return
+        self._status_due_ns = now_ns + NS_PER_S // 2
+        self._status.put_document(
+            {"writing": self._writing is not None, "held_bytes": self._memory.held_bytes}
+        )
 
     def _tell(self, event: str, causes: list[Trigger], **details: str) -> None:
         whats = [cause.what for cause in causes[:_SHOWN_CAUSES]]

@@ -174,7 +174,14 @@ def test_one_that_does_not_run_is_stopped_at_once(state):
 
 
 def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_it():
-    assert [row.name for row in TABLE] == ["twin", "control", "perception", "planner", "executor"]
+    assert [row.name for row in TABLE] == [
+        "twin",
+        "control",
+        "perception",
+        "planner",
+        "executor",
+        "recorder",
+    ]
     assert [row.name for row in TABLE if row.when is twin_only] == ["twin"]
     assert all(row.ready_files or row.ready_topic for row in TABLE)
 

@@ -1,0 +1,56 @@
+"""Give the tests a robot in the twin with a flight recorder on board, in lock-step."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sim_twin.stack import LockstepControl
+from vla_deploy.telemetry.flight import Flight, read_flight
+from vla_deploy.telemetry.folder import FlightFolder
+from vla_deploy.telemetry.node import RecorderNode
+
+WALL_NS = 1_800_000_000_000_000_000
+
+
+class Rig(LockstepControl):
+    """Add the recorder, and what the supervisor and the executor would write."""
+
+    def __init__(self, tmp_path: Path) -> None:
+        super().__init__(tmp_path)
+        self.folder = FlightFolder(tmp_path / "flights")
+        self.events = self.space.ring_reader("flight_event", from_start=True)
+        self.requests = self.space.ring_writer("flight_request")
+        self.base_command = self.space.cell_writer("base_command")
+        self.process_table = self.space.cell_writer("process_table")
+        self.recorder = self.new_recorder()
+
+    def new_recorder(self) -> RecorderNode:
+        step = self.lockstep
+        recorder = RecorderNode(step.context, self.folder, lambda: WALL_NS + step.clock.now_ns())
+        step.add(recorder)
+        return recorder
+
+    def run(self, seconds: float) -> None:
+        self.lockstep.run_for(seconds)
+
+    def drive(self, seconds: float) -> None:
+        for _ in range(round(seconds / 0.02)):
+            self.base_command.put(v_m_s=0.2, w_rad_s=0.1)
+            self.run(0.02)
+
+    def flights(self) -> list[Flight]:
+        return [read_flight(path) for path in self.folder.flights()]
+
+    def wait_for_flight(self) -> Flight:
+        before = len(self.folder.flights())
+        assert self.lockstep.run_until(lambda: len(self.folder.flights()) > before, 60.0)
+        return self.flights()[-1]
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Rig]:
+    rig = Rig(tmp_path)
+    rig.arm()
+    yield rig
+    rig.close()

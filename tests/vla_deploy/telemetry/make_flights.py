@@ -1,0 +1,95 @@
+"""Record the example flights anew, after the rules or their inputs were changed on purpose.
+
+.venv/bin/python tests/vla_deploy/telemetry/make_flights.py
+
+Each is a short life of control in the twin, in lock-step: same code, same bytes.
+"""
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from sim_twin.stack import LockstepControl
+from vla_deploy.telemetry.folder import FlightFolder
+from vla_deploy.telemetry.node import RecorderNode
+from vla_deploy.telemetry.triggers import Debounce
+
+FLIGHTS = Path(__file__).parent / "flights"
+_WALL_NS = 1_800_000_000_000_000_000
+
+
+def drive(stack: LockstepControl, seconds: float) -> None:
+    """Drive a curve."""
+    command = stack.space.cell_writer("base_command")
+    for _ in range(round(seconds / 0.02)):
+        command.put(v_m_s=0.3, w_rad_s=0.2)
+        stack.lockstep.run_for(0.02)
+
+
+def reach(stack: LockstepControl, seconds: float, **targets: float) -> None:
+    """Move joints."""
+    goal = {"kind": "goal", "motion_id": 1, "targets": targets, "speed_ratio": 1.0}
+    stack.space.ring_writer("motion_command").publish(goal)
+    stack.lockstep.run_for(seconds)
+
+
+def estop_while_driving(stack: LockstepControl) -> None:
+    """Press stop at full speed, reset, arm."""
+    drive(stack, 0.5)
+    stack.operate("estop")
+    drive(stack, 0.5)
+    stack.operate("reset")
+    stack.lockstep.run_for(0.1)
+
+
+def servo_bus_unplugged(stack: LockstepControl) -> None:
+    """Pull the servos' plug while an arm reaches."""
+    reach(stack, 0.3, left_elbow=1.6, head_pan=0.5)
+    stack.faults.inject("servo_bus", None, "unplug")
+    stack.lockstep.run_for(0.3)
+
+
+def wheel_blocked(stack: LockstepControl) -> None:
+    """Block a wheel while the base drives."""
+    drive(stack, 0.3)
+    stack.faults.inject("drive", "left_wheel", "stuck")
+    drive(stack, 0.8)
+
+
+SCENES: Mapping[str, Callable[[LockstepControl], None]] = {
+    "estop_while_driving": estop_while_driving,
+    "servo_bus_unplugged": servo_bus_unplugged,
+    "wheel_blocked": wheel_blocked,
+}
+
+
+def record(name: str, to: Path) -> None:
+    """Record one scene from control's first tick on."""
+    with tempfile.TemporaryDirectory() as directory:
+        # A run's directory carries its name.
+        run_dir = Path(directory) / name
+        run_dir.mkdir()
+        stack, folder = LockstepControl(run_dir), FlightFolder(Path(directory) / "flights")
+        clock = stack.lockstep.clock
+        # Only the request at the end saves: one file for all that happens.
+        debounce = Debounce(gap_s=3600.0, longest_s=3600.0)
+        recorder = RecorderNode(
+            stack.lockstep.context, folder, lambda: _WALL_NS + clock.now_ns(), debounce
+        )
+        stack.lockstep.add(recorder)
+        stack.arm()
+        SCENES[name](stack)
+        stack.space.ring_writer("flight_request").publish({"source": "example", "reason": name})
+        if not stack.lockstep.run_until(lambda: bool(folder.flights()), 30.0):
+            sys.exit(f"{name}: no flight was written")
+        shutil.copyfile(folder.find("latest"), to)
+        stack.close()
+
+
+if __name__ == "__main__":
+    FLIGHTS.mkdir(exist_ok=True)
+    for scene in sys.argv[1:] or SCENES:
+        record(scene, FLIGHTS / f"{scene}.mcap")
+        print(FLIGHTS / f"{scene}.mcap")
