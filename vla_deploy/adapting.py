@@ -15,8 +15,29 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import Adaptable, NeedsRestart, Node
 
 MIN_RATE_RATIO: Final = 0.8
+_PACE_WEIGHT: Final = 0.01
 _UNSLOWED: Final = "control"
 _log = logging.getLogger(__name__)
+
+
+class Pace:
+    """Measure which share of its steps a node makes: one that was slow before may stay so."""
+
+    def __init__(self) -> None:
+        self._periods_by_step = 1.0
+        self._last_ns: int | None = None
+
+    @property
+    def ratio(self) -> float:
+        """Return the share of its steps that the node has made of late."""
+        return min(1.0, 1.0 / self._periods_by_step)
+
+    def note(self, now_ns: int, period_s: float) -> None:
+        """Count a step."""
+        if self._last_ns is not None:
+            periods = (now_ns - self._last_ns) / (period_s * NS_PER_S)
+            self._periods_by_step += _PACE_WEIGHT * (periods - self._periods_by_step)
+        self._last_ns = now_ns
 
 
 class Host(Protocol):
@@ -41,6 +62,7 @@ class _Change:
     way_back: "tuple[Profile, Any] | None" = None
     steps: int = 0
     committed_ns: int = 0
+    wanted_hz: float = 0.0
 
 
 class AdaptingNode:
@@ -68,6 +90,7 @@ class AdaptingNode:
         self._host = host
         self._aside = aside
         self._rate_ratio = 1.0
+        self._pace = Pace()
         self._tier = 0
         self._tier_future: Future[tuple[Profile, Any]] | None = None
         self._directives_sequence = -1
@@ -105,6 +128,7 @@ class AdaptingNode:
         self._tell_prepared()
         if self._name != _UNSLOWED:
             self._heed_directives()
+        self._pace.note(self._clock.now_ns(), self.period_s)
         self._node.step()
         if self._change is not None:
             self._change.steps += 1
@@ -156,6 +180,7 @@ class AdaptingNode:
             self._answer(message["change_id"], "commit", "it has prepared nothing")
             return
         before = self._profile
+        kept_ratio = self._pace.ratio
         change.way_back = before, self._switch(change.future.result())
         refused = [
             text
@@ -163,6 +188,7 @@ class AdaptingNode:
             if text not in self._host.obstacles(before)
         ]
         change.steps, change.committed_ns = 0, self._clock.now_ns()
+        change.wanted_hz = MIN_RATE_RATIO * kept_ratio / self.period_s
         self._answer(change.change_id, "commit", "; ".join(refused))
 
     def _on_validate(self, message: Mapping[str, Any]) -> None:
@@ -171,9 +197,9 @@ class AdaptingNode:
             self._answer(message["change_id"], "validate", "it has committed nothing")
             return
         elapsed_s = (self._clock.now_ns() - change.committed_ns) / NS_PER_S
-        rate_hz, wanted_hz = change.steps / max(elapsed_s, self.period_s), 1.0 / self.period_s
-        slow = rate_hz < MIN_RATE_RATIO * wanted_hz
-        reason = f"steps at {rate_hz:.1f} Hz, expected {wanted_hz:.1f} Hz" if slow else ""
+        rate_hz = change.steps / max(elapsed_s, self.period_s)
+        slow = rate_hz < change.wanted_hz
+        reason = f"steps at {rate_hz:.1f} Hz, expected {change.wanted_hz:.1f} Hz" if slow else ""
         self._answer(change.change_id, "validate", reason)
 
     def _on_keep(self, message: Mapping[str, Any]) -> None:

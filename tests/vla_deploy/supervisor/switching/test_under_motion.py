@@ -1,12 +1,22 @@
 import gc
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import pytest
 
 from vla_deploy.control.axes import Floats
+
+SLOWEST_S = 0.008
+
+
+def private_bytes() -> int:
+    """Return this process' own memory; rings that are shared fill up once, as they should."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("RssAnon:"):
+            return int(line.split()[1]) * 1024
+    raise AssertionError("this kernel tells no RssAnon")
 
 
 class MotionWatch:
@@ -25,7 +35,7 @@ class MotionWatch:
 
     def remember_memory(self) -> None:
         gc.collect()
-        self._memory = (psutil.Process().memory_info().rss, len(gc.get_objects()))
+        self._memory = (private_bytes(), len(gc.get_objects()))
 
     def grown(self) -> tuple[int, int]:
         """Return by how many bytes, and by how many objects, the process has grown since."""
@@ -56,7 +66,7 @@ class MotionWatch:
                 self.worst_speed, float((np.abs(velocity) / robot.velocity_max).max())
             )
             if self._velocity is not None:
-                jump = np.abs(velocity - self._velocity) / robot.velocity_max
+                jump = np.abs(velocity - self._velocity) / (SLOWEST_S * robot.acceleration_max)
                 self.worst_jump = max(self.worst_jump, float(jump.max()))
             self._velocity = velocity
         self._setpoint, self._before_ns = setpoint, now_ns
@@ -85,7 +95,7 @@ def judge(watch: MotionWatch) -> None:
     assert watch.periods_ns == {4_000_000, 8_000_000}
     assert watch.moved_rad > 0.5
     assert watch.worst_speed <= 1.0
-    print(watch.worst_jump, watch.worst_speed, watch.moved_rad, watch.grown())
+    assert watch.worst_jump <= 1.01
 
 
 def test_switches_under_motion_cost_no_tick_and_no_jump(rig, profiles):
@@ -97,3 +107,7 @@ def test_switches_under_motion_cost_no_tick_and_no_jump(rig, profiles):
 def test_a_hundred_switches_under_motion_cost_no_tick_no_jump_and_no_memory(rig, profiles):
     watch = switch_under_motion(rig, profiles, 100)
     judge(watch)
+    grown_bytes, grown_objects = watch.grown()
+    print(f"the last 50 switches took {grown_bytes} bytes and {grown_objects} objects")
+    assert grown_bytes < 1 << 20
+    assert grown_objects < 200
