@@ -33,8 +33,9 @@ from vla_deploy.install.commands import (
 from vla_deploy.install.disk import apply_changes, read_files
 from vla_deploy.install.manifest import afterwards, during, read_manifest, write_manifest
 from vla_deploy.robots import load_robot
+from vla_deploy.supervisor.profile_choice import detect
 
-INSTALL_EXAMPLES = """  vla-deploy install --robot butler --profile jetson_orin_nx --dry-run
+INSTALL_EXAMPLES = """  vla-deploy install --robot butler --dry-run
   sudo vla-deploy install --robot butler --profile jetson_orin_nx
   vla-deploy install --root /tmp/image        into a folder that stands for the computer
 """
@@ -51,7 +52,11 @@ def register(commands: Any) -> None:
     )
     add_layout_arguments(install)
     install.add_argument("--robot", default="butler", help="name or folder (default: butler)")
-    install.add_argument("--profile", default="desktop", help="platform profile")
+    install.add_argument(
+        "--profile",
+        default="",
+        help="fix the platform profile (default: the chosen or detected one, at each start)",
+    )
     install.add_argument("--twin", action="store_true", help="run the twin, not the hardware")
     install.add_argument(
         "--credential",
@@ -108,15 +113,16 @@ def run_install(arguments: argparse.Namespace) -> int:
         twin=arguments.twin,
         credentials=tuple(arguments.credential),
     )
-    files = system_files(load_robot(choice.robot), load_profile(choice.profile), choice, layout)
+    profile = load_profile(choice.profile or detect(layout.root)[0])
+    files = system_files(load_robot(choice.robot), profile, choice, layout)
     known = read_manifest(layout)
     changes = install_changes(files, known, read_files(layout, paths_of(files, known)))
     commands = after_install(files) if layout.is_this_computer else ()
     _report(arguments, changes, commands)
     if not arguments.dry_run:
-        write_manifest(layout, during(known, changes))
+        write_manifest(layout, during(known, changes), choice)
         apply_changes(layout, changes)
-        write_manifest(layout, afterwards(known, changes))
+        write_manifest(layout, afterwards(known, changes), choice)
         _run(commands)
     return 0
 

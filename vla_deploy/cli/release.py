@@ -16,10 +16,13 @@ from drivers.clock import MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.install import add_layout_arguments, layout_of
+from vla_deploy.install.layout import SERVICE_RUNTIME, Layout
+from vla_deploy.install.manifest import installed_choice
 from vla_deploy.install.release_build import Source, add_release, version_of
 from vla_deploy.install.release_store import ReleaseStore
 from vla_deploy.install.service_control import SystemdService
 from vla_deploy.install.switch import End, Switch, SwitchPlan, SwitchReport, recover
+from vla_deploy.supervisor.profile_choice import start_profile
 
 EXAMPLES = """  vla-deploy release list
   sudo vla-deploy release add vla_deploy-0.2.0-py3-none-any.whl --wheelhouse wheels
@@ -45,8 +48,8 @@ def register(commands: Any) -> None:
     release.add_argument(
         "--share-packages", type=Path, metavar="DIR", help="use that folder's packages, not its own"
     )
-    release.add_argument("--robot", default="butler", help="robot to check a release with")
-    release.add_argument("--profile", default="desktop", help="profile to check it with")
+    release.add_argument("--robot", help="to check a release with (default: the installed one)")
+    release.add_argument("--profile", help="to check it with (default: the one that would run)")
     release.add_argument("--healthy", type=float, default=20.0, metavar="S", help="time on trial")
     release.add_argument("--keep", type=int, default=3, metavar="N", help="releases to keep")
     release.set_defaults(run=run)
@@ -119,10 +122,12 @@ def _remove(arguments: argparse.Namespace, store: ReleaseStore) -> int:
 
 
 def _switch_to(release_id: str, arguments: argparse.Namespace, store: ReleaseStore) -> int:
+    choice = installed_choice(Layout(root=arguments.root.absolute(), prefix=arguments.prefix))
+    profile = arguments.profile or choice.profile or start_profile(SERVICE_RUNTIME)[0]
     plan = SwitchPlan(
         to=release_id,
-        robot=arguments.robot,
-        profile=arguments.profile,
+        robot=arguments.robot or choice.robot,
+        profile=profile,
         healthy_s=arguments.healthy,
         keep=arguments.keep,
     )

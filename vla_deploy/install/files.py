@@ -35,10 +35,13 @@ class Credential:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServiceChoice:
-    """Choose what the service runs; robot and profile as `vla-deploy run` takes them."""
+    """Choose what the service runs; robot and profile as `vla-deploy run` takes them.
+
+    Without a profile each start takes the one chosen by `vla-deploy profile use`, or the detected.
+    """
 
     robot: str = "butler"
-    profile: str = "desktop"
+    profile: str = ""
     twin: bool = False
     watchdog_s: int = 5
     credentials: tuple[Credential, ...] = ()
@@ -102,8 +105,7 @@ def _values(
         "ROBOT": robot.name,
         "ROBOT_ARGUMENT": _argument(choice.robot),
         "PROFILE": profile.name,
-        "PROFILE_ARGUMENT": _argument(choice.profile),
-        "RUN_OPTIONS": " --twin" if choice.twin else "",
+        "RUN_OPTIONS": _run_options(choice),
         "PREFIX": _argument(str(layout.prefix)),
         "USER": _argument(layout.user),
         "IP": layout.ip,
@@ -119,6 +121,11 @@ def _values(
         ),
         "LINKS": "" if choice.twin else "\n".join(_links(robot)),
     }
+
+
+def _run_options(choice: ServiceChoice) -> str:
+    profile = f" --profile {_argument(choice.profile)}" if choice.profile else ""
+    return profile + (" --twin" if choice.twin else "")
 
 
 def _argument(text: str) -> str:

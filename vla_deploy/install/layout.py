@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SERVICE = "vla-deploy.service"
+SERVICE_RUNTIME = Path("/run/vla-deploy")
 STATE_FOLDERS = (
     Path("/var/lib/vla-deploy"),
     Path("/var/log/vla-deploy"),

@@ -3,10 +3,12 @@
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from vla_deploy.install.changes import Change, Kind, Known, digest
 from vla_deploy.install.disk import write_file
 from vla_deploy.install.errors import InstallError
+from vla_deploy.install.files import ServiceChoice
 from vla_deploy.install.layout import Layout
 
 _OURS = (Kind.SAME, Kind.WRITE, Kind.UPDATE, Kind.BESIDE)
@@ -18,27 +20,57 @@ def read_manifest(layout: Layout) -> dict[Path, frozenset[str]]:
     Raises:
         InstallError: the manifest is damaged.
     """
-    file = layout.on_disk(layout.manifest)
-    if not file.is_file():
-        return {}
-    try:
-        listed = json.loads(file.read_text())["files"]
-        return {Path(path): frozenset(digests) for path, digests in listed.items()}
-    except (json.JSONDecodeError, KeyError, AttributeError, TypeError) as error:
-        raise InstallError(
-            f"manifest {file} is damaged ({error}); move it away and install again: files that "
-            "are there already will be kept, with the new version beside them"
-        ) from error
+    listed = _document(layout).get("files", {})
+    return {Path(path): frozenset(digests) for path, digests in listed.items()}
 
 
-def write_manifest(layout: Layout, known: Mapping[Path, Iterable[str]]) -> None:
+def installed_choice(layout: Layout) -> ServiceChoice:
+    """Return what the installed service runs; what it would run when nothing is installed.
+
+    Raises:
+        InstallError: the manifest is damaged.
+    """
+    service = _document(layout).get("service", {})
+    return ServiceChoice(robot=service.get("robot", "butler"), profile=service.get("profile", ""))
+
+
+def write_manifest(
+    layout: Layout,
+    known: Mapping[Path, Iterable[str]],
+    choice: ServiceChoice | None = None,
+) -> None:
     """Write the manifest, or remove it when nothing is left to remember."""
     file = layout.on_disk(layout.manifest)
     if not known:
         file.unlink(missing_ok=True)
         return
     listed = {str(path): sorted(digests) for path, digests in known.items()}
-    write_file(file, json.dumps({"files": listed}, indent=1) + "\n", 0o644)
+    service = {"robot": choice.robot, "profile": choice.profile} if choice else {}
+    text = json.dumps({"files": listed, "service": service}, indent=1)
+    write_file(file, f"{text}\n", 0o644)
+
+
+def _document(layout: Layout) -> dict[str, Any]:
+    file = layout.on_disk(layout.manifest)
+    if not file.is_file():
+        return {}
+    try:
+        document = json.loads(file.read_text())
+    except json.JSONDecodeError as error:
+        raise _damaged(file, str(error)) from error
+    tables = ("files", "service")
+    if not isinstance(document, dict) or not all(
+        isinstance(document.get(name), dict) for name in tables
+    ):
+        raise _damaged(file, f"expected the tables {' and '.join(tables)}")
+    return document
+
+
+def _damaged(file: Path, what: str) -> InstallError:
+    return InstallError(
+        f"manifest {file} is damaged ({what}); move it away and install again: files that "
+        "are there already will be kept, with the new version beside them"
+    )
 
 
 def during(known: Known, changes: Iterable[Change]) -> dict[Path, frozenset[str]]:
