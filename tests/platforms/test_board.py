@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from platforms.board import BY_CHIP, MODULES, identify
+from platforms.profile import profile_names
 
 TREES = sorted((Path(__file__).parent / "trees").glob("*.toml"))
 BoardTree = Callable[[str], Path]
@@ -38,6 +39,13 @@ def test_nothing_at_all_is_a_desktop_of_unknown_size_with_reasons(tmp_path: Path
 def test_every_known_part_number_has_its_profile(tmp_path: Path, part: str) -> None:
     write(tmp_path, "/proc/device-tree/compatible", f"vendor,board\0nvidia,{part}\0nvidia,tegra\0")
     assert identify(tmp_path).profile_name == MODULES[part].profile
+
+
+def test_every_profile_that_a_board_may_get_is_there() -> None:
+    named = {module.profile for module in MODULES.values()}
+    named |= {module.super_profile for module in MODULES.values() if module.super_profile}
+    named |= {profile for _, _, profile in BY_CHIP}
+    assert named <= set(profile_names())
 
 
 def test_the_super_modes_are_known_by_the_power_modes_alone(board_tree: BoardTree) -> None:
