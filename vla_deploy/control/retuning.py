@@ -34,7 +34,7 @@ def retuned(robot: RobotDescription, before: Profile, after: Profile) -> Tuning:
 
     Raises:
         ProfileError: the servo bus is too slow for the rate.
-        NeedsRestart: a servo or drive would have to be set up anew, which is done at standstill.
+        NeedsRestart: something would have to be set up anew, which is done at standstill.
     """
     _refuse_busy_bus(robot, after)
     reasons = "; ".join(_set_up_anew(robot, before, after))
@@ -60,6 +60,8 @@ def _set_up_anew(robot: RobotDescription, before: Profile, after: Profile) -> It
         old, new = getattr(before, key), getattr(after, key)
         if old != new:
             yield f"{key}: {old:g} s -> {new:g} s is set up in the {device} at standstill only"
+    if before.memory_lock != after.memory_lock:
+        yield "memory_lock: to lock what is in use takes longer than a tick"
     in_step = any(drive.mode == _RAMPED_BY_CYCLE for drive in robot.can_bus.drives)
     if in_step and before.control_rate_hz != after.control_rate_hz:
         yield f"control_rate_hz: drives in {_RAMPED_BY_CYCLE} are set up for the period"
