@@ -3,11 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 STAMP := $(VENV)/.installed
 
-.PHONY: help demo test campaign lock clean
+.PHONY: help demo test campaign mutation lock clean
 help:
 	@echo "make demo      install what is needed, then pick up the red cup on the twin"
 	@echo "make test      install what is needed, then format, lint, types, import rules and all tests"
 	@echo "make campaign  the long tests: ten seeds of pick and place, every fault, a million streams into every parser"
+	@echo "make mutation  change vla_deploy/safety in every small way: each change must fail a test; minutes, nightly"
 	@echo "make lock      pin every dependency afresh"
 
 $(STAMP): pyproject.toml requirements-dev.lock scripts/install
@@ -25,6 +26,9 @@ test: $(STAMP)
 campaign: $(STAMP)
 	scripts/system-packages
 	$(VENV)/bin/python -m pytest -m slow --timeout 3600
+
+mutation: $(STAMP)
+	$(VENV)/bin/python scripts/mutation
 
 lock: $(STAMP)
 	scripts/lock
