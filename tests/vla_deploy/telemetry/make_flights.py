@@ -11,6 +11,8 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import numpy as np
+
 from sim_twin.stack import LockstepControl
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode
@@ -21,10 +23,11 @@ _WALL_NS = 1_800_000_000_000_000_000
 
 
 def drive(stack: LockstepControl, seconds: float) -> None:
-    """Drive a curve."""
-    command = stack.space.cell_writer("base_command")
+    """Drive a curve, with a scan of an empty hall."""
+    command, scan = (stack.space.cell_writer(name) for name in ("base_command", "scan"))
     for _ in range(round(seconds / 0.02)):
         command.put(v_m_s=0.3, w_rad_s=0.2)
+        scan.put(range_m=np.full(360, 8.0, dtype=np.float32))
         stack.lockstep.run_for(0.02)
 
 
