@@ -10,7 +10,7 @@ from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.follow import follow_command
 from vla_deploy.ipc import CellReader, Sample, SharedSpace
-from vla_deploy.safety.stop_button import ESTOP, StopButton
+from vla_deploy.ipc.stop_button import ESTOP, StopButton
 from vla_deploy.supervisor import default_base, running
 
 POLL_NS = NS_PER_S // 50

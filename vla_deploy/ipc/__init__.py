@@ -16,6 +16,7 @@ from vla_deploy.ipc.frame_ring import Frame, FrameReader, FrameWriter
 from vla_deploy.ipc.record_ring import Record, RecordReader, RecordWriter
 from vla_deploy.ipc.ring import Event, RingReader, RingWriter
 from vla_deploy.ipc.space import SharedSpace
+from vla_deploy.ipc.stop_button import StopButton
 from vla_deploy.ipc.topics import BY_NAME, TOPICS, Field, Kind, Topic
 
 __all__ = [
@@ -45,6 +46,7 @@ __all__ = [
     "SchemaMismatch",
     "SharedSpace",
     "SpaceUnavailable",
+    "StopButton",
     "Topic",
     "UnknownTopic",
 ]

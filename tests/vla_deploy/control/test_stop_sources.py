@@ -4,7 +4,7 @@ import subprocess
 import sys
 from typing import Any as Rig  # the class in conftest.py, which no test can import
 
-from vla_deploy.safety.stop_button import StopButton
+from vla_deploy.ipc.stop_button import StopButton
 
 SOURCES = ("voice", "dashboard", "cli", "button", "ros")
 FORBIDDEN = (

@@ -7,7 +7,7 @@ model, no executor and no network, and nothing here imports any.
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc.space import SharedSpace
 
 ESTOP: Final = "estop"
 REPEAT_NS: Final = NS_PER_S // 10

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.safety.stop_button import StopButton
+from vla_deploy.ipc.stop_button import StopButton
 
 FORBIDDEN = (
     *("vla_deploy.planning", "vla_deploy.skills", "vla_deploy.perception", "vla_deploy.navigation"),
@@ -111,7 +111,7 @@ def test_it_measures_time_by_itself_where_nobody_gives_it_a_clock(space: SharedS
 
 def test_the_button_imports_nothing_of_planner_models_or_network() -> None:
     probe = (
-        "import sys, vla_deploy.safety.stop_button\n"
+        "import sys, vla_deploy.ipc.stop_button\n"
         f"bad = [name for name in {FORBIDDEN!r} if name in sys.modules]\n"
         "assert not bad, bad\n"
     )
