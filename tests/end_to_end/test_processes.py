@@ -16,7 +16,7 @@ from sim_twin.process_stack import ProcessStack
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
-VLA_DEPLOY = [sys.executable, "-m", "vla_deploy.cli.main"]
+VLA_DEPLOY = [sys.executable, "-m", "vla_deploy.cli"]
 STANDSTILL_RAD_S = 0.02
 MOVING_RAD_S = 1.0
 DRIVE = "go to the kitchen"
@@ -107,7 +107,7 @@ def test_bad_requests_are_one_line_each_and_lose_nothing(run: Run, tmp_path: Pat
     for words, complaint in complaints.items():
         assert complaint in one_line(run.ask(*words))
     assert run.state() == "armed"
-    assert [row["restarts"] for row in run.status()["process_table"]["processes"]] == [0] * 5
+    assert {row["restarts"] for row in run.status()["process_table"]["processes"]} == {0}
 
 
 def test_kill_9_of_control_stops_the_robot_and_leaves_it_disarmed(run: Run) -> None:
@@ -169,18 +169,51 @@ def test_kill_9_of_the_twin_stops_control_until_another_twin_is_armed(run: Run) 
 
 
 @pytest.mark.slow
-def test_a_frozen_twin_is_told_by_its_silent_buses_and_control_does_not_hang(run: Run) -> None:
+def test_a_frozen_twin_stops_control_and_is_started_again_by_its_silence(run: Run) -> None:
     saying = run.drive()
     run.freeze("twin")
     assert stops_with(run, "servo_bus_lost")
     assert "every servo" in run.status()["control"]["detail"]
     saying.communicate(timeout=30)
     assert saying.returncode == 1
-    assert not run.wait_until(lambda: run.row("control")["state"] != "ready", 8.0)
-    run.thaw("twin")
+    assert run.wait_until(lambda: run.row("twin")["restarts"] == 1, 30.0)
+    assert run.wait_until(lambda: run.row("twin")["state"] == "ready", 60.0)
+    assert "twin_status silent for 10" in run.ask("crashes", "show").stdout
     assert run.state() == "stopped"
     assert drives_again(run)
     assert run.row("control")["restarts"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["control", "perception", "planner", "executor"])
+def test_a_frozen_process_rests_the_robot_and_is_started_again(run: Run, name: str) -> None:
+    saying = run.drive()
+    run.freeze(name)
+    if name in ("control", "executor"):
+        assert run.wait_until(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
+    assert run.wait_until(lambda: run.row(name)["restarts"] == 1, 30.0)
+    assert run.wait_until(lambda: run.row(name)["state"] == "ready", 60.0)
+    assert f"{name} (pid" in run.ask("crashes", "show").stdout
+    run.ask("stop")
+    saying.communicate(timeout=60)
+    if name == "control":
+        assert run.wait_until(lambda: run.ask("arm").returncode == 0, 20.0)
+    assert run.wait_until(lambda: run.ask("say", "turn left 20 degrees").returncode == 0, 40.0)
+
+
+@pytest.mark.slow
+def test_a_frozen_supervisor_stops_the_robot_and_goes_on_when_it_is_continued(run: Run) -> None:
+    saying = run.drive()
+    pids = {name: run.row(name)["pid"] for name in ("twin", "control", "executor")}
+    run.process.send_signal(signal.SIGSTOP)
+    assert run.wait_until(lambda: run.fastest_rad_s() < STANDSTILL_RAD_S, 10.0)
+    assert stops_with(run, "supervisor_lost")
+    saying.communicate(timeout=60)
+    assert saying.returncode == 1
+    run.process.send_signal(signal.SIGCONT)
+    assert drives_again(run)
+    assert {name: run.row(name)["pid"] for name in pids} == pids
+    assert "was held up for" in run.ask("logs", "supervisor", "--level", "warning").stdout
 
 
 def test_kill_9_of_the_supervisor_ends_everything_and_a_new_run_starts(
