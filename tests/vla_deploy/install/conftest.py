@@ -42,13 +42,17 @@ class Computer:
 
     pid: int
     image: Path
-    log: Path
+
+    def logs(self) -> str:
+        """Return the end of what systemd and the service have said."""
+        logs = [self.image / "journal", self.image / "opt/service.log"]
+        return "".join(log.read_text()[-4000:] for log in logs if log.is_file())
 
     def run(self, *command: str, check: bool = True) -> str:
         """Run a command in the computer; return what it printed."""
         enter = ["nsenter", "-t", str(self.pid), "-m", "-p", "-C"]
         done = subprocess.run([*enter, *command], capture_output=True, text=True, timeout=60)
-        assert not check or done.returncode == 0, done.stderr + self.log.read_text()[-4000:]
+        assert not check or done.returncode == 0, done.stderr + self.logs()
         return done.stdout
 
     def show(self, unit: str, name: str) -> str:
@@ -59,7 +63,7 @@ class Computer:
         """Wait until something holds; fail with the journal when it never does."""
         end_s = time.monotonic() + limit_s
         while not holds():
-            assert time.monotonic() < end_s, self.log.read_text()[-6000:]
+            assert time.monotonic() < end_s, self.logs()
             time.sleep(0.05)
 
 
@@ -153,7 +157,7 @@ def boot(image: Path) -> Iterator[Callable[[], Computer]]:
             process = subprocess.Popen(command, stdout=log, stderr=log)
         started.append(process)
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        return Computer(pid=_first(children), image=image, log=image / "journal")
+        return Computer(pid=_first(children), image=image)
 
     yield start
     for process in started:

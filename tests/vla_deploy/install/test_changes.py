@@ -157,7 +157,7 @@ def test_a_damaged_manifest_is_an_error_that_loses_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run(capsys, "install", "--root", str(tmp_path))
-    (tmp_path / "opt/vla-deploy/manifest.json").write_text('{"files": ')
+    (tmp_path / "opt/vla-deploy/manifest.json").write_text('{"files": ', encoding="utf-8")
     before = tree(tmp_path)
     assert main(["uninstall", "--root", str(tmp_path)]) == 2
     assert "is damaged" in capsys.readouterr().err

@@ -95,7 +95,7 @@ def test_the_twin_needs_neither_link_nor_devices() -> None:
     files = texts(ServiceChoice(twin=True))
     assert "vla-deploy-can.service" not in files
     assert "SYMLINK" not in files["70-vla-deploy.rules"]
-    assert "--profile desktop --twin\n" in files["vla-deploy.service"]
+    assert "run --robot butler --twin\n" in files["vla-deploy.service"]
 
 
 def test_every_usb_device_gets_a_name_that_stays() -> None:

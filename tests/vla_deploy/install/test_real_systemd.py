@@ -1,5 +1,6 @@
 """The unit does under a real systemd what it says."""
 
+import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ from vla_deploy.install.release_store import ReleaseStore
 
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(150)]
 TRIAL = "/opt/vla-deploy/trial"
+QUICK = "etc/systemd/system/vla-deploy.service.d/quick.conf"
 UNIT = "vla-deploy.service"
 # Comes to rest half a second after it was told to stop, as control does, and says so.
 CHILD = """
@@ -60,9 +62,11 @@ def computer(image: Path, boot: Callable[[], Any], add_environment: Callable[[Pa
         ["systemd-sysusers", f"--root={image}", "vla-deploy.conf"], check=True, capture_output=True
     )
     # A drop-in as a person would write it, so that the test need not wait for long.
-    extra = image / "etc/systemd/system/vla-deploy.service.d/quick.conf"
+    extra = image / QUICK
     extra.parent.mkdir()
     extra.write_text("[Service]\nWatchdogSec=1\nTimeoutAbortSec=1\nRestartSec=0.2\n")
+    output = "[Service]\nStandardOutput=append:/opt/service.log\n"  # no journal is running
+    (image / QUICK).with_name("output.conf").write_text(output)
     computer = boot()
     up = ("running", "degraded", "starting")
     state = ("systemctl", "is-system-running")
@@ -109,10 +113,33 @@ def test_a_release_on_trial_that_dies_is_taken_back_at_its_next_start(computer: 
     assert "had to be started again" in store.last_rollback()
 
 
+def test_the_twin_comes_up_in_the_sandbox_and_stops_in_order(
+    computer: Any, add_environment: Callable[[Path], None]
+) -> None:
+    robot = computer.image / "opt/vla-deploy/releases/robot"
+    add_environment(robot)
+    (robot / "bin/vla-deploy").write_text(LAUNCHER)
+    (robot / "bin/vla-deploy").chmod(0o755)
+    ReleaseStore(computer.image / "opt/vla-deploy").use("robot")
+    (computer.image / QUICK).unlink()
+    computer.run("systemctl", "daemon-reload")
+    computer.run("systemctl", "restart", UNIT)
+    assert computer.show(UNIT, "ActiveState") == "active"
+    words = ("--runtime-base", "/run/vla-deploy", "status", "--json")
+    vla_deploy = ("setpriv", "--reuid=vla-deploy", "--clear-groups", "/usr/local/bin/vla-deploy")
+    status = json.loads(computer.run(*vla_deploy, *words))
+    states = {row["name"]: row["state"] for row in status["process_table"]["processes"]}
+    assert {states[name] for name in ("control", "perception", "twin")} == {"ready"}
+    computer.run("systemctl", "stop", UNIT)
+    assert computer.show(UNIT, "Result") == "success"
+    assert computer.show(UNIT, "NRestarts") == "0"
+    assert computer.run("find", "/run/vla-deploy", "/dev/shm", "-user", "vla-deploy") == ""
+
+
 def test_a_service_that_keeps_failing_is_given_up(computer: Any) -> None:
     def is_given_up() -> bool:
         computer.run("systemctl", "kill", "--signal=KILL", UNIT, check=False)
-        return computer.show(UNIT, "ActiveState") == "failed"
+        return str(computer.show(UNIT, "ActiveState")) == "failed"
 
     computer.await_that(is_given_up)
     assert computer.show(UNIT, "Result") in ("start-limit-hit", "signal")

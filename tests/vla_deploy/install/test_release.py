@@ -65,7 +65,7 @@ def test_a_wheel_becomes_a_release_that_is_switched_to_and_back(
     status = json.loads(release("status"))
     assert (status["current"], status["previous"]) == (added, "old")
     program = prefix / "current/bin/vla-deploy"
-    words = [program, "install", "--root", tmp_path / "image", "--json"]
+    words = [str(program), "install", "--root", str(tmp_path / "image"), "--json"]
     done = subprocess.run(words, capture_output=True, text=True, check=True, cwd="/")
     assert "vla-deploy.service" in done.stdout  # its templates came with it
     assert json.loads(release("rollback"))["current"] == "old"
