@@ -73,7 +73,7 @@ class ProcessSpec:
     when: Predicate = always
     ready_topic: str | None = None
     ready_files: tuple[str, ...] = ()
-    ready_timeout_s: float = 20.0
+    ready_timeout_s: float = 40.0
     watched: tuple[Watched, ...] = ()
     stop_timeout_s: float = 3.0
     restart: RestartPolicy = RestartPolicy()
