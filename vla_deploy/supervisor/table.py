@@ -116,7 +116,6 @@ TABLE: tuple[ProcessSpec, ...] = (
         when=all_of(budgeted("perception"), not_suspended("perception")),
         ready_topic="scan",
         ready_files=("ready/perception",),
-        ready_timeout_s=40.0,
         watched=(Watched(topic="scene", silence_limit_s=10.0),),
     ),
     ProcessSpec(
