@@ -18,7 +18,7 @@ from vla_deploy.control.setpoint_rates import SetpointRates
 from vla_deploy.ipc import BY_NAME, SharedSpace
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
-from vla_deploy.robots.protection import ZoneSource
+from vla_deploy.robots.protection import Zone, ZoneSource
 from vla_deploy.safety.balance import tip_margin_ratio
 from vla_deploy.safety.clearance import (
     JointBounds,
@@ -30,7 +30,15 @@ from vla_deploy.safety.clearance import (
 )
 from vla_deploy.safety.keep_out import judge_keep_out, seen_from
 from vla_deploy.safety.surroundings import NOTHING_KNOWN, Surroundings, ZoneFinding
-from vla_deploy.safety.zones import IDLE, Footprint, Motion, Points, Trigger, judge_zone
+from vla_deploy.safety.zones import (
+    IDLE,
+    Footprint,
+    Motion,
+    Points,
+    Trigger,
+    braking_m,
+    judge_zone,
+)
 
 # From one look ahead to the next one's first braking setpoint.
 ARM_REACTION_S = 0.024
@@ -79,6 +87,7 @@ class SurroundingsWatch:
             source: Nearby(source, space, robot, model, self._body) for source in ZoneSource
         }
         self._triggers: dict[str, Trigger] = {}
+        self._reach_m = max((self._reach_of(zone) for zone in robot.protection.zones), default=0.0)
         self._pose = space.cell_reader("pose")
         self._imu = space.cell_reader("imu")
         self._acceleration: Floats | None = None
@@ -181,7 +190,7 @@ class SurroundingsWatch:
 
     def _look_at_zones(self, body: _Body) -> None:
         points: dict[ZoneSource, Points] = {
-            source: nearby.points(body.now_ns, body.position, body.motion)
+            source: _within(nearby.points(body.now_ns, body.position, body.motion), self._reach_m)
             for source, nearby in self._nearby.items()
         }
         self._known = replace(
@@ -190,6 +199,16 @@ class SurroundingsWatch:
             scan_age_s=self._nearby[ZoneSource.LIDAR].age_s,
             depth_age_s=self._nearby[ZoneSource.DEPTH].age_s,
         )
+
+    def _reach_of(self, zone: Zone) -> float:
+        """Return how far from the base's centre a point can matter to a zone."""
+        base, footprint = self._robot.base, self._robot.base.footprint_radius_m
+        top = Motion(
+            v_m_s=base.max_speed_m_s, w_rad_s=0.0, deceleration_m_s2=base.max_acceleration_m_s2
+        )
+        corner_m = max((float(np.hypot(x, y)) for x, y in zone.polygon_m), default=footprint)
+        driven_m = base.max_speed_m_s * zone.time_before_collision_s
+        return corner_m + max(driven_m, braking_m(top, zone.reaction_s or 0.0))
 
     def _zone_findings(self, points: dict[ZoneSource, Points], motion: Motion) -> list[ZoneFinding]:
         found = []
@@ -234,3 +253,8 @@ class SurroundingsWatch:
             tip_over.max_lean_rad,
         )
         self._known = replace(self._known, tip_margin_ratio=ratio)
+
+
+def _within(points: Points, reach_m: float) -> Points:
+    near: Points = points[(points**2).sum(axis=1) <= reach_m**2]
+    return near

@@ -32,19 +32,18 @@ def judge_keep_out(
     `areas` are polygons in the base frame. None while the footprint stays outside all of them.
     """
     way_m = float(np.copysign(braking_m(motion, reaction_s), motion.v_m_s))
-    found = [
-        KeepOut(
-            name=name,
-            depth_m=max(_depth(area, footprint), _depth(moved(area, way_m, 0.0), footprint)),
-            blocked=_directions_into(area, footprint),
-        )
+    depths = {
+        name: max(_depth(area, footprint), _depth(moved(area, way_m, 0.0), footprint))
         for name, area in areas.items()
-    ]
-    return max((one for one in found if one.depth_m > 0.0), key=_depth_of, default=None)
-
-
-def _depth_of(found: KeepOut) -> float:
-    return found.depth_m
+    }
+    deepest = max(depths, key=lambda name: depths[name], default=None)
+    if deepest is None or depths[deepest] <= 0.0:
+        return None
+    return KeepOut(
+        name=deepest,
+        depth_m=depths[deepest],
+        blocked=_directions_into(areas[deepest], footprint),
+    )
 
 
 def _depth(area: Points, footprint: Footprint) -> float:

@@ -44,6 +44,9 @@ class Footprint:
 
     def distance(self, points: Points) -> Points:
         """Return each point's distance from the footprint, negative inside."""
+        if len(self.corners_m) == 1:
+            aside = points - self.corners_m[0]
+            return np.hypot(aside[:, 0], aside[:, 1]) - self.radius_m
         return signed_distance(points, np.array(self.corners_m)) - self.radius_m
 
 
