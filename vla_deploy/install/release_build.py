@@ -65,7 +65,8 @@ def add_release(store: ReleaseStore, release_id: str, source: Source) -> Path:
     run_command([sys.executable, "-m", "venv", "--without-pip", *flags, str(venv)])
     python = venv / "bin" / "python"
     if source.packages_of is not None:
-        write_file(_site_packages(venv) / "shared.pth", f"{source.packages_of}\n", 0o644)
+        share = f"import site; site.addsitedir({str(source.packages_of)!r})\n"  # with its own .pth
+        write_file(_site_packages(venv) / "shared.pth", share, 0o644)
     run_command(_pip_install(python, source))
     write_file(folder / "bin" / "vla-deploy", LAUNCHER, 0o755)
     return store.accept(release_id)

@@ -51,7 +51,7 @@ class Computer:
     def run(self, *command: str, check: bool = True) -> str:
         """Run a command in the computer; return what it printed."""
         enter = ["nsenter", "-t", str(self.pid), "-m", "-p", "-C"]
-        done = subprocess.run([*enter, *command], capture_output=True, text=True, timeout=60)
+        done = subprocess.run([*enter, *command], capture_output=True, text=True, timeout=120)
         assert not check or done.returncode == 0, done.stderr + self.logs()
         return done.stdout
 
@@ -125,7 +125,9 @@ def _add_environment(release: Path) -> None:
     """Give a release an interpreter that the service can reach, with our packages and source."""
     packages = release / "venv/lib" / INTERPRETER.name / "site-packages"
     packages.mkdir(parents=True)
-    (packages / "test.pth").write_text("/opt/source\n/opt/packages\n")
+    (packages / "test.pth").write_text(
+        "/opt/source\nimport site; site.addsitedir('/opt/packages')\n"
+    )
     (release / "venv/pyvenv.cfg").write_text(f"home = {INTERPRETER.parent}\n")
     (release / "venv/bin").mkdir()
     (release / "venv/bin/python").symlink_to(INTERPRETER)
