@@ -1,10 +1,9 @@
 """Take the running robot to another profile: prepare, commit, watch, keep - or go back."""
 
 import itertools
-import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from typing import Any, Final
+from typing import Final
 
 import psutil
 
@@ -17,13 +16,12 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor import profile_change
 from vla_deploy.supervisor.profile_change import Change, Member, Outcome, Phase, Request
 from vla_deploy.supervisor.profile_choice import ProfileChoice
+from vla_deploy.supervisor.profile_members import CONTROL, Allegiance
+from vla_deploy.supervisor.profile_report import ProfileReport
 from vla_deploy.supervisor.profile_trial import Trial
 
-_STATUS_NS: Final = NS_PER_S // 2
 _MB: Final = 1_000_000
-_CONTROL: Final = "control"
 _DISARMED: Final = "disarmed"
-_log = logging.getLogger(__name__)
 
 
 class ProfileSwitch:
@@ -56,14 +54,11 @@ class ProfileSwitch:
         self._requests = space.ring_reader("profile_request", from_start=False)
         self._changes = space.ring_writer("profile_change")
         self._answers = space.ring_reader("profile_answer", from_start=False)
-        self._status = space.cell_writer("profile_status")
+        self._report = ProfileReport(space, clock)
         self._trial = Trial(space, clock)
         self._ids = itertools.count(1)
         self._change: Change | None = None
-        self._adopted: dict[str, int] = {}
-        self._doubtful: dict[str, int] = {}
-        self._outcome: dict[str, Any] = {}
-        self._status_due_ns = 0
+        self._allegiance = Allegiance()
         self._phases: Mapping[Phase, Callable[[Change, Mapping[str, Member]], None]] = {
             Phase.PREPARE: self._preparing,
             Phase.SET_POWER: self._setting_power,
@@ -83,13 +78,15 @@ class ProfileSwitch:
         answers = [event.payload for event in self._answers.drain()]
         change = self._change
         if change is None:
-            self._tell()
-            return self._strangers(members)
+            self._report.tell(self._kept, self._change)
+            return self._allegiance.strangers(
+                members, self.profile, may_restart_control=self._trial.control_state == _DISARMED
+            )
         for answer in answers:
             change.note(answer)
         self._look_for_dead(change, members)
         self._phases[change.phase](change, members)
-        self._tell()
+        self._report.tell(self._kept, self._change)
         return self._to_restart(change, members)
 
     def close(self) -> None:
@@ -108,7 +105,7 @@ class ProfileSwitch:
             self._power.check(target.power_mode)
             _refuse_small_computer(target)
         except ProfileError as error:
-            self._conclude(request, Outcome.REFUSED, "; ".join(error.faults), 0.0)
+            self._report.conclude(request, Outcome.REFUSED, "; ".join(error.faults), 0.0)
             return
         now_ns = self._clock.now_ns()
         self._trial.begin()
@@ -160,7 +157,7 @@ class ProfileSwitch:
                 continue
             if not change.request.allow_restart:
                 refusals[name] = f"needs a restart: {reason}; permit it with --allow-restart"
-            elif name == _CONTROL and self._trial.control_state != _DISARMED:
+            elif name == CONTROL and self._trial.control_state != _DISARMED:
                 refusals[name] = f"needs a restart: {reason}; disarm first"
             else:
                 change.restarts.add(name)
@@ -229,8 +226,7 @@ class ProfileSwitch:
             return
         self._publish(change, "keep")
         self._kept, self._kept_profile = self.profile, self.in_force
-        self._adopted = {name: member.pid for name, member in members.items()}
-        self._doubtful = {}
+        self._allegiance.adopt(members)
         self._end(change, Outcome.KEPT, "")
 
     def _rolling_back(self, change: Change, _: Mapping[str, Member]) -> None:
@@ -241,7 +237,7 @@ class ProfileSwitch:
         reason = change.failure
         if change.silent:
             reason += f"; {', '.join(change.silent)} did not go back and is started again"
-            self._doubtful = {name: change.pids[name] for name in change.silent}
+            self._allegiance.doubt({name: change.pids[name] for name in change.silent})
         if self._power_set is not None and self._power_set.done() and self._power_set.result():
             reason += f"; {self._power_set.result()}"
         self._power_set = None
@@ -295,20 +291,6 @@ class ProfileSwitch:
             if name in members and members[name].pid == change.pids[name]
         )
 
-    def _strangers(self, members: Mapping[str, Member]) -> tuple[str, ...]:
-        """Name who runs under another profile than the one in force, once nothing changes."""
-        return tuple(
-            name
-            for name, member in members.items()
-            if self._is_stranger(name, member)
-            and (name != _CONTROL or self._trial.control_state == _DISARMED)
-        )
-
-    def _is_stranger(self, name: str, member: Member) -> bool:
-        if self._doubtful.get(name) == member.pid:
-            return True
-        return member.started_under != self.profile and self._adopted.get(name) != member.pid
-
     # --- tell ---------------------------------------------------------------------------------
 
     def _publish(self, change: Change, phase: str) -> None:
@@ -319,42 +301,14 @@ class ProfileSwitch:
     def _end(self, change: Change, outcome: Outcome, reason: str) -> None:
         self._change = None
         took_s = (self._clock.now_ns() - change.began_ns) / NS_PER_S
-        self._conclude(change.request, outcome, reason, took_s)
-
-    def _conclude(self, request: Request, outcome: Outcome, reason: str, took_s: float) -> None:
-        level = logging.INFO if outcome in (Outcome.KEPT, Outcome.WOULD_WORK) else logging.WARNING
-        _log.log(level, "profile %s: %s%s", request.profile, outcome, reason and f" ({reason})")
-        self._outcome = {
-            "request_id": request.request_id,
-            "profile": request.profile,
-            "outcome": outcome.value,
-            "reason": reason[:2000],
-            "took_s": round(took_s, 3),
-        }
-        self._status_due_ns = 0
-
-    def _tell(self) -> None:
-        now_ns, change = self._clock.now_ns(), self._change
-        if now_ns < self._status_due_ns:
-            return
-        self._status_due_ns = now_ns + _STATUS_NS
-        self._status.put_document(
-            {
-                "profile": self._kept,
-                "phase": change.phase.value if change else "",
-                "target": change.request.profile if change else "",
-                "last": self._outcome,
-            }
-        )
+        self._report.conclude(change.request, outcome, reason, took_s)
 
 
 def _refuse_small_computer(profile: Profile) -> None:
     has_mb, wants_mb = psutil.virtual_memory().total / _MB, profile.total.memory_mb
     if wants_mb > has_mb:
-        text = (
-            f"budgets.total.memory_mb: expected at most the {has_mb:.0f} MB that this computer has"
-        )
-        raise ProfileError((f"{text}, got {wants_mb:g}",))
+        text = f"expected at most the {has_mb:.0f} MB that this computer has, got {wants_mb:g}"
+        raise ProfileError((f"budgets.total.memory_mb: {text}",))
 
 
 def _ns(duration_s: float) -> int:

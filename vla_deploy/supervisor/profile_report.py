@@ -1,0 +1,50 @@
+"""Tell which profile is in force, how far a change is, and how the last one ended."""
+
+import logging
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor.profile_change import Change, Outcome, Request
+
+_PERIOD_NS: Final = NS_PER_S // 2
+_MOST_CHARACTERS: Final = 2000
+_log = logging.getLogger(__name__)
+
+
+class ProfileReport:
+    """Write the `profile_status` cell, and the log's line about each request."""
+
+    def __init__(self, space: SharedSpace, clock: Clock) -> None:
+        self._cell = space.cell_writer("profile_status")
+        self._clock = clock
+        self._last: dict[str, Any] = {}
+        self._due_ns = 0
+
+    def conclude(self, request: Request, outcome: Outcome, reason: str, took_s: float) -> None:
+        """Say how a request ended."""
+        level = logging.INFO if outcome in (Outcome.KEPT, Outcome.WOULD_WORK) else logging.WARNING
+        _log.log(level, "profile %s: %s%s", request.profile, outcome, reason and f" ({reason})")
+        self._last = {
+            "request_id": request.request_id,
+            "profile": request.profile,
+            "outcome": outcome.value,
+            "reason": reason[:_MOST_CHARACTERS],
+            "took_s": round(took_s, 3),
+        }
+        self._due_ns = 0
+
+    def tell(self, profile: str, change: Change | None) -> None:
+        """Publish at a steady pace, and at once after an end."""
+        now_ns = self._clock.now_ns()
+        if now_ns < self._due_ns:
+            return
+        self._due_ns = now_ns + _PERIOD_NS
+        self._cell.put_document(
+            {
+                "profile": profile,
+                "phase": change.phase.value if change else "",
+                "target": change.request.profile if change else "",
+                "last": self._last,
+            }
+        )
