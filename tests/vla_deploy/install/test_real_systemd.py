@@ -136,7 +136,8 @@ def test_the_twin_comes_up_in_the_sandbox_and_stops_in_order(
     assert {states[name] for name in ("control", "perception", "twin")} == {"ready"}
     computer.run("systemctl", "stop", UNIT)
     assert computer.show(UNIT, "Result") == "success"
-    assert computer.run("find", "/run/vla-deploy", "/dev/shm", "-user", "vla-deploy") == ""
+    assert "vla-deploy" not in computer.run("ls", "/run")
+    assert computer.run("find", "/dev/shm", "-user", "vla-deploy") == ""
 
 
 def test_a_service_that_keeps_failing_is_given_up(computer: Any) -> None:
