@@ -61,7 +61,7 @@ def keep_out(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 def workspace(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a group that is outside the workspace and still on its way out."""
     excess = inputs.surroundings.workspace
-    if excess is None or not inputs.energised:
+    if excess is None or not _moves_by_itself(inputs):
         return None
     if excess.excess_m <= limits.workspace_excess_m or excess.rate_m_s <= limits.approach_m_s:
         return None
@@ -72,14 +72,14 @@ def workspace(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 def self_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find two parts of the robot that are too close and come closer."""
-    pair = inputs.surroundings.self_clearance if inputs.energised else None
+    pair = inputs.surroundings.self_clearance if _moves_by_itself(inputs) else None
     return _too_close(pair, limits.self_clearance_m, 0.0, limits)
 
 
 def environment_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a part of the robot that is too close to something around it and comes closer."""
     around = inputs.surroundings
-    pair = around.environment_clearance if inputs.energised else None
+    pair = around.environment_clearance if _moves_by_itself(inputs) else None
     return _too_close(pair, limits.environment_clearance_m, around.depth_age_s or 0.0, limits)
 
 
@@ -99,6 +99,11 @@ def collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     push = np.abs(torque)
     pushed = (push > limits.external_torque_nm) & inputs.torque_enabled
     return first_joint(pushed, push, limits.external_torque_nm, inputs.sample_age_s, limits)
+
+
+def _moves_by_itself(inputs: SafetyInputs) -> bool:
+    """Tell whether every joint is under power: a limp arm that sinks is not stopped by a ramp."""
+    return inputs.energised and bool(inputs.torque_enabled.all())
 
 
 def _too_close(

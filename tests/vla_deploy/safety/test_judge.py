@@ -571,6 +571,8 @@ def test_nothing_known_of_the_surroundings_forbids_nothing_but_driving_blind() -
 )
 def test_a_disarmed_arm_may_be_moved_by_hand_wherever_it_goes(cause: Cause) -> None:
     assert ticks(SafetyState(), 5, **SPOILERS[cause], energised=False)[1] is CLEAR
+    limp = {"torque_enabled": np.array([True, False])}
+    assert ticks(SafetyState(), 5, **SPOILERS[cause], **limp)[1] is CLEAR
 
 
 def test_a_loose_joint_may_move_during_standstill() -> None:
