@@ -60,6 +60,7 @@ class Nearby:
             read = self._read_scan if self._source is ZoneSource.LIDAR else self._read_depth
             self._points = read(sample.data, position)
         if self.age_s > self._deadline_s:
+            self.fresh = True  # knowing nothing is news too: it releases what old points hold
             return _NO_POINTS
         return moved(self._points, motion.v_m_s * self.age_s, motion.w_rad_s * self.age_s)
 

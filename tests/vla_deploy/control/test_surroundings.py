@@ -1,0 +1,128 @@
+"""What control knows of its surroundings in the twin: contact, clearance, keep-out, balance."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vla_deploy.control.setpoint_rates import SetpointRates
+from vla_deploy.control.surroundings import SurroundingsWatch
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.robots.model import full_positions
+
+pytestmark = pytest.mark.timeout(180)
+
+SWING = {"left_shoulder_pitch": 1.5, "left_elbow": 0.6}
+BLOCKING_NM = 50.0
+# Servos without an integral part run over the setpoint that they stop at.
+OVERSHOOT_M = 0.002
+
+
+def test_an_arm_that_swings_freely_feels_no_contact(armed: Any) -> None:
+    armed.go(1, **SWING)
+    armed.run(3.0)
+    assert armed.state == "armed", armed.status["detail"]
+    assert armed.joint("left_shoulder_pitch") == pytest.approx(1.5, abs=0.05)
+
+
+def test_an_arm_that_is_blocked_on_its_way_stops_before_its_following_error(armed: Any) -> None:
+    armed.go(1, **SWING)
+    assert armed.lockstep.run_until(lambda: armed.joint("left_shoulder_pitch") > 0.7, 3.0)
+    model = armed.lockstep.twin.engine.model
+    model.dof_frictionloss[model.joint("left_shoulder_pitch").dofadr[0]] = BLOCKING_NM
+    armed.run(1.0)
+    assert armed.state == "stopped"
+    assert armed.status["cause"] == "collision"
+    assert armed.joint("left_shoulder_pitch") < 1.4
+
+
+def test_an_arm_on_its_way_into_the_body_is_stopped_where_they_touch_at_most(armed: Any) -> None:
+    shapes = armed.control._surroundings._body
+    least_m, causes = np.inf, set()
+    inward = {"left_shoulder_yaw": -1.17, "left_shoulder_pitch": 1.2, "left_elbow": 1.5}
+    armed.go(1, **inward)
+    for _ in range(100):
+        armed.run(0.02)
+        causes.add(armed.status["cause"])
+        least_m = min(least_m, float(shapes.distances(armed.column("position"))[0].min()))
+    assert "self_collision" in causes
+    assert least_m > -OVERSHOOT_M
+
+
+def test_setpoint_rates_are_differences_and_begin_at_zero() -> None:
+    rates = SetpointRates()
+    velocity, acceleration = rates.rates(0, np.array([1.0]))
+    assert (velocity[0], acceleration[0]) == (0.0, 0.0)
+    velocity, acceleration = rates.rates(20_000_000, np.array([1.01]))
+    assert (velocity[0], acceleration[0]) == (pytest.approx(0.5), pytest.approx(25.0))
+    velocity, _ = rates.rates(900_000_000, np.array([2.0]))
+    assert velocity[0] == 0.0
+
+
+@pytest.fixture
+def watch(rig: Any) -> Any:
+    clock = rig.lockstep.clock
+    made = SurroundingsWatch(SharedSpace(rig.lockstep.context.run_dir / "ipc", clock), rig.robot)
+    yield made
+    made.close()
+
+
+def refreshed(watch: SurroundingsWatch, rig: Any, position: np.ndarray, ticks: int = 45) -> Any:
+    still = np.zeros_like(position)
+    now_ns = rig.lockstep.clock.now_ns()
+    for tick in range(ticks):
+        known = watch.refresh(now_ns + tick * 4_000_000, position, still, still, position, 0.0, 0.0)
+    return known
+
+
+def test_each_part_gets_its_turn_and_tells_what_it_knows(watch: Any, rig: Any) -> None:
+    space = SharedSpace(rig.lockstep.context.run_dir / "ipc", rig.lockstep.clock)
+    zone = rig.robot.home.zones[0].polygon_m
+    x_m, y_m = np.mean(zone, axis=0)
+    space.cell_writer("pose").put(x_m=x_m, y_m=y_m, yaw_rad=0.0, match_ratio=1.0)
+    ahead = np.zeros(360, dtype=np.float32)
+    ahead[:3] = 0.245
+    space.cell_writer("scan").put(range_m=ahead)
+    level = (0.0, 0.0, 9.81)
+    space.cell_writer("imu").put(yaw_rad=0.0, pitch_rad=0.0, roll_rad=0.0, acceleration_m_s2=level)
+    tuck = full_positions(rig.robot, list(rig.robot.poses["tuck"].items()))
+    known = refreshed(watch, rig, tuck)
+    assert known.keep_out is not None
+    assert known.keep_out.name == rig.robot.home.zones[0].name
+    assert [zone.name for zone in known.zones] == ["contact"]
+    assert known.tip_margin_ratio is not None
+    assert known.tip_margin_ratio > 0.7
+    assert known.self_clearance is not None
+    assert known.environment_clearance is not None
+    assert known.external_torque_nm is not None
+    assert known.workspace is None
+    assert known.scan_age_s is not None
+    assert known.depth_age_s is None
+
+
+def test_stale_topics_are_no_knowledge(watch: Any, rig: Any) -> None:
+    space = SharedSpace(rig.lockstep.context.run_dir / "ipc", rig.lockstep.clock)
+    space.cell_writer("imu").put(
+        yaw_rad=0.0, pitch_rad=0.0, roll_rad=0.0, acceleration_m_s2=(0.0, 0.0, 9.81)
+    )
+    tuck = full_positions(rig.robot, list(rig.robot.poses["tuck"].items()))
+    assert refreshed(watch, rig, tuck).tip_margin_ratio is not None
+    rig.lockstep.run_for(1.0)
+    assert refreshed(watch, rig, tuck).tip_margin_ratio is None
+
+
+def test_a_beam_on_the_own_arm_is_no_obstacle(rig: Any) -> None:
+    space = SharedSpace(rig.lockstep.context.run_dir / "ipc", rig.lockstep.clock)
+    robot = replace(rig.robot)
+    watch = SurroundingsWatch(space, robot)
+    hanging = full_positions(robot, [("left_shoulder_yaw", 0.0), ("left_shoulder_pitch", 0.0)])
+    centres, _ = watch._body.balls(hanging)
+    low = centres[np.abs(centres[:, 2] - 0.19).argmin()]
+    bearing = round(np.degrees(np.arctan2(low[1], low[0]))) % 360
+    scan = np.zeros(360, dtype=np.float32)
+    scan[bearing - 1 : bearing + 2] = float(np.hypot(low[0], low[1]))
+    space.cell_writer("scan").put(range_m=scan)
+    assert refreshed(watch, rig, hanging).zones == ()
+    assert abs(low[2] - 0.19) < 0.05
+    watch.close()
