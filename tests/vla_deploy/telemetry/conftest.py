@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sim_twin.stack import LockstepControl
@@ -23,6 +24,9 @@ class Rig(LockstepControl):
         self.requests = self.space.ring_writer("flight_request")
         self.base_command = self.space.cell_writer("base_command")
         self.process_table = self.space.cell_writer("process_table")
+        self._scan = self.space.cell_writer("scan")
+        self.arm()
+        self.run(1.0)  # what the first movement calls for is over before the recorder looks
         self.recorder = self.new_recorder()
 
     def new_recorder(self) -> RecorderNode:
@@ -37,6 +41,7 @@ class Rig(LockstepControl):
     def drive(self, seconds: float) -> None:
         for _ in range(round(seconds / 0.02)):
             self.base_command.put(v_m_s=0.2, w_rad_s=0.1)
+            self._scan.put(range_m=np.full(360, 8.0, dtype=np.float32))
             self.run(0.02)
 
     def flights(self) -> list[Flight]:
@@ -51,6 +56,5 @@ class Rig(LockstepControl):
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[Rig]:
     rig = Rig(tmp_path)
-    rig.arm()
     yield rig
     rig.close()
