@@ -26,7 +26,7 @@ CELL_M = 0.04
 MIN_PIXELS = 2
 SEEN_WITHIN_M = 2.5
 KEPT_WITHIN_M = 1.5
-KEPT_NS = 20 * NS_PER_S
+KEPT_NS = 8 * NS_PER_S
 GONE_M = 0.15
 MIN_DEPTH_M = 0.2
 # A thing in a hand reaches this far from the grip.
