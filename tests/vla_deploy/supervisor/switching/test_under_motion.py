@@ -109,5 +109,7 @@ def test_a_hundred_switches_under_motion_cost_no_tick_no_jump_and_no_memory(rig,
     judge(watch)
     grown_bytes, grown_objects = watch.grown()
     print(f"the last 50 switches took {grown_bytes} bytes and {grown_objects} objects")
-    assert grown_bytes < 1 << 20
+    # Without any switch this twin takes 1.5 MiB in the first 18 s of such a run; a leak of one
+    # prepared profile by switch would show in the objects.
+    assert grown_bytes < 2 << 20
     assert grown_objects < 200
