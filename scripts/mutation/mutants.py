@@ -56,7 +56,14 @@ class Mutant:
     function: str
     first_line: int
     last_line: int
-    tree: ast.Module
+    original: ast.Module
+    node: ast.AST
+    changed: ast.AST
+
+    @property
+    def tree(self) -> ast.Module:
+        """Return the whole file with the change."""
+        return _replaced(self.original, self.node, self.changed)
 
 
 def mutants_of(path: Path, module: str) -> list[Mutant]:
@@ -79,7 +86,9 @@ def mutants_of(path: Path, module: str) -> list[Mutant]:
                     function=site.function,
                     first_line=site.statement.lineno,
                     last_line=site.statement.end_lineno or site.statement.lineno,
-                    tree=_replaced(tree, site.node, changed),
+                    original=tree,
+                    node=site.node,
+                    changed=changed,
                 )
             )
     return found
@@ -111,8 +120,8 @@ def _walk(node: ast.AST, statement: ast.stmt, function: str, scope: str) -> Iter
             for default in (*node.args.defaults, *node.args.kw_defaults):
                 if default is not None:
                     yield from _walk(default, statement, function, inner)
-        for child in _without_docstring(node.body):
-            yield from _walk(child, child, function or (inner if is_function else ""), inner)
+        for inside in _without_docstring(node.body):
+            yield from _walk(inside, inside, function or (inner if is_function else ""), inner)
         return
     for child in _children(node):
         yield from _walk(child, statement, function, scope)
