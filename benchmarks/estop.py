@@ -153,6 +153,7 @@ def _standstill_s(phase: Phase) -> float:
     """Return how long everything takes to rest after a request in a phase of the work."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         stack = LockstepControl(Path(folder))
+        stack.add_lidar()
         try:
             stage = Stage(stack)
             stage.begin(phase)

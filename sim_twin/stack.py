@@ -6,6 +6,7 @@ from typing import Any
 
 from platforms import load_profile
 from sim_twin.faults import FaultInjector
+from sim_twin.lidar_node import LidarNode
 from sim_twin.lockstep import Lockstep
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
@@ -47,6 +48,11 @@ class LockstepControl:
     def faults(self) -> FaultInjector:
         """Return the way to make the twin's devices fail."""
         return self.lockstep.faults
+
+    def add_lidar(self) -> None:
+        """Let control see by its lidar: without it the base does not drive."""
+        context, devices = self.lockstep.context, self.lockstep.devices
+        self.lockstep.add(LidarNode(context, self.robot, devices))
 
     def restart_control(self) -> None:
         """Start control anew, as the supervisor does after it died."""

@@ -103,8 +103,10 @@ def _is_possible(cell: Cell, robot: RobotDescription) -> bool:
 def play(cell: Cell, seed: int = 0) -> Case:
     """Play one case on a robot of its own and judge it."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        kind = LockstepStack if cell.component in _SENSORS else LockstepControl
-        stack = kind(Path(folder), seed)
+        takes_all = cell.component in _SENSORS
+        stack = (LockstepStack if takes_all else LockstepControl)(Path(folder), seed)
+        if not takes_all:
+            stack.add_lidar()
         try:
             return _Trial(cell, stack).run()
         finally:

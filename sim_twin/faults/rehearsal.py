@@ -12,7 +12,6 @@ from sim_twin.faults.scenario import Meanwhile, Scenario
 from sim_twin.faults.verdict import failures
 from sim_twin.faults.witness import Witness
 from sim_twin.stack import LockstepControl, LockstepStack
-from vla_deploy.ipc.topics import SCAN_BEAMS
 
 _SAMPLE_S: Final = 0.004
 _COMMAND_EVERY: Final = 5
@@ -24,7 +23,6 @@ _STILL_RAD: Final = 0.02
 _TRAVEL_S: Final = 20.0
 _TRAVEL_M: Final = 0.8
 _TURN_RAD: Final = 2.5
-_FAR_M = 8.0
 _DRIVE_M_S: Final = 0.3
 _REACH: Final = {"left_elbow": 1.9, "left_shoulder_pitch": 0.7, "right_elbow": 1.9}
 _WHEELS: Final = ("left_wheel", "right_wheel")
@@ -57,7 +55,8 @@ class Rehearsal:
         takes_all = scenario.meanwhile.takes_all
         self._stack = (LockstepStack if takes_all else LockstepControl)(tmp_path, seed)
         self._base_command = self._stack.space.cell_writer("base_command")
-        self._scan = None if takes_all else self._stack.space.cell_writer("scan")
+        if not takes_all:
+            self._stack.add_lidar()
         self._start_s = 0.0
 
     def run(self) -> Outcome:
@@ -114,15 +113,9 @@ class Rehearsal:
         while self._stack.lockstep.now_s - self._start_s < until_s:
             if drives and count % _COMMAND_EVERY == 0:
                 self._base_command.put(v_m_s=_DRIVE_M_S, w_rad_s=0.0)
-                self._see_empty_floor()
             self._stack.lockstep.run_for(_SAMPLE_S)
             count += 1
             yield
-
-    def _see_empty_floor(self) -> None:
-        """Stand in for perception where only control runs, for it does not drive blind."""
-        if self._scan is not None:
-            self._scan.put(range_m=np.full(SCAN_BEAMS, _FAR_M))
 
     def _return(self, seen: Witness) -> list[str]:
         """See what happens once the fault has gone: nothing moves without an operator's act."""

@@ -60,6 +60,7 @@ def test_arms_that_sag_without_torque_are_unsafe_where_nothing_excuses_them(
 
 def test_carrying_holds_the_payload_and_moves(tmp_path: Path) -> None:
     stack = LockstepControl(tmp_path)
+    stack.add_lidar()
     stage = Stage(stack)
     stage.begin(Phase.CARRYING)
     assert stage.holds_payload
