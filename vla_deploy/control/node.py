@@ -32,6 +32,7 @@ from vla_deploy.control.watch import Watch
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import NodeContext
+from vla_deploy.power_off import power_off_asked
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import StopCategory
 from vla_deploy.robots.model import RobotModel
@@ -54,7 +55,8 @@ class ControlNode:
     """Own the servo and CAN buses, and be the only process that moves anything.
 
     Joint groups of stop category 2 keep their power through stops, resets and a restart of this
-    process: an arm that is let go falls. `disarm`, or an orderly `stop`, takes it away.
+    process, whatever ended it: an arm that is let go falls. `disarm` takes it away, and a `stop`
+    when the robot is switched off.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class ControlNode:
         """Prepare everything that needs no device."""
         clock = context.clock
         self._robot, self._profile = robot, profile
+        self._run_dir = context.run_dir
         self._tuning = tuning_of(profile)
         self._clock = clock
         self._servos = ServoLine(robot, profile, devices, clock)
@@ -138,7 +141,12 @@ class ControlNode:
         self._tell()
 
     def stop(self) -> None:
-        """Ramp to rest, take the power off every joint and the wheels, and close the buses."""
+        """Ramp to rest, release what may be released, and close the buses.
+
+        All power goes only when the robot is switched off. Whatever else ends this process, such as
+        a crash or the supervisor's death, leaves groups of stop category 2, and hands that hold
+        something, to their Bus Watchdog and to the next control.
+        """
         self._telemetry.tell_results(self._motions.stop("control is shut down"))
         deadline_ns = self._clock.now_ns() + _SHUTDOWN_NS
         while not self._at_rest() and self._clock.now_ns() < deadline_ns:
@@ -146,8 +154,10 @@ class ControlNode:
             self._move_joints(self.period_s)
             self._ramp_base(0.0, 0.0, self.period_s)
             self._clock.sleep_until(self._clock.now_ns() + round(self.period_s * NS_PER_S))
-        self._servos.remove_power(self._plan.every_joint)
-        self._wheels.disable()
+        if power_off_asked(self._run_dir):
+            self._remove_power()
+        else:
+            self._release()
         self._wheels.cycle(0.0, 0.0)
         self._wheels.close()
         self._servos.close()

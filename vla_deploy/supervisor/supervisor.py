@@ -9,6 +9,7 @@ from platforms import load_profile
 from platforms.profile_schema import NODES
 from vla_deploy.exit_codes import EXIT_CONFIGURATION
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.power_off import ask_power_off
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.consequences import Consequences
 from vla_deploy.supervisor.errors import ProcessGivenUp, StartCrashed, StartFailed, SupervisorError
@@ -34,8 +35,9 @@ _log = logging.getLogger(__name__)
 class Supervisor:
     """Start, watch, restart and stop the processes of one run.
 
-    Use it as a context manager: leaving it stops everything in order. All calls belong to the main
-    thread, because the kernel ends the children when the thread that started them ends.
+    Use it as a context manager: leaving it stops everything in order; by an exception, arms keep
+    holding. All calls belong to the main thread, because the kernel ends the children when the
+    thread that started them ends.
     """
 
     def __init__(
@@ -64,8 +66,8 @@ class Supervisor:
     def __enter__(self) -> "Supervisor":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.stop()
+    def __exit__(self, failure: type[BaseException] | None, *_: object) -> None:
+        self.stop(power_off=failure is None)
 
     @property
     def run_dir(self) -> Path:
@@ -105,7 +107,7 @@ class Supervisor:
         try:
             self._wait_until_ready()
         except BaseException:
-            self.stop()
+            self.stop(power_off=False)
             raise
         if self._options.arm and not self.stop_requested:
             _arm(self._run.space)
@@ -130,11 +132,16 @@ class Supervisor:
         """Let `start` and `run_until_stopped` return soon."""
         self.stop_requested = True
 
-    def stop(self) -> None:
-        """Stop every process, the last started first, and remove the run; twice is allowed."""
+    def stop(self, *, power_off: bool = True) -> None:
+        """Stop every process, the last started first, and remove the run; twice is allowed.
+
+        Without `power_off` control leaves arms as they hold: nobody has asked for letting them go.
+        """
         if self._run is None:
             return
         self._run.notifier.stopping()
+        if power_off:
+            _ask_power_off(self._run.runtime.run_dir)
         try:
             while any(record.state is not State.STOPPED for record in self._records.values()):
                 self._step(stopping=True)
@@ -278,6 +285,13 @@ def _arm(space: SharedSpace) -> None:
     space.ring_writer("operator").publish(
         {"act": "arm", "source": "supervisor", "reason": "asked for by --arm"}
     )
+
+
+def _ask_power_off(run_dir: Path) -> None:
+    try:
+        ask_power_off(run_dir)
+    except OSError as error:
+        _log.warning("%s: arms keep holding: %s", run_dir, error)
 
 
 def _log_changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> bool:

@@ -6,8 +6,10 @@ from typing import Any as Rig  # the class in conftest.py, which no test can imp
 import numpy as np
 import pytest
 
+from drivers.drive_bus import PowerState
 from drivers.errors import DeviceMissing
 from platforms import load_profile
+from vla_deploy.power_off import ask_power_off
 
 ELBOW, PITCH = "left_elbow", "left_shoulder_pitch"
 STANDSTILL_RAD_S = 0.02
@@ -326,13 +328,45 @@ def test_a_lost_servo_line_is_reopened_and_needs_reset_and_arm(armed: Rig) -> No
     assert armed.state == "armed", armed.status
 
 
-def test_an_orderly_stop_ramps_and_then_takes_all_power(armed: Rig) -> None:
+def true_elbow(rig: Rig) -> float:
+    return float(rig.lockstep.truth()["joints"][ELBOW]["position"])
+
+
+def torque_enabled(rig: Rig) -> dict[str, int]:
+    bank = rig.lockstep.twin.serial_devices["servos"]
+    return {
+        servo.joint: bank.register(servo.id, "torque_enable")
+        for servo in rig.robot.servo_bus.servos
+    }
+
+
+def test_a_robot_that_is_switched_off_ramps_and_then_takes_all_power(armed: Rig) -> None:
     start_a_long_motion(armed)
-    bank = armed.lockstep.twin.serial_devices["servos"]
+    ask_power_off(armed.lockstep.context.run_dir)
     armed.lockstep.remove(armed.control)
     assert [r["status"] for r in armed.results()] == ["stopped"]
-    ids = [servo.id for servo in armed.robot.servo_bus.servos]
-    assert [bank.register(servo_id, "torque_enable") for servo_id in ids] == [0] * len(ids)
+    assert set(torque_enabled(armed).values()) == {0}
+
+
+def test_a_control_that_is_ended_otherwise_holds_the_arms_for_the_next_one(armed: Rig) -> None:
+    start_a_long_motion(armed)
+    armed.drive(0.3, 0.0, 0.5)
+    armed.lockstep.remove(armed.control)
+    assert [r["status"] for r in armed.results()] == ["stopped"]
+    assert set(torque_enabled(armed).values()) == {1}
+    followed = PowerState.OPERATION_ENABLED
+    assert followed not in [drive.power_state for drive in armed.lockstep.twin.drives]
+    armed.run(1.0)  # longer than the servos' watchdog
+    stays_at_standstill(armed)
+    rest = true_elbow(armed)
+    armed.control = armed.new_control()
+    armed.lockstep.add(armed.control)
+    armed.run(0.5)
+    assert (armed.state, set(torque_enabled(armed).values())) == ("disarmed", {1})
+    assert true_elbow(armed) == pytest.approx(rest, abs=0.01)
+    armed.ask("arm")
+    assert armed.state == "armed", armed.status
+    assert true_elbow(armed) == pytest.approx(rest, abs=0.02)
 
 
 def test_a_control_that_finds_no_wheels_drops_no_arm_that_holds(

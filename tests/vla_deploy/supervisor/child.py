@@ -46,6 +46,8 @@ if behaviour == "crash-later":
 while True:
     signal.sigwait({signal.SIGTERM, signal.SIGINT})
     tell("asked to stop")
+    if behaviour == "witness":
+        tell("lets go" if (run_dir / "power_off").exists() else "holds")
     if behaviour != "stubborn":
         break
 tell("stopped")

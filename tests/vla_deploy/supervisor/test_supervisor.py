@@ -162,6 +162,38 @@ def test_sigterm_ends_the_run_in_order(stage, python):
     assert stage.leftovers() == []
 
 
+def test_who_ends_the_run_in_order_switches_the_robot_off(stage):
+    with stage.supervisor(stage.row("a", "witness")) as supervisor:
+        supervisor.start()
+        supervisor.request_stop()
+        supervisor.run_until_stopped()
+    assert stage.events()[-2:] == ["a lets go", "a stopped"]
+
+
+def test_a_run_that_fails_lets_no_arm_go(stage):
+    def fail() -> None:
+        with stage.supervisor(stage.row("a", "witness")) as supervisor:
+            supervisor.start()
+            raise RuntimeError("no space left")
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert stage.events()[-2:] == ["a holds", "a stopped"]
+
+
+def test_a_start_that_fails_lets_no_arm_go(stage):
+    with pytest.raises(StartFailed):
+        stage.supervisor(stage.row("a", "witness"), stage.row("b", "refuse")).start()
+    assert stage.events()[-2:] == ["a holds", "a stopped"]
+
+
+def test_a_run_whose_folder_is_gone_still_ends(stage, caplog):
+    with stage.supervisor(stage.row("a")) as supervisor:
+        supervisor.start()
+        supervisor.run_dir.rename(supervisor.run_dir.with_name("elsewhere"))
+    assert "arms keep holding" in caplog.text
+
+
 def test_kill_9_of_the_supervisor_ends_its_children_and_the_next_start_sweeps_the_rest(
     stage, python, eventually
 ):
