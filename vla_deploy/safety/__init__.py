@@ -1,6 +1,6 @@
 """Judge each control tick: pure functions from measurements to a verdict, no I/O."""
 
-from vla_deploy.safety.causes import RULES, Cause, Latch, Reaction, ResetBy, Rule
+from vla_deploy.safety.causes import RULES, Cause, Latch, Reaction, Rule
 from vla_deploy.safety.inputs import DriveSample, SafetyInputs, SafetyLimits
 from vla_deploy.safety.judge import CLEAR, ResetOutcome, SafetyState, Verdict, evaluate
 from vla_deploy.safety.surroundings import (
@@ -26,7 +26,6 @@ __all__ = [
     "KeepOut",
     "Latch",
     "Reaction",
-    "ResetBy",
     "ResetOutcome",
     "Rule",
     "SafetyInputs",

@@ -5,7 +5,7 @@ silence where it matters, and `servo_watchdog_tripped` brings the answer back.
 """
 
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import Enum, IntEnum, auto
 
 from vla_deploy.robots.protection import ZoneKind
 from vla_deploy.safety import probes
@@ -71,16 +71,9 @@ class Cause(Enum):
 class Latch(Enum):
     """Say when a cause stays in force after it has gone, until a person resets it."""
 
-    ALWAYS = "always"
-    ENERGISED = "while energised"
-    NEVER = "never"
-
-
-class ResetBy(Enum):
-    """Say who ends the reaction."""
-
-    OPERATOR = "operator"
-    AUTOMATIC = "automatic"
+    ALWAYS = auto()
+    ENERGISED = auto()
+    NEVER = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +91,6 @@ class Rule:
     release_samples: int
     probe: Probe
     advice: str
-
-    @property
-    def reset_by(self) -> ResetBy:
-        """Tell who ends the reaction: what latches waits for a person."""
-        return ResetBy.AUTOMATIC if self.latch is Latch.NEVER else ResetBy.OPERATOR
 
 
 # Rows of equal reaction are in order of precedence: the first one found is the one reported.

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, auto
 
 from vla_deploy.safety.causes import RULES, Cause, Latch, Reaction, Rule
 from vla_deploy.safety.findings import Finding
@@ -13,9 +13,9 @@ from vla_deploy.safety.surroundings import Direction
 class ResetOutcome(Enum):
     """Say what became of a reset request in this tick."""
 
-    NOT_ASKED = "not asked"
-    DONE = "done"
-    REFUSED = "refused"
+    NOT_ASKED = auto()
+    DONE = auto()
+    REFUSED = auto()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

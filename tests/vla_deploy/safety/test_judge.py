@@ -22,7 +22,6 @@ from vla_deploy.safety import (
     KeepOut,
     Latch,
     Reaction,
-    ResetBy,
     ResetOutcome,
     Rule,
     SafetyInputs,
@@ -449,7 +448,7 @@ def test_only_the_estop_latches_while_nothing_is_energised(rule: Rule) -> None:
 
 
 def test_what_latches_waits_for_the_operator_and_the_rest_does_not() -> None:
-    automatic = {rule.cause for rule in RULES if rule.reset_by is ResetBy.AUTOMATIC}
+    automatic = {rule.cause for rule in RULES if rule.latch is Latch.NEVER}
     assert automatic == {
         rule.cause
         for rule in RULES
