@@ -122,6 +122,22 @@ def test_what_cannot_stand_in_a_unit_is_refused(name: str) -> None:
         texts(ServiceChoice(robot=name))
 
 
+def test_the_topics_of_a_robot_that_runs_for_days_are_not_cleaned_away(tmp_path: Path) -> None:
+    topics = tmp_path / "dev" / "shm" / "vla-deploy-0-20260101-000000-1"
+    other = topics.with_name("other")
+    for folder in (topics, other):
+        folder.mkdir(parents=True)
+        (folder / "operator").touch()
+    assert main(["install", "--root", str(tmp_path)]) == 0
+    rules = tmp_path / "usr/lib/tmpfiles.d/vla-deploy.conf"
+    system = tmp_path / "usr/lib/tmpfiles.d/a-system.conf"
+    system.write_text("d /dev/shm - - - 0\n")  # whatever is there is too old
+    command = ["systemd-tmpfiles", "--clean", f"--root={tmp_path}", str(system), str(rules)]
+    subprocess.run(command, capture_output=True, check=False)  # this root has no such users
+    assert not (other / "operator").exists()
+    assert (topics / "operator").exists()
+
+
 def test_a_template_with_an_unknown_name_is_refused() -> None:
     with pytest.raises(TemplateBroken, match="x: nobody fills in NEW"):
         filled("User=@USER@\nGroup=@NEW@\n", {"USER": "me"}, "x")
