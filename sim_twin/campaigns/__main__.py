@@ -7,12 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import fault_matrix, kills, soak
+from sim_twin.campaigns import fault_matrix, kills, pressure, soak, switches
 from sim_twin.campaigns.report import Report
 
 CAMPAIGNS: Final[Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], Report]]] = {
     "faults": fault_matrix.run,
     "kills": kills.run,
+    "pressure": pressure.run,
+    "switches": switches.run,
     "soak": soak.run,
 }
 _EXAMPLES: Final = """examples:
@@ -50,7 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("campaign", choices=tuple(CAMPAIGNS))
     parser.add_argument("--only", default="", help="play only cases whose name contains this")
-    parser.add_argument("--count", type=int, help="how many injections")
+    parser.add_argument("--count", type=int, help="how many injections or switches")
     parser.add_argument("--hours", type=float, default=1.0, help="how long to soak")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=2, help="how many cases at a time")

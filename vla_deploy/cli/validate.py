@@ -12,6 +12,8 @@ from vla_deploy.cli.example import add_command
 CAMPAIGNS = {
     "faults": "every fault in every phase of the work, on the lock-step twin",
     "kills": "kill -9, SIGSTOP and SIGTERM of every process at random moments",
+    "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
+    "switches": "hot profile switches under motion, and bad profiles",
     "soak": "hours of work in lock-step: memory, files and threads must not grow",
 }
 EXAMPLES = """  vla-deploy validate faults --only servo_bus --json
@@ -26,7 +28,7 @@ def register(commands: Any) -> None:
     listed = "; ".join(f"{name}: {summary}" for name, summary in CAMPAIGNS.items())
     validate.add_argument("campaign", choices=tuple(CAMPAIGNS), help=listed)
     validate.add_argument("--only", metavar="TEXT", help="only cases whose name contains this")
-    validate.add_argument("--count", type=int, help="how many injections")
+    validate.add_argument("--count", type=int, help="how many injections or switches")
     validate.add_argument("--hours", type=float, help="how long to soak (default: 1)")
     validate.add_argument("--seed", type=int, help="of the random moments (default: 0)")
     validate.add_argument("--workers", type=int, help="how many cases at a time (default: 2)")
