@@ -4,10 +4,13 @@ import fcntl
 import json
 import logging
 import os
+import re
 import shutil
+import stat
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Final
 
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
 from vla_deploy.supervisor.orphans import end_orphans
@@ -16,6 +19,7 @@ from vla_deploy.supervisor.state_folder import BoundedFolder, state_dir_of, user
 SHARED_MEMORY = Path("/dev/shm")
 KEEP_LOGS_OF_RUNS = 20
 _OWNER_FILE = "owner.json"
+_RUN_ID: Final = re.compile(r"\d{8}-\d{6}-\d+")
 _ENDED_STATES = ("Z", "X")
 _START_FIELD = 19  # of /proc/<pid>/stat after the name and the state, see proc_pid_stat(5)
 _log = logging.getLogger(__name__)
@@ -133,13 +137,18 @@ def _prefix() -> str:
 def _make_private(base: Path) -> None:
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        owner_uid = base.stat().st_uid
+        found = base.stat()
     except OSError as error:
         raise _unavailable(base, error) from error
-    if owner_uid != os.getuid():
+    if found.st_uid != os.getuid():
         raise RuntimeUnavailable(
-            f"runtime directory {base}: belongs to user {owner_uid}, expected {os.getuid()}; "
+            f"runtime directory {base}: belongs to user {found.st_uid}, expected {os.getuid()}; "
             "choose another with --runtime-base"
+        )
+    if found.st_mode & stat.S_IWOTH:
+        raise RuntimeUnavailable(
+            f"runtime directory {base}: everybody may write to it, expected its owner only: "
+            f"`chmod o-w {base}`, or choose another with --runtime-base"
         )
 
 
@@ -184,12 +193,18 @@ def _keep_logs(run_dir: Path, folder: BoundedFolder) -> None:
 
 
 def _sweep_runs(base: Path, logs: BoundedFolder) -> list[int]:
-    stale = [path for path in base.iterdir() if path.is_dir() and not path.is_symlink()]
+    stale = [path for path in base.iterdir() if _is_run(path)]
     orphans = end_orphans({path.name for path in stale}) if stale else []
     for path in stale:
         _keep_logs(path, logs)
         shutil.rmtree(path, ignore_errors=True)
     return orphans
+
+
+def _is_run(path: Path) -> bool:
+    """Tell a run from a folder of somebody who chose the wrong runtime directory."""
+    is_named_so = _RUN_ID.fullmatch(path.name) is not None
+    return is_named_so and path.is_dir() and not path.is_symlink()
 
 
 def _sweep_shared_memory(shared_memory: Path) -> None:

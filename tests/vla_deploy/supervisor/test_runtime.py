@@ -77,6 +77,22 @@ def test_a_holder_that_has_not_yet_said_who_it_is_is_still_respected(tmp_path, s
             Runtime(base, shared)
 
 
+def test_folders_that_are_no_runs_are_left_alone(tmp_path, shared):
+    (tmp_path / "photos" / "logs").mkdir(parents=True)
+    (tmp_path / "20260101-old").mkdir()
+    Runtime(tmp_path, shared).close()
+    assert (tmp_path / "photos" / "logs").is_dir()
+    assert (tmp_path / "20260101-old").is_dir()
+
+
+def test_a_directory_that_everybody_may_write_to_is_refused(tmp_path, shared):
+    base = tmp_path / "base"
+    base.mkdir()
+    base.chmod(0o1777)
+    with pytest.raises(RuntimeUnavailable, match=r"everybody may write to it.*chmod o-w"):
+        Runtime(base, shared)
+
+
 def test_runs_and_shared_memory_of_dead_supervisors_are_swept(tmp_path, shared):
     base = tmp_path / "base"
     (base / "20260101-000000-1" / "logs").mkdir(parents=True)
@@ -153,12 +169,12 @@ def test_an_owner_is_told_from_a_later_process_of_its_pid_by_ticks_since_boot(tm
 
 def test_the_logs_of_a_dead_run_are_kept_by_the_next_start(tmp_path, shared):
     base = tmp_path / "base"
-    logs = base / "dead-run" / "logs"
+    logs = base / "20260101-000000-1" / "logs"
     logs.mkdir(parents=True)
     (logs / "control.log").write_text("{}\n")
     Runtime(base, shared).close()
     (kept,) = old_logs(tmp_path / "base-state").entries()
-    assert kept.name == "000001-dead-run"
+    assert kept.name == "000001-20260101-000000-1"
     assert (kept / "control.log").read_text() == "{}\n"
 
 
