@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio
 from numpy.typing import NDArray
 
+from vla_deploy.control.near_pairs import NearPairs
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.mjcf import read_mjcf_names
 
@@ -21,6 +22,8 @@ Pair = tuple[str, str]
 
 FLOOR = "floor"
 _FINEST_M = 0.02
+# Beyond the least clearance by this, a distance is as good as any larger one.
+_LOOK_M = 0.05
 
 
 class BodyShapes:
@@ -44,6 +47,14 @@ class BodyShapes:
         shapes = pinocchio.buildGeomFromMJCF(self._model, path, pinocchio.GeometryType.COLLISION)
         self._shapes = self._with_pairs(shapes, robot)
         self._results = self._shapes.createData()
+        limits = robot.protection.clearance
+        self._near = NearPairs(
+            self._model,
+            self._shapes,
+            {int(joint): int(column) for joint, column in moved},
+            len(robot.joint_names),
+            max(limits.self_m, limits.floor_m) + _LOOK_M,
+        )
         self._covers = [
             _cover(shape)
             for shape in self._shapes.geometryObjects
@@ -63,6 +74,19 @@ class BodyShapes:
         found = np.array([result.min_distance for result in self._results.distanceResults])
         return found[~self._is_floor], found[self._is_floor]
 
+    def near_distances(self, positions: Array) -> tuple[Array, Array]:
+        """Return what `distances` does, but for pairs too far apart to matter only a bound."""
+        q = self._expand(positions)
+        found = self._near.distances(self._model, self._data, q, positions)
+        return found[~self._is_floor], found[self._is_floor]
+
+    def grips_here(self) -> Array:
+        """Return where the hands with a workspace grip, (n, 3), in the pose that was asked last."""
+        for frame in self._grips:
+            pinocchio.updateFramePlacement(self._model, self._data, frame)
+        points = [self._data.oMf[frame].translation for frame in self._grips]
+        return np.array(points, dtype=np.float64).reshape(-1, 3)
+
     def balls(self, positions: Array) -> tuple[Array, Array]:
         """Return centres, (n, 3) in the base frame, and radii of balls that cover what moves."""
         q = self._expand(positions)
@@ -75,9 +99,8 @@ class BodyShapes:
 
     def grips(self, positions: Array) -> Array:
         """Return where the hands with a workspace grip, (n, 3) in the base frame."""
-        pinocchio.framesForwardKinematics(self._model, self._data, self._expand(positions))
-        points = [self._data.oMf[frame].translation for frame in self._grips]
-        return np.array(points, dtype=np.float64).reshape(-1, 3)
+        pinocchio.forwardKinematics(self._model, self._data, self._expand(positions))
+        return self.grips_here()
 
     def centre_of_mass(self, positions: Array) -> Array:
         """Return the whole robot's centre of mass in the base frame."""
