@@ -1,9 +1,7 @@
 """Record each tick so that it can be judged again, also when this process is killed in it."""
 
 from dataclasses import fields
-from typing import Any
-
-import numpy as np
+from operator import attrgetter
 
 from vla_deploy.control.axes import Floats
 from vla_deploy.ipc import SharedSpace
@@ -12,11 +10,12 @@ from vla_deploy.ipc.packing import Catalogue, types_within
 from vla_deploy.safety import SafetyInputs, SafetyLimits, SafetyState, Verdict
 
 _INPUTS = tuple(field.name for field in fields(SafetyInputs))
-_NAMES = (
+_JUDGED = (
     *("tick", "now_ns", "state", "limits", "verdict"),
-    *("sent", "sent_v_m_s", "sent_w_rad_s"),
     *(f"inputs.{name}" for name in _INPUTS),
 )
+_SENT = ("sent", "sent_v_m_s", "sent_w_rad_s")
+_read_inputs = attrgetter(*_INPUTS)
 _KEY_EVERY = 250
 
 
@@ -26,9 +25,8 @@ class TickRecorder:
     def __init__(self, space: SharedSpace) -> None:
         catalogue = Catalogue(types_within(SafetyState, SafetyInputs, SafetyLimits, Verdict))
         self._ring = space.record_writer("tick_record")
-        self._delta = DeltaWriter(_NAMES, catalogue, key_every=_KEY_EVERY)
-        self._head: tuple[Any, ...] = ()
-        self._inputs: list[Any] = []
+        self._delta = DeltaWriter((*_JUDGED, *_SENT), catalogue, key_every=_KEY_EVERY)
+        self._is_open = False
 
     def judged(
         self,
@@ -40,8 +38,8 @@ class TickRecorder:
         verdict: Verdict,
     ) -> None:
         """Keep what the tick was judged by; `state` is the one before."""
-        self._head = (tick, now_ns, state, limits, verdict)
-        self._inputs = [_kept(getattr(inputs, name)) for name in _INPUTS]
+        self._delta.put(0, (tick, now_ns, state, limits, verdict, *_read_inputs(inputs)))
+        self._is_open = True
 
     def sent(self, setpoint: Floats, v_m_s: float, w_rad_s: float) -> None:
         """Record the tick with what it sent to joints and wheels."""
@@ -49,15 +47,11 @@ class TickRecorder:
 
     def close(self) -> None:
         """Record a tick that was judged and did not come to its end, and unmap the topic."""
-        if self._head:
+        if self._is_open:
             self._append(None, None, None)
         self._ring.close()
 
     def _append(self, *sent: Floats | float | None) -> None:
-        self._ring.append(self._delta.record((*self._head, *sent, *self._inputs)))
-        self._head = ()
-
-
-def _kept(value: Any) -> Any:
-    """Return what a later step of the tick cannot alter."""
-    return value.copy() if type(value) is np.ndarray else value
+        self._delta.put(len(_JUDGED), sent)
+        self._ring.append(self._delta.record())
+        self._is_open = False

@@ -8,14 +8,15 @@ record.
 import json
 import struct
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from vla_deploy.ipc.errors import BadPayload
-from vla_deploy.ipc.packing import Catalogue, Unpacker, array_head
+from vla_deploy.ipc.packing import Catalogue, Unpacker
 
 _HEAD = struct.Struct("<II")
+_NOTHING: Final = object()
 
 
 class DeltaWriter:
@@ -28,39 +29,41 @@ class DeltaWriter:
     def __init__(self, names: Sequence[str], catalogue: Catalogue, *, key_every: int) -> None:
         table = {"names": list(names), "types": catalogue.document()}
         self._table = json.dumps(table, separators=(",", ":")).encode()
-        self._catalogue = catalogue
+        self._pack = catalogue.pack
         self._key_every = key_every
         self._mask_bytes = -(-len(names) // 8)
+        self._every_bit = (1 << len(names)) - 1
         self._number = 0
-        self._values: list[Any] = [None] * len(names)
+        self._values: list[Any] = [_NOTHING] * len(names)
         self._packed: list[bytes] = [b""] * len(names)
+        self._mask = 0
+        self._changed: list[bytes] = []
 
-    def record(self, values: Sequence[Any]) -> bytes:
-        """Return the record of one row, in the order of the names.
+    def put(self, first: int, values: Sequence[Any]) -> None:
+        """Take values from the `first` name on, in order; arrays may be altered afterwards.
 
         Raises:
             BadPayload: a value of a type that the catalogue does not have.
         """
-        key = self._number % self._key_every == 0
-        mask, body = 0, bytearray()
-        for place, value in enumerate(values):
-            is_array = type(value) is np.ndarray
-            known = value is self._values[place] and not is_array and self._number
-            packed = self._packed[place] if known else self._pack(value, is_array)
-            if key or packed != self._packed[place]:
-                mask |= 1 << place
-                body += packed
-            self._values[place] = value
-            self._packed[place] = packed
-        table = self._table if key else b""
-        head = _HEAD.pack(self._number, len(table))
-        self._number += 1
-        return b"".join((head, table, mask.to_bytes(self._mask_bytes, "little"), body))
+        known, packed, pack = self._values, self._packed, self._pack
+        for place, value in enumerate(values, first):
+            if value is known[place] and type(value) is not np.ndarray:
+                continue
+            known[place] = value
+            new = pack(value)
+            if new != packed[place]:
+                packed[place] = new
+                self._mask |= 1 << place
+                self._changed.append(new)
 
-    def _pack(self, value: Any, is_array: bool) -> bytes:
-        if is_array:
-            return array_head(value.dtype.str, value.shape) + bytes(value.tobytes())
-        return self._catalogue.pack(value)
+    def record(self) -> bytes:
+        """Return the record of what was put; values that were not are as before."""
+        number, mask, body, table = self._number, self._mask, self._changed, b""
+        self._number, self._mask, self._changed = number + 1, 0, []
+        if number % self._key_every == 0:
+            mask, body, table = self._every_bit, self._packed, self._table
+        head = _HEAD.pack(number, len(table))
+        return b"".join((head, table, mask.to_bytes(self._mask_bytes, "little"), *body))
 
 
 class DeltaReader:

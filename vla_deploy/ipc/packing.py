@@ -10,7 +10,8 @@ import struct
 import typing
 from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Any
+from operator import attrgetter
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,7 +19,10 @@ from vla_deploy.ipc.errors import BadPayload
 
 _INT = struct.Struct("<q")
 _FLOAT = struct.Struct("<d")
+_int = struct.Struct("<cq").pack
+_float = struct.Struct("<cd").pack
 _COUNT = struct.Struct("<I")
+_NOTHING: Final = object()
 
 
 def types_within(*roots: type) -> tuple[type, ...]:
@@ -39,100 +43,123 @@ def types_within(*roots: type) -> tuple[type, ...]:
 
 
 class Catalogue:
-    """Number the types of one stream."""
+    """Number the types of one stream, and pack their values.
+
+    What a dataclass' field held last time is remembered with its bytes, and the same object is
+    taken for unchanged; bare arrays are looked into each time.
+    """
 
     def __init__(self, known: Sequence[type]) -> None:
         self.types = tuple(known)
-        self._codes = {kind: bytes((code,)) for code, kind in enumerate(known)}
-        self._fields = {
-            kind: tuple(field.name for field in dataclasses.fields(kind))
-            for kind in known
-            if dataclasses.is_dataclass(kind)
-        }
+        self._rows: dict[type, _Row] = {}
+        self._members: dict[type, dict[Enum, bytes]] = {}
+        for code, kind in enumerate(known):
+            if dataclasses.is_dataclass(kind):
+                self._rows[kind] = _Row(code, tuple(one.name for one in dataclasses.fields(kind)))
+            elif issubclass(kind, Enum):
+                head = b"E" + bytes((code,))
+                self._members[kind] = {one: head + _text(one.name) for one in kind}
 
     def document(self) -> list[list[Any]]:
         """Return names and fields, as the stream carries them."""
-        return [[kind.__name__, *self._fields.get(kind, ())] for kind in self.types]
+        return [
+            [kind.__name__, *(self._rows[kind].names if kind in self._rows else ())]
+            for kind in self.types
+        ]
 
-    def pack(self, value: object) -> bytes:
+    def pack(self, value: Any) -> bytes:
         """Return the bytes of one value.
 
         Raises:
             BadPayload: a type that is neither plain nor in the catalogue.
         """
-        out = bytearray()
-        self.put(out, value)
-        return bytes(out)
-
-    def put(self, out: bytearray, value: Any) -> None:
-        """Append the bytes of one value.
-
-        Raises:
-            BadPayload: a type that is neither plain nor in the catalogue.
-        """
         kind = type(value)
-        put = _PLAIN.get(kind)
-        if put is not None:
-            put(out, value)
-        elif kind is tuple:
-            self._put_many(out, b"(", value)
-        elif kind is frozenset:
-            self._put_many(out, b"{", sorted(value, key=self.pack))
-        elif kind in self._fields:
-            out += b"@" + self._codes[kind]
-            for name in self._fields[kind]:
-                self.put(out, getattr(value, name))
-        elif kind in self._codes:
-            out += b"E" + self._codes[kind]
-            _put_text(out, value.name)
-        else:
-            raise BadPayload(
-                f"cannot pack a {kind.__name__}; expected None, bool, int, float, str, bytes, "
-                f"tuple, frozenset, array, or one of {[known.__name__ for known in self.types]}"
-            )
-
-    def _put_many(self, out: bytearray, tag: bytes, values: Sequence[Any]) -> None:
-        out += tag + _COUNT.pack(len(values))
-        for value in values:
-            self.put(out, value)
+        plain = _PLAIN.get(kind)
+        if plain is not None:
+            return plain(value)
+        if kind in self._rows:
+            return self._rows[kind].pack(value, self.pack)
+        if kind is tuple:
+            return _many(b"(", [self.pack(one) for one in value])
+        if kind is frozenset:
+            return _many(b"{", sorted(map(self.pack, value)))
+        if kind in self._members:
+            return self._members[kind][value]
+        raise BadPayload(
+            f"cannot pack a {kind.__name__}; expected None, bool, int, float, str, bytes, "
+            f"tuple, frozenset, array, or one of {[known.__name__ for known in self.types]}"
+        )
 
 
-def _put_text(out: bytearray, value: str) -> None:
-    _put_bytes(out, value.encode(), b"s")
+class _Row:
+    """Pack the fields of one dataclass; most are what they were."""
+
+    def __init__(self, code: int, names: tuple[str, ...]) -> None:
+        self.names = names
+        self._head = b"@" + bytes((code,))
+        self._read: Callable[[Any], tuple[Any, ...]] = (
+            attrgetter(*names)
+            if len(names) > 1
+            else lambda value: tuple(getattr(value, name) for name in names)
+        )
+        self._values: tuple[Any, ...] = (_NOTHING,) * len(names)
+        self._packed = [b""] * len(names)
+
+    def pack(self, value: Any, pack: Callable[[Any], bytes]) -> bytes:
+        # A plain loop, not a comprehension with a call: control does this each tick.
+        values = self._read(value)
+        packed = [self._head]
+        append = packed.append
+        for new, old, known in zip(values, self._values, self._packed, strict=True):
+            kind = type(new)
+            if kind is float:
+                append(_float(b"d", new))
+            elif new is old and kind is not np.ndarray:
+                append(known)
+            else:
+                append(pack(new))
+        self._values, self._packed = values, packed[1:]
+        return b"".join(packed)
 
 
-def _put_bytes(out: bytearray, value: bytes, tag: bytes = b"b") -> None:
-    out += tag + _COUNT.pack(len(value)) + value
+def _many(tag: bytes, packed: Sequence[bytes]) -> bytes:
+    return tag + _COUNT.pack(len(packed)) + b"".join(packed)
 
 
-def _put_array(out: bytearray, value: "np.ndarray[Any, Any]") -> None:
-    out += array_head(value.dtype.str, value.shape)
-    out += value.tobytes()
+def _text(value: str) -> bytes:
+    return _bytes(value.encode(), b"s")
 
 
-_heads: dict[tuple[str, tuple[int, ...]], bytes] = {}
+def _bytes(value: bytes, tag: bytes = b"b") -> bytes:
+    return tag + _COUNT.pack(len(value)) + value
 
 
-def array_head(code: str, shape: tuple[int, ...]) -> bytes:
-    """Return what stands before an array's bytes."""
-    head = _heads.get((code, shape))
+def _array(value: "np.ndarray[Any, Any]") -> bytes:
+    key = (value.dtype, value.shape)
+    head = _heads.get(key)
     if head is None:
-        name = code.encode()
-        sizes = b"".join(map(_COUNT.pack, shape))
-        head = b"A" + bytes((len(name),)) + name + bytes((len(shape),)) + sizes
-        _heads[code, shape] = head
-    return head
+        head = _heads[key] = _array_head(*key)
+    return head + value.tobytes()
 
 
-_PLAIN: dict[type, Callable[[bytearray, Any], None]] = {
-    type(None): lambda out, _: out.extend(b"N"),
-    bool: lambda out, value: out.extend(b"T" if value else b"F"),
-    int: lambda out, value: out.extend(b"i" + _INT.pack(value)),
-    float: lambda out, value: out.extend(b"d" + _FLOAT.pack(value)),
-    str: _put_text,
-    bytes: _put_bytes,
-    np.ndarray: _put_array,
-    **dict.fromkeys((np.float64, np.float32, np.bool_, np.int64, np.uint8), _put_array),
+_heads: dict[tuple[Any, tuple[int, ...]], bytes] = {}
+
+
+def _array_head(dtype: "np.dtype[Any]", shape: tuple[int, ...]) -> bytes:
+    name = dtype.str.encode()
+    sizes = b"".join(map(_COUNT.pack, shape))
+    return b"A" + bytes((len(name),)) + name + bytes((len(shape),)) + sizes
+
+
+_PLAIN: dict[type, Callable[[Any], bytes]] = {
+    type(None): lambda _: b"N",
+    bool: lambda value: b"T" if value else b"F",
+    int: lambda value: _int(b"i", value),
+    float: lambda value: _float(b"d", value),
+    str: _text,
+    bytes: _bytes,
+    np.ndarray: _array,
+    **dict.fromkeys((np.float64, np.float32, np.bool_, np.int64, np.uint8), _array),
 }
 
 

@@ -26,8 +26,21 @@ class Rig(LockstepControl):
         self.process_table = self.space.cell_writer("process_table")
         self._scan = self.space.cell_writer("scan")
         self.arm()
-        self.run(1.0)  # what the first movement calls for is over before the recorder looks
+        self.settle()
         self.recorder = self.new_recorder()
+        self.run(0.1)  # what was so before its first look would call for no flight
+
+    def settle(self) -> None:
+        """Wait until whatever arming called for has been over for a second."""
+        clear_ns = self.lockstep.clock.now_ns()
+        for _ in range(100):
+            self.run(0.1)
+            now_ns, status = self.lockstep.clock.now_ns(), self.status()
+            if status["state"] != "armed" or status["cause"]:
+                clear_ns = now_ns
+            if now_ns - clear_ns >= 1_000_000_000:
+                return
+        raise AssertionError(f"the robot does not settle: {self.status()}")
 
     def new_recorder(self) -> RecorderNode:
         step = self.lockstep

@@ -36,7 +36,11 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
 
 def packed(rows: list[dict[str, Any]]) -> list[bytes]:
     writer = DeltaWriter(list(rows[0]), Catalogue(JUDGED_TYPES), key_every=50)
-    return [writer.record(list(row.values())) for row in rows]
+    given = []
+    for row in rows:
+        writer.put(0, list(row.values()))
+        given.append(writer.record())
+    return given
 
 
 def test_there_is_a_flight_of_every_scene_and_they_are_small() -> None:
