@@ -6,11 +6,11 @@ from typing import Any
 
 from drivers.clock import Clock
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.supervisor.budgets.sampler import Snapshot
 from vla_deploy.supervisor.crew import Crew
 from vla_deploy.supervisor.lifecycle import Record
 from vla_deploy.supervisor.liveness import Vital
 from vla_deploy.supervisor.options import RunOptions
-from vla_deploy.supervisor.usage import UsageMeter
 
 _SUPERVISOR = "supervisor"
 _UNKNOWN_USAGE = {"memory_mb": None, "rss_mb": None, "cpu_ratio": None}
@@ -21,8 +21,6 @@ class Report:
 
     def __init__(self, run_id: str, options: RunOptions, space: SharedSpace, clock: Clock) -> None:
         self._cell = space.cell_writer("process_table")
-        self._meter = UsageMeter(clock.now_ns())
-        self._clock = clock
         self._head = {
             "run_id": run_id,
             "robot": options.robot,
@@ -37,19 +35,12 @@ class Report:
         crew: Crew,
         vitals: Mapping[str, tuple[Vital, ...]],
         refusal: str,
+        snapshot: Snapshot | None,
     ) -> None:
-        """Measure every process and publish the table; `refusal` is why no command is taken."""
+        """Publish the table with what was measured; `refusal` is why no command is taken."""
         self._head["profile"] = crew.profile
         pids = crew.pids()
-        measured = self._meter.sample({_SUPERVISOR: os.getpid(), **pids}, self._clock.now_ns())
-        usages = {
-            name: {
-                "memory_mb": round(usage.memory_mb, 1),
-                "rss_mb": round(usage.rss_mb, 1),
-                "cpu_ratio": round(usage.cpu_ratio, 3),
-            }
-            for name, usage in measured.items()
-        }
+        usages = {} if snapshot is None else _usages(snapshot)
         rows = [
             {
                 **_row(name, record, pids, crew, vitals.get(name, ())),
@@ -62,11 +53,22 @@ class Report:
                 **self._head,
                 "refusal": refusal,
                 "processes": rows,
-                "supervisor": usages[_SUPERVISOR],
-                "peak_memory_mb": round(self._meter.peak_memory_mb, 1),
-                "memory_kind": self._meter.memory_kind,
+                "supervisor": usages.get(_SUPERVISOR, _UNKNOWN_USAGE),
+                "peak_memory_mb": None if snapshot is None else round(snapshot.peak_memory_mb, 1),
+                "memory_kind": None if snapshot is None else snapshot.memory_kind,
             }
         )
+
+
+def _usages(snapshot: Snapshot) -> dict[str, dict[str, float]]:
+    return {
+        name: {
+            "memory_mb": round(usage.memory_mb, 1),
+            "rss_mb": round(usage.rss_mb, 1),
+            "cpu_ratio": round(usage.cpu_ratio, 3),
+        }
+        for name, usage in snapshot.usages.items()
+    }
 
 
 def _row(

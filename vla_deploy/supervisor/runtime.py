@@ -14,14 +14,13 @@ from typing import Final
 
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
 from vla_deploy.supervisor.orphans import end_orphans
+from vla_deploy.supervisor.proc_files import read_stat
 from vla_deploy.supervisor.state_folder import BoundedFolder, state_dir_of, user_base
 
 SHARED_MEMORY = Path("/dev/shm")
 KEEP_LOGS_OF_RUNS = 20
 _OWNER_FILE = "owner.json"
 _RUN_ID: Final = re.compile(r"\d{8}-\d{6}-\d+")
-_ENDED_STATES = ("Z", "X")
-_START_FIELD = 19  # of /proc/<pid>/stat after the name and the state, see proc_pid_stat(5)
 _log = logging.getLogger(__name__)
 
 
@@ -39,8 +38,8 @@ class Owner:
 
     def is_alive(self) -> bool:
         """Tell whether that very process still runs; one that nobody has reaped does not."""
-        found = _state_and_start(self.pid)
-        return found is not None and found[0] not in _ENDED_STATES and found[1] == self.start_ticks
+        found = read_stat(self.pid)
+        return found is not None and not found.ended and found.start_ticks == self.start_ticks
 
 
 def default_base() -> Path:
@@ -113,21 +112,11 @@ class Runtime:
         return directory
 
 
-def _state_and_start(pid: int) -> tuple[str, int] | None:
-    """Return a process' state and its start in clock ticks since boot, None when there is none."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_text()
-    except (FileNotFoundError, ProcessLookupError):
-        return None
-    fields = text.rpartition(")")[2].split()  # the name before may hold anything
-    return fields[0], int(fields[_START_FIELD])
-
-
 def own_start_ticks() -> int:
     """Return when this process was started, in clock ticks since boot."""
-    found = _state_and_start(os.getpid())
+    found = read_stat(os.getpid())
     assert found is not None, "this process runs"
-    return found[1]
+    return found.start_ticks
 
 
 def _prefix() -> str:

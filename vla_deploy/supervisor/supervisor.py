@@ -249,7 +249,13 @@ class Supervisor:
             self._vitals = run.crew.examine(run.directives.rate_ratios)
             run.crew.bound_output()
             self._log_alarms()
-        run.report.publish(self._records, run.crew, self._vitals, self._consequences.refusal)
+        run.report.publish(
+            self._records,
+            run.crew,
+            self._vitals,
+            self._consequences.refusal,
+            run.budgets.snapshot,
+        )
 
     def _log_alarms(self) -> None:
         """Log an alarm when it is raised, not for as long as it lasts."""

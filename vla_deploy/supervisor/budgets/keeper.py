@@ -88,6 +88,11 @@ class BudgetKeeper:
         self._enforcer.adopt(profile.budgets)
         self._claims.declare(_memory_of(profile))
 
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """Return what was measured last, or None before the first time."""
+        return self._feed.latest()
+
     def step(self, pids: Mapping[str, int]) -> Orders:
         """Judge the newest measurement, if there is a new one, and return what is to be done."""
         now_ns = self._clock.now_ns()

@@ -26,12 +26,17 @@ class Probes(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """Carry what was measured in one round; `pids` are the processes that ran then."""
+    """Carry what was measured in one round; `pids` are the processes that ran then.
+
+    `peak_memory_mb` is of all together since the start, `memory_kind` says how it was measured.
+    """
 
     stamp_ns: int
     readings: Mapping[str, Reading]
     usages: Mapping[str, Usage]
     pids: Mapping[str, int]
+    peak_memory_mb: float
+    memory_kind: str
 
 
 class Feed(Protocol):
@@ -92,9 +97,12 @@ class BackgroundSampler:
 
     def _sample(self, probes: Probes) -> Snapshot:
         pids, stamp_ns = self._pids, self._clock.now_ns()
+        usages = self._meter.sample(pids, stamp_ns)
         return Snapshot(
             stamp_ns=stamp_ns,
             readings=probes.read(),
-            usages=self._meter.sample(pids, stamp_ns),
+            usages=usages,
             pids=pids,
+            peak_memory_mb=self._meter.peak_memory_mb,
+            memory_kind=self._meter.memory_kind,
         )

@@ -103,6 +103,8 @@ class World:
                 for name in self.running
             },
             pids=dict(self.running),
+            peak_memory_mb=sum(self.memory_mb.values()),
+            memory_kind="pss",
         )
 
 
