@@ -23,10 +23,10 @@ _FITNESS_BYTES: Final = 36
 
 
 def enable_torque(registers: Registers, servos: Sequence[ServoSpec], watchdog_units: int) -> None:
-    """Hold the servos where they are; on any failure switch all of them off again.
+    """Hold the servos where they are; on any failure switch those off again that were off before.
 
-    The watchdog is armed before torque comes on. It runs only with torque on, so the motors are
-    never powered without it.
+    A servo that holds already goes on holding: what it carries would fall. The others get torque
+    only with an armed watchdog.
 
     Raises:
         ServoFault: a servo reports a hardware error; reboot it once the cause is gone.
@@ -35,7 +35,7 @@ def enable_torque(registers: Registers, servos: Sequence[ServoSpec], watchdog_un
         NotKept: a servo refuses a step, for instance a pose outside its position limits.
         LinkLost: the adapter is gone; the watchdogs stop the servos.
     """
-    _check_fitness(registers, servos)
+    holding = _check_fitness(registers, servos)
     try:
         write_kept(registers, "bus_watchdog", servos, dict.fromkeys(_ids(servos), watchdog_units))
         present = _read_all(registers, "present_position", servos)
@@ -44,7 +44,7 @@ def enable_torque(registers: Registers, servos: Sequence[ServoSpec], watchdog_un
     except LinkLost:
         raise
     except DriverError:
-        disable_torque(registers, servos)
+        disable_torque(registers, [servo for servo in servos if servo.id not in holding])
         raise
 
 
@@ -111,7 +111,8 @@ def _require_all(answers: Mapping[int, object], servos: Sequence[ServoSpec]) -> 
         raise ServoSilent(f"no answer from {', '.join(silent)}; check power and cable")
 
 
-def _check_fitness(registers: Registers, servos: Sequence[ServoSpec]) -> None:
+def _check_fitness(registers: Registers, servos: Sequence[ServoSpec]) -> frozenset[int]:
+    """Return the ids of those that hold torque already."""
     spans = registers.read_span_many(servos, _FITNESS_START, _FITNESS_BYTES)
     _require_all(spans, servos)
     for servo in servos:
@@ -127,3 +128,8 @@ def _check_fitness(registers: Registers, servos: Sequence[ServoSpec]) -> None:
                 f"{servo}: the Bus Watchdog has tripped because the bus was silent; "
                 "clear the watchdog, then enable torque again"
             )
+    return frozenset(
+        servo.id
+        for servo in servos
+        if decode(servo, spans[servo.id], _FITNESS_START, "torque_enable")
+    )

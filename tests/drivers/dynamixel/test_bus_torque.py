@@ -151,6 +151,17 @@ def test_a_failure_half_way_switches_everything_off_again(bench: Any) -> None:
     assert watchdog_of(bench) is WatchdogState.OFF
 
 
+def test_a_failure_half_way_lets_none_go_that_held_before(bench: Any) -> None:
+    bench.bus.write_register(3, "max_position_limit", 1000)
+    bench.bus.write_register(3, "min_position_limit", 0)
+    bench.rotors.position_rad[:] = np.pi / 4
+    bench.run(0.01)
+    bench.bus.enable_torque([1, 2])
+    with pytest.raises(NotKept, match="servo 3"):
+        bench.bus.enable_torque()
+    assert [bench.bank.register(n, "torque_enable") for n in (1, 2, 3, 4)] == [1, 1, 0, 0]
+
+
 def test_chosen_servos_alone_are_enabled(bench: Any) -> None:
     bench.bus.enable_torque([1, 4])
     assert bench.bus.state.torque_on.tolist() == [True, False, False, True]
