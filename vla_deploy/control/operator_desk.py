@@ -9,6 +9,7 @@ from vla_deploy.ipc import RingReader, Sample
 UNKNOWN = "unknown"
 LOST = "operator events were lost"
 LATCHED_BEFORE = "latched before control was restarted"
+MOST_WAITING = 8
 
 
 class Act(Enum):
@@ -45,14 +46,14 @@ class OperatorDesk:
     def listen(self) -> None:
         """Take in what has come; `estop_source` is set for this tick only.
 
-        An emergency stop drops the acts that came before it; events that were lost to a full ring
-        may have held one, so they count as one.
+        An emergency stop drops the acts that came before it; events that were lost to a full ring,
+        or are damaged, may have held one, so they count as one.
         """
-        lost_before = self._ring.lost
+        missed_before = self._ring.lost + self._ring.torn
         self.estop_source, self._recalled = self._recalled, None
         for event in self._ring.drain():
             self._take(event.payload.get("act"), str(event.payload.get("source", UNKNOWN)))
-        if self._ring.lost > lost_before:
+        if self._ring.lost + self._ring.torn > missed_before:
             self._stop(LOST)
         self._look_at_button()
 
@@ -81,8 +82,10 @@ class OperatorDesk:
             return
         if act is Act.ESTOP:
             self._stop(source)
-        else:
+        elif len(self._waiting) < MOST_WAITING:
             self._waiting.append(act)
+        else:
+            self.complaint = f"{name} from {source} was dropped: {MOST_WAITING} acts wait already"
 
     def _look_at_button(self) -> None:
         """Stop as long as the button is pressed; only the press itself drops the waiting acts."""

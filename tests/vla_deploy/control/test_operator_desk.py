@@ -5,7 +5,13 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.control.operator_desk import LATCHED_BEFORE, LOST, Act, OperatorDesk
+from vla_deploy.control.operator_desk import (
+    LATCHED_BEFORE,
+    LOST,
+    MOST_WAITING,
+    Act,
+    OperatorDesk,
+)
 from vla_deploy.ipc import RingWriter, SharedSpace
 
 
@@ -47,6 +53,31 @@ def test_lost_events_count_as_an_estop(ring: tuple[OperatorDesk, RingWriter]) ->
     desk.listen()
     assert desk.estop_source == "operator events were lost"
     assert desk.next_act() is None
+
+
+def test_a_damaged_event_counts_as_an_estop(
+    ring: tuple[OperatorDesk, RingWriter], tmp_path: Path
+) -> None:
+    desk, writer = ring
+    ask(writer, "reset")
+    (file,) = (path for path in tmp_path.iterdir() if b'"reset"' in path.read_bytes())
+    with file.open("r+b") as memory:
+        memory.seek(file.read_bytes().index(b'"reset"'))
+        memory.write(b'"arm"')
+    desk.listen()
+    assert desk.estop_source == LOST
+    assert desk.next_act() is None
+
+
+def test_whoever_floods_the_desk_delays_nobody_for_long(
+    ring: tuple[OperatorDesk, RingWriter],
+) -> None:
+    desk, writer = ring
+    for _ in range(100):
+        ask(writer, "arm")
+        desk.listen()
+    assert desk.complaint == f"arm from page was dropped: {MOST_WAITING} acts wait already"
+    assert [desk.next_act() for _ in range(MOST_WAITING + 1)] == [*[Act.ARM] * MOST_WAITING, None]
 
 
 def test_an_unknown_act_is_told_and_does_nothing(ring: tuple[OperatorDesk, RingWriter]) -> None:
