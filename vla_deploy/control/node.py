@@ -243,6 +243,14 @@ class ControlNode:
         if self._mode is Mode.STOPPING:
             self._notice = "reset refused: the stop has not ended yet"
             return
+        held_by = self._servos.faulted_but_holding
+        if held_by:
+            joints = ", ".join(held_by)
+            self._notice = (
+                f"reset refused: it would reboot {joints}, which still hold torque and would fall; "
+                "support the arm, disarm, then reset"
+            )
+            return
         self._notice = ""
         self._reset_until_ns = now_ns + _RESET_NS
         if self._servos.state.error.any():

@@ -129,6 +129,12 @@ class ServoLine:
         """Return the servos that hold no torque under an armed watchdog."""
         return np.flatnonzero(~self.state.torque_on | (self.state.watchdog <= 0))
 
+    @property
+    def faulted_but_holding(self) -> list[str]:
+        """Name the joints that report an error and still hold: rebooted, they would let go."""
+        holding = np.flatnonzero((self.state.error != 0) & self.state.torque_on)
+        return [self._specs[servo].joint for servo in holding]
+
     def read(self) -> None:
         """Refresh `state`; values grow old while the line is lost."""
         if self._bus is None or self.lost:

@@ -298,6 +298,23 @@ def test_a_servo_with_a_hardware_error_stops_all_and_rejoins_after_reset(armed: 
     assert armed.state == "armed", armed.status
 
 
+def test_a_reset_lets_no_servo_go_that_reports_an_error_and_still_holds(armed: Rig) -> None:
+    low_voltage = 1  # the servo obeys, but tells of it until it is rebooted
+    servo = next(s for s in armed.robot.servo_bus.servos if s.joint == ELBOW)
+    armed.lockstep.twin.serial_devices["servos"].set_alert(servo.id, low_voltage)
+    armed.run(0.5)
+    assert (armed.state, armed.status["cause"]) == ("stopped", "servo_hardware_error")
+    rest = true_elbow(armed)
+    armed.ask("reset", within_s=2.5)
+    assert armed.state == "stopped"
+    assert f"it would reboot {ELBOW}, which still hold" in armed.status["detail"]
+    assert true_elbow(armed) == pytest.approx(rest, abs=0.01)
+    armed.ask("disarm", "reset", within_s=2.5)
+    assert armed.state == "disarmed", armed.status
+    armed.ask("arm", within_s=1.0)
+    assert armed.state == "armed", armed.status
+
+
 def test_a_silent_servo_stops_all_and_names_itself(armed: Rig) -> None:
     servo = next(s for s in armed.robot.servo_bus.servos if s.joint == PITCH)
     armed.lockstep.twin.serial_devices["servos"].silence(servo.id)
