@@ -3,9 +3,9 @@
     .venv/bin/python scripts/mutation [--only TEXT] [--jobs N] [--list]
 
 The tests are collected once; each mutant runs in a fork. Inside a function its code is exchanged
-and only the tests that reach the line run; anywhere else the package is imported anew. The first
-test that fails ends it. Mutants that change nothing are listed, each with its reason, in
-`equivalent_mutants.toml` beside the tests.
+and only the tests that reach the line run; anywhere else, and where only an import reaches it, the
+package is imported anew. The first test that fails ends it. Mutants that change nothing are listed,
+each with its reason, in `equivalent_mutants.toml` beside the tests.
 """
 
 import argparse
@@ -159,9 +159,9 @@ class Campaign:
         os.dup2(quiet, 1)
         os.dup2(quiet, 2)
         code = compile(mutant.tree, str(mutant.path), "exec")
-        if not mutant.function or not _exchange(mutant, code):
-            return _passes_anew(mutant, code, self._target, _QuickestFirst(self._seconds))
         items = self._items(mutant, session)
+        if not items or not mutant.function or not _exchange(mutant, code):
+            return _passes_anew(mutant, code, self._target, _QuickestFirst(self._seconds))
         for at, item in enumerate(items):
             following = items[at + 1] if at + 1 < len(items) else None
             reports = runtestprotocol(item, log=False, nextitem=following)

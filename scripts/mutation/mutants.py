@@ -48,7 +48,11 @@ _JUDGES_ITSELF = (ast.Compare, ast.BoolOp, ast.UnaryOp, ast.Constant)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mutant:
-    """Describe one change; `function` is empty where it is outside of every function body."""
+    """Describe one change.
+
+    `function` is empty where exchanging a function's code would not do: outside of every function,
+    and within one that another one has already made.
+    """
 
     name: str
     module: str
@@ -83,7 +87,7 @@ def mutants_of(path: Path, module: str) -> list[Mutant]:
                     name=name,
                     module=module,
                     path=path,
-                    function=site.function,
+                    function=site.function if site.function == site.scope else "",
                     first_line=site.statement.lineno,
                     last_line=site.statement.end_lineno or site.statement.lineno,
                     original=tree,

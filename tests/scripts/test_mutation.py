@@ -1,5 +1,6 @@
 """The mutation campaign, on a package of one function: what it notices and what it tells."""
 
+import os
 import subprocess
 import sys
 import tomllib
@@ -16,8 +17,25 @@ LEAST = 3
 
 def is_big(value):
     return value > LEAST
+
+
+def above(least):
+    def judge(value):
+        return value > least
+
+    return judge
+
+
+is_vast = above(9)
 """
-NARROW = "from little.sizes import is_big\n\ndef test_it():\n    assert is_big(9)\n"
+NARROW = """
+from little.sizes import is_big, is_vast
+
+def test_it():
+    assert not is_vast(9)
+    assert is_vast(10)
+    assert is_big(9)
+"""
 WIDE = NARROW + "    assert is_big(4)\n    assert not is_big(3)\n"
 
 
@@ -34,7 +52,15 @@ def little(tmp_path: Path) -> Path:
 
 def run(*options: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, str(TOOL), "--jobs", "1", *options]
-    return subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    only_what_it_needs = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_PLUGINS": "pytest_timeout"}
+    return subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+        env=os.environ | only_what_it_needs,
+    )
 
 
 def run_on(little: Path) -> subprocess.CompletedProcess[str]:
@@ -52,14 +78,14 @@ def test_what_no_test_notices_is_reported_and_the_rest_is_not(little: Path) -> N
         "survived: sizes.py:2: sizes.module: 3 -> 4",
         "survived: sizes.py:6: sizes.is_big: value > LEAST -> value >= LEAST",
     ]
-    assert "4 mutants, 2 survived" in done.stdout
+    assert "9 mutants, 2 survived" in done.stdout
     assert done.returncode == 1
 
 
 def test_a_test_of_the_boundary_kills_them_all(little: Path) -> None:
     (little / "tests" / "little" / "test_sizes.py").write_text(WIDE)
     done = run_on(little)
-    assert "4 mutants, 0 survived" in done.stdout
+    assert "9 mutants, 0 survived" in done.stdout
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -67,7 +93,7 @@ def test_a_list_of_equivalents_must_tell_the_truth(little: Path) -> None:
     killed = "sizes.is_big: value > LEAST -> value <= LEAST"
     list_as_equivalent(little, "sizes.module: 3 -> 4", killed, "sizes.gone: 1 -> 2")
     done = run_on(little)
-    assert "4 mutants, 1 survived" in done.stdout
+    assert "9 mutants, 1 survived" in done.stdout
     assert f"listed as equivalent, but a test fails: {killed}" in done.stdout
     assert "listed as equivalent, but there is no such mutant: sizes.gone: 1 -> 2" in done.stdout
     assert done.returncode == 1

@@ -156,11 +156,7 @@ def _lingering(
     before: tuple[Lingering, ...], active: tuple[Verdict, ...], found: _Found
 ) -> tuple[Lingering, ...]:
     """Count each down in clear ticks in a row; a finding starts it anew."""
-    begun = tuple(
-        Lingering(verdict=verdict, left=_RELEASE[verdict.cause])
-        for verdict in active
-        if _RELEASE[verdict.cause] > 0
-    )
+    begun = (Lingering(verdict=verdict, left=_RELEASE[verdict.cause]) for verdict in active)
     causes = {verdict.cause for verdict in active}
     waiting = (
         replace(
@@ -169,7 +165,7 @@ def _lingering(
         for one in before
         if one.verdict.cause not in causes
     )
-    return begun + tuple(one for one in waiting if one.left > 0)
+    return tuple(one for one in (*begun, *waiting) if one.left > 0)
 
 
 _RELEASE = {rule.cause: rule.release_samples for rule in RULES}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.safety import CLEAR, RULES, Cause, Latch, Reaction, ResetOutcome, Rule
+from vla_deploy.safety import CLEAR, RULES, Cause, Direction, Latch, Reaction, ResetOutcome, Rule
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "safety.md"
 REACTIONS = {
@@ -27,7 +27,7 @@ def documented() -> dict[str, tuple[Reaction, bool, int, int]]:
     """Return reaction, whether it latches, debounce and release of each cause in the document."""
     lines = DOCUMENT.read_text().splitlines()
     start = lines.index("| cause | found when | for | reaction | ends by |") + 2
-    rows = {}
+    rows: dict[str, tuple[Reaction, bool, int, int]] = {}
     for line in lines[start : lines.index("", start)]:
         names, _, debounce, reaction, end = (cell.strip() for cell in line.strip("|").split("|"))
         release = int(end.split()[0]) if end.endswith("clear ticks") else 0
@@ -50,6 +50,12 @@ def test_the_table_is_the_documented_one() -> None:
 
 def test_causes_are_told_by_their_names() -> None:
     assert [cause.value for cause in Cause] == [cause.name.lower() for cause in Cause]
+
+
+def test_directions_are_told_by_their_names() -> None:
+    assert [str(direction) for direction in Direction] == [
+        direction.name.lower() for direction in Direction
+    ]
 
 
 @rules

@@ -1,5 +1,6 @@
 """Sweep each cause across its boundary and hold the latch, debounce and reset rules."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -162,6 +163,12 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         {"sample_age_s": np.array([0.02, 0.02])},
         "every servo",
     ),
+    (
+        Cause.SERVO_BUS_LOST,
+        {"sample_age_s": np.array([0.03, 0.02])},
+        {"sample_age_s": np.array([0.02, 0.0])},
+        "shoulder",
+    ),
     (Cause.CAN_BUS_LOST, {"lost_can_buses": ("can0",)}, {"lost_can_buses": ()}, "can0"),
     (Cause.CAN_BUS_LOST, right(lost=True), right(age_s=9.0), "right_wheel"),
     (
@@ -188,6 +195,12 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         Cause.FOLLOWING_ERROR,
         {"setpoint": np.array([0.25 + ULP, 1.0])},
         {"setpoint": np.array([0.25, 1.0])},
+        "shoulder",
+    ),
+    (
+        Cause.FOLLOWING_ERROR,
+        {"position": np.array([0.5, 1.0]), "setpoint": np.array([0.25 - ULP, 1.0])},
+        {"position": np.array([0.5, 1.0]), "setpoint": np.array([0.25, 1.0])},
         "shoulder",
     ),
     (
@@ -630,6 +643,7 @@ OLD = {"sample_age_s": np.array([0.0, 0.015]), "climate_age_s": np.array([0.0, 0
         (right(measured_rad_s=5.0, age_s=0.05), 0.05),
         (standing(**right(measured_rad_s=0.2, age_s=0.05)), 0.05),
         (close_by("environment_clearance", 0.0, 0.1), 0.0),
+        (close_by("self_clearance", 0.0, 0.1), 0.0),
     ],
 )
 def test_a_measured_cause_tells_how_old_its_sample_is(
@@ -638,6 +652,31 @@ def test_a_measured_cause_tells_how_old_its_sample_is(
     _, verdict = ticks(SafetyState(), 50, **OLD, **changes)
     assert verdict.cause is not Cause.NONE
     assert verdict.age_s == age_s
+
+
+def test_a_cause_without_numbers_tells_none_and_its_text_leaves_them_out() -> None:
+    _, verdict = tick(SafetyState(), estop_source="button")
+    assert math.isnan(verdict.measured)
+    assert math.isnan(verdict.limit)
+    assert verdict.age_s == 0.0
+    assert verdict.text == "estop (button); release the button, then reset, then arm"
+
+
+@pytest.mark.parametrize(
+    ("changes", "measured"),
+    [
+        ({"hardware_error": np.array([0, 32], dtype=np.uint8)}, 32.0),
+        (right(fault_code=3), 3.0),
+    ],
+)
+def test_an_error_code_is_measured_against_none(changes: dict[str, Any], measured: float) -> None:
+    _, verdict = tick(SafetyState(), **changes)
+    assert (verdict.measured, verdict.limit) == (measured, 0.0)
+
+
+def test_of_several_joints_the_first_is_named() -> None:
+    _, verdict = ticks(SafetyState(), 5, velocity=np.array([2.5, 3.5]))
+    assert (verdict.subject, verdict.measured) == ("shoulder", 2.5)
 
 
 def test_what_the_camera_saw_tells_its_age() -> None:
@@ -651,6 +690,30 @@ def test_among_equal_reactions_the_first_latched_is_reported_as_the_root_cause()
     state, verdict = tick(state, **SPOILERS[Cause.SERVO_BUS_LOST])
     assert verdict.cause is Cause.SUPERVISOR_LOST
     assert [v.cause for v in state.latched] == [Cause.SUPERVISOR_LOST, Cause.SERVO_BUS_LOST]
+
+
+def test_a_reset_is_refused_while_one_of_several_latched_causes_persists() -> None:
+    state, _ = tick(SafetyState(), estop_source="button", supervisor_age_s=9.0)
+    after, verdict = tick(state, reset_requested=True, supervisor_age_s=9.0)
+    assert verdict.reset is ResetOutcome.REFUSED
+    assert after.latched == state.latched
+
+
+def test_a_reset_with_nothing_to_reset_is_done() -> None:
+    state, verdict = tick(SafetyState(), reset_requested=True)
+    assert (state, verdict) == (SafetyState(), replace(CLEAR, reset=ResetOutcome.DONE))
+
+
+def test_an_estop_stays_latched_among_other_causes() -> None:
+    state, _ = tick(SafetyState(), supervisor_age_s=9.0)
+    assert not state.estop_latched
+    state, _ = tick(state, estop_source="button")
+    assert state.estop_latched
+
+
+def test_what_has_no_release_time_does_not_linger() -> None:
+    state, _ = tick(SafetyState(), **SPOILERS[Cause.STALE_COMMAND])
+    assert state.lingering == ()
 
 
 def test_a_latched_cause_is_not_latched_twice() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from vla_deploy.safety.keep_out import judge_keep_out, seen_from
 from vla_deploy.safety.surroundings import Direction
-from vla_deploy.safety.zones import Footprint, Motion
+from vla_deploy.safety.zones import PROBES, Footprint, Motion
 
 ROUND = Footprint(corners_m=((0.0, 0.0),), radius_m=0.25)
 LONG = Footprint(corners_m=((0.5, 0.1), (-0.5, 0.1), (-0.5, -0.1), (0.5, -0.1)), radius_m=0.0)
@@ -19,6 +19,17 @@ BOX = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
 def test_an_area_lies_around_the_base_as_its_pose_says() -> None:
     seen = seen_from(np.array([[2.0, 3.0]]), 2.0, 1.0, math.pi / 2)
     assert seen == pytest.approx(np.array([[2.0, 0.0]]), abs=1e-12)
+
+
+def test_an_area_turns_against_the_base() -> None:
+    corners = np.array([[2.0, 1.0], [1.0, 3.0]])
+    c, s = math.cos(0.3), math.sin(0.3)
+    expected = [[c * 1.0, -s * 1.0], [s * 2.0, c * 2.0]]  # the base's axes, met by each corner
+    assert seen_from(corners, 1.0, 1.0, 0.3) == pytest.approx(np.array(expected))
+
+
+def test_an_area_that_only_touches_is_not_entered() -> None:
+    assert judge_keep_out({"box": BOX - (0.75, 0.0)}, ROUND, STANDING, 0.0) is None
 
 
 def test_outside_with_room_to_stop_nothing_is_found() -> None:
@@ -50,3 +61,27 @@ def test_a_long_base_must_not_turn_its_end_into_the_area() -> None:
     assert found is not None
     assert Direction.TURN_LEFT in found.blocked
     assert Direction.TURN_RIGHT not in found.blocked
+
+
+def test_sliding_along_an_edge_leads_no_deeper() -> None:
+    beside = np.array([[-9.0, 0.2], [9.0, 0.25], [9.0, 1.0], [-9.0, 1.0]])
+    found = judge_keep_out({"beside": beside}, ROUND, STANDING, 0.0)
+    assert found is not None
+    assert found.blocked == ()
+
+
+def test_a_turn_that_hardly_leads_deeper_is_free() -> None:
+    nose = Footprint(corners_m=((1.0, 0.0), (0.0, 0.0)), radius_m=0.0)
+    slope = np.array([[0.9, -9.0], [9.0, -9.0], [9.0, 9.0], [0.9 - 0.45, 9.0]])
+    found = judge_keep_out({"slope": slope}, nose, STANDING, 0.0)
+    assert found is not None
+    assert found.blocked == (Direction.FORWARD,)
+
+
+def test_only_more_than_the_share_of_its_way_leads_deeper(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(PROBES, Direction.FORWARD, (0.25, 0.0))
+    area = {"box": BOX - (0.875, 0.0)}
+    monkeypatch.setattr("vla_deploy.safety.keep_out.NEARER_SHARE", 1.0)
+    found = judge_keep_out(area, ROUND, STANDING, 0.0)
+    assert found is not None
+    assert found.blocked == ()
