@@ -12,7 +12,8 @@ from typing import Any, Final
 
 from drivers.clock import Clock
 from sim_twin.campaigns.clock_shift import CannotShift, ClockShift
-from sim_twin.campaigns.working_robot import Talk, WorkingRobot
+from sim_twin.campaigns.talk import Talk
+from sim_twin.campaigns.working_robot import WorkingRobot
 from vla_deploy.supervisor.crash_reports import crash_folder
 from vla_deploy.supervisor.state_folder import state_dir_of
 
@@ -44,12 +45,14 @@ ladder = [
   {{ action = "protective_stop" }},
 ]
 ladder_timing = {{ rise_s = 2.0, fall_s = 3.0, release_ratio = 0.9 }}
+[board]
+cpu_count = 64
 [budgets]
 perception = {{ memory_mb = 600, cpu_ratio = 0.9 }}
 planner = {{ memory_mb = 300, cpu_ratio = 1.5 }}
 [budgets.total]
 memory_mb = 4000
-cpu_ratio = 8.0
+cpu_ratio = 64
 temperature_c = 85.0
 disk_free_mb = 8
 """
@@ -86,7 +89,7 @@ class Scene:
                 stack.enter_context(_mounted(self.disk))
             self.shift = _shift(self.folder) if shifted_clock else None
             self.wish()
-            self._lay_out_board()
+            self.lay_out_board()
             self.robot = self._start()
             stack.callback(self.robot.close)
             self.talk: Talk = self.robot.talk()
@@ -113,7 +116,7 @@ class Scene:
 
     def brown_out(self) -> None:
         """Let the board count one more under-voltage."""
-        self._rewrite(_UNDER_VOLTAGE, 1 + int((self._board / _UNDER_VOLTAGE).read_text()))
+        self._rewrite(_UNDER_VOLTAGE, 1 + int((self.board / _UNDER_VOLTAGE).read_text()))
 
     def fill_disk(self) -> None:
         """Leave no byte free."""
@@ -151,19 +154,21 @@ class Scene:
         return [str(json.loads(report.read_text())["process"]) for report in reports]
 
     @property
-    def _board(self) -> Path:
+    def board(self) -> Path:
+        """Return the root of what the robot's probes read."""
         return self.folder / "board"
 
-    def _lay_out_board(self) -> None:
+    def lay_out_board(self) -> None:
+        """Write what a cool board with a good supply tells."""
         for name, content in _BOARD.items():
-            path = self._board / name
+            path = self.board / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(content, encoding="utf-8")
 
     def _rewrite(self, name: str, value: int) -> None:
-        fresh = self._board / f"{name}.new"
+        fresh = self.board / f"{name}.new"
         fresh.write_text(f"{value}\n", encoding="utf-8")
-        fresh.replace(self._board / name)
+        fresh.replace(self.board / name)
 
     def _start(self) -> WorkingRobot:
         profile = self.folder / "pressed.toml"
@@ -171,7 +176,7 @@ class Scene:
         profile.write_text(text, encoding="utf-8")
         words = {
             "--profile": profile,
-            "--probe-root": self._board,
+            "--probe-root": self.board,
             "--wish": self.folder / "wish.json",
             "--seed": self._seed,
         }

@@ -7,14 +7,15 @@ import subprocess
 import sys
 import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
+from sim_twin.campaigns.talk import Talk
+from sim_twin.campaigns.ticks import Ticks
 from sim_twin.referee import ask
 from vla_deploy.cli.session import Session
-from vla_deploy.ipc import RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor import running
 
 _START_S: Final = 120.0
@@ -25,30 +26,10 @@ _FRESH_S: Final = 3.0
 _FRESH_STATUS_S: Final = 1.0
 _FIRST_MOTION: Final = 1_000_000
 _LAST_WORDS: Final = 8
-_LAST_EVENTS: Final = ("finished", "rejected")
 
 
 class RobotFailed(Exception):
     """Say that the robot did not come up, or went away."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ticks:
-    """Count control's ticks over a time, and how many of them came late."""
-
-    ticks: int
-    late: int
-
-    @property
-    def late_ratio(self) -> float:
-        """Return the late share; everything is late where nothing ticks."""
-        return self.late / self.ticks if self.ticks > 0 else 1.0
-
-    def since(self, before: "Ticks") -> "Ticks":
-        """Return what came after `before`; a control that started anew counts from 0."""
-        if self.ticks < before.ticks:
-            return self
-        return Ticks(ticks=self.ticks - before.ticks, late=self.late - before.late)
 
 
 class WorkingRobot:
@@ -162,12 +143,11 @@ class WorkingRobot:
             return {"outcome": "no answer", "reason": f"none within {_SWITCH_S:g} s"}
         return last()
 
-    def talk(self) -> "Talk":
+    def talk(self) -> Talk:
         """Return a way to give commands."""
         space = self._space
-        return Talk(
-            space.ring_writer("utterance"), space.ring_reader("task_event", from_start=False)
-        )
+        events = space.ring_reader("task_event", from_start=False)
+        return Talk(space.ring_writer("utterance"), events, self.clock)
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Return whether something came true in time.
@@ -229,38 +209,6 @@ class WorkingRobot:
     def _last_words(self) -> str:
         lines = self._log.read_text(encoding="utf-8", errors="replace").splitlines()
         return " | ".join(lines[-_LAST_WORDS:])
-
-
-class Talk:
-    """Give commands one at a time and see how each ends, without ever waiting."""
-
-    def __init__(self, utterances: RingWriter, events: RingReader) -> None:
-        self._utterances = utterances
-        self._events = events
-        self._now = ""
-        self.done = 0
-        self.failed = 0
-
-    @property
-    def is_busy(self) -> bool:
-        """Tell whether the last command has not ended."""
-        return bool(self._now)
-
-    def say(self, text: str) -> None:
-        """Give a command; the one before is no longer followed."""
-        self._now = f"campaign-{uuid.uuid4().hex[:12]}"
-        command = {"command_id": self._now, "source": "cli", "text": text}
-        self._utterances.publish(command)
-
-    def listen(self) -> None:
-        """Note how the command ended."""
-        for event in self._events.drain():
-            said = event.payload
-            if said.get("command_id") == self._now and said.get("event") in _LAST_EVENTS:
-                self._now = ""
-                success = bool(said.get("success"))
-                self.done += success
-                self.failed += not success
 
 
 def _anonymous_mib(pid: int) -> float:

@@ -7,7 +7,9 @@ from dataclasses import replace
 import pytest
 
 from sim_twin.campaigns import pressure
-from sim_twin.campaigns.pressure import TROUBLES, Seen, Ticks, judge, steps_of
+from sim_twin.campaigns.pressure_judge import Seen, judge, steps_of
+from sim_twin.campaigns.ticks import Ticks
+from sim_twin.campaigns.troubles import TROUBLES
 
 HOG = next(trouble for trouble in TROUBLES if trouble.name == "memory_hog")
 QUIET = Ticks(ticks=1000, late=2)

@@ -9,17 +9,16 @@ import pytest
 
 from platforms import ProfileError, load_profile
 from sim_twin.campaigns import switches
-from sim_twin.campaigns.switches import (
-    BAD,
-    GOOD,
+from sim_twin.campaigns.switch_judge import (
     MOST_MIB_PER_SWITCH,
     Seen,
-    Ticks,
     judge,
     memory_case,
     slopes,
     ticks_case,
 )
+from sim_twin.campaigns.switch_profiles import BAD, GOOD
+from sim_twin.campaigns.ticks import Ticks
 
 KEPT = Seen(
     outcome="kept",

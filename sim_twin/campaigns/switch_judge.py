@@ -1,0 +1,97 @@
+"""Judge switches: each by itself, late ticks and memory over all of them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from sim_twin.campaigns.report import Case
+from sim_twin.campaigns.ticks import Ticks, late_limit, total
+
+MOST_MIB_PER_SWITCH: Final = 0.05
+"""A hundred switches may leave 5 MiB: allocators and caches never stand quite still."""
+FEWEST_FOR_A_SLOPE: Final = 40
+LEAST_RATE_RATIO: Final = 0.9
+LEAST_MOTION_RAD: Final = 0.05
+_WARM_UP_RATIO: Final = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """Hold what was measured across one switch; memory is each process' own, in MiB."""
+
+    outcome: str
+    reason: str
+    seconds: float
+    ticks: Ticks
+    least_rate_hz: float
+    moved_rad: float
+    states: frozenset[str]
+    memory_mib: Mapping[str, float]
+
+
+def judge(seen: Seen, outcomes: Sequence[str], reason: str = "") -> Iterator[str]:
+    """Return what was wrong with one switch; late ticks are judged over all of them."""
+    if seen.outcome not in outcomes:
+        yield f"{seen.outcome} ({seen.reason}), expected {' or '.join(outcomes)}"
+    elif reason not in seen.reason:
+        yield f"the reason is {seen.reason!r}, expected a word about {reason}"
+    if seen.states != {"armed"}:
+        strange = ", ".join(sorted(seen.states - {"armed"})) or "never looked at"
+        yield f"control was {strange}"
+    expected = LEAST_RATE_RATIO * seen.least_rate_hz * seen.seconds
+    if seen.ticks.ticks < expected:
+        yield f"{seen.ticks.ticks} ticks in {seen.seconds:.1f} s, expected {expected:.0f}"
+    if seen.moved_rad < LEAST_MOTION_RAD:
+        yield f"moved {seen.moved_rad:.3f} rad, expected {LEAST_MOTION_RAD} at least"
+
+
+def slopes(history: Sequence[Seen]) -> dict[str, float]:
+    """Return by how many MiB each process grows with a switch, after the warm-up."""
+    warm = history[round(_WARM_UP_RATIO * len(history)) :]
+    if len(warm) < 2:
+        return {}
+    numbers = np.arange(len(warm), dtype=float)
+    return {
+        name: float(
+            np.polynomial.Polynomial.fit(numbers, [seen.memory_mib[name] for seen in warm], 1)
+            .convert()
+            .coef[-1]
+        )
+        for name in warm[0].memory_mib
+        if all(name in seen.memory_mib for seen in warm)
+    }
+
+
+def memory_case(history: Sequence[Seen]) -> Case:
+    """Return the verdict about memory; too few switches give figures without a verdict."""
+    found = slopes(history)
+    enough = len(history) >= FEWEST_FOR_A_SLOPE
+    failures = tuple(
+        f"{name} grows by {slope:.3f} MiB per switch, limit {MOST_MIB_PER_SWITCH:g}"
+        for name, slope in found.items()
+        if enough and slope > MOST_MIB_PER_SWITCH
+    )
+    figures: dict[str, Any] = {f"{name}_mib_per_switch": slope for name, slope in found.items()}
+    if not enough:
+        figures["not_judged"] = f"{len(history)} switches, {FEWEST_FOR_A_SLOPE} are needed"
+    return Case(name="memory", failures=failures, figures=figures)
+
+
+def ticks_case(before: Ticks, history: Sequence[Seen]) -> Case:
+    """Return the verdict about late ticks across all switches."""
+    during = total(seen.ticks for seen in history)
+    limit = late_limit(before)
+    failures = (
+        (f"{during.late_ratio:.2%} of the ticks late, limit {limit:.2%}",)
+        if during.late_ratio > limit
+        else ()
+    )
+    figures = {
+        "before_late_ratio": before.late_ratio,
+        "late_ratio": during.late_ratio,
+        "ticks": during.ticks,
+        "late_ticks": during.late,
+    }
+    return Case(name="deadlines", failures=failures, figures=figures)

@@ -1,0 +1,39 @@
+"""Count control's ticks, and say how many of them may be late."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+LATE_MARGIN_RATIO: Final = 0.01
+"""So many more ticks may be late than before: other users of the computer come and go."""
+LATE_FACTOR: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ticks:
+    """Count control's ticks over a time, and how many of them came late."""
+
+    ticks: int
+    late: int
+
+    @property
+    def late_ratio(self) -> float:
+        """Return the late share; everything is late where nothing ticks."""
+        return self.late / self.ticks if self.ticks > 0 else 1.0
+
+    def since(self, before: "Ticks") -> "Ticks":
+        """Return what came after `before`; a control that started anew counts from 0."""
+        if self.ticks < before.ticks:
+            return self
+        return Ticks(ticks=self.ticks - before.ticks, late=self.late - before.late)
+
+
+def late_limit(before: Ticks) -> float:
+    """Return which share of ticks may be late, given the share before."""
+    return max(LATE_FACTOR * before.late_ratio, before.late_ratio + LATE_MARGIN_RATIO)
+
+
+def total(parts: Iterable[Ticks]) -> Ticks:
+    """Return all ticks together."""
+    counted = list(parts)
+    return Ticks(ticks=sum(one.ticks for one in counted), late=sum(one.late for one in counted))

@@ -1,0 +1,77 @@
+"""Whoever gives commands must see each one's end, and not wait for a planner that was away."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.clock import NS_PER_S
+from sim_twin.campaigns.talk import Talk
+from vla_deploy.ipc import SharedSpace
+
+
+class StepClock:
+    def __init__(self) -> None:
+        self.ns = NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.ns = max(self.ns, deadline_ns)
+
+
+class Room:
+    """Hold both ends of a talk."""
+
+    def __init__(self, folder: Path) -> None:
+        self.clock = StepClock()
+        self.space = SharedSpace(folder, self.clock)
+        self._heard = self.space.ring_reader("utterance", from_start=False)
+        self._events = self.space.ring_writer("task_event")
+        writer = self.space.ring_writer("utterance")
+        reader = self.space.ring_reader("task_event", from_start=False)
+        self.talk = Talk(writer, reader, self.clock)
+
+    def say(self, text: str) -> str:
+        self.talk.say(text)
+        (event,) = self._heard.drain()
+        assert event.payload["text"] == text
+        return str(event.payload["command_id"])
+
+    def answer(self, command_id: str, event: str, **more: bool) -> None:
+        self._events.publish({"command_id": command_id, "event": event, **more})
+        self.talk.listen()
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Iterator[Room]:
+    room = Room(tmp_path / "ipc")
+    yield room
+    room.space.close()
+
+
+def test_a_command_goes_on_until_its_own_end(room: Room) -> None:
+    mine = room.say("look left")
+    room.answer("another", "finished", success=True)
+    room.answer(mine, "accepted")
+    room.clock.ns += 100 * NS_PER_S
+    assert room.talk.is_busy
+    room.answer(mine, "finished", success=True)
+    assert not room.talk.is_busy
+    assert (room.talk.done, room.talk.failed) == (1, 0)
+
+
+@pytest.mark.parametrize("event", ["finished", "rejected"])
+def test_what_did_not_succeed_counts_as_failed(room: Room, event: str) -> None:
+    room.answer(room.say("look left"), event)
+    assert not room.talk.is_busy
+    assert (room.talk.done, room.talk.failed) == (0, 1)
+
+
+def test_a_command_that_nobody_heard_holds_nothing_up(room: Room) -> None:
+    room.say("look left")
+    room.clock.ns += 7 * NS_PER_S
+    assert room.talk.is_busy
+    room.clock.ns += 2 * NS_PER_S
+    assert not room.talk.is_busy
