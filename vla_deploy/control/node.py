@@ -44,6 +44,7 @@ from vla_deploy.safety import (
     Verdict,
     evaluate,
 )
+from vla_deploy.safety.probes import jumped_joints
 
 _RESET_NS = 2 * NS_PER_S
 _SHUTDOWN_NS = 3 * NS_PER_S
@@ -228,6 +229,7 @@ class ControlNode:
                 self._gate.sent,
                 self._wheels.v_m_s,
                 self._wheels.w_rad_s,
+                powered=self._mode is not Mode.DISARMED and bool(state.torque_on.all()),
             ),
         )
         before = self._safety
@@ -236,7 +238,17 @@ class ControlNode:
         self._tick_record.judged(
             self._ticks.tick, now_ns, before, inputs, self._limits, self._verdict
         )
+        self._follow_encoders(jumped_joints(inputs, self._limits))
         self._note_reset(now_ns)
+
+    def _follow_encoders(self, jumped: Flags) -> None:
+        """Hold joints whose encoders have jumped where they say they are: else the arm goes there.
+
+        The stop begins in this very tick; nothing may move them before.
+        """
+        if jumped.any():
+            self._place(jumped)
+            self._telemetry.tell_results(self._motions.stop(self._verdict.text))
 
     def _begin_reset(self, now_ns: int) -> None:
         """Remove what a reset may remove, and give the devices time to say that it is gone."""

@@ -25,6 +25,7 @@ from vla_deploy.safety.clearance import (
     JointMotion,
     Stopping,
     beyond_box,
+    least_distances,
     nearest_pair,
     stopping,
 )
@@ -95,6 +96,7 @@ class SurroundingsWatch:
             area.name: np.array(area.polygon_m, dtype=np.float64) for area in robot.home.zones
         }
         boxes = robot.protection.workspaces
+        self._workspaces = tuple(boxes)
         self._box_low = np.array([box.min_m for box in boxes.values()]).reshape(-1, 3)
         self._box_high = np.array([box.max_m for box in boxes.values()]).reshape(-1, 3)
         self._bounds = JointBounds(
@@ -108,7 +110,11 @@ class SurroundingsWatch:
             ),
             reaction_s=ARM_REACTION_S,
         )
-        self._ahead: tuple[Stopping, Floats, Floats] | None = None
+        self._ahead: tuple[Stopping, Floats, Floats, Floats] | None = None
+        self._self_m = robot.protection.clearance.self_m
+        self._floor_m = robot.protection.clearance.floor_m
+        self._self_least = np.full(len(self._body.self_pairs), self._self_m)
+        self._floor_least = np.full(len(self._body.floor_pairs), self._floor_m)
         self._setpoints = SetpointRates()
         self._parts = [_Part(work, NS_PER_S // rate_hz) for work, rate_hz in self._declared_rates()]
 
@@ -130,10 +136,14 @@ class SurroundingsWatch:
         setpoint: Floats,
         v_m_s: float,
         w_rad_s: float,
+        powered: bool,
     ) -> Surroundings:
-        """Do the part that is most overdue, if any, and return all that is known."""
+        """Do the part that is most overdue, if any, and return all that is known.
+
+        `powered` tells whether every joint is: before that, parts may lie against each other.
+        """
         if self._ahead is not None:
-            self._look_at_clearance(position)
+            self._look_at_clearance(powered)
             return self._known
         part = min(self._parts, key=lambda one: one.due_ns)
         if now_ns >= part.due_ns and np.isfinite(position).all() and np.isfinite(velocity).all():
@@ -155,7 +165,7 @@ class SurroundingsWatch:
         self._known = replace(self._known, external_torque_nm=torque)
 
     def _look_ahead(self, body: _Body) -> None:
-        """Measure where the joints come to rest; the next tick measures where they are."""
+        """Measure where the joints come to rest; the next tick measures from where."""
         velocity, acceleration = self._setpoints.rates(body.now_ns, body.setpoint)
         motion = JointMotion(
             position=body.position,
@@ -165,26 +175,31 @@ class SurroundingsWatch:
             setpoint_acceleration=acceleration,
         )
         ahead = stopping(motion, self._bounds)
-        self._ahead = (ahead, *self._body.distances(ahead.position))
+        distances = self._body.near_distances(ahead.position)
+        self._ahead = (ahead, *distances, self._body.grips_here())
 
-    def _look_at_clearance(self, position: Floats) -> None:
+    def _look_at_clearance(self, powered: bool) -> None:
         assert self._ahead is not None, "the caller has looked ahead"
-        (ahead, self_ahead, floor_ahead), self._ahead = self._ahead, None
-        self_now, floor_now = self._body.distances(position)
-        body = self._body
+        (ahead, self_ahead, floor_ahead, grips_ahead), self._ahead = self._ahead, None
+        body, time_s = self._body, ahead.time_s
+        self_start, floor_start = body.near_distances(ahead.start)
+        self._self_least = least_distances(self._self_least, self_start, self._self_m, powered)
+        self._floor_least = least_distances(self._floor_least, floor_start, self._floor_m, powered)
         self._known = replace(
             self._known,
-            self_clearance=nearest_pair(body.self_pairs, self_now, self_ahead, ahead.time_s),
+            self_clearance=nearest_pair(
+                body.self_pairs, self_start, self_ahead, self._self_least, time_s
+            ),
             environment_clearance=nearest_pair(
-                body.floor_pairs, floor_now, floor_ahead, ahead.time_s
+                body.floor_pairs, floor_start, floor_ahead, self._floor_least, time_s
             ),
             workspace=beyond_box(
-                tuple(self._robot.protection.workspaces),
-                body.grips(position),
-                body.grips(ahead.position),
+                self._workspaces,
+                body.grips_here(),
+                grips_ahead,
                 self._box_low,
                 self._box_high,
-                ahead.time_s,
+                time_s,
             ),
         )
 

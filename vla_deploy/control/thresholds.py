@@ -11,6 +11,8 @@ from vla_deploy.safety import SafetyLimits
 _RANGE_MARGIN = 0.02
 _OUTWARD_SHARE = 0.05
 _OVERSPEED = 2.0
+# Servos that answer late and early tell several cycles' way at once.
+_POSITION_JUMP_RAD = 0.08
 _FOLLOWING_ERROR_RAD = 0.4
 _WHEEL_ERROR_OF_TOP = 0.05
 _WHEEL_ERROR_OF_COMMAND = 0.5
@@ -43,6 +45,9 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         position_upper=robot.position_max + margin,
         outward_velocity=_OUTWARD_SHARE * robot.velocity_max,
         velocity=_OVERSPEED * robot.velocity_max,
+        position_jump=np.array(
+            [_POSITION_JUMP_RAD * servo.travel_per_rad for servo in robot.servo_bus.servos]
+        ),
         following_error=_following_error(robot),
         wheel_error_rad_s=_WHEEL_ERROR_OF_TOP
         * robot.base.max_speed_m_s

@@ -4,6 +4,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.control.axes import Floats
+from vla_deploy.control.joint_steps import JointSteps
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import CellReader, SharedSpace
@@ -27,9 +28,11 @@ class Watch:
         self._base_sequence = 0
         self._base_age_s: float | None = None
         self._quiet = np.zeros(len(servos.state.torque_on), dtype=np.bool_)
+        self._steps = JointSteps(len(self._quiet))
 
     def refresh(self) -> None:
-        """Take in the newest base command."""
+        """Take in the newest base command and what the joints have told."""
+        self._steps.take(self._servos.state)
         sample = self._base_command.latest()
         if sample is None:
             return
@@ -65,6 +68,8 @@ class Watch:
             reset_requested=reset_requested,
             position=state.position_rad,
             velocity=state.velocity_rad_s,
+            position_step=self._steps.step,
+            step_time_s=self._steps.time_s,
             setpoint=setpoint,
             torque_enabled=state.torque_on,
             sample_age_s=state.age_s,

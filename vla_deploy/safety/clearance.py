@@ -14,10 +14,13 @@ from vla_deploy.safety.surroundings import Clearance, Excess
 
 Floats = NDArray[np.float64]
 
-# Below this share of its top speed a joint counts as standing: servos tell speed in coarse steps.
+# Below this share of its top speed a joint that does not follow its setpoint counts as standing:
+# servos tell speed in coarse steps. Setpoints are exact.
 STANDING_SHARE = 0.03
 # A gap that closes slower than this does not close: it is the play of the distances themselves.
 CLOSING_M_S = 0.005
+# What rests on something when power comes may settle this much deeper.
+PLAY_M = 0.003
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +49,9 @@ class JointMotion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stopping:
-    """Carry the pose in which the joints come to rest, and how long the slowest one takes."""
+    """Carry from where and to where the joints come to rest; how long the slowest one takes."""
 
+    start: Floats
     position: Floats
     time_s: float
 
@@ -61,7 +65,7 @@ def stopping(motion: JointMotion, bounds: JointBounds) -> Stopping:
     start = np.where(follows, motion.setpoint, motion.position)
     velocity = np.where(follows, motion.setpoint_velocity, motion.velocity)
     acceleration = np.where(follows, motion.setpoint_acceleration, 0.0)
-    moving = np.abs(velocity) > STANDING_SHARE * bounds.velocity
+    moving = np.abs(velocity) > np.where(follows, 0.0, STANDING_SHARE * bounds.velocity)
     speed = np.where(moving, np.abs(velocity), 0.0)
     gain = np.clip(acceleration * np.sign(velocity), -bounds.acceleration, bounds.acceleration)
     onset_s = (bounds.acceleration + gain) / bounds.jerk
@@ -69,21 +73,37 @@ def stopping(motion: JointMotion, bounds: JointBounds) -> Stopping:
     way = np.sign(velocity) * speed * (bounds.reaction_s + 0.5 * onset_s + 0.5 * braking_s)
     low, high = np.minimum(bounds.lower, start), np.maximum(bounds.upper, start)
     slowest_s = float(np.where(moving, onset_s + braking_s, 0.0).max())
-    return Stopping(position=np.clip(start + way, low, high), time_s=bounds.reaction_s + slowest_s)
+    return Stopping(
+        start=start, position=np.clip(start + way, low, high), time_s=bounds.reaction_s + slowest_s
+    )
+
+
+def least_distances(least_m: Floats, start_m: Floats, limit_m: float, powered: bool) -> Floats:
+    """Return how near each pair may come: the limit, and less for those that power found nearer.
+
+    Those may stay and part, but a pair that has parted may not come as near again.
+    """
+    here: Floats = np.minimum(start_m - PLAY_M, limit_m)
+    return np.maximum(here, least_m) if powered else here
 
 
 def nearest_pair(
-    pairs: Sequence[tuple[str, str]], now_m: Floats, ahead_m: Floats, time_s: float
+    pairs: Sequence[tuple[str, str]],
+    start_m: Floats,
+    ahead_m: Floats,
+    least_m: Floats,
+    time_s: float,
 ) -> Clearance | None:
-    """Return the pair that comes nearest; pairs that close their gap go before all others.
+    """Return the pair with the least to spare; pairs that close their gap go before all others.
 
     Its distance is the one ahead, its rate the mean on the way there.
     """
     if len(pairs) == 0:
         return None
-    rate = (now_m - ahead_m) / time_s
+    rate = (start_m - ahead_m) / time_s
     closing = rate > CLOSING_M_S
-    among = np.where(closing, ahead_m, np.inf) if closing.any() else ahead_m
+    spare_m = ahead_m - least_m
+    among = np.where(closing, spare_m, np.inf) if closing.any() else spare_m
     worst = int(among.argmin())
     first, second = pairs[worst]
     return Clearance(
@@ -91,11 +111,12 @@ def nearest_pair(
         second=second,
         distance_m=float(ahead_m[worst]),
         closing_m_s=float(rate[worst]) if closing[worst] else 0.0,
+        least_m=float(least_m[worst]),
     )
 
 
 def beyond_box(
-    names: Sequence[str], now: Floats, ahead: Floats, low: Floats, high: Floats, time_s: float
+    names: Sequence[str], start: Floats, ahead: Floats, low: Floats, high: Floats, time_s: float
 ) -> Excess | None:
     """Return which point, (n, 3), ends up furthest outside its box; None while all stay inside.
 
@@ -103,8 +124,8 @@ def beyond_box(
     """
     if len(names) == 0:
         return None
-    excess_now, excess_ahead = _outside(now, low, high), _outside(ahead, low, high)
-    rate = (excess_ahead - excess_now) / time_s
+    excess_start, excess_ahead = _outside(start, low, high), _outside(ahead, low, high)
+    rate = (excess_ahead - excess_start) / time_s
     leaving = rate > CLOSING_M_S
     among = np.where(leaving, excess_ahead, -np.inf) if leaving.any() else excess_ahead
     worst = int(among.argmax())

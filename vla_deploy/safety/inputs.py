@@ -31,8 +31,10 @@ class SafetyInputs:
     """Carry one tick's measurements, joint arrays in the order of the robot file.
 
     `energised` is true from arming until the robot is disarmed again, `standstill` while it has to
-    stand under a stop. `effort_ratio` is of the stall current; voltage and temperature are NaN
-    before the first reading, and are read less often than the rest: `climate_age_s`.
+    stand under a stop. `position_step` is what a joint has gone since its sample before this one,
+    `step_time_s` the time between both; both are 0 where no new one came. `effort_ratio` is of the
+    stall current; voltage and temperature are NaN before the first reading, and are read less often
+    than the rest: `climate_age_s`.
     `budget_stop` says which budget demands a stop.
     An age of None means that nothing has ever arrived, so there is nothing to lose yet.
     """
@@ -42,6 +44,8 @@ class SafetyInputs:
     reset_requested: bool
     position: Floats
     velocity: Floats
+    position_step: Floats
+    step_time_s: Floats
     setpoint: Floats
     torque_enabled: Flags
     sample_age_s: Floats
@@ -68,7 +72,8 @@ class SafetyLimits:
     """Carry the thresholds; an infinite entry switches one joint's check off.
 
     `outward_velocity` is the speed above which a joint beyond its range counts as still
-    leaving it, so that the way back stays open. A wheel may be off its commanded speed by
+    leaving it, so that the way back stays open. `position_jump` is what a joint may go beyond what
+    `velocity` allows between two samples. A wheel may be off its commanded speed by
     `wheel_error_rad_s`, and by `wheel_error_ratio` of that speed on top. What is too close or out
     of the workspace counts only while it gets worse by more than `approach_m_s`: the way back
     stays open there too.
@@ -79,6 +84,7 @@ class SafetyLimits:
     position_upper: Floats
     outward_velocity: Floats
     velocity: Floats
+    position_jump: Floats
     following_error: Floats
     wheel_error_rad_s: float
     wheel_error_ratio: float

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.safety.findings import Finding, first_joint, stale
-from vla_deploy.safety.inputs import Floats, SafetyInputs, SafetyLimits
+from vla_deploy.safety.inputs import Flags, Floats, SafetyInputs, SafetyLimits
 
 EVERY_SERVO: Final = "every servo"
 
@@ -27,6 +27,18 @@ def joint_position_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding 
 def joint_velocity_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a powered joint that is faster than allowed."""
     return _powered_above(np.abs(inputs.velocity), limits.velocity, inputs, limits)
+
+
+def encoder_jump(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a powered joint that is said to have gone further than any joint can in that time."""
+    step, allowed = np.abs(inputs.position_step), _possible_step(inputs, limits)
+    return first_joint(jumped_joints(inputs, limits), step, allowed, inputs.sample_age_s, limits)
+
+
+def jumped_joints(inputs: SafetyInputs, limits: SafetyLimits) -> Flags:
+    """Tell which powered joints `encoder_jump` finds: their setpoints are where no joint is."""
+    beyond: Flags = np.abs(inputs.position_step) > _possible_step(inputs, limits)
+    return beyond & inputs.torque_enabled
 
 
 def following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
@@ -163,6 +175,10 @@ def supervisor_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | Non
 def budget_exhausted(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a budget whose last step is the protective stop."""
     return None if inputs.budget_stop is None else Finding(subject=inputs.budget_stop)
+
+
+def _possible_step(inputs: SafetyInputs, limits: SafetyLimits) -> Floats:
+    return limits.velocity * inputs.step_time_s + limits.position_jump
 
 
 def _powered_above(

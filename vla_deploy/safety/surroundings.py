@@ -4,6 +4,7 @@ Whoever computes these numbers says what is; `causes.py` and `SafetyLimits` say 
 None means that nothing is known, 0 and () that it is known to be nothing.
 """
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -59,12 +60,17 @@ class Excess:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Clearance:
-    """Tell the smallest distance of a pair of bodies; a positive rate closes the gap."""
+    """Tell the smallest distance of a pair of bodies; a positive rate closes the gap.
+
+    `least_m` is how near this pair may come: less than all others' where it lay nearer when power
+    came.
+    """
 
     first: str
     second: str
     distance_m: float
     closing_m_s: float
+    least_m: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

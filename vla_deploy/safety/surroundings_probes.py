@@ -109,12 +109,15 @@ def _moves_by_itself(inputs: SafetyInputs) -> bool:
 def _too_close(
     pair: Clearance | None, allowed_m: float, age_s: float, limits: SafetyLimits
 ) -> Finding | None:
-    if pair is None or pair.distance_m >= allowed_m or pair.closing_m_s <= limits.approach_m_s:
+    if pair is None or pair.closing_m_s <= limits.approach_m_s:
+        return None
+    least_m = min(allowed_m, pair.least_m)
+    if pair.distance_m >= least_m:
         return None
     return Finding(
         subject=f"{pair.first} and {pair.second}",
         measured=pair.distance_m,
-        limit=allowed_m,
+        limit=least_m,
         age_s=age_s,
     )
 

@@ -39,15 +39,29 @@ def test_an_arm_that_is_blocked_on_its_way_stops_before_its_following_error(arme
 
 def test_an_arm_on_its_way_into_the_body_is_stopped_where_they_touch_at_most(armed: Any) -> None:
     shapes = armed.control._surroundings._body
+    apart = shapes.distances(armed.column("position"))[0] > 0.02  # the right hand lies on the base
     least_m, causes = np.inf, set()
     inward = {"left_shoulder_yaw": -1.17, "left_shoulder_pitch": 1.2, "left_elbow": 1.5}
     armed.go(1, **inward)
     for _ in range(100):
         armed.run(0.02)
         causes.add(armed.status["cause"])
-        least_m = min(least_m, float(shapes.distances(armed.column("position"))[0].min()))
+        gaps_m = shapes.distances(armed.column("position"))[0]
+        least_m = min(least_m, float(gaps_m[apart].min()))
     assert "self_collision" in causes
-    assert least_m > -OVERSHOOT_M
+    assert least_m > armed.robot.protection.clearance.self_m - OVERSHOOT_M
+
+
+def test_arms_that_lie_on_the_base_are_armed_and_leave_it_without_a_stop(armed: Any) -> None:
+    shapes = armed.control._surroundings._body
+    assert shapes.distances(armed.column("position"))[0].min() < 0.001
+    armed.go(1, **armed.robot.poses["tuck"])
+    causes = set()
+    for _ in range(200):
+        armed.run(0.02)
+        causes.add(armed.status["cause"])
+    assert causes == {""}
+    assert shapes.distances(armed.column("position"))[0].min() > 0.02
 
 
 def test_setpoint_rates_are_differences_and_begin_at_zero() -> None:
@@ -72,7 +86,9 @@ def refreshed(watch: SurroundingsWatch, rig: Any, position: np.ndarray, ticks: i
     still = np.zeros_like(position)
     now_ns = rig.lockstep.clock.now_ns()
     for tick in range(ticks):
-        known = watch.refresh(now_ns + tick * 4_000_000, position, still, still, position, 0.0, 0.0)
+        known = watch.refresh(
+            now_ns + tick * 4_000_000, position, still, still, position, 0.0, 0.0, powered=True
+        )
     return known
 
 

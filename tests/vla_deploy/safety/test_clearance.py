@@ -1,5 +1,7 @@
 """Clearances where the joints come to rest, and points beyond their boxes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,9 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vla_deploy.safety.clearance import (
+    PLAY_M,
     JointBounds,
     JointMotion,
     beyond_box,
+    least_distances,
     nearest_pair,
     stopping,
 )
@@ -24,6 +28,8 @@ BOUNDS = JointBounds(
     reaction_s=0.1,
 )
 PAIRS = (("hand", "torso"), ("hand", "head"), ("elbow", "torso"))
+LIMIT_M = 0.005
+LEAST = np.full(3, LIMIT_M)
 LOW, HIGH = np.array([[-1.0, -1.0, 0.0]] * 2), np.array([[1.0, 1.0, 1.0]] * 2)
 
 speeds = arrays(np.float64, 2, elements=st.floats(-2.0, 2.0))
@@ -44,9 +50,28 @@ def driven(
 
 def test_standing_joints_stay_where_they_are() -> None:
     here = np.array([0.2, 0.01])
-    at_rest = stopping(driven(here, np.array([0.02, -0.002])), BOUNDS)
-    assert at_rest.position.tolist() == here.tolist()
+    at_rest = stopping(driven(here, np.zeros(2)), BOUNDS)
+    assert at_rest.start.tolist() == at_rest.position.tolist() == here.tolist()
     assert at_rest.time_s == BOUNDS.reaction_s
+
+
+def test_what_a_servo_tells_of_a_standing_joint_that_does_not_follow_is_no_motion() -> None:
+    motion = JointMotion(
+        position=np.array([0.5, 0.02]),
+        velocity=np.array([0.03, -0.003]),
+        setpoint=np.array([0.0, 0.01]),
+        setpoint_velocity=np.zeros(2),
+        setpoint_acceleration=np.zeros(2),
+    )
+    at_rest = stopping(motion, BOUNDS)
+    assert at_rest.start.tolist() == at_rest.position.tolist() == [0.5, 0.02]
+    moving = stopping(replace(motion, velocity=np.array([0.031, -0.003])), BOUNDS)
+    assert moving.position[0] > 0.5
+
+
+def test_a_setpoint_that_creeps_is_motion() -> None:
+    at_rest = stopping(driven(np.zeros(2), np.array([0.001, 0.0])), BOUNDS)
+    assert at_rest.position[0] > 0.0001
 
 
 def test_a_moving_joint_needs_its_reaction_onset_and_braking_way() -> None:
@@ -91,14 +116,14 @@ def test_a_faster_joint_never_stops_sooner(velocity: np.ndarray, factor: float) 
 
 
 def test_the_nearest_pair_is_told_while_none_closes() -> None:
-    found = nearest_pair(PAIRS, np.array([0.3, 0.1, 0.2]), np.array([0.3, 0.1, 0.2]), 0.2)
+    found = nearest_pair(PAIRS, np.array([0.3, 0.1, 0.2]), np.array([0.3, 0.1, 0.2]), LEAST, 0.2)
     assert found is not None
     assert (found.first, found.second) == ("hand", "head")
     assert (found.distance_m, found.closing_m_s) == (0.1, 0.0)
 
 
 def test_a_pair_that_closes_goes_before_one_that_rests_nearer() -> None:
-    found = nearest_pair(PAIRS, np.array([0.3, 0.0, 0.2]), np.array([0.25, 0.0, 0.1]), 0.5)
+    found = nearest_pair(PAIRS, np.array([0.3, 0.0, 0.2]), np.array([0.25, 0.0, 0.1]), LEAST, 0.5)
     assert found is not None
     assert (found.first, found.second) == ("elbow", "torso")
     assert found.distance_m == 0.1
@@ -106,13 +131,44 @@ def test_a_pair_that_closes_goes_before_one_that_rests_nearer() -> None:
 
 
 def test_a_pair_that_opens_does_not_close() -> None:
-    found = nearest_pair(PAIRS[:1], np.array([0.01]), np.array([0.05]), 0.2)
+    found = nearest_pair(PAIRS[:1], np.array([0.01]), np.array([0.05]), LEAST[:1], 0.2)
     assert found is not None
     assert found.closing_m_s == 0.0
 
 
 def test_without_pairs_there_is_no_clearance() -> None:
-    assert nearest_pair((), np.zeros(0), np.zeros(0), 0.1) is None
+    assert nearest_pair((), np.zeros(0), np.zeros(0), LEAST[:0], 0.1) is None
+
+
+def test_a_pair_that_lay_near_when_power_came_hides_none_that_comes_near_now() -> None:
+    least_m = np.array([0.005, -0.004, 0.005])
+    found = nearest_pair(
+        PAIRS, np.array([0.3, 0.0, 0.1]), np.array([0.3, -0.001, 0.004]), least_m, 0.1
+    )
+    assert found is not None
+    assert (found.first, found.distance_m, found.least_m) == ("elbow", 0.004, 0.005)
+    found = nearest_pair(
+        PAIRS, np.array([0.3, 0.0, 0.1]), np.array([0.3, -0.006, 0.09]), least_m, 0.1
+    )
+    assert found is not None
+    assert (found.second, found.distance_m, found.least_m) == ("head", -0.006, -0.004)
+
+
+def test_before_power_comes_a_pair_may_be_where_it_is_and_no_nearer() -> None:
+    here = np.array([0.2, -0.001, LIMIT_M + 0.001])
+    least_m = least_distances(LEAST, here, LIMIT_M, powered=False)
+    assert least_m == pytest.approx([LIMIT_M, -0.001 - PLAY_M, LIMIT_M + 0.001 - PLAY_M])
+    sunk = least_distances(least_m, here - 0.01, LIMIT_M, powered=False)
+    assert sunk[1] == pytest.approx(-0.011 - PLAY_M)
+
+
+def test_under_power_what_has_parted_may_not_come_as_near_again() -> None:
+    least_m = least_distances(LEAST, np.full(3, -0.001), LIMIT_M, powered=False)
+    apart = least_distances(least_m, np.array([0.002, 0.02, -0.001]), LIMIT_M, powered=True)
+    assert apart == pytest.approx([0.002 - PLAY_M, LIMIT_M, -0.001 - PLAY_M])
+    assert (
+        least_distances(apart, np.full(3, -0.001), LIMIT_M, powered=True).tolist() == apart.tolist()
+    )
 
 
 def test_inside_the_box_there_is_no_excess() -> None:

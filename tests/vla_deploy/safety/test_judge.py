@@ -40,6 +40,7 @@ LIMITS = SafetyLimits(
     position_upper=np.array([1.0, 2.0]),
     outward_velocity=np.array([0.05, 0.05]),
     velocity=np.array([2.0, 3.0]),
+    position_jump=np.array([0.125, np.inf]),
     following_error=np.array([0.25, np.inf]),
     wheel_error_rad_s=0.25,
     wheel_error_ratio=0.5,
@@ -77,6 +78,8 @@ HEALTHY = SafetyInputs(
     reset_requested=False,
     position=np.array([0.0, 1.0]),
     velocity=np.zeros(2),
+    position_step=np.zeros(2),
+    step_time_s=np.full(2, 0.004),
     setpoint=np.array([0.0, 1.0]),
     torque_enabled=np.array([True, True]),
     sample_age_s=np.zeros(2),
@@ -121,9 +124,22 @@ def excess(excess_m: float, rate_m_s: float) -> dict[str, Any]:
     return around(workspace=Excess(subject="left hand", excess_m=excess_m, rate_m_s=rate_m_s))
 
 
-def close_by(which: str, distance_m: float, closing_m_s: float) -> dict[str, Any]:
-    pair = Clearance(first="hand", second="head", distance_m=distance_m, closing_m_s=closing_m_s)
+def close_by(
+    which: str, distance_m: float, closing_m_s: float, least_m: float = np.inf
+) -> dict[str, Any]:
+    pair = Clearance(
+        first="hand",
+        second="head",
+        distance_m=distance_m,
+        closing_m_s=closing_m_s,
+        least_m=least_m,
+    )
     return around(**{which: pair})
+
+
+def stepped(step: float, time_s: float = 0.25, **changes: Any) -> dict[str, Any]:
+    steps = {"position_step": np.array([step, 9.0]), "step_time_s": np.array([time_s, 0.0])}
+    return steps | changes
 
 
 def within(depth_m: float) -> dict[str, Any]:
@@ -183,6 +199,15 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         {"watchdog_tripped": np.array([False, True])},
         {"watchdog_tripped": np.array([False, False])},
         "elbow",
+    ),
+    (Cause.ENCODER_JUMP, stepped(0.625 + ULP), stepped(0.625), "shoulder"),
+    (Cause.ENCODER_JUMP, stepped(-0.625 - ULP), stepped(-0.625), "shoulder"),
+    (Cause.ENCODER_JUMP, stepped(0.125 + ULP, 0.0), stepped(0.125, 0.0), "shoulder"),
+    (
+        Cause.ENCODER_JUMP,
+        stepped(3.0),
+        stepped(3.0, torque_enabled=np.array([False, True])),
+        "shoulder",
     ),
     (Cause.JOINT_POSITION_LIMIT, at(1.0 + ULP, 0.06), at(1.0, 0.06), "shoulder"),
     (Cause.JOINT_POSITION_LIMIT, at(1.1, 0.05 + ULP), at(1.1, 0.05), "shoulder"),
@@ -318,6 +343,12 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         Cause.SELF_COLLISION,
         close_by("self_clearance", 0.004, 0.005 + ULP),
         close_by("self_clearance", 0.004, 0.005),
+        "hand and head",
+    ),
+    (
+        Cause.SELF_COLLISION,
+        close_by("self_clearance", -0.002 - ULP, 0.006, least_m=-0.002),
+        close_by("self_clearance", -0.002, 0.006, least_m=-0.002),
         "hand and head",
     ),
     (
