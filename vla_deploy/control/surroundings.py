@@ -88,6 +88,7 @@ class SurroundingsWatch:
             source: Nearby(source, space, robot, model, self._body) for source in ZoneSource
         }
         self._triggers: dict[str, Trigger] = {}
+        self._stands = False
         self._reach_m = max((self._reach_of(zone) for zone in robot.protection.zones), default=0.0)
         self._pose = space.cell_reader("pose")
         self._imu = space.cell_reader("imu")
@@ -208,9 +209,12 @@ class SurroundingsWatch:
             source: _within(nearby.points(body.now_ns, body.position, body.motion), self._reach_m)
             for source, nearby in self._nearby.items()
         }
+        stood, self._stands = self._stands, body.motion.stands
+        nothing_new = stood and self._stands and not any(n.fresh for n in self._nearby.values())
+        zones = self._known.zones if nothing_new else self._zone_findings(points, body.motion)
         self._known = replace(
             self._known,
-            zones=tuple(self._zone_findings(points, body.motion)),
+            zones=tuple(zones),
             scan_age_s=self._nearby[ZoneSource.LIDAR].age_s,
             depth_age_s=self._nearby[ZoneSource.DEPTH].age_s,
         )

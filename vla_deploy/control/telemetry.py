@@ -70,6 +70,10 @@ class Telemetry:
             writer.close()
 
 
+# A tick is late when more than this many periods lie between its begin and the last one's.
+_LATE_PERIODS = 1.2
+
+
 class TickClock:
     """Measure the ticks: how long since the last one, how many came late."""
 
@@ -93,6 +97,6 @@ class TickClock:
         if last_ns is None:
             return nominal_s
         gap_s = (now_ns - last_ns) / 1e9
-        self.late_ticks += gap_s > 1.5 * nominal_s
+        self.late_ticks += gap_s > _LATE_PERIODS * nominal_s
         self.period_s += 0.02 * (gap_s - self.period_s)
         return min(max(gap_s, 0.0), 2.0 * nominal_s)

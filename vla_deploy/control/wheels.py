@@ -132,14 +132,17 @@ class Wheels:
         state = self.state
         if state is None:
             return ()
+        dropped_out, age_s = self._dropped_out, state.age_s.tolist()
+        commanded_rad_s = self._tracking.commanded_rad_s.tolist()
+        measured_rad_s = self._tracking.measured_rad_s.tolist()
         return tuple(
             DriveSample(
                 name=drive.joint,
                 lost=state.lost[row],
-                age_s=float(state.age_s[row]),
-                fault_code=_fault_code(state, row, dropped_out=self._dropped_out),
-                commanded_rad_s=float(self._tracking.commanded_rad_s[row]),
-                measured_rad_s=float(self._tracking.measured_rad_s[row]),
+                age_s=age_s[row],
+                fault_code=_fault_code(state, row, dropped_out=dropped_out),
+                commanded_rad_s=commanded_rad_s[row],
+                measured_rad_s=measured_rad_s[row],
             )
             for row, drive in enumerate(self._wiring.drives)
         )

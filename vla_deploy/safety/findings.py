@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from vla_deploy.safety.inputs import Flags, Floats, SafetyInputs, SafetyLimits
 from vla_deploy.safety.surroundings import Direction
 
@@ -29,7 +31,7 @@ def first_joint(
     mask: Flags, measured: Floats, limit: Floats, age_s: Floats, limits: SafetyLimits
 ) -> Finding | None:
     """Return the finding of the first joint that a mask names."""
-    if not mask.any():
+    if not np.count_nonzero(mask):  # several times faster than `any` on a few joints
         return None
     joint = int(mask.argmax())
     return Finding(

@@ -24,6 +24,7 @@ _PROBE_M = 0.01
 _PROBE_RAD = 0.02
 _ARC_STEP_S = 0.05
 _STANDING_M_S = 1e-3
+_STANDING_RAD_S = 1e-3
 
 
 # What each direction does to the base within a probe: x in metres, turn in radians.
@@ -57,6 +58,11 @@ class Motion:
     v_m_s: float
     w_rad_s: float
     deceleration_m_s2: float
+
+    @property
+    def stands(self) -> bool:
+        """Tell whether the base is too slow for its motion to matter."""
+        return abs(self.v_m_s) < _STANDING_M_S and abs(self.w_rad_s) < _STANDING_RAD_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
