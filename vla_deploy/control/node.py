@@ -19,6 +19,7 @@ from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionSet
 from vla_deploy.control.operator_desk import Act, OperatorDesk
 from vla_deploy.control.payload import Payload
+from vla_deploy.control.rest import Rest
 from vla_deploy.control.retuning import Tuning, retuned, tuning_of
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import Mode, ModeInputs, next_mode, status_name
@@ -85,6 +86,7 @@ class ControlNode:
             turn_acceleration_rad_s2=robot.base.max_turn_acceleration_rad_s2,
         )
         self._base = BaseRamp(self._base_limits)
+        self._rest = Rest()
         self._arming = Arming(self._servos, self._wheels, clock)
         self._plan = StopPlan(robot)
         self._dispatcher = Dispatcher(robot, self._motions, self._servos)
@@ -360,7 +362,11 @@ class ControlNode:
         self._wheels.disable()
 
     def _at_rest(self) -> bool:
-        return self._motions.at_rest and self._base.at_rest and self._wheels.still
+        return self._rest.reached(
+            self._clock.now_ns(),
+            setpoints_rest=self._motions.at_rest and self._base.at_rest,
+            wheels_still=self._wheels.still,
+        )
 
     # --- plan, limit, write -------------------------------------------------------------------
 
