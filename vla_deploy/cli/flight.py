@@ -15,10 +15,11 @@ from vla_deploy.supervisor import default_base
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
 from vla_deploy.telemetry.flight import Flight, read_flight
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
-from vla_deploy.telemetry.judge import Judgement, judge_again
+from vla_deploy.telemetry.judge import Judgement, judge_again, rules_digest
 from vla_deploy.telemetry.timeline import time_line
 
 SAVE_TIMEOUT_S = 60.0
+_OTHER = "judge it there, or record an example flight anew"
 EXAMPLES = """  vla-deploy flight list
   vla-deploy flight show latest         what happened, line by line
   vla-deploy flight judge latest        the safety rules must come to the same verdicts again
@@ -86,13 +87,15 @@ def run_judge(arguments: argparse.Namespace) -> int:
     folder, agreed, results = _folder(arguments), True, []
     for name in arguments.flight:
         path = folder.find(name)
-        judgement = judge_again(
-            tick_bytes(message.text) for message in read_flight(path).messages(TICKS)
-        )
+        flight = read_flight(path)
+        judgement = judge_again(tick_bytes(message.text) for message in flight.messages(TICKS))
         agreed &= judgement.difference is None
-        results.append({"file": path.name, **judgement.document})
+        same = flight.rules == rules_digest()
+        results.append({"file": path.name, "same_rules": same, **judgement.document})
         if not arguments.json:
             print(f"{path.name}: {_verdict(judgement)}")
+        if not arguments.json and judgement.difference and not same:
+            print(f"  recorded by other rules than these, of a version {flight.version}: {_OTHER}")
     if arguments.json:
         print(json.dumps(results, indent=2))
     return 0 if agreed else 1

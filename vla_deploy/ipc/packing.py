@@ -251,6 +251,6 @@ def _check(
     if unknown or missing:
         raise BadPayload(
             f"recorded {name} does not fit this version: unknown fields {unknown}, fields without "
-            f"a default that are missing {missing}; judge it with the version that recorded it"
+            f"a default that are missing {missing}"
         )
     return kind, tuple(fields)

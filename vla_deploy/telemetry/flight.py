@@ -12,6 +12,7 @@ from mcap.reader import McapReader, make_reader
 from zstandard import ZstdError
 
 from vla_deploy.telemetry.errors import FlightUnreadable
+from vla_deploy.telemetry.history import KEPT_NS
 from vla_deploy.telemetry.writing import METADATA
 
 # What the library and what it unpacks with raise on bytes that are no MCAP; lz4: RuntimeError.
@@ -34,13 +35,17 @@ class Message:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flight:
-    """Describe one file; `counts` is the number of messages per topic."""
+    """Describe one file; `counts` is the number of messages per topic.
+
+    It starts where everything is remembered from; a topic that seldom changes has an older value.
+    """
 
     path: Path
     run_id: str
     robot: str
     profile: str
     version: str
+    rules: str
     wall_offset_ns: int
     causes: tuple[dict[str, Any], ...]
     counts: dict[str, int]
@@ -93,17 +98,19 @@ def _describe(path: Path, reader: McapReader) -> Flight:
         for channel, count in statistics.channel_message_counts.items()
     }
     offset_ns = int(metadata["wall_offset_ns"])
+    end_ns = statistics.message_end_time - offset_ns
     return Flight(
         path=path,
         run_id=metadata["run_id"],
         robot=metadata["robot"],
         profile=metadata["profile"],
         version=metadata["vla_deploy"],
+        rules=metadata.get("rules", ""),
         wall_offset_ns=offset_ns,
         causes=tuple(json.loads(metadata["causes"])),
         counts=counts,
-        start_ns=statistics.message_start_time - offset_ns,
-        end_ns=statistics.message_end_time - offset_ns,
+        start_ns=max(statistics.message_start_time - offset_ns, end_ns - KEPT_NS),
+        end_ns=end_ns,
     )
 
 

@@ -3,6 +3,12 @@
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
+
+from drivers.clock import NS_PER_S
+
+# 30 s before what happened, a few after it, and the time until it is written.
+KEPT_NS: Final = 36 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

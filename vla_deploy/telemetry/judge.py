@@ -2,6 +2,9 @@
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
+from functools import cache
+from hashlib import sha256
+from importlib.resources import files
 from typing import Any
 
 from vla_deploy.ipc import BadPayload
@@ -55,6 +58,17 @@ class Judgement:
         return asdict(self)
 
 
+@cache
+def rules_digest() -> str:
+    """Return what is the same as long as the sources of the safety rules are."""
+    sources = {
+        one.name: one.read_bytes()
+        for one in files("vla_deploy.safety").iterdir()
+        if one.name.endswith(".py")
+    }
+    return sha256(repr(sorted(sources.items())).encode()).hexdigest()
+
+
 def judge_again(records: Iterable[bytes]) -> Judgement:
     """Judge the ticks of one flight again, up to the first difference.
 
@@ -106,7 +120,10 @@ def read_tick(reader: DeltaReader, record: bytes) -> RecordedTick | None:
             sent=row["sent"],
         )
     except (BadPayload, TypeError, KeyError) as error:
-        raise FlightForeign(f"recorded ticks do not fit this version: {error}") from error
+        raise FlightForeign(
+            f"recorded by other rules, its ticks do not fit this version: {error}; judge it with "
+            "the version that recorded it, or record an example flight anew"
+        ) from error
 
 
 def _first_difference(tick: int, recorded: Any, judged: Any) -> Difference | None:

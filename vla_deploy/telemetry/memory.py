@@ -7,13 +7,11 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import TOPICS, CellReader, FrameReader, Kind, Record, RingReader, SharedSpace
 from vla_deploy.telemetry.channels import TICKS
-from vla_deploy.telemetry.history import History, Kept
+from vla_deploy.telemetry.history import KEPT_NS, History, Kept
 from vla_deploy.telemetry.images import compress
 
-KEPT_S: Final = 36.0  # 30 s before what happened, a few after it, and the time until it is written
 LIMIT_BYTES: Final = 48 * 2**20
 FRAME_PERIOD_S: Final = 2.0
-_KEPT_NS = round(KEPT_S * NS_PER_S)
 
 Value = tuple[str, Kept]
 
@@ -25,7 +23,7 @@ class Memory:
     """
 
     def __init__(self, space: SharedSpace) -> None:
-        self._history = History(_KEPT_NS, LIMIT_BYTES)
+        self._history = History(KEPT_NS, LIMIT_BYTES)
         self._ticks = space.record_reader(TICKS)
         self._cells: dict[str, CellReader] = {}
         self._rings: dict[str, RingReader] = {}
@@ -53,7 +51,7 @@ class Memory:
 
     def snapshot(self, now_ns: int) -> tuple[list[Value], list[Record]]:
         """Return all values and all ticks, by time."""
-        return self._history.snapshot(), self._ticks.held(now_ns - _KEPT_NS)
+        return self._history.snapshot(), self._ticks.held(now_ns - KEPT_NS)
 
     @property
     def held_bytes(self) -> int:

@@ -11,6 +11,7 @@ from drivers.clock import NS_PER_S
 _IN_SERVICE = frozenset({"disarmed", "arming", "armed", "disarming"})
 _TROUBLE = frozenset({"back-off", "given up"})
 _MAX_CAUSES = 50
+_SELF = "recorder"
 
 
 class Kind(Enum):
@@ -55,16 +56,18 @@ class Watcher:
         return [Trigger(kind=Kind.STOP, what=stopped_by, at_ns=at_ns, detail=detail)]
 
     def table(self, document: Mapping[str, Any], at_ns: int) -> list[Trigger]:
-        """Return a trigger for each process that has ended by itself."""
+        """Return a trigger for each process that has ended by itself, the recorder included."""
         triggers = []
         for row in document["processes"]:
             state, restarts = str(row["state"]), int(row["restarts"])
             before = self._rows.get(row["name"])
             self._rows[row["name"]] = (state, restarts)
+            if before is None and row["name"] == _SELF:
+                before = ("", 0)  # what it was about to write is lost with it: write it now
             if before is None or before[0] in _TROUBLE:
                 continue
             if state in _TROUBLE or restarts > before[1]:
-                detail = f"{row['reason'] or 'ended'}, exit code {row['exit_code']}"
+                detail = str(row["reason"] or f"exit code {row['exit_code']}")
                 triggers.append(
                     Trigger(kind=Kind.CRASH, what=str(row["name"]), at_ns=at_ns, detail=detail)
                 )

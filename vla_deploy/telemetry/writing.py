@@ -15,7 +15,7 @@ from vla_deploy.ipc import BY_NAME, TOPICS, BadPayload, Kind, Record
 from vla_deploy.ipc.delta import DeltaReader
 from vla_deploy.telemetry.channels import TICKS, cell_text, channels_of, image_text, tick_text
 from vla_deploy.telemetry.history import Kept
-from vla_deploy.telemetry.judge import JUDGED_TYPES
+from vla_deploy.telemetry.judge import JUDGED_TYPES, rules_digest
 from vla_deploy.telemetry.triggers import Trigger
 
 METADATA = "flight"
@@ -41,6 +41,7 @@ class FlightHead:
             "robot": self.robot,
             "profile": self.profile,
             "vla_deploy": version("vla-deploy"),
+            "rules": rules_digest(),
             "wall_offset_ns": str(self.wall_offset_ns),
             "causes": json.dumps(causes),
         }

@@ -91,6 +91,15 @@ def test_inputs_that_this_version_does_not_know_are_refused_by_name() -> None:
         judge_again(packed(rows))
 
 
+def test_inputs_that_are_missing_are_told_as_those_of_other_rules() -> None:
+    rows = [
+        {name: value for name, value in row.items() if name != "inputs.budget_stop"}
+        for row in rows_of(FLIGHTS[0])
+    ]
+    with pytest.raises(FlightForeign, match=r"recorded by other rules.*budget_stop.*anew"):
+        judge_again(packed(rows))
+
+
 def test_spoiled_records_are_refused() -> None:
     with pytest.raises(FlightForeign, match="record of 3 bytes"):
         judge_again([b"abc"])
@@ -110,7 +119,11 @@ def test_the_command_judges_flights_and_its_exit_code_tells(
 
     monkeypatch.setattr(judge, "evaluate", laxer)
     assert main(["flight", "judge", path]) == 1
-    assert "differs: Verdict.reaction: recorded <Reaction.GROUP_STOP" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "differs: Verdict.reaction: recorded <Reaction.GROUP_STOP" in out
+    monkeypatch.setattr("vla_deploy.cli.flight.rules_digest", lambda: "of tomorrow")
+    assert main(["flight", "judge", path]) == 1
+    assert "recorded by other rules than these" in capsys.readouterr().out
 
 
 def test_the_commands_list_and_show_flights(capsys: pytest.CaptureFixture[str]) -> None:

@@ -71,6 +71,14 @@ def test_what_was_so_before_the_recorder_came_calls_nobody():
     assert watcher.table(table(control=("back-off", 3)), 0) == []
 
 
+def test_a_recorder_that_comes_after_one_that_crashed_calls():
+    watcher = Watcher()
+    (trigger,) = watcher.table(table(control=("ready", 3), recorder=("starting", 1)), 5)
+    assert (trigger.kind, trigger.what, trigger.detail) == (Kind.CRASH, "recorder", "killed")
+    assert watcher.table(table(control=("ready", 3), recorder=("ready", 1)), 6) == []
+    assert Watcher().table(table(recorder=("starting", 0)), 5) == []
+
+
 def test_each_crash_of_a_process_calls_once():
     watcher = Watcher()
     rows = (
