@@ -27,10 +27,13 @@ MIN_PIXELS = 2
 SEEN_WITHIN_M = 2.5
 KEPT_WITHIN_M = 1.5
 KEPT_NS = 8 * NS_PER_S
-GONE_M = 0.15
+# A cup hides the table close behind it; what is in view is seen anew wherever it stays.
+GONE_M = 0.04
 MIN_DEPTH_M = 0.2
 # A thing in a hand reaches this far from the grip.
 HELD_M = 0.22
+# What was kept this near to a full hand is what it has taken; further off it may be the table.
+TAKEN_M = 0.1
 
 
 class NearObstacles:
@@ -51,6 +54,7 @@ class NearObstacles:
     ) -> None:
         """Take in an image; `body` marks the robot itself, `grips` are points of full hands."""
         self._forget_what_is_gone(depth_m, camera, base_from_camera, body, pose)
+        self._forget_what_is_taken(grips, pose)
         points = _standing(depth_m, camera, base_from_camera, body)
         for grip in grips:
             points = points[np.linalg.norm(points - grip, axis=1) > HELD_M]
@@ -98,6 +102,15 @@ class NearObstacles:
         at = (row[seen], column[seen])
         gone = np.zeros(len(points), dtype=np.bool_)
         gone[seen] = (depth_m[at] > ahead[seen] + GONE_M) & ~body[at]
+        self._forget(gone)
+
+    def _forget_what_is_taken(self, grips: Sequence[Array], pose: Pose2D) -> None:
+        """Drop cells where a full hand is: it carries away what stood there."""
+        for grip in grips:
+            points = _to_base(self._points(), pose)
+            self._forget(np.linalg.norm(points - grip, axis=1) < TAKEN_M)
+
+    def _forget(self, gone: NDArray[np.bool_]) -> None:
         self._cells = {
             cell: kept
             for (cell, kept), is_gone in zip(self._cells.items(), gone, strict=True)

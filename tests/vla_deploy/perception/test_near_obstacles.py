@@ -98,6 +98,32 @@ def test_what_is_looked_through_is_gone_at_once_and_the_rest_in_time() -> None:
     assert len(seen.around(away, 3 + KEPT_NS)) == 0
 
 
+def test_a_thing_close_before_another_is_seen_to_be_gone() -> None:
+    seen = NearObstacles()
+    look(seen, np.minimum(post(1.2, 0.0), post(1.28, 0.0, half_m=0.5)))
+    points = look(seen, post(1.28, 0.0, half_m=0.5), stamp_ns=1)
+    assert len(points) > 0
+    assert points[:, 0].min() > 1.25
+
+
+def test_what_stays_is_not_forgotten_by_noise_or_a_pose_that_is_a_little_off() -> None:
+    seen, noise = NearObstacles(), np.random.default_rng(0).normal(0.0, 0.003, (120, 160))
+    first = look(seen, post(1.2, 0.0))
+    off = Pose2D(0.01, 0.01, 0.005)
+    again = look(seen, post(1.2, 0.0) + noise.astype(np.float32), off, 1)
+    assert len(again) >= len(first)
+
+
+def test_what_a_hand_takes_is_forgotten_out_of_view_and_what_stands_beside_it_is_kept() -> None:
+    seen = NearObstacles()
+    look(seen, np.minimum(post(1.2, 0.0), post(1.2, 0.4)))
+    turned = Pose2D(1.2, 0.4, math.pi)  # both are behind the camera's back
+    before = look(seen, floor(), turned, 1)
+    points = look(seen, floor(), turned, 2, grips=(before[0],))
+    assert 0 < len(points) < len(before)
+    assert np.linalg.norm(points - before[0], axis=1).min() > 0.09
+
+
 def test_the_own_body_and_what_a_hand_holds_are_no_obstacles() -> None:
     body = np.ones_like(NO_BODY)
     assert len(look(NearObstacles(), post(1.0, 0.0), body=body)) == 0
