@@ -66,8 +66,10 @@ class Segment:
 
 
 def _open(path: Path) -> int:
+    # No link: root may give a command to a service that could make it write to any file else.
+    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
     try:
-        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o660)
+        return os.open(path, flags, 0o660)
     except OSError as error:
         raise SpaceUnavailable(
             f"{path}: cannot open shared memory: {error.strerror}; "

@@ -68,6 +68,17 @@ def test_a_directory_that_cannot_be_made_is_named(tmp_path, clock):
         SharedSpace(tmp_path / "file" / "ipc", clock)
 
 
+def test_a_link_in_the_place_of_a_topic_is_not_followed(tmp_path, clock):
+    precious = tmp_path / "precious"
+    precious.write_text("precious")
+    space = tmp_path / "ipc"
+    space.mkdir()
+    (space / "pose.cell").symlink_to(precious)
+    with pytest.raises(SpaceUnavailable, match=r"pose\.cell: cannot open shared memory"):
+        SharedSpace(space, clock).cell_writer("pose")
+    assert precious.read_text() == "precious"
+
+
 def test_a_file_that_cannot_be_opened_is_named(tmp_path, clock):
     (tmp_path / "pose.cell").mkdir()
     with pytest.raises(SpaceUnavailable, match=r"pose\.cell: cannot open shared memory"):
