@@ -1,6 +1,6 @@
 """Change one thing in the package and run its tests: a change that no test notices is a hole.
 
-    .venv/bin/python scripts/mutation [--only TEXT] [--jobs N] [--list]
+    .venv/bin/python scripts/mutation [--only TEXT ...] [--jobs N] [--list]
 
 The tests are collected once; each mutant runs in a fork. Inside a function its code is exchanged
 and only the tests that reach the line run; anywhere else, and where only an import reaches it, the
@@ -84,7 +84,7 @@ class Campaign:
         self._run_unchanged(session)
         self._import_unchanged(session)
         running: dict[int, Mutant] = {}
-        for mutant in self._mutants:
+        for mutant in sorted(self._mutants, key=lambda mutant: not mutant.function):
             while len(running) >= self._jobs:
                 self._collect(running)
             sys.stdout.flush()
@@ -102,6 +102,8 @@ class Campaign:
         code, listed = os.waitstatus_to_exitcode(status), mutant.name in self._equivalent
         outcome = "killed" if code == KILLED else "equivalent" if listed else "survived"
         self.counts[mutant.path.name, outcome] += 1
+        if self.counts.total() % 50 == 0:
+            print(f"{self.counts.total()} of {len(self._mutants)}", flush=True)
         if code not in (SURVIVED, KILLED):
             self.faults.append(f"this tool could not run it (exit code {code}): {mutant.name}")
         elif outcome == "survived":
@@ -268,7 +270,7 @@ def _report(campaign: Campaign) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="Change a package in every small way, and test.")
-    parser.add_argument("--only", default="", help="only mutants whose name contains this")
+    parser.add_argument("--only", nargs="+", default=[""], help="only what contains one of these")
     parser.add_argument("--list", action="store_true", help="print the mutants and run none")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="how many run at once")
     parser.add_argument("--root", type=Path, default=ROOT, help="where package and tests lie")
@@ -282,7 +284,8 @@ def main() -> int:
     target, began = Target(root=given.root, package=given.package), time.perf_counter()
     target, began = Target(root=given.root, package=given.package), time.perf_counter()
     every, equivalent = target.mutants(), target.equivalent()
-    mutants = [mutant for mutant in every if given.only in f"{mutant.path.name} {mutant.name}"]
+    named = ((f"{mutant.path.name} {mutant.name}", mutant) for mutant in every)
+    mutants = [mutant for name, mutant in named if any(text in name for text in given.only)]
     campaign = Campaign(target, mutants, equivalent, given.jobs)
     campaign.faults += [
         f"listed as equivalent, but there is no such mutant: {name}"
@@ -292,7 +295,6 @@ def main() -> int:
         print("\n".join(f"{one.path.name}:{one.first_line}: {one.name}" for one in mutants))
         print("\n".join(campaign.faults), end="")
         return 1 if campaign.faults else 0
-    os.nice(10)
     sys.path.insert(0, str(given.root))
     code = pytest.main([*OPTIONS, str(target.tests)], plugins=[campaign])
     print(_report(campaign))

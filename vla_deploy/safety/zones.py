@@ -25,6 +25,7 @@ _PROBE_RAD = 0.02
 _ARC_STEP_S = 0.05
 _STANDING_M_S = 1e-3
 _STANDING_RAD_S = 1e-3
+_ROUNDING_M = 1e-6
 
 
 # What each direction does to the base within a probe: x in metres, turn in radians.
@@ -156,9 +157,9 @@ def time_to_collision(
     for step in range(1, math.ceil(horizon_s / _ARC_STEP_S) + 1):
         time_s = min(step * _ARC_STEP_S, horizon_s)
         after = footprint.distance(moved(points, motion.v_m_s * time_s, motion.w_rad_s * time_s))
-        hit = (after <= 0.0) & (after < before - 1e-6)
+        hit = (after <= 0.0) & (after < before - _ROUNDING_M)
         if hit.any():
-            share = np.clip(before[hit] / (before[hit] - after[hit]), 0.0, 1.0)
+            share = np.maximum(before[hit] / (before[hit] - after[hit]), 0.0)
             return float((share * time_s).min())
     return math.inf
 
