@@ -10,8 +10,10 @@ from vla_deploy.cli.example import add_command
 # Started by name: the robot's code never imports the benchmarks.
 BENCHMARKS = {
     "bus": "16-servo cycle against dynamixel-sdk on the same emulated bus",
+    "contact": "torque that no contact explains while the robot works, against its limits",
     "control": "where the CPU time of a control tick goes, as shares of the period",
     "estop": "emergency stop: from the request to the wire under load, and to standstill",
+    "recorder": "what the flight recorder costs: per control tick, per look, per flight",
     "ticks": "late control ticks, idle and under load, with and without SCHED_FIFO",
     "twin": "twin steps against raw mj_step, and the lock-step real-time factor",
 }
