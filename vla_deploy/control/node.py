@@ -49,6 +49,7 @@ from vla_deploy.safety.probes import jumped_joints
 
 _RESET_NS = 2 * NS_PER_S
 _SHUTDOWN_NS = 3 * NS_PER_S
+_INSIST_TICKS = 25
 _AT_REST_MODES = (Mode.DISARMED, Mode.STOPPED)
 _STANDSTILL_MODES = (Mode.STOPPED, Mode.PAUSED)
 
@@ -306,6 +307,8 @@ class ControlNode:
         stopping = self._mode in (Mode.STOPPING, Mode.STOPPED)
         if stopping and verdict.reaction > self._stopping_for:
             self._begin_stop(verdict)
+        if self._mode is Mode.STOPPED and self._ticks.tick % _INSIST_TICKS == 0:
+            self._insist()
 
     def _enter(self, before: Mode) -> None:
         match self._mode:
@@ -343,6 +346,12 @@ class ControlNode:
 
     def _end_stop(self) -> None:
         self._servos.remove_power(self._plan.unpowered_at_rest(self._stopping_for, self._holding()))
+
+    def _insist(self) -> None:
+        """Take the power again from joints that have not confirmed that they gave it up."""
+        powered = self._servos.state.torque_on
+        if self._stopping_for is Reaction.GROUP_STOP and powered[self._plan.released()].any():
+            self._end_stop()
 
     def _holding(self) -> frozenset[str]:
         state = self._servos.state

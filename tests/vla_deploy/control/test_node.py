@@ -1,5 +1,6 @@
 """Run control against the twin in lock-step: arming, motion, stops, losses and restarts."""
 
+from dataclasses import replace
 from typing import Any
 from typing import Any as Rig  # the class in conftest.py, which no test can import
 
@@ -9,7 +10,9 @@ import pytest
 from drivers.drive_bus import PowerState
 from drivers.errors import DeviceMissing
 from platforms import load_profile
+from vla_deploy.control.servos import ServoLine
 from vla_deploy.power_off import ask_power_off
+from vla_deploy.robots.description import StopCategory
 
 ELBOW, PITCH = "left_elbow", "left_shoulder_pitch"
 STANDSTILL_RAD_S = 0.02
@@ -150,6 +153,25 @@ def test_an_estop_stops_each_group_by_its_category(armed: Rig) -> None:
     assert armed.base()["enabled"] == 0.0
     assert abs(armed.base()["v_m_s"]) < 0.01
     assert [r["status"] for r in armed.results()] == ["stopped"]
+
+
+def test_power_that_a_servo_has_not_given_up_is_taken_again(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    head = replace(rig.robot.group("head"), stop_category=StopCategory.POWER_REMOVED)
+    rig.robot = replace(rig.robot, groups={**rig.robot.groups, "head": head})
+    rig.control = rig.new_control()
+    rig.boot()
+    rig.ask("arm")
+    taken = ServoLine.remove_power
+    unheard = [True, True]  # at once, and when all has come to rest
+    monkeypatch.setattr(
+        ServoLine, "remove_power", lambda *given: not unheard.pop() if unheard else taken(*given)
+    )
+    rig.ask("estop", within_s=0.5)
+    assert (rig.state, unheard) == ("stopped", [])
+    assert torque_enabled(rig)["head_pan"] == 0
+    assert torque_enabled(rig)[ELBOW] == 1
 
 
 def test_after_an_estop_commands_are_refused_until_reset_and_arm(armed: Rig) -> None:
