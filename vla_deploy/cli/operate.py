@@ -50,7 +50,10 @@ def register(commands: Any) -> None:
     )
     stop.set_defaults(run=run_stop)
     shutdown = add_command(
-        commands, "shutdown", "end the run in order, as Ctrl-C does", "  vla-deploy shutdown\n"
+        commands,
+        "shutdown",
+        "end the run in order, as Ctrl-C does; power goes off, so support the arms",
+        "  vla-deploy shutdown\n",
     )
     shutdown.set_defaults(run=run_shutdown)
 
