@@ -1,0 +1,143 @@
+"""Measure the torque that no contact explains while the robot works, against `[contact]`'s limits.
+
+The whole robot works in lock-step in the twin: friction, payloads and the coarseness of what servos
+tell are what is left of the torque. Percentiles are over all jobs, at 50 Hz; the largest value is
+told with the share of the limit that it takes.
+"""
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from sim_twin.stack import LockstepStack
+from vla_deploy.control.contact_torque import ContactTorque
+from vla_deploy.ipc import CellReader
+from vla_deploy.robots.model import RobotModel
+
+JOBS: Final = (
+    "pick up the red cup and put it in the box",
+    "pick up the book and put it in the box",
+    "pick up the bottle and put it in the box",
+)
+_PERCENTILES: Final = (50, 99, 100)
+
+
+class Listener:
+    """Reckon the unexplained torque as control does, from what control tells of the joints."""
+
+    period_s = 0.02
+
+    def __init__(self, stack: LockstepStack) -> None:
+        self.torques_nm: list[np.ndarray] = []
+        self._stack = stack
+        self._count = len(stack.robot.joint_names)
+        self._contact = ContactTorque(stack.robot, RobotModel(stack.robot))
+        self._joints: CellReader = stack.space.cell_reader("joint_state")
+
+    def start(self) -> None:
+        """Have nothing to open."""
+
+    def step(self) -> None:
+        """Take in one sample."""
+        sample = self._joints.latest()
+        if sample is None:
+            return
+        position, velocity, effort = (
+            np.array(sample.data[name][: self._count], dtype=np.float64)
+            for name in ("position", "velocity", "effort_ratio")
+        )
+        torque = self._contact.update(sample.stamp_ns, position, velocity, effort)
+        if torque is not None:
+            self.torques_nm.append(np.abs(torque))
+
+    def stop(self) -> None:
+        """Release the topic."""
+        self._joints.close()
+
+
+def measure(jobs: Sequence[str], seed: int) -> dict[str, Any]:
+    """Return what became of each job, and each judged joint's percentiles and limit."""
+    torques_nm: list[np.ndarray] = []
+    told = []
+    for job in jobs:
+        with _listening(seed) as (stack, listener):
+            outcome = stack.say(job)
+            told.append({"job": job, "success": outcome["success"], "error": outcome["error"]})
+            torques_nm += listener.torques_nm
+    contact = stack.robot.protection.contact
+    limits = {} if contact is None else contact.torque_nm
+    names = stack.robot.joint_names
+    found: np.ndarray = np.percentile(torques_nm, _PERCENTILES, axis=0)
+    return {
+        "seed": seed,
+        "jobs": told,
+        "joints": {
+            name: _row(found[:, names.index(name)], limit) for name, limit in limits.items()
+        },
+    }
+
+
+def _row(percentiles_nm: np.ndarray, limit_nm: float) -> dict[str, float]:
+    middle_nm, high_nm, largest_nm = percentiles_nm.tolist()
+    return {
+        "p50_nm": round(middle_nm, 3),
+        "p99_nm": round(high_nm, 3),
+        "max_nm": round(largest_nm, 3),
+        "limit_nm": limit_nm,
+        "max_of_limit_ratio": round(largest_nm / limit_nm, 3),
+    }
+
+
+@contextmanager
+def _listening(seed: int) -> Iterator[tuple[LockstepStack, Listener]]:
+    """Own an armed robot whose joints are listened to from then on."""
+    with tempfile.TemporaryDirectory() as folder:
+        stack = LockstepStack(Path(folder), seed=seed)
+        try:
+            stack.arm()
+            listener = Listener(stack)
+            stack.lockstep.add(listener)
+            yield stack, listener
+        finally:
+            stack.close()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the table; 1 where a job failed or a limit was reached."""
+    parser = argparse.ArgumentParser(
+        prog="bench contact",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example:\n  vla-deploy bench contact --json",
+    )
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--job", action="append", help="a command instead of the usual ones")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    options = parser.parse_args(argv)
+    figures = measure(options.job or JOBS, options.seed)
+    sys.stdout.write((json.dumps(figures, indent=2) if options.json else _text(figures)) + "\n")
+    reached = any(row["max_of_limit_ratio"] >= 1.0 for row in figures["joints"].values())
+    failed = any(not job["success"] for job in figures["jobs"])
+    return 1 if reached or failed else 0
+
+
+def _text(figures: dict[str, Any]) -> str:
+    lines = [f"{job['job']}: {job['error'] or 'done'}" for job in figures["jobs"]]
+    lines.append(f"{'joint':24}{'p50':>8}{'p99':>8}{'max':>8}{'limit':>8}  max of limit")
+    lines += [
+        f"{name:24}{row['p50_nm']:8.2f}{row['p99_nm']:8.2f}{row['max_nm']:8.2f}"
+        f"{row['limit_nm']:8.2f}{row['max_of_limit_ratio']:8.2f}"
+        for name, row in figures["joints"].items()
+    ]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
