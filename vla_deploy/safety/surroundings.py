@@ -36,8 +36,8 @@ class ZoneFinding:
     name: str
     points: int
     distance_m: float
-    speed_ratio: float = 1.0
-    blocked: tuple[Direction, ...] = ()
+    speed_ratio: float
+    blocked: tuple[Direction, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -116,7 +116,7 @@ def around(**changes: Any) -> dict[str, Any]:
 
 
 def zone(kind: ZoneKind, name: str = "near", **changes: Any) -> ZoneFinding:
-    fields = {"points": 3, "distance_m": 0.4, "speed_ratio": 0.5} | changes
+    fields = {"points": 3, "distance_m": 0.4, "speed_ratio": 0.5, "blocked": ()} | changes
     return ZoneFinding(kind=kind, name=name, **fields)
 
 
