@@ -46,7 +46,7 @@ def test_a_joint_follows_up_to_its_allowance(setpoint: float, start: float) -> N
 def test_each_joint_stands_below_a_share_of_its_own_top_speed(velocity: float, moves: bool) -> None:
     lagging = np.array([0.5, 0.03])
     motion = replace(RESTING, setpoint=lagging, velocity=np.array([0.0, velocity]))
-    assert (stopping(motion, BOUNDS).position[1] < 0.02) is moves
+    assert bool(stopping(motion, BOUNDS).position[1] < 0.02) is moves
 
 
 @pytest.mark.parametrize(

@@ -116,8 +116,8 @@ def around(**changes: Any) -> dict[str, Any]:
 
 
 def zone(kind: ZoneKind, name: str = "near", **changes: Any) -> ZoneFinding:
-    fields = {"points": 3, "distance_m": 0.4, "speed_ratio": 0.5, "blocked": ()} | changes
-    return ZoneFinding(kind=kind, name=name, **fields)
+    fields: dict[str, Any] = {"points": 3, "distance_m": 0.4, "speed_ratio": 0.5, "blocked": ()}
+    return ZoneFinding(kind=kind, name=name, **fields | changes)
 
 
 def excess(excess_m: float, rate_m_s: float) -> dict[str, Any]:
