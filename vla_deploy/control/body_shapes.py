@@ -6,6 +6,7 @@ robot file excludes are left out.
 """
 
 from collections.abc import Iterator
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import coal
@@ -24,6 +25,14 @@ FLOOR = "floor"
 _FINEST_M = 0.02
 # Beyond the least clearance by this, a distance is as good as any larger one.
 _LOOK_M = 0.05
+
+
+class Survey(NamedTuple):
+    """Carry the distances of `self_pairs` and `floor_pairs`, and where the hands grip."""
+
+    self_m: Array
+    floor_m: Array
+    grips: Array
 
 
 class BodyShapes:
@@ -47,6 +56,7 @@ class BodyShapes:
         shapes = pinocchio.buildGeomFromMJCF(self._model, path, pinocchio.GeometryType.COLLISION)
         self._shapes = self._with_pairs(shapes, robot)
         self._results = self._shapes.createData()
+        self._surveyed: tuple[Array, Survey] | None = None
         limits = robot.protection.clearance
         self._near = NearPairs(
             self._model,
@@ -74,18 +84,18 @@ class BodyShapes:
         found = np.array([result.min_distance for result in self._results.distanceResults])
         return found[~self._is_floor], found[self._is_floor]
 
-    def near_distances(self, positions: Array) -> tuple[Array, Array]:
-        """Return what `distances` does, but for pairs too far apart to matter only a bound."""
-        q = self._expand(positions)
-        found = self._near.distances(self._model, self._data, q, positions)
-        return found[~self._is_floor], found[self._is_floor]
+    def survey(self, positions: Array) -> Survey:
+        """Return what `distances` and `grips` do; the pose of the last call costs nothing again.
 
-    def grips_here(self) -> Array:
-        """Return where the hands with a workspace grip, (n, 3), in the pose that was asked last."""
-        for frame in self._grips:
-            pinocchio.updateFramePlacement(self._model, self._data, frame)
-        points = [self._data.oMf[frame].translation for frame in self._grips]
-        return np.array(points, dtype=np.float64).reshape(-1, 3)
+        For pairs that are too far apart to matter, the distance is only a bound.
+        """
+        if self._surveyed is None or not np.array_equal(positions, self._surveyed[0]):
+            found = self._near.distances(
+                self._model, self._data, self._expand(positions), positions
+            )
+            survey = Survey(found[~self._is_floor], found[self._is_floor], self._grips_here())
+            self._surveyed = positions.copy(), survey
+        return self._surveyed[1]
 
     def balls(self, positions: Array) -> tuple[Array, Array]:
         """Return centres, (n, 3) in the base frame, and radii of balls that cover what moves."""
@@ -100,7 +110,14 @@ class BodyShapes:
     def grips(self, positions: Array) -> Array:
         """Return where the hands with a workspace grip, (n, 3) in the base frame."""
         pinocchio.forwardKinematics(self._model, self._data, self._expand(positions))
-        return self.grips_here()
+        return self._grips_here()
+
+    def _grips_here(self) -> Array:
+        """Return where the hands grip in the pose that the model's data are in."""
+        for frame in self._grips:
+            pinocchio.updateFramePlacement(self._model, self._data, frame)
+        points = [self._data.oMf[frame].translation for frame in self._grips]
+        return np.array(points, dtype=np.float64).reshape(-1, 3)
 
     def centre_of_mass(self, positions: Array) -> Array:
         """Return the whole robot's centre of mass in the base frame."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from vla_deploy.control.axes import Floats
-from vla_deploy.control.body_shapes import BodyShapes
+from vla_deploy.control.body_shapes import BodyShapes, Survey
 from vla_deploy.control.contact_torque import ContactTorque
 from vla_deploy.control.nearby import Nearby
 from vla_deploy.control.setpoint_rates import SetpointRates
@@ -111,7 +111,7 @@ class SurroundingsWatch:
             ),
             reaction_s=ARM_REACTION_S,
         )
-        self._ahead: tuple[Stopping, Floats, Floats, Floats] | None = None
+        self._ahead: tuple[Stopping, Survey] | None = None
         self._self_m = robot.protection.clearance.self_m
         self._floor_m = robot.protection.clearance.floor_m
         self._self_least = np.full(len(self._body.self_pairs), self._self_m)
@@ -176,28 +176,27 @@ class SurroundingsWatch:
             setpoint_acceleration=acceleration,
         )
         ahead = stopping(motion, self._bounds)
-        distances = self._body.near_distances(ahead.position)
-        self._ahead = (ahead, *distances, self._body.grips_here())
+        self._ahead = ahead, self._body.survey(ahead.position)
 
     def _look_at_clearance(self, powered: bool) -> None:
         assert self._ahead is not None, "the caller has looked ahead"
-        (ahead, self_ahead, floor_ahead, grips_ahead), self._ahead = self._ahead, None
+        (ahead, there), self._ahead = self._ahead, None
         body, time_s = self._body, ahead.time_s
-        self_start, floor_start = body.near_distances(ahead.start)
-        self._self_least = least_distances(self._self_least, self_start, self._self_m, powered)
-        self._floor_least = least_distances(self._floor_least, floor_start, self._floor_m, powered)
+        here = body.survey(ahead.start)
+        self._self_least = least_distances(self._self_least, here.self_m, self._self_m, powered)
+        self._floor_least = least_distances(self._floor_least, here.floor_m, self._floor_m, powered)
         self._known = replace(
             self._known,
             self_clearance=nearest_pair(
-                body.self_pairs, self_start, self_ahead, self._self_least, time_s
+                body.self_pairs, here.self_m, there.self_m, self._self_least, time_s
             ),
             environment_clearance=nearest_pair(
-                body.floor_pairs, floor_start, floor_ahead, self._floor_least, time_s
+                body.floor_pairs, here.floor_m, there.floor_m, self._floor_least, time_s
             ),
             workspace=beyond_box(
                 self._workspaces,
-                body.grips_here(),
-                grips_ahead,
+                here.grips,
+                there.grips,
                 self._box_low,
                 self._box_high,
                 time_s,

@@ -24,7 +24,7 @@ def test_near_distances_are_those_of_all_pairs_up_to_their_reach(
         way = rng.uniform(-step_rad, step_rad, len(pose)) * (rng.random(len(pose)) < 0.5)
         pose = np.clip(pose + way, ROBOT.position_min, ROBOT.position_max)
         near, exact = (
-            np.concatenate(body.near_distances(pose)),
+            np.concatenate(body.survey(pose)[:2]),
             np.concatenate(body.distances(pose)),
         )
         reach_m = near.max()
@@ -32,8 +32,15 @@ def test_near_distances_are_those_of_all_pairs_up_to_their_reach(
         assert near == pytest.approx(np.minimum(exact, reach_m), abs=SOLVED_M)
 
 
-def test_grips_of_the_pose_asked_last_are_those_of_that_pose() -> None:
+def test_a_survey_is_of_its_own_pose_whatever_was_asked_between() -> None:
     body = BodyShapes(ROBOT)
-    pose = ROBOT.position_min * 0.5
-    body.near_distances(pose)
-    np.testing.assert_allclose(body.grips_here(), body.grips(pose))
+    first, second = ROBOT.position_min * 0.5, ROBOT.position_max * 0.5
+    for pose in (first, first, second, first):
+        survey = body.survey(pose)
+        body.balls(second)
+        np.testing.assert_allclose(survey.grips, body.grips(pose))
+    assert body.survey(first) is survey
+    pose = first.copy()
+    body.survey(pose)
+    pose += 0.1
+    assert body.survey(pose) is not survey
