@@ -51,7 +51,7 @@ def servo_bus_unplugged(stack: LockstepControl) -> None:
     """Pull the servos' plug while an arm reaches."""
     reach(stack, 0.3, left_elbow=1.6, head_pan=0.5)
     stack.faults.inject("servo_bus", None, "unplug")
-    stack.lockstep.run_for(0.3)
+    stack.lockstep.run_for(0.6)
 
 
 def wheel_blocked(stack: LockstepControl) -> None:
