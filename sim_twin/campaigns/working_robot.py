@@ -125,14 +125,12 @@ class WorkingRobot:
     def go(self, **targets: float) -> None:
         """Send joints somewhere, past the executor: it must be idle."""
         goal = {"kind": "goal", "motion_id": next(self._motions), "speed_ratio": 1.0}
-        self._space.ring_writer("motion_command").publish({**goal, "targets": targets})
+        self._goals.publish({**goal, "targets": targets})
 
     def use_profile(self, path: Path, meanwhile: Callable[[], object]) -> dict[str, Any]:
         """Ask for a profile, as `vla-deploy profile use` does, and return how that ended."""
         request_id = uuid.uuid4().hex
-        self._space.ring_writer("profile_request").publish(
-            {"request_id": request_id, "profile": str(path)}
-        )
+        self._requests.publish({"request_id": request_id, "profile": str(path)})
 
         def last() -> dict[str, Any]:
             meanwhile()
@@ -204,6 +202,8 @@ class WorkingRobot:
             return False
         self._session = Session(Path(owner.run_dir), self.clock)
         self._space = SharedSpace(Path(owner.run_dir) / "ipc", self.clock)
+        self._goals = self._space.ring_writer("motion_command")
+        self._requests = self._space.ring_writer("profile_request")
         return True
 
     def _last_words(self) -> str:
