@@ -1,6 +1,7 @@
 """Judge one tick: (state, inputs, limits) -> (state, verdict); nothing else is read or changed."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 
@@ -95,8 +96,8 @@ def evaluate(
         for rule, finding in zip(RULES, findings, strict=True)
         if finding is not None
     }
-    counts = _counted(state.counts, found)
-    active = _active(counts, found, inputs.energised)
+    counts = _counted(state.counts, findings)
+    active = _active(counts, findings, inputs.energised)
     latched, outcome = _reset(state.latched, found, inputs.reset_requested)
     latched += _newly_latched(latched, active)
     lingering = _lingering(state.lingering, active, found)
@@ -105,18 +106,20 @@ def evaluate(
     return after, _merged(in_force, outcome)
 
 
-def _counted(counts: tuple[int, ...], found: _Found) -> tuple[int, ...]:
+def _counted(counts: tuple[int, ...], findings: Sequence[Finding | None]) -> tuple[int, ...]:
     return tuple(
-        min(count + 1, rule.debounce_samples) if rule.cause in found else 0
-        for rule, count in zip(RULES, counts, strict=True)
+        0 if finding is None else min(count + 1, rule.debounce_samples)
+        for rule, finding, count in zip(RULES, findings, counts, strict=True)
     )
 
 
-def _active(counts: tuple[int, ...], found: _Found, energised: bool) -> tuple[Verdict, ...]:
+def _active(
+    counts: tuple[int, ...], findings: Sequence[Finding | None], energised: bool
+) -> tuple[Verdict, ...]:
     return tuple(
-        _verdict(rule, found[rule.cause], energised)
-        for rule, count in zip(RULES, counts, strict=True)
-        if count >= rule.debounce_samples
+        _verdict(rule, finding, energised)
+        for rule, finding, count in zip(RULES, findings, counts, strict=True)
+        if finding is not None and count >= rule.debounce_samples
     )
 
 

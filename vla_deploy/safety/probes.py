@@ -96,7 +96,7 @@ def wheel_following_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding
 
 def servo_hardware_error(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a servo that reports a hardware error of its own."""
-    if not inputs.hardware_error.any():
+    if not np.count_nonzero(inputs.hardware_error):
         return None
     joint = int(inputs.hardware_error.argmax())
     return Finding(
@@ -129,7 +129,7 @@ def servo_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None
 
 def servo_watchdog_tripped(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a servo whose Bus Watchdog has stopped it."""
-    if not inputs.watchdog_tripped.any():
+    if not np.count_nonzero(inputs.watchdog_tripped):
         return None
     joint = int(inputs.watchdog_tripped.argmax())
     return Finding(subject=limits.joint_names[joint], age_s=float(inputs.sample_age_s[joint]))
