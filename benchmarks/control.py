@@ -9,6 +9,7 @@ around and recording.
 
 import argparse
 import contextlib
+import gc
 import json
 import sys
 import tempfile
@@ -43,11 +44,14 @@ def measure(seconds: float, seed: int) -> dict[str, Any]:
         try:
             stack.arm()
             stack.give(text=_COMMAND)
+            gc.collect()
+            gc.freeze()  # as control's own process does
             with contextlib.closing(Spans()) as spans:
                 _instrument(spans, stack)
                 stack.lockstep.run_for(seconds)
             return _report(spans, seconds, stack.control.period_s)
         finally:
+            gc.unfreeze()
             stack.close()
 
 
