@@ -9,7 +9,7 @@ import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -69,7 +69,7 @@ def measure(jobs: Sequence[str], seed: int) -> dict[str, Any]:
     for job in jobs:
         with _listening(seed) as (stack, listener):
             outcome = stack.say(job)
-            told.append({"job": job, "success": outcome["success"], "error": outcome["error"]})
+            told.append({"job": job, **_ending(outcome)})
             torques_nm += listener.torques_nm
     contact = stack.robot.protection.contact
     limits = {} if contact is None else contact.torque_nm
@@ -82,6 +82,12 @@ def measure(jobs: Sequence[str], seed: int) -> dict[str, Any]:
             name: _row(found[:, names.index(name)], limit) for name, limit in limits.items()
         },
     }
+
+
+def _ending(outcome: Mapping[str, Any]) -> dict[str, Any]:
+    if outcome["event"] == "rejected":
+        return {"success": False, "error": outcome["reason"]}
+    return {"success": outcome["success"], "error": outcome["error"]}
 
 
 def _row(percentiles_nm: np.ndarray, limit_nm: float) -> dict[str, float]:
