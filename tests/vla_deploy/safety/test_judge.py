@@ -1,7 +1,7 @@
 """Sweep each cause across its boundary and hold the latch, debounce and reset rules."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -389,6 +389,66 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
     (Cause.OBSTACLE_LIMIT_ZONE, around(zones=(zone(ZoneKind.LIMIT),)), around(zones=()), "near"),
     (Cause.OBSTACLE_APPROACH, around(zones=(zone(ZoneKind.APPROACH),)), around(zones=()), "near"),
 )
+# cause, what gives a measured value, the limit, and on which side of it the cause lies
+SWEEPS: tuple[tuple[Cause, Callable[[float], dict[str, Any]], float, int], ...] = (
+    (Cause.SERVO_BUS_LOST, lambda age_s: {"sample_age_s": np.array([0.0, age_s])}, 0.02, 1),
+    (Cause.ENCODER_JUMP, lambda step: stepped(step), 0.625, 1),
+    (Cause.ENCODER_JUMP, lambda step: stepped(step), -0.625, -1),
+    (Cause.JOINT_POSITION_LIMIT, lambda position: at(position, 0.5), 1.0, 1),
+    (Cause.JOINT_POSITION_LIMIT, lambda position: at(position, -0.5), -1.0, -1),
+    (Cause.JOINT_POSITION_LIMIT, lambda velocity: at(1.5, velocity), 0.05, 1),
+    (Cause.JOINT_POSITION_LIMIT, lambda velocity: at(-1.5, velocity), -0.05, -1),
+    (Cause.JOINT_VELOCITY_LIMIT, lambda velocity: at(0.0, velocity), 2.0, 1),
+    (Cause.JOINT_VELOCITY_LIMIT, lambda velocity: at(0.0, velocity), -2.0, -1),
+    (Cause.FOLLOWING_ERROR, lambda setpoint: {"setpoint": np.array([setpoint, 1.0])}, 0.25, 1),
+    (Cause.FOLLOWING_ERROR, lambda setpoint: {"setpoint": np.array([setpoint, 1.0])}, -0.25, -1),
+    (Cause.WHEEL_FOLLOWING_ERROR, lambda speed: turning(2.0, speed), 3.25, 1),
+    (Cause.WHEEL_FOLLOWING_ERROR, lambda speed: turning(2.0, speed), 0.75, -1),
+    (Cause.JOINT_CURRENT_LIMIT, lambda ratio: {"effort_ratio": np.array([ratio, 0.0])}, 0.5, 1),
+    (Cause.JOINT_CURRENT_LIMIT, lambda ratio: {"effort_ratio": np.array([ratio, 0.0])}, -0.5, -1),
+    (Cause.JOINT_TEMPERATURE_LIMIT, lambda t: {"temperature_c": np.array([t, 30.0])}, 75.0, 1),
+    (Cause.JOINT_VOLTAGE_LIMIT, lambda volts: {"voltage_v": np.array([volts, 12.0])}, 15.5, 1),
+    (Cause.JOINT_VOLTAGE_LIMIT, lambda volts: {"voltage_v": np.array([volts, 12.0])}, 9.5, -1),
+    (Cause.STANDSTILL_MOTION, lambda v: standing(velocity=np.array([v, 0.0])), 0.125, 1),
+    (Cause.STANDSTILL_MOTION, lambda v: standing(velocity=np.array([v, 0.0])), -0.125, -1),
+    (Cause.STANDSTILL_MOTION, lambda speed: standing(**turning(0.0, speed)), 0.125, 1),
+    (Cause.SUPERVISOR_LOST, lambda age_s: {"supervisor_age_s": age_s}, 3.0, 1),
+    (Cause.STALE_COMMAND, lambda age_s: {"base_command_age_s": age_s}, 0.25, 1),
+    (Cause.STALE_SCAN, lambda age_s: around(scan_age_s=age_s), 0.5, 1),
+    (Cause.COLLISION, lambda torque_nm: pushed(torque_nm), 2.0, 1),
+    (Cause.COLLISION, lambda torque_nm: pushed(torque_nm), -2.0, -1),
+    (Cause.SELF_COLLISION, lambda gap_m: close_by("self_clearance", gap_m, 0.1), 0.005, -1),
+    (Cause.SELF_COLLISION, lambda rate: close_by("self_clearance", 0.0, rate), 0.005, 1),
+    (
+        Cause.ENVIRONMENT_COLLISION,
+        lambda gap_m: close_by("environment_clearance", gap_m, 0.1),
+        0.01,
+        -1,
+    ),
+    (
+        Cause.ENVIRONMENT_COLLISION,
+        lambda rate: close_by("environment_clearance", 0.0, rate),
+        0.005,
+        1,
+    ),
+    (Cause.WORKSPACE, lambda excess_m: excess(excess_m, 0.1), 0.0, 1),
+    (Cause.WORKSPACE, lambda rate: excess(0.1, rate), 0.005, 1),
+    (Cause.TIP_OVER, lambda margin: around(tip_margin_ratio=margin), 0.25, -1),
+    (Cause.KEEP_OUT_ZONE, lambda depth_m: within(depth_m), 0.0, 1),
+)
+# Causes that no number decides: somebody says so, or nobody does.
+SAID = {
+    Cause.ESTOP,
+    Cause.CAN_BUS_LOST,
+    Cause.SERVO_HARDWARE_ERROR,
+    Cause.DRIVE_FAULT,
+    Cause.SERVO_WATCHDOG_TRIPPED,
+    Cause.BUDGET_EXHAUSTED,
+    Cause.OBSTACLE_STOP_ZONE,
+    Cause.OBSTACLE_SLOW_ZONE,
+    Cause.OBSTACLE_LIMIT_ZONE,
+    Cause.OBSTACLE_APPROACH,
+}
 BY_CAUSE = {rule.cause: rule for rule in RULES}
 SPOILERS = {cause: changes for cause, changes, _, _ in reversed(BOUNDARIES)}
 cases = pytest.mark.parametrize(("cause", "bad", "good", "subject"), BOUNDARIES)
@@ -443,6 +503,22 @@ def test_a_cause_is_not_found_at_its_limit(
 ) -> None:
     _, verdict = ticks(SafetyState(), BY_CAUSE[cause].debounce_samples, **good)
     assert verdict is CLEAR
+
+
+def test_every_cause_that_a_number_decides_is_swept() -> None:
+    assert {sweep[0] for sweep in SWEEPS} | SAID == set(BY_CAUSE)
+    assert not {sweep[0] for sweep in SWEEPS} & SAID
+
+
+@pytest.mark.parametrize(("cause", "changes", "limit", "side"), SWEEPS)
+def test_a_cause_begins_exactly_beyond_its_limit(
+    cause: Cause, changes: Callable[[float], dict[str, Any]], limit: float, side: int
+) -> None:
+    found = [
+        ticks(SafetyState(), BY_CAUSE[cause].debounce_samples, **changes(value))[1].cause is cause
+        for value in (limit - side * 1e-3, limit - side * 1e-9, limit, limit + side * 1e-9)
+    ]
+    assert found == [False, False, False, True]
 
 
 @rules
@@ -833,6 +909,19 @@ def test_a_reset_clears_all_latches_or_none(history: list[set[Cause]], present: 
         assert after.latched[: len(state.latched)] == state.latched
     else:
         assert {v.cause for v in after.latched} <= present
+
+
+@given(st.lists(causes, max_size=6), causes)
+def test_a_reset_touches_nothing_but_the_latch(
+    history: list[set[Cause]], present: set[Cause]
+) -> None:
+    state = [SafetyState(), *(state for state, _ in walk(history))][-1]
+    with_reset, after_reset = tick(state, reset_requested=True, **spoiled(present))
+    without, before_reset = tick(state, **spoiled(present))
+    assert with_reset.counts == without.counts
+    assert with_reset.lingering == without.lingering
+    assert set(with_reset.latched) <= set(without.latched)
+    assert after_reset.reaction <= before_reset.reaction
 
 
 @given(st.lists(causes, max_size=8))
