@@ -29,6 +29,7 @@ class Seen:
     moved_rad: float
     states: frozenset[str]
     memory_mib: Mapping[str, float]
+    cause: str = ""
 
 
 def judge(seen: Seen, outcomes: Sequence[str], reason: str = "") -> Iterator[str]:
@@ -39,7 +40,7 @@ def judge(seen: Seen, outcomes: Sequence[str], reason: str = "") -> Iterator[str
         yield f"the reason is {seen.reason!r}, expected a word about {reason}"
     if seen.states != {"armed"}:
         strange = ", ".join(sorted(seen.states - {"armed"})) or "never looked at"
-        yield f"control was {strange}"
+        yield f"control was {strange} {seen.cause}".rstrip()
     expected = LEAST_RATE_RATIO * seen.least_rate_hz * seen.seconds
     if seen.ticks.ticks < expected:
         yield f"{seen.ticks.ticks} ticks in {seen.seconds:.1f} s, expected {expected:.0f}"

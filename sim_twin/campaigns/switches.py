@@ -19,11 +19,13 @@ from sim_twin.campaigns.switch_judge import Seen, judge, memory_case, ticks_case
 from sim_twin.campaigns.switch_profiles import BAD, GOOD, Bad, control_rate_hz
 from sim_twin.campaigns.ticks import Ticks
 from sim_twin.campaigns.working_robot import RobotFailed, WorkingRobot
+from vla_deploy.robots import load_robot
 
 SWITCHES: Final = 100
 _BEFORE_S: Final = 10.0
 _AFTER_BAD_S: Final = 2.0
 _SWING_S: Final = 2.5
+_TUCK_S: Final = 8.0
 
 
 class SwitchCampaign:
@@ -41,6 +43,9 @@ class SwitchCampaign:
         self._targets = itertools.cycle((0.6, -0.6))
         self._swing_ns = 0
         self._meter = _Meter(self._robot)
+        # Arms rest on the base without power: moving there is what a protective stop is for.
+        self._robot.go(**load_robot("butler").poses["tuck"])
+        self._robot.pause(_TUCK_S)
 
     def before(self) -> Ticks:
         """Return the ticks of a while without any switch, in the same motion."""
@@ -91,6 +96,7 @@ class SwitchCampaign:
             moved_rad=self._meter.moved_rad,
             states=frozenset(self._meter.states),
             memory_mib=self._robot.memory_mib(),
+            cause=self._meter.cause,
         )
 
     def _keep_moving(self, duration_s: float) -> None:
@@ -103,7 +109,7 @@ class SwitchCampaign:
         if self._clock.now_ns() >= self._swing_ns:
             self._swing_ns = self._clock.now_ns() + round(_SWING_S * NS_PER_S)
             side = next(self._targets)
-            self._robot.go(head_pan=side, left_wrist_roll=1.2 + side)
+            self._robot.go(head_pan=side, left_wrist_roll=1.2 + 0.5 * side)
         return False
 
 
@@ -117,12 +123,17 @@ class _Meter:
     def begin(self) -> None:
         """Forget what was seen."""
         self.states: set[str] = set()
+        self.cause = ""
         self.moved_rad = 0.0
         self._before: np.ndarray[Any, np.dtype[np.float64]] | None = None
 
     def look(self) -> None:
         """Look once."""
-        self.states.add(self._robot.state())
+        state = self._robot.state()
+        self.states.add(state)
+        if state != "armed":
+            status = self._robot.document("control_status")
+            self.cause = " ".join(str(status.get(key, "")) for key in ("cause", "subject"))
         place = np.array(self._robot.setpoint())
         if self._before is not None and len(place) == len(self._before):
             self.moved_rad += float(np.abs(place - self._before).max(initial=0.0))
@@ -174,6 +185,7 @@ def _case(name: str, failures: Sequence[str], seen: Seen) -> Case:
         "late": seen.ticks.late,
         "moved_rad": seen.moved_rad,
         "reason": seen.reason,
+        "cause": seen.cause,
     }
     return Case(name=name, failures=tuple(failures), figures=figures, seconds=seen.seconds)
 
