@@ -64,7 +64,7 @@ class RobotService:
         if table is None:
             return False
         rows = table["processes"]
-        return bool(rows) and all(row["state"] in ("ready", "not wanted") for row in rows)
+        return bool(rows) and all(row["state"] in ("ready", "off") for row in rows)
 
     def control_state(self) -> str:
         """Return control's state, "silent" where it tells none."""
