@@ -42,6 +42,8 @@ QUICK = ServiceRules(
 )
 Launch = Callable[..., ServiceRunner]
 
+pytestmark = pytest.mark.stack
+
 
 @pytest.fixture
 def launch() -> Iterator[Launch]:
