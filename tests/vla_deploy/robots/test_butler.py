@@ -52,7 +52,11 @@ def test_base_dimensions_agree_with_the_mjcf(
     assert physics.geom("base_deck").size[0] <= robot.base.footprint_radius_m
 
 
-def test_tucked_arms_stay_above_the_footprint_and_touch_nothing(
+WRISTS_BEYOND_M = 0.012
+"""What keeping the hands 20 mm apart costs, 0.8 m up; the map's cells are 0.05 m."""
+
+
+def test_tucked_arms_stay_near_the_footprint_and_touch_nothing(
     robot: RobotDescription, physics: mujoco.MjModel
 ) -> None:
     data = stand(physics, tucked(robot))
@@ -60,7 +64,7 @@ def test_tucked_arms_stay_above_the_footprint_and_touch_nothing(
     arms = [g for g in solid if data.geom_xpos[g, 2] > 0.4]
     reach = max(_reach(physics, data, geom) for geom in arms)
 
-    assert reach <= robot.base.footprint_radius_m + 0.005
+    assert reach <= robot.base.footprint_radius_m + WRISTS_BEYOND_M
     assert data.ncon == 0
 
 
