@@ -9,6 +9,7 @@ from dataclasses import replace
 import psutil
 import pytest
 
+from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.service_runner import ServiceRules, ServiceRunner, ServiceState
 
 # A service whose words are those of the product's own notifier.
@@ -70,6 +71,10 @@ def launch() -> Iterator[Launch]:
 def test_a_service_is_ready_when_its_main_process_says_so(launch: Launch) -> None:
     runner = launch("good")
     assert runner.wait_ready(20)
+    clock = MonotonicClock()
+    deadline_ns = clock.now_ns() + 5 * NS_PER_S
+    while runner.report.status != "at work" and clock.now_ns() < deadline_ns:  # a datagram later
+        clock.sleep_until(clock.now_ns() + NS_PER_S // 50)
     assert (runner.report.status, runner.report.restarts) == ("at work", 0)
     runner.stop()
     assert (runner.state, runner.report.exit_code) == (ServiceState.INACTIVE, 0)

@@ -24,7 +24,8 @@ def profile_of(tmp_path):
 
 @pytest.fixture
 def powerless(monkeypatch):
-    """Take every right away that a profile may need."""
+    """Take every right away that a profile may need; threads of other tests are not its own."""
+    monkeypatch.setattr(host_settings, "_threads", lambda: [os.getpid()])
     monkeypatch.setattr(host_settings, "_may", lambda _: False)
     limits = {resource.RLIMIT_RTPRIO: 0, resource.RLIMIT_NICE: 20, resource.RLIMIT_MEMLOCK: 65536}
     monkeypatch.setattr(resource, "getrlimit", lambda which: (limits[which], limits[which]))
