@@ -30,7 +30,7 @@ _COMMANDS: Final = (
 _EARLIEST_S, _LATEST_S = 0.5, 9.0
 _REST_FOR_S: Final = 0.3
 _POLL_S: Final = 0.02
-_SETTLE_S: Final = 2.0
+_SETTLE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,11 +39,13 @@ class Rule:
 
     `rest_s` is until when everything rests, None where the robot may carry on; `ready_s` until when
     all processes are ready again without a hand; `states` are those in which control then may be.
+    Where it `ends`, a person has asked for it: `ready_s` is until when the service has ended.
     """
 
     rest_s: float | None
     ready_s: float
     states: tuple[str, ...]
+    ends: bool = False
 
 
 _CARRIES_ON: Final = ("armed",)
@@ -67,7 +69,8 @@ RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
     ("recorder", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
     ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
     ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
-    ("supervisor", signal.SIGTERM): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
+    # An orderly end takes the power: the arms sink until they lie on the base.
+    ("supervisor", signal.SIGTERM): Rule(rest_s=10.0, ready_s=30.0, states=("silent",), ends=True),
 }
 
 
@@ -87,7 +90,7 @@ class Injection:
         return f"{self.number:03d}/{self.process}/{self.signal.name}@{self.after_s:.1f}s"
 
 
-def injections(count: int, seed: int) -> list[Injection]:
+def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injection]:
     """Return every pair of process and signal about equally often, in random order and time."""
     draw = random.Random(seed)
     pairs: list[tuple[str, signal.Signals]] = []
@@ -100,7 +103,7 @@ def injections(count: int, seed: int) -> list[Injection]:
             number=number,
             process=process,
             signal=what,
-            after_s=draw.uniform(_EARLIEST_S, _LATEST_S),
+            after_s=draw.uniform(_EARLIEST_S, latest_s),
             command=_COMMANDS[number % len(_COMMANDS)],
         )
         for number, (process, what) in enumerate(pairs[:count])
@@ -131,8 +134,7 @@ class KillCampaign:
         self._machine.begin_watch()
         began_ns = self._clock.now_ns()
         self._robot.signal(injection.process, injection.signal)
-        rest_s = self._time_to_rest(began_ns, rule.rest_s)
-        ready_s = self._time_to_ready(began_ns, injection.process, pid, rule.ready_s)
+        rest_s, ready_s = self._follow(began_ns, rule, injection.process, pid)
         self._clock.sleep_until(self._clock.now_ns() + round(_SETTLE_S * NS_PER_S))
         state = self._robot.control_state()
         failures = [*self._hazards(), *_late(rule, rest_s, ready_s)]
@@ -160,28 +162,24 @@ class KillCampaign:
             for found in self._machine.hazards()
         ]
 
-    def _time_to_rest(self, began_ns: int, limit_s: float | None) -> float:
-        """Return when everything began to rest for good, NaN where that is not asked for."""
-        if limit_s is None:
-            return math.nan
-        rest_s = math.inf
-        end_ns = began_ns + round((limit_s + _REST_FOR_S) * NS_PER_S)
-        while self._clock.now_ns() < end_ns:
-            if self._machine.fastest_rad_s() > STANDSTILL_RAD_S:
-                rest_s = math.inf
-            elif math.isinf(rest_s):
-                rest_s = (self._clock.now_ns() - began_ns) / NS_PER_S
+    def _follow(self, began_ns: int, rule: Rule, process: str, pid: int) -> tuple[float, float]:
+        """Return when everything began to rest for good, and when all was ready again."""
+        rest_s, ready_s, since_s = math.inf, math.inf, 0.0
+        least_s = 0.0 if rule.rest_s is None else rule.rest_s + _REST_FOR_S
+        while since_s < max(least_s, rule.ready_s) and (since_s < least_s or math.isinf(ready_s)):
+            since_s = (self._clock.now_ns() - began_ns) / NS_PER_S
+            if since_s < least_s:
+                moves = self._machine.fastest_rad_s() > STANDSTILL_RAD_S
+                rest_s = math.inf if moves else min(rest_s, since_s)
+            if math.isinf(ready_s) and self._is_back(rule, process, pid):
+                ready_s = since_s
             self._clock.sleep_until(self._clock.now_ns() + round(_POLL_S * NS_PER_S))
-        return rest_s
+        return (math.nan if rule.rest_s is None else rest_s), ready_s
 
-    def _time_to_ready(self, began_ns: int, process: str, pid: int, limit_s: float) -> float:
-        """Return when a new process of the name and all others were ready."""
-        end_ns = began_ns + round(limit_s * NS_PER_S)
-        while self._clock.now_ns() < end_ns:
-            if self._robot.is_ready() and self._robot.pid_of(process) != pid:
-                return (self._clock.now_ns() - began_ns) / NS_PER_S
-            self._clock.sleep_until(self._clock.now_ns() + round(5 * _POLL_S * NS_PER_S))
-        return math.inf
+    def _is_back(self, rule: Rule, process: str, pid: int) -> bool:
+        if rule.ends:
+            return self._robot.has_ended()
+        return self._robot.is_ready() and self._robot.pid_of(process) != pid
 
 
 def _late(rule: Rule, rest_s: float, ready_s: float) -> list[str]:
@@ -195,11 +193,15 @@ def _late(rule: Rule, rest_s: float, ready_s: float) -> list[str]:
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Do `options.count` injections, 200 unless told otherwise."""
-    chosen = [
-        each for each in injections(options.count or 200, options.seed) if options.only in each.name
-    ]
+    drawn = injections(options.count or 200, options.seed)
+    chosen = [each for each in drawn if options.only in each.name]
+    return inject_all(chosen, options.seed, tell)
+
+
+def inject_all(chosen: Sequence[Injection], seed: int, tell: Callable[[str], None]) -> Report:
+    """Do injections one after the other on one machine."""
     with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
-        campaign = KillCampaign(Path(folder), options.seed)
+        campaign = KillCampaign(Path(folder), seed)
         try:
             cases = [_told(campaign.inject(injection), tell) for injection in chosen]
         finally:

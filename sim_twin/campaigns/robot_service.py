@@ -12,7 +12,7 @@ from typing import Any, Final
 import psutil
 
 from drivers.clock import NS_PER_S, Clock
-from sim_twin.service_runner import ServiceRunner
+from sim_twin.service_runner import ServiceRunner, ServiceState
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
 from vla_deploy.logs import RUN_ID_VARIABLE
@@ -43,20 +43,24 @@ class RobotService:
         self._clock = clock
         self._session: Session | None = None
         words = ("--runtime-base", str(base), "run", "--devices-dir", str(devices_dir))
-        self._runner = ServiceRunner(
-            [*_COMMAND, *words], dict(os.environ), watchdog_s=WATCHDOG_S, restart_s=RESTART_S
-        )
-        self._runner.start()
+        self._command = [*_COMMAND, *words]
+        self._runner = self._started()
 
     def make_ready(self) -> None:
-        """Wait for every process, then reset and arm as an operator does.
+        """Start the service if it has ended, wait for every process, then reset and arm.
 
         Raises:
             NotReady: it does not come up, or control does not arm.
         """
+        if self.has_ended():
+            self._runner = self._started()
         self._await(self.is_ready, _READY_S, "not every process is ready")
         for act, wanted in (("reset", ("disarmed", "armed")), ("arm", ("armed",))):
             self._do(act, wanted)
+
+    def has_ended(self) -> bool:
+        """Tell whether the service has ended as a person wanted: nobody starts it again."""
+        return self._runner.state is ServiceState.INACTIVE
 
     def is_ready(self) -> bool:
         """Tell whether every process that should run is ready."""
@@ -116,6 +120,13 @@ class RobotService:
         self._runner.stop()
         self._detach()
 
+    def _started(self) -> ServiceRunner:
+        runner = ServiceRunner(
+            self._command, dict(os.environ), watchdog_s=WATCHDOG_S, restart_s=RESTART_S
+        )
+        runner.start()
+        return runner
+
     def _do(self, act: str, wanted: tuple[str, ...]) -> None:
         """Do an act again and again, as a person would, until control is where it should be."""
         deadline_ns = self._clock.now_ns() + round(_ACT_S * NS_PER_S)
@@ -133,7 +144,8 @@ class RobotService:
         while not condition():
             if self._clock.now_ns() > deadline_ns:
                 table = self._document("process_table", _FRESH_S)
-                raise NotReady(f"{what} after {timeout_s:g} s: {json.dumps(table)}")
+                report = self._runner.report
+                raise NotReady(f"{what} after {timeout_s:g} s: {report}, {json.dumps(table)}")
             self._clock.sleep_until(self._clock.now_ns() + _POLL_NS)
 
     def _document(self, topic: str, age_limit_s: float) -> dict[str, Any] | None:
