@@ -84,7 +84,7 @@ def test_the_real_time_share_is_told(computer, runtime_us, level, words) -> None
     ("path", "content"),
     [
         ("/sys/fs/cgroup/cpu/cpu.rt_runtime_us", b"950000"),
-        ("/proc/config.gz", gzip.compress(b"CONFIG_SMP=y\nCONFIG_RT_GROUP_SCHED=y\n")),
+        ("/proc/config.gz", gzip.compress(b"CONFIG_SMP=y\nCONFIG_RT_GROUP_SCHED=y\n", mtime=0)),
         ("/boot/config-5.15.148-tegra", b"CONFIG_RT_GROUP_SCHED=y\n"),
     ],
 )
