@@ -14,7 +14,16 @@ _POSE_S: Final = 3.5
 _CLOSE_S: Final = 1.5
 _SETTLE_S: Final = 1.0
 _RUN_UP_S: Final = 0.6
-_POSE: Final = "tuck"
+_POSE: Final = {
+    "left_shoulder_yaw": -0.4,
+    "left_shoulder_pitch": -0.3,
+    "left_elbow": 2.5,
+    "left_wrist_pitch": -2.35,
+    "left_wrist_roll": 1.57,
+    "right_shoulder_yaw": 0.2,
+}
+"""Butler's left hand before the chest, where its fingers hold the cup from both sides."""
+_TUCK: Final = "tuck"
 _HAND: Final = "left"
 _REACH: Final = {"left_elbow": 1.9, "left_shoulder_pitch": 0.4, "right_elbow": 1.9}
 _CARRY_REACH: Final = {"left_elbow": 2.2, "right_elbow": 2.2}
@@ -86,7 +95,7 @@ class Stage:
         fingers = robot.group(hand.gripper).joints
         widest = dict(zip(robot.joint_names, robot.position_max.tolist(), strict=True))
         open_m = {name: widest[name] for name in fingers}
-        self._go({**robot.poses[_POSE], **open_m}, 1.0)
+        self._go({**robot.poses[_TUCK], **_POSE, **open_m}, 1.0)
         self.run_for(_POSE_S)
         grip = engine.data.site(hand.grip_site)
         self._go(dict.fromkeys(fingers, 0.004), 0.5, dict.fromkeys(fingers, 0.5))
