@@ -53,6 +53,7 @@ class RobotService:
             NotReady: it does not come up, or control does not arm.
         """
         if self.has_ended():
+            self._runner.stop()  # what it holds of an ended service goes too
             self._runner = self._started()
         self._await(self.is_ready, _READY_S, "not every process is ready")
         for act, wanted in (("reset", ("disarmed", "armed")), ("arm", ("armed",))):
