@@ -127,10 +127,8 @@ class KillCampaign:
         self._robot.make_ready()
         job = self._robot.begin("say", injection.command)
         self._clock.sleep_until(self._clock.now_ns() + round(injection.after_s * NS_PER_S))
-        rule, pid = (
-            RULES[injection.process, injection.signal],
-            self._robot.pid_of(injection.process),
-        )
+        rule = RULES[injection.process, injection.signal]
+        pid = self._robot.pid_of(injection.process)
         self._machine.begin_watch()
         began_ns = self._clock.now_ns()
         self._robot.signal(injection.process, injection.signal)
@@ -139,7 +137,8 @@ class KillCampaign:
         state = self._robot.control_state()
         failures = [*self._hazards(), *_late(rule, rest_s, ready_s)]
         if state not in rule.states:
-            failures.append(f"control is {state}, expected {' or '.join(rule.states)}")
+            why = self._robot.why()
+            failures.append(f"control is {state} ({why}), expected {' or '.join(rule.states)}")
         failures += [f"orphan {orphan}" for orphan in self._robot.orphans()]
         self._robot.end(job)
         return Case(

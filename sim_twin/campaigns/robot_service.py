@@ -76,6 +76,11 @@ class RobotService:
         status = self._document("control_status", _FRESH_STATUS_S)
         return "silent" if status is None else str(status["state"])
 
+    def why(self) -> str:
+        """Return the cause of control's state, and what it says of it."""
+        status = self._document("control_status", _FRESH_STATUS_S) or {}
+        return f"{status.get('cause')}: {status.get('detail')}"
+
     def pid_of(self, process: str) -> int:
         """Return a process' id, 0 while it has none."""
         table = self._document("process_table", _FRESH_S)
