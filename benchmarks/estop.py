@@ -1,9 +1,11 @@
 """Measure the emergency stop: from the request to the frame on the wire, and to standstill.
 
 - `request_to_frame_ticks`: real processes, whose cores are kept busy by others. A listener on the
-  CAN bus sees the quick stop that control sends to the first wheel drive; the time counts from just
-  before the request is written to the ring that every source of a stop writes to. Where the machine
-  permits, control has SCHED_FIFO, as on the robot (`realtime` tells).
+  CAN bus sees the first frame by which control no longer lets the first wheel drive operate: a base
+  that drives is stopped quickly, one that rests loses its power. The time counts from just before
+  the request is written to the ring that every source of a stop writes to; before each request the
+  robot is armed anew. Where the machine permits, control has SCHED_FIFO, as on the robot
+  (`realtime` tells).
 - `standstill_s_<phase>`: in lock-step, so free of the machine's noise: from the request until no
   joint and no wheel moves faster than 0.02 rad/s, by physics.
 """
@@ -35,7 +37,7 @@ from vla_deploy.cli.session import Session
 from vla_deploy.robots import load_robot
 
 _RPDO1: Final = 0x200
-_CONTROLWORD_BITS: Final = 0x8F
+_COMMAND_BITS: Final = 0x0F
 _ANSWER_S: Final = 1.0
 _ACT_S: Final = 10.0
 _STANDSTILL_RAD_S: Final = 0.02
@@ -117,23 +119,23 @@ def _ask_again_and_again(
                 continue
             asked_ns = clock.now_ns()
             session.operate("estop", "bench")
-            ticks.append((_quick_stop_ns(bus, cob_id) - asked_ns) / period_ns)
+            ticks.append((_stop_frame_ns(bus, cob_id) - asked_ns) / period_ns)
             _reach(session, "reset", "disarmed")
     session.close()
     return ticks
 
 
-def _quick_stop_ns(bus: can.BusABC, cob_id: int) -> int:
-    """Return when the drive was told to stop quickly."""
+def _stop_frame_ns(bus: can.BusABC, cob_id: int) -> int:
+    """Return when the drive was first told anything but to operate."""
     clock = MonotonicClock()
     deadline_ns = clock.now_ns() + round(_ANSWER_S * NS_PER_S)
     while clock.now_ns() < deadline_ns:
         frame = bus.recv(_ANSWER_S)
         if frame is None or frame.arbitration_id != cob_id:
             continue
-        if frame.data[0] & _CONTROLWORD_BITS == ControlCommand.QUICK_STOP:
+        if frame.data[0] & _COMMAND_BITS != ControlCommand.ENABLE_OPERATION:
             return clock.now_ns()
-    raise NoStop(f"no quick stop on the wire within {_ANSWER_S:g} s of the request")
+    raise NoStop(f"no stop on the wire within {_ANSWER_S:g} s of the request")
 
 
 def _reach(session: Session, act: str, wanted: str) -> None:
