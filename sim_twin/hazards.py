@@ -85,7 +85,7 @@ class HazardWatch:
 
     def document(self) -> list[dict[str, Any]]:
         """Return the hazards as JSON."""
-        return [asdict(hazard) for hazard in self.found]
+        return [{**asdict(hazard), "text": str(hazard)} for hazard in self.found]
 
     def _look_at_joints(self) -> None:
         position = self._data.qpos[self._places]

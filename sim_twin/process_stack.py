@@ -14,6 +14,8 @@ import psutil
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.faults.remote import RemoteFaults
 from sim_twin.referee import ask
+from sim_twin.truth import fastest_joint
+from vla_deploy.supervisor.orphans import run_id_of
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli")
 _POLL_NS: Final = NS_PER_S // 50
@@ -157,8 +159,7 @@ class ProcessStack:
 
     def fastest_rad_s(self) -> float:
         """Return the speed of the fastest joint."""
-        joints = self.truth()["joints"]
-        return max(abs(float(joint["velocity"])) for joint in joints.values())
+        return fastest_joint(self.truth())[1]
 
     def wait_until(self, condition: Callable[[], object], timeout_s: float = 30.0) -> bool:
         """Return whether `condition()` came true in time."""
@@ -171,7 +172,7 @@ class ProcessStack:
 
     def members(self) -> list[psutil.Process]:
         """Return every process that carries the run's id, the supervisor's descendants or not."""
-        return [one for one in psutil.process_iter() if _belongs(one, self.run_dir.name)]
+        return [one for one in psutil.process_iter() if run_id_of(one) == self.run_dir.name]
 
     def close(self) -> None:
         """End the run in order; ending twice is allowed."""
@@ -183,11 +184,3 @@ class ProcessStack:
 
     def _words(self, *words: str) -> list[str]:
         return [*_COMMAND, "--runtime-base", str(self.base), *words]
-
-
-def _belongs(process: psutil.Process, run_id: str) -> bool:
-    try:
-        alive = process.status() != psutil.STATUS_ZOMBIE
-        return alive and process.environ().get("VLA_DEPLOY_RUN_ID") == run_id
-    except (psutil.NoSuchProcess, psutil.AccessDenied):
-        return False

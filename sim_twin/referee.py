@@ -51,6 +51,15 @@ def ask(run_dir: Path, op: str, **arguments: str) -> dict[str, Any]:
     return answer
 
 
+def told_hazards(run_dir: Path) -> tuple[str, ...]:
+    """Return in words what the twin under `run_dir` saw go wrong since its watch began.
+
+    Raises:
+        Unreachable: no twin answers there.
+    """
+    return tuple(found["text"] for found in ask(run_dir, "hazards", begin="")["hazards"])
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Print one answer as JSON; 2 when the twin is not there or refuses."""
     options = vars(_parser().parse_args(argv))

@@ -1,6 +1,7 @@
 """Tell what really happened in the physics; for tests and the demo's verdict only."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -10,9 +11,17 @@ from numpy.typing import NDArray
 from sim_twin.compose import ROBOT_ROOT
 from sim_twin.errors import RefereeRefusal
 
+STANDSTILL_RAD_S = 0.02
+"""A joint that is slower stands still."""
 REST_SPEED_M_S = 0.02
 REST_RATE_RAD_S = 0.3
 _SCALAR_JOINTS = (mujoco.mjtJoint.mjJNT_HINGE.value, mujoco.mjtJoint.mjJNT_SLIDE.value)
+
+
+def fastest_joint(truth: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the name and the speed of the joint that moves fastest."""
+    speeds = {name: abs(float(joint["velocity"])) for name, joint in truth["joints"].items()}
+    return max(speeds.items(), key=lambda item: item[1])
 
 
 class Referee:

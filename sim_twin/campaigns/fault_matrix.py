@@ -19,9 +19,10 @@ from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
 from sim_twin.faults.scenario import NO_CAUSE
 from sim_twin.faults.table import faults_of
-from sim_twin.faults.witness import STANDSTILL_RAD_S, Witness
+from sim_twin.faults.witness import Witness
 from sim_twin.hazards import Hazard
 from sim_twin.stack import LockstepControl, LockstepStack
+from sim_twin.truth import STANDSTILL_RAD_S
 from vla_deploy.robots import RobotDescription, load_robot
 
 INSTANCES: Final = {

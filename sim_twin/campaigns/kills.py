@@ -16,10 +16,10 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.machine import Machine
-from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.report import Case, Report, told
 from sim_twin.campaigns.robot_service import RobotService
+from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
 
-STANDSTILL_RAD_S: Final = 0.02
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
 _COMMANDS: Final = (
     "pick up the red cup and put it in the box",
@@ -115,6 +115,7 @@ class KillCampaign:
 
     def __init__(self, folder: Path, seed: int, robot: str = "butler") -> None:
         self._clock = MonotonicClock()
+        self._mover = ""
         self._machine = Machine(folder / "machine", self._clock, robot=robot, seed=seed)
         try:
             self._robot = RobotService(folder / "run", self._machine.devices_dir, self._clock)
@@ -135,7 +136,7 @@ class KillCampaign:
         rest_s, ready_s = self._follow(began_ns, rule, injection.process, pid)
         self._clock.sleep_until(self._clock.now_ns() + round(_SETTLE_S * NS_PER_S))
         state = self._robot.control_state()
-        failures = [*self._hazards(), *_late(rule, rest_s, ready_s)]
+        failures = [*self._machine.hazards(), *_late(rule, rest_s, ready_s, self._mover)]
         if state not in rule.states:
             why = self._robot.why()
             failures.append(f"control is {state} ({why}), expected {' or '.join(rule.states)}")
@@ -155,12 +156,6 @@ class KillCampaign:
         finally:
             self._machine.close()
 
-    def _hazards(self) -> list[str]:
-        return [
-            f"{found['kind']} {found['part']}: {found['worst']:.3g}, limit {found['limit']:.3g}"
-            for found in self._machine.hazards()
-        ]
-
     def _follow(self, began_ns: int, rule: Rule, process: str, pid: int) -> tuple[float, float]:
         """Return when everything began to rest for good, and when all was ready again."""
         rest_s, ready_s, since_s = math.inf, math.inf, 0.0
@@ -168,8 +163,11 @@ class KillCampaign:
         while since_s < max(least_s, rule.ready_s) and (since_s < least_s or math.isinf(ready_s)):
             since_s = (self._clock.now_ns() - began_ns) / NS_PER_S
             if since_s < least_s:
-                moves = self._machine.fastest_rad_s() > STANDSTILL_RAD_S
-                rest_s = math.inf if moves else min(rest_s, since_s)
+                joint, speed_rad_s = fastest_joint(self._machine.truth())
+                if speed_rad_s > STANDSTILL_RAD_S:
+                    rest_s, self._mover = math.inf, f"{joint} moves at {speed_rad_s:.2g} rad/s"
+                else:
+                    rest_s = min(rest_s, since_s)
             if math.isinf(ready_s) and self._is_back(rule, process, pid):
                 ready_s = since_s
             self._clock.sleep_until(self._clock.now_ns() + round(_POLL_S * NS_PER_S))
@@ -181,10 +179,10 @@ class KillCampaign:
         return self._robot.is_ready() and self._robot.pid_of(process) != pid
 
 
-def _late(rule: Rule, rest_s: float, ready_s: float) -> list[str]:
+def _late(rule: Rule, rest_s: float, ready_s: float, mover: str) -> list[str]:
     late = []
     if rule.rest_s is not None and not rest_s <= rule.rest_s:
-        late.append(f"at rest after {rest_s:.2f} s, limit {rule.rest_s:g} s")
+        late.append(f"at rest after {rest_s:.2f} s, limit {rule.rest_s:g} s ({mover})")
     if not ready_s <= rule.ready_s:
         late.append(f"ready after {ready_s:.1f} s, limit {rule.ready_s:g} s")
     return late
@@ -202,15 +200,10 @@ def inject_all(chosen: Sequence[Injection], seed: int, tell: Callable[[str], Non
     with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
         campaign = KillCampaign(Path(folder), seed)
         try:
-            cases = [_told(campaign.inject(injection), tell) for injection in chosen]
+            cases = [told(campaign.inject(injection), tell) for injection in chosen]
         finally:
             campaign.close()
     return Report(campaign="kills", cases=tuple(cases), summary=_summary(cases))
-
-
-def _told(case: Case, tell: Callable[[str], None]) -> Case:
-    tell(case.row)
-    return case
 
 
 def _summary(cases: Sequence[Case]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from sim_twin.errors import TwinError, Unreachable
 from sim_twin.process import READY_FILE
-from sim_twin.referee import ask
+from sim_twin.referee import ask, told_hazards
 
 _READY_S: Final = 90.0
 _END_S: Final = 10.0
@@ -50,15 +50,9 @@ class Machine:
         """Forget the hazards seen so far."""
         ask(self.folder, "hazards", begin="yes")
 
-    def hazards(self) -> list[dict[str, Any]]:
-        """Return the hazards since the watch began."""
-        found: list[dict[str, Any]] = ask(self.folder, "hazards", begin="")["hazards"]
-        return found
-
-    def fastest_rad_s(self) -> float:
-        """Return the speed of the fastest joint."""
-        joints = self.truth()["joints"]
-        return max(abs(float(joint["velocity"])) for joint in joints.values())
+    def hazards(self) -> tuple[str, ...]:
+        """Return the hazards since the watch began, in words."""
+        return told_hazards(self.folder)
 
     def close(self) -> None:
         """End the twin; ending twice is allowed."""

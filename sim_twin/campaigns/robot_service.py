@@ -15,8 +15,9 @@ from drivers.clock import NS_PER_S, Clock
 from sim_twin.service_runner import ServiceRunner, ServiceState
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
-from vla_deploy.logs import RUN_ID_VARIABLE
 from vla_deploy.supervisor import running
+from vla_deploy.supervisor.lifecycle import is_settled
+from vla_deploy.supervisor.orphans import run_id_of
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
 _READY_S: Final = 120.0
@@ -66,10 +67,7 @@ class RobotService:
     def is_ready(self) -> bool:
         """Tell whether every process that should run is ready."""
         table = self._document("process_table", _FRESH_S)
-        if table is None:
-            return False
-        rows = table["processes"]
-        return bool(rows) and all(row["state"] in ("ready", "off") for row in rows)
+        return table is not None and is_settled(table)
 
     def control_state(self) -> str:
         """Return control's state, "silent" where it tells none."""
@@ -118,7 +116,7 @@ class RobotService:
         return [
             f"{process.pid} of run {run_id}"
             for process in psutil.process_iter()
-            if (run_id := _run_id(process)) and run_id != now and self._is_mine(process)
+            if (run_id := run_id_of(process)) and run_id != now and self._is_mine(process)
         ]
 
     def close(self) -> None:
@@ -182,11 +180,3 @@ class RobotService:
             return str(self._base) in " ".join(process.cmdline())
         except (psutil.NoSuchProcess, psutil.AccessDenied):
             return False
-
-
-def _run_id(process: psutil.Process) -> str | None:
-    try:
-        alive = process.status() != psutil.STATUS_ZOMBIE
-        return process.environ().get(RUN_ID_VARIABLE) if alive else None
-    except (psutil.NoSuchProcess, psutil.AccessDenied, OSError):
-        return None

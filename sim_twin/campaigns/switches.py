@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.clock import NS_PER_S, MonotonicClock
-from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.report import Case, Report, told
 from sim_twin.campaigns.switch_judge import Seen, judge, memory_case, ticks_case
 from sim_twin.campaigns.switch_profiles import BAD, GOOD, Bad, control_rate_hz
 from sim_twin.campaigns.ticks import Ticks
@@ -158,15 +158,15 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
                 if options.only in name:
                     seen, case = campaign.switch(name)
                     history.append(seen)
-                    cases.append(_told(case, tell))
+                    cases.append(told(case, tell))
             chosen = [bad for bad in BAD if options.only in bad.case]
-            cases += [_told(campaign.refuse(bad), tell) for bad in chosen]
+            cases += [told(campaign.refuse(bad), tell) for bad in chosen]
         except RobotFailed as error:
-            cases.append(_told(Case(name="robot", failures=(str(error),)), tell))
+            cases.append(told(Case(name="robot", failures=(str(error),)), tell))
         finally:
             campaign.close()
     if history:
-        cases += [_told(ticks_case(before, history), tell), _told(memory_case(history), tell)]
+        cases += [told(ticks_case(before, history), tell), told(memory_case(history), tell)]
     return Report(campaign="switches", cases=tuple(cases), summary=_summary(cases, history))
 
 
@@ -188,11 +188,6 @@ def _case(name: str, failures: Sequence[str], seen: Seen) -> Case:
         "cause": seen.cause,
     }
     return Case(name=name, failures=tuple(failures), figures=figures, seconds=seen.seconds)
-
-
-def _told(case: Case, tell: Callable[[str], None]) -> Case:
-    tell(case.row)
-    return case
 
 
 def _written(folder: Path, name: str, text: str) -> Path:

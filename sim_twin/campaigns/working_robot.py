@@ -13,10 +13,11 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from sim_twin.campaigns.talk import Talk
 from sim_twin.campaigns.ticks import Ticks
-from sim_twin.referee import ask
+from sim_twin.referee import ask, told_hazards
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor import running
+from vla_deploy.supervisor.lifecycle import is_settled
 
 _START_S: Final = 120.0
 _END_S: Final = 40.0
@@ -105,9 +106,8 @@ class WorkingRobot:
 
     def is_ready(self) -> bool:
         """Tell whether every process that should run is ready, and control armed."""
-        rows = self.document("process_table").get("processes", ())
-        settled = all(row["state"] in ("ready", "not wanted") for row in rows)
-        return bool(rows) and settled and self.state() == "armed"
+        table = self.document("process_table")
+        return bool(table) and is_settled(table) and self.state() == "armed"
 
     def begin_watch(self) -> None:
         """Let the referee forget the hazards seen so far."""
@@ -115,10 +115,7 @@ class WorkingRobot:
 
     def hazards(self) -> tuple[str, ...]:
         """Return what was unsafe in physics since the watch began."""
-        return tuple(
-            f"{found['kind']} {found['part']}: {found['worst']:.3g}, limit {found['limit']:.3g}"
-            for found in ask(self.run_dir, "hazards", begin="")["hazards"]
-        )
+        return told_hazards(self.run_dir)
 
     # --- act ----------------------------------------------------------------------------------
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 from sim_twin.faults.scenario import NO_CAUSE
 from sim_twin.stack import LockstepControl
+from sim_twin.truth import STANDSTILL_RAD_S
 from vla_deploy.ipc import BY_NAME
 
-STANDSTILL_RAD_S: Final = 0.02
 SENSOR_CELLS: Final = ("scan", "imu", "pose")
 _IMAGES: Final = "rgbd"
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.exit_codes import EXIT_CONFIGURATION
@@ -24,6 +25,14 @@ class State(Enum):
     GIVEN_UP = "given up"
     STOPPING = "stopping"
     STOPPED = "stopped"
+
+
+_SETTLED = (State.READY.value, State.OFF.value)
+
+
+def is_settled(table: Mapping[str, Any]) -> bool:
+    """Tell whether a published process table shows every process ready that should run."""
+    return bool(table["processes"]) and all(row["state"] in _SETTLED for row in table["processes"])
 
 
 class Act(Enum):

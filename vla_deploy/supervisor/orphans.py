@@ -11,9 +11,14 @@ _TERM_WAIT_S = 1.0
 _KILL_WAIT_S = 2.0
 
 
+def run_id_of(process: psutil.Process) -> str | None:
+    """Return the run that a living process belongs to, None where it belongs to none of ours."""
+    return _environment(process).get(RUN_ID_VARIABLE)
+
+
 def end_orphans(run_ids: Collection[str]) -> list[int]:
     """End every process of these runs, SIGTERM first; return their pids."""
-    orphans = [process for process in psutil.process_iter() if _run_id(process) in run_ids]
+    orphans = [process for process in psutil.process_iter() if run_id_of(process) in run_ids]
     for process in orphans:
         _signal(process, kill=False)
     _, stubborn = psutil.wait_procs(orphans, timeout=_TERM_WAIT_S)
@@ -38,13 +43,10 @@ def end_leftovers(run_id: str, process_name: str | None = None) -> list[int]:
     return leftovers
 
 
-def _run_id(process: psutil.Process) -> str | None:
-    return _environment(process).get(RUN_ID_VARIABLE)
-
-
 def _environment(process: psutil.Process) -> Mapping[str, str]:
     try:
-        return process.environ()
+        ended = process.status() == psutil.STATUS_ZOMBIE
+        return {} if ended else process.environ()
     except (psutil.AccessDenied, psutil.NoSuchProcess, OSError):
         return {}  # another user's, a kernel thread, or gone meanwhile: not ours
 

@@ -1,6 +1,16 @@
+from typing import Any
+
 import pytest
 
-from vla_deploy.supervisor.lifecycle import Act, Record, Seen, State, reconcile, wind_down
+from vla_deploy.supervisor.lifecycle import (
+    Act,
+    Record,
+    Seen,
+    State,
+    is_settled,
+    reconcile,
+    wind_down,
+)
 from vla_deploy.supervisor.predicates import twin_only
 from vla_deploy.supervisor.table import TABLE, ProcessSpec, RestartPolicy
 
@@ -292,3 +302,13 @@ def test_nothing_is_started_after_one_that_was_given_up_before_it_ever_worked():
     play.step()
     assert play.step(a=Seen(exit_code=2)) == []
     assert (play.state("a"), play.state("b")) == (State.GIVEN_UP, State.WAITING)
+
+
+def test_a_table_is_settled_when_whoever_should_run_is_ready() -> None:
+    def table(*states: State) -> dict[str, Any]:
+        return {"processes": [{"state": state.value} for state in states]}
+
+    assert is_settled(table(State.READY, State.OFF))
+    assert not is_settled(table(State.READY, State.STARTING))
+    assert not is_settled(table(State.GIVEN_UP))
+    assert not is_settled(table())
