@@ -8,8 +8,6 @@ compared, plain sync read with plain, fast with fast. With pacing, every byte ta
 `bus_paced`.
 """
 
-import argparse
-import json
 import statistics
 import sys
 import tempfile
@@ -22,6 +20,7 @@ from typing import Any, Final
 
 from benchmarks.bus_clients import CLIENTS, SERVOS, Client
 from benchmarks.bus_paced import measure_paced
+from benchmarks.command import parser, show
 from benchmarks.core import own_core
 from benchmarks.emulated_bus import READ_BYTES, WRITE_BYTES, emulated_bus, wire_s
 from drivers.clock import NS_PER_S
@@ -131,11 +130,10 @@ def _text(report: dict[str, Any]) -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the comparison; exit 2 where a peer is not installed, 1 where the bus fails."""
-    parser = argparse.ArgumentParser(prog="bench bus", description=__doc__)
-    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds per client")
-    parser.add_argument("--seconds", type=float, default=0.8, help="length of one round")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args(argv)
+    arguments = parser("bus", __doc__)
+    arguments.add_argument("--rounds", type=int, default=5, help="interleaved rounds per client")
+    arguments.add_argument("--seconds", type=float, default=0.8, help="length of one round")
+    options = arguments.parse_args(argv)
     missing = [name for name in _PEERS if find_spec(name) is None]
     if missing:
         print(
@@ -148,7 +146,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except RuntimeError as error:
         print(f"bench bus: {error}", file=sys.stderr)
         return 1
-    print(json.dumps(report, indent=2) if options.json else _text(report))
+    show(report, as_json=options.json, text=_text)
     return 0
 
 

@@ -5,8 +5,6 @@ tell are what is left of the torque. Percentiles are over all jobs, at 50 Hz; th
 told with the share of the limit that it takes.
 """
 
-import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.command import parser, show
 from sim_twin.stack import LockstepStack
 from vla_deploy.control.contact_torque import ContactTorque
 from vla_deploy.ipc import CellReader
@@ -117,18 +116,12 @@ def _listening(seed: int) -> Iterator[tuple[LockstepStack, Listener]]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the table; 1 where a job failed or a limit was reached."""
-    parser = argparse.ArgumentParser(
-        prog="bench contact",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example:\n  vla-deploy bench contact --json",
-    )
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--job", action="append", help="a command instead of the usual ones")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
-    options = parser.parse_args(argv)
+    arguments = parser("contact", __doc__)
+    arguments.add_argument("--seed", type=int, default=0)
+    arguments.add_argument("--job", action="append", help="a command instead of the usual ones")
+    options = arguments.parse_args(argv)
     figures = measure(options.job or JOBS, options.seed)
-    sys.stdout.write((json.dumps(figures, indent=2) if options.json else _text(figures)) + "\n")
+    show(figures, as_json=options.json, text=_text)
     reached = any(row["max_of_limit_ratio"] >= 1.0 for row in figures["joints"].values())
     failed = any(not job["success"] for job in figures["jobs"])
     return 1 if reached or failed else 0

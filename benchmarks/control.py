@@ -7,17 +7,17 @@ sockets cost a real robot system calls on top, which are not in these figures.
 around and recording.
 """
 
-import argparse
 import contextlib
 import gc
-import json
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from benchmarks.command import parser, show
 from benchmarks.spans import REST, Spans
+from benchmarks.stopwatch import answering
 from drivers.clock import NS_PER_S
 from sim_twin.stack import LockstepStack
 from vla_deploy.control import node as control_node
@@ -63,15 +63,8 @@ def _instrument(spans: Spans, stack: LockstepStack) -> None:
             owner, _, name = path.rpartition(".")
             spans.wrap(part, getattr(control, owner) if owner else control, name)
     spans.wrap(_JUDGE, control_node, "evaluate")
-    for owner, name in _answering(stack):
+    for owner, name in answering(stack.lockstep.twin):
         spans.wrap(_DEVICES, owner, name)
-
-
-def _answering(stack: LockstepStack) -> Iterator[tuple[Any, str]]:
-    twin = stack.lockstep.twin
-    yield twin.can_wire, "send"
-    for device in twin.serial_devices.values():
-        yield from ((device, "receive"), (device, "transmit"))
 
 
 def _report(spans: Spans, seconds: float, period_s: float) -> dict[str, Any]:
@@ -91,19 +84,11 @@ def _report(spans: Spans, seconds: float, period_s: float) -> dict[str, Any]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the figures."""
-    parser = argparse.ArgumentParser(
-        prog="bench control",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example:\n  vla-deploy bench control --json",
-    )
-    parser.add_argument("--seconds", type=float, default=20.0, help="of simulated time")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args(argv)
-    report = measure(options.seconds, options.seed)
-    lines = [f"{name:24} {value:.6g}" for name, value in report.items()]
-    sys.stdout.write((json.dumps(report, indent=2) if options.json else "\n".join(lines)) + "\n")
+    arguments = parser("control", __doc__)
+    arguments.add_argument("--seconds", type=float, default=20.0, help="of simulated time")
+    arguments.add_argument("--seed", type=int, default=0)
+    options = arguments.parse_args(argv)
+    show(measure(options.seconds, options.seed), as_json=options.json)
     return 0
 
 

@@ -1,11 +1,15 @@
-"""Give client and emulated hardware a core each, so that neither waits for the other's."""
+"""Settle who gets the cores: a core each, real-time priority, or none to spare for anybody."""
 
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Final
 
-_PRIORITY: Final = 40
+_BUSY: Final = "while True: pass"
+REALTIME_PRIORITY: Final = 40
 """Below the emulated servos': hardware waits for nobody."""
 
 
@@ -33,7 +37,7 @@ def realtime() -> Iterator[bool]:
     """
     try:
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY))
+        os.sched_setscheduler(0, policy, os.sched_param(REALTIME_PRIORITY))
     except PermissionError:
         yield False
         return
@@ -41,3 +45,23 @@ def realtime() -> Iterator[bool]:
         yield True
     finally:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+@contextmanager
+def busy_cores() -> Iterator[None]:
+    """Keep every core busy with a process that never pauses."""
+    spinners = [subprocess.Popen([sys.executable, "-c", _BUSY]) for _ in os.sched_getaffinity(0)]
+    try:
+        yield
+    finally:
+        for spinner in spinners:
+            spinner.kill()
+            spinner.wait()
+
+
+def write_profile(folder: Path, realtime_priority: int) -> Path:
+    """Write the profile of a desktop whose control has this priority; 0 is none."""
+    path = folder / "bench.toml"
+    text = f'inherits = "desktop"\nrealtime_priority = {realtime_priority}\n'
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -10,22 +10,19 @@
   joint and no wheel moves faster than 0.02 rad/s, by physics.
 """
 
-import argparse
-import contextlib
-import json
 import os
 import random
 import statistics
-import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import can
 
-from benchmarks.core import realtime
+from benchmarks.command import parser, show
+from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime, write_profile
 from drivers.can_hub import HubBus
 from drivers.canopen.cia402 import ControlCommand
 from drivers.clock import NS_PER_S, MonotonicClock
@@ -43,8 +40,6 @@ _ACT_S: Final = 10.0
 _STANDSTILL_RAD_S: Final = 0.02
 _LONGEST_S: Final = 5.0
 _LOOK_S: Final = 0.004
-_REALTIME_PRIORITY: Final = 40
-_BUSY: Final = "while True: pass"
 
 
 class NoStop(Exception):
@@ -64,7 +59,7 @@ def measure(requests: int, seed: int) -> dict[str, Any]:
 
 def _latencies(folder: Path, requests: int, seed: int) -> dict[str, Any]:
     with realtime() as permitted:  # who measures must not wait for whom it keeps busy
-        profile = _write_profile(folder, priority=_REALTIME_PRIORITY if permitted else 0)
+        profile = write_profile(folder, REALTIME_PRIORITY if permitted else 0)
         stack = ProcessStack(folder / "run", "--profile", str(profile))
         try:
             stack.wait_until_armed()
@@ -81,24 +76,6 @@ def _latencies(folder: Path, requests: int, seed: int) -> dict[str, Any]:
         "request_to_frame_ticks_p99": ticks[min(len(ticks) - 1, round(0.99 * len(ticks)))],
         "request_to_frame_ticks_max": ticks[-1],
     }
-
-
-def _write_profile(folder: Path, priority: int) -> Path:
-    path = folder / "bench.toml"
-    path.write_text(f'inherits = "desktop"\nrealtime_priority = {priority}\n', encoding="utf-8")
-    return path
-
-
-@contextlib.contextmanager
-def busy_cores() -> Iterator[None]:
-    """Keep every core busy with a process that never pauses."""
-    spinners = [subprocess.Popen([sys.executable, "-c", _BUSY]) for _ in os.sched_getaffinity(0)]
-    try:
-        yield
-    finally:
-        for spinner in spinners:
-            spinner.kill()
-            spinner.wait()
 
 
 def _ask_again_and_again(
@@ -177,19 +154,11 @@ def _fastest_rad_s(stack: LockstepControl) -> float:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the figures."""
-    parser = argparse.ArgumentParser(
-        prog="bench estop",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example:\n  vla-deploy bench estop --json",
-    )
-    parser.add_argument("--requests", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args(argv)
-    report = measure(options.requests, options.seed)
-    lines = [f"{name:34} {value}" for name, value in report.items()]
-    sys.stdout.write((json.dumps(report, indent=2) if options.json else "\n".join(lines)) + "\n")
+    arguments = parser("estop", __doc__)
+    arguments.add_argument("--requests", type=int, default=200)
+    arguments.add_argument("--seed", type=int, default=0)
+    options = arguments.parse_args(argv)
+    show(measure(options.requests, options.seed), as_json=options.json)
     return 0
 
 

@@ -6,9 +6,7 @@ recorded once more one after another, `tick_ratio_in_a_row`, are a lower one. A 
 in small parts between looks: `write_core_ratio` is the share of a core while that lasts.
 """
 
-import argparse
 import contextlib
-import json
 import sys
 import tempfile
 import time
@@ -19,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.command import parser, show
 from benchmarks.spans import REST, Spans
 from drivers.clock import NS_PER_S
 from sim_twin.stack import LockstepStack
@@ -122,19 +121,11 @@ def _recorder(stack: LockstepStack, seconds: float, folder: Path) -> dict[str, f
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the figures."""
-    parser = argparse.ArgumentParser(
-        prog="bench recorder",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example:\n  vla-deploy bench recorder --json",
-    )
-    parser.add_argument("--seconds", type=float, default=20.0, help="of simulated time")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args(argv)
-    report = measure(options.seconds, options.seed)
-    lines = [f"{name:24} {value:.6g}" for name, value in report.items()]
-    sys.stdout.write((json.dumps(report, indent=2) if options.json else "\n".join(lines)) + "\n")
+    arguments = parser("recorder", __doc__)
+    arguments.add_argument("--seconds", type=float, default=20.0, help="of simulated time")
+    arguments.add_argument("--seed", type=int, default=0)
+    options = arguments.parse_args(argv)
+    show(measure(options.seconds, options.seed), as_json=options.json)
     return 0
 
 

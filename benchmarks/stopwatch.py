@@ -1,7 +1,7 @@
 """Count the CPU time that a twin spends in physics, in whole steps, and on answering its buses."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Final, ParamSpec, TypeVar
 
 from sim_twin.twin import Twin
@@ -10,6 +10,13 @@ _RUN_STEPS: Final = 7
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+
+def answering(twin: Twin) -> Iterator[tuple[Any, str]]:
+    """Yield owner and name of each method by which the twin's devices answer their buses."""
+    yield twin.can_wire, "send"
+    for device in twin.serial_devices.values():
+        yield from ((device, "receive"), (device, "transmit"))
 
 
 class Stopwatch:
@@ -30,10 +37,7 @@ class Stopwatch:
         self._physics_step = twin.engine.step
         setattr(twin, "step", self._step)  # noqa: B010 - a method of this one twin
         setattr(twin.engine, "step", self._physics)  # noqa: B010
-        answering: list[tuple[Any, str]] = [(twin.can_wire, "send")]
-        for device in twin.serial_devices.values():
-            answering += [(device, "receive"), (device, "transmit")]
-        for owner, name in answering:
+        for owner, name in answering(twin):
             setattr(owner, name, self._timed(getattr(owner, name)))
 
     @property

@@ -5,20 +5,18 @@ itself counts it. Robot, drivers and twin are the real processes; the twin stand
 and so has a real-time priority of its own wherever the machine permits.
 """
 
-import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.core import realtime
-from benchmarks.estop import busy_cores
+from benchmarks.command import parser, show
+from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime, write_profile
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.cli.session import Session
 
-_PRIORITIES: Final = {"plain": 0, "fifo": 40}
+_PRIORITIES: Final = {"plain": 0, "fifo": REALTIME_PRIORITY}
 _SETTLE_S: Final = 2.0
 
 
@@ -37,8 +35,7 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str, Any]:
-    profile = folder / "bench.toml"
-    profile.write_text(f'inherits = "desktop"\nrealtime_priority = {priority}\n', encoding="utf-8")
+    profile = write_profile(folder, priority)
     stack = ProcessStack(folder / "run", "--profile", str(profile))
     try:
         stack.wait_until_armed()
@@ -63,18 +60,10 @@ def _late_ratio(session: Session, seconds: float) -> float:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the figures."""
-    parser = argparse.ArgumentParser(
-        prog="bench ticks",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example:\n  vla-deploy bench ticks --json",
-    )
-    parser.add_argument("--seconds", type=float, default=20.0, help="of each combination")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args(argv)
-    report = measure(options.seconds)
-    lines = [f"{name:24} {value}" for name, value in report.items()]
-    sys.stdout.write((json.dumps(report, indent=2) if options.json else "\n".join(lines)) + "\n")
+    arguments = parser("ticks", __doc__)
+    arguments.add_argument("--seconds", type=float, default=20.0, help="of each combination")
+    options = arguments.parse_args(argv)
+    show(measure(options.seconds), as_json=options.json)
     return 0
 
 

@@ -14,8 +14,6 @@ The fastest round of each in CPU time counts: neighbours on the machine only eve
 - lock-step with the whole control node on the buses, disarmed, at the profile's rate.
 """
 
-import argparse
-import json
 import sys
 import tempfile
 import time
@@ -26,6 +24,7 @@ from typing import Any, Final
 
 import mujoco
 
+from benchmarks.command import parser, show
 from benchmarks.device_traffic import DeviceTraffic
 from benchmarks.stopwatch import Stopwatch
 from platforms import load_profile
@@ -82,20 +81,14 @@ def measure(robot_name: str, world: str, rounds: int, steps: int) -> dict[str, A
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the comparison."""
-    parser = argparse.ArgumentParser(
-        prog="bench twin",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example:\n  vla-deploy bench twin --json",
-    )
-    parser.add_argument("--robot", default="butler")
-    parser.add_argument("--world", default="flat")
-    parser.add_argument("--rounds", type=int, default=7, help="interleaved rounds of each run")
-    parser.add_argument("--steps", type=int, default=500, help="physics steps per round")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args(argv)
+    arguments = parser("twin", __doc__)
+    arguments.add_argument("--robot", default="butler")
+    arguments.add_argument("--world", default="flat")
+    arguments.add_argument("--rounds", type=int, default=7, help="interleaved rounds of each run")
+    arguments.add_argument("--steps", type=int, default=500, help="physics steps per round")
+    options = arguments.parse_args(argv)
     report = measure(options.robot, options.world, options.rounds, options.steps)
-    print(json.dumps(report, indent=2) if options.json else _text(report))
+    show(report, as_json=options.json, text=_text)
     return 0
 
 
