@@ -28,7 +28,8 @@ def background() -> Executor:
 
 
 def _give_way() -> None:
-    """Lower this thread alone, which has inherited the main thread's priority."""
+    """Lower this thread alone, below the main thread whose priority it has inherited."""
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     thread = 0
-    os.setpriority(os.PRIO_PROCESS, thread, max(_NICE, os.getpriority(os.PRIO_PROCESS, thread)))
+    inherited = os.getpriority(os.PRIO_PROCESS, thread)
+    os.setpriority(os.PRIO_PROCESS, thread, max(_NICE, inherited + 1))

@@ -18,7 +18,11 @@ _THREADS: Final = Path("/proc/self/task")
 
 
 class HostSettings:
-    """Hold how the kernel runs this process; threads that it has and will have share it."""
+    """Hold how the kernel runs this process; threads that it has and will have share it.
+
+    Only threads of the main thread's nice follow when that changes: others have put themselves
+    aside.
+    """
 
     def __init__(self, process: str) -> None:
         self._process = process
@@ -49,8 +53,11 @@ class HostSettings:
 
     def _set_nice(self, profile: Profile) -> None:
         nice = profile.processes[self._process].nice
+        before = os.getpriority(os.PRIO_PROCESS, os.getpid())
+        if nice == before:
+            return
         for thread in _threads():
-            if os.getpriority(os.PRIO_PROCESS, thread) != nice:
+            if os.getpriority(os.PRIO_PROCESS, thread) == before:
                 os.setpriority(os.PRIO_PROCESS, thread, nice)
 
     def _set_priority(self, profile: Profile) -> None:

@@ -3,13 +3,17 @@ import os
 import resource
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
 from platforms import load_profile
 from vla_deploy import host_settings
+from vla_deploy.aside import background
 from vla_deploy.host_settings import HostSettings
+
+NICE = os.getpriority(os.PRIO_PROCESS, os.getpid())
 
 
 @pytest.fixture
@@ -24,8 +28,7 @@ def profile_of(tmp_path):
 
 @pytest.fixture
 def powerless(monkeypatch):
-    """Take every right away that a profile may need; threads of other tests are not its own."""
-    monkeypatch.setattr(host_settings, "_threads", lambda: [os.getpid()])
+    """Take every right away that a profile may need."""
     monkeypatch.setattr(host_settings, "_may", lambda _: False)
     limits = {resource.RLIMIT_RTPRIO: 0, resource.RLIMIT_NICE: 20, resource.RLIMIT_MEMLOCK: 65536}
     monkeypatch.setattr(resource, "getrlimit", lambda which: (limits[which], limits[which]))
@@ -41,7 +44,10 @@ def _refuse(*_: object) -> None:
     ("text", "refusal"),
     [
         ("realtime_priority = 40", "no SCHED_FIFO priority 40 (grant CAP_SYS_NICE or LimitRTPRIO)"),
-        ("processes.control.nice = -5", "no nice -5 after 0 (grant CAP_SYS_NICE or LimitNICE)"),
+        (
+            "processes.control.nice = -5",
+            f"no nice -5 after {NICE} (grant CAP_SYS_NICE or LimitNICE)",
+        ),
         ("memory_lock = true", "no memory lock (grant CAP_IPC_LOCK or LimitMEMLOCK=infinity)"),
         (
             "board.cpu_count = 256\nprocesses.control.affinity = [255]",
@@ -57,7 +63,23 @@ def test_what_the_kernel_refuses_is_told_with_its_remedy(powerless, profile_of, 
 
 
 def test_a_profile_that_asks_for_nothing_is_never_refused(powerless, profile_of):
-    assert HostSettings("control").apply(profile_of("")) == ()
+    profile = profile_of(f"processes.control.nice = {NICE}")
+    assert HostSettings("control").apply(profile) == ()
+
+
+def test_threads_that_have_put_themselves_aside_keep_their_nice(monkeypatch, profile_of):
+    gate = threading.Event()
+    sharing = threading.Thread(target=gate.wait)
+    sharing.start()
+    with background() as executor:
+        aside = executor.submit(threading.get_native_id).result()
+        asked = {}
+        monkeypatch.setattr(os, "setpriority", lambda _, thread, nice: asked.update({thread: nice}))
+        HostSettings("control").apply(profile_of(f"processes.control.nice = {NICE + 1}"))
+    gate.set()
+    sharing.join()
+    assert asked[os.getpid()] == asked[sharing.native_id] == NICE + 1
+    assert aside not in asked
 
 
 def test_only_control_asks_for_realtime_and_a_memory_lock(powerless, profile_of):
