@@ -17,7 +17,7 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.machine import Machine
 from sim_twin.campaigns.report import Case, Report, told
-from sim_twin.campaigns.robot_service import RobotService
+from sim_twin.campaigns.robot_service import NotReady, RobotService
 from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
 
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
@@ -129,10 +129,9 @@ class KillCampaign:
         job = self._robot.begin("say", injection.command)
         self._clock.sleep_until(self._clock.now_ns() + round(injection.after_s * NS_PER_S))
         rule = RULES[injection.process, injection.signal]
-        pid = self._robot.pid_of(injection.process)
         self._machine.begin_watch()
         began_ns = self._clock.now_ns()
-        self._robot.signal(injection.process, injection.signal)
+        pid = self._robot.signal(injection.process, injection.signal)
         rest_s, ready_s = self._follow(began_ns, rule, injection.process, pid)
         self._clock.sleep_until(self._clock.now_ns() + round(_SETTLE_S * NS_PER_S))
         state = self._robot.control_state()
@@ -200,17 +199,24 @@ def inject_all(chosen: Sequence[Injection], seed: int, tell: Callable[[str], Non
     with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
         campaign = KillCampaign(Path(folder), seed)
         try:
-            cases = [told(campaign.inject(injection), tell) for injection in chosen]
+            cases = [told(_tried(campaign, injection), tell) for injection in chosen]
         finally:
             campaign.close()
     return Report(campaign="kills", cases=tuple(cases), summary=_summary(cases))
+
+
+def _tried(campaign: KillCampaign, injection: Injection) -> Case:
+    try:
+        return campaign.inject(injection)
+    except NotReady as error:
+        return Case(name=injection.name, failures=(str(error),))
 
 
 def _summary(cases: Sequence[Case]) -> dict[str, Any]:
     """Return, for each process, its longest way to rest and back to ready."""
     summary: dict[str, Any] = {"unsafe": sum(bool(case.failures) for case in cases)}
     for process in sorted({process for process, _ in RULES}):
-        mine = [case.figures for case in cases if f"/{process}/" in case.name]
+        mine = [case.figures for case in cases if case.figures and f"/{process}/" in case.name]
         rests = [each["rest_s"] for each in mine if not math.isnan(each["rest_s"])]
         summary[f"{process}_longest_rest_s"] = max(rests, default=math.nan)
         summary[f"{process}_longest_ready_s"] = max((each["ready_s"] for each in mine), default=0.0)

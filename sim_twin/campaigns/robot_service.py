@@ -89,9 +89,17 @@ class RobotService:
         pids = {row["name"]: row["pid"] or 0 for row in table["processes"]}
         return int(pids[process])
 
-    def signal(self, process: str, number: signal.Signals) -> None:
-        """Send a signal to one process."""
-        os.kill(self.pid_of(process), number)
+    def signal(self, process: str, number: signal.Signals) -> int:
+        """Send a signal to one process, and return who got it.
+
+        Raises:
+            NotReady: it does not run.
+        """
+        pid = self.pid_of(process)
+        if not pid:  # kill(2) would take 0 for everyone in our own process group
+            raise NotReady(f"{process} does not run, so it cannot get {number.name}")
+        os.kill(pid, number)
+        return pid
 
     def begin(self, *words: str) -> "subprocess.Popen[bytes]":
         """Start `vla-deploy WORDS` and do not wait for it."""
