@@ -5,7 +5,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Final
 
 _BUSY: Final = "while True: pass"
@@ -57,11 +56,3 @@ def busy_cores() -> Iterator[None]:
         for spinner in spinners:
             spinner.kill()
             spinner.wait()
-
-
-def write_profile(folder: Path, realtime_priority: int) -> Path:
-    """Write the profile of a desktop whose control has this priority; 0 is none."""
-    path = folder / "bench.toml"
-    text = f'inherits = "desktop"\nrealtime_priority = {realtime_priority}\n'
-    path.write_text(text, encoding="utf-8")
-    return path

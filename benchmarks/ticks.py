@@ -2,22 +2,31 @@
 
 A tick is late when it begins more than a fifth of the period after it should have, as control
 itself counts it. Robot, drivers and twin are the real processes; the twin stands for the hardware
-and so has a real-time priority of its own wherever the machine permits.
+and so has a real-time priority of its own wherever the machine permits. `late_ratio_bare_...` is
+the yardstick: a loop that only sleeps runs beside control for as long, at its rate and priority,
+and is counted in the same way. What is late there, no program on this machine can do on time.
 """
 
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.command import parser, show
-from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime, write_profile
-from sim_twin.process_stack import ProcessStack
+from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
+from benchmarks.live_robot import live_robot, reach
+from drivers.clock import NS_PER_S, Clock
+from platforms import load_profile
 from vla_deploy.cli.session import Session
+from vla_deploy.control.telemetry import TickClock
 
 _PRIORITIES: Final = {"plain": 0, "fifo": REALTIME_PRIORITY}
+_LOADS: Final = ("idle", "loaded")
+_ROWS: Final = ("late_ratio", "late_ratio_bare")
 _SETTLE_S: Final = 2.0
+_PERIOD_S: Final = 1.0 / load_profile("desktop").control_rate_hz
 
 
 def measure(seconds: float) -> dict[str, Any]:
@@ -27,7 +36,7 @@ def measure(seconds: float) -> dict[str, Any]:
     report: dict[str, Any] = {"seconds": seconds, "realtime": permitted}
     for name, priority in _PRIORITIES.items():
         if priority and not permitted:
-            report |= {f"late_ratio_{name}_{load}": None for load in ("idle", "loaded")}
+            report |= {f"{row}_{name}_{load}": None for row in _ROWS for load in _LOADS}
             continue
         with tempfile.TemporaryDirectory(prefix="vla-") as folder:
             report |= _measure(Path(folder), name, priority, seconds)
@@ -35,27 +44,37 @@ def measure(seconds: float) -> dict[str, Any]:
 
 
 def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str, Any]:
-    profile = write_profile(folder, priority)
-    stack = ProcessStack(folder / "run", "--profile", str(profile))
-    try:
-        stack.wait_until_armed()
-        session = Session(stack.run_dir)
-        idle = _late_ratio(session, seconds)
+    with live_robot(folder, priority) as session, realtime() if priority else nullcontext():
+        reach(session, "arm", "armed")
+        idle = _late_ratios(session, seconds)
         with busy_cores():
-            loaded = _late_ratio(session, seconds)
-        session.close()
-    finally:
-        stack.close()
-    return {f"late_ratio_{name}_idle": idle, f"late_ratio_{name}_loaded": loaded}
+            loaded = _late_ratios(session, seconds)
+    return {
+        f"{row}_{name}_{load}": ratio
+        for load, ratios in zip(_LOADS, (idle, loaded), strict=True)
+        for row, ratio in zip(_ROWS, ratios, strict=True)
+    }
 
 
-def _late_ratio(session: Session, seconds: float) -> float:
+def _late_ratios(session: Session, seconds: float) -> tuple[float, float]:
+    """Return the shares of control's late ticks and of the bare loop's."""
     session.pause(_SETTLE_S)
     before = session.document("control_status") or {}
-    session.pause(seconds)
+    bare = _sleep_bare(session.clock, _PERIOD_S, seconds)
     after = session.document("control_status") or {}
     ticks = after["tick"] - before["tick"]
-    return float((after["late_ticks"] - before["late_ticks"]) / ticks)
+    return (after["late_ticks"] - before["late_ticks"]) / ticks, bare.late_ticks / bare.tick
+
+
+def _sleep_bare(clock: Clock, period_s: float, seconds: float) -> TickClock:
+    ticks = TickClock(period_s)
+    period_ns = round(period_s * NS_PER_S)
+    deadline_ns = clock.now_ns()
+    for _ in range(round(seconds / period_s)):
+        ticks.begin(clock.now_ns())
+        deadline_ns = max(deadline_ns + period_ns, clock.now_ns())
+        clock.sleep_until(deadline_ns)
+    return ticks
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -45,16 +45,24 @@ class ProcessStack:
             start_new_session=True,
         )
 
+    def wait_until_ready(self) -> None:
+        """Return once all processes run; control arms next, unless something stops it.
+
+        Raises:
+            StackFailed: the run ended.
+        """
+        assert self.process.stdout is not None
+        if not any(line.startswith("ready;") for line in iter(self.process.stdout.readline, "")):
+            raise StackFailed("the run ended before it was ready; its last words are on stderr")
+        self.run_dir = (self.base / "current").resolve()
+
     def wait_until_armed(self) -> None:
         """Return once the robot takes commands.
 
         Raises:
             StackFailed: the run ended, or control does not arm.
         """
-        assert self.process.stdout is not None
-        if not any(line.startswith("ready;") for line in iter(self.process.stdout.readline, "")):
-            raise StackFailed("the run ended before it was ready; its last words are on stderr")
-        self.run_dir = (self.base / "current").resolve()
+        self.wait_until_ready()
         if not self.wait_until(lambda: self.state() == "armed"):
             raise StackFailed(f"control does not arm: {self.status()['control']}")
 
