@@ -1,17 +1,21 @@
 """Open an emergency-stop input by the model that the robot file names."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from drivers.clock import Clock
 from drivers.errors import UnknownModel
 from drivers.estop.base import EstopInput
 from drivers.estop.gpio_button import GpioButton
 from drivers.estop.hid_button import HidButton
-from drivers.opener import DeviceOpener
 
-Open = Callable[[DeviceOpener, str, int, Clock], EstopInput]
+if TYPE_CHECKING:  # the opener loads python-can, which who only reads a robot file never needs
+    from drivers.opener import DeviceOpener
+
+    Open = Callable[[DeviceOpener, str, int, Clock], EstopInput]
 
 
 def _hid(devices: DeviceOpener, name: str, number: int, clock: Clock) -> EstopInput:

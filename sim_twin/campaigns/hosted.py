@@ -11,8 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from sim_twin.campaigns import hog
-from vla_deploy.supervisor import ProcessSpec, RunOptions, Supervisor
-from vla_deploy.supervisor.table import TABLE
+from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.supervisor import Supervisor
+from vla_deploy.supervisor.table import TABLE, ProcessSpec
 
 BURDENED = "perception"
 

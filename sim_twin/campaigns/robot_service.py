@@ -15,9 +15,9 @@ from drivers.clock import NS_PER_S, Clock
 from sim_twin.service_runner import ServiceRunner, ServiceState
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
-from vla_deploy.supervisor import running
 from vla_deploy.supervisor.lifecycle import is_settled
 from vla_deploy.supervisor.orphans import run_id_of
+from vla_deploy.supervisor.runtime import running
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
 _READY_S: Final = 120.0

@@ -8,8 +8,10 @@ from typing import Any
 from platforms import load_profile
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.say import read_plan
-from vla_deploy.planning import check_plan, parse_plan, plan_schema
+from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.node import world_of
+from vla_deploy.planning.plan import plan_schema
+from vla_deploy.planning.validator import check_plan
 from vla_deploy.robots import load_robot
 
 

@@ -18,7 +18,8 @@ from vla_deploy.cli.referee import SteppingClock, ask_referee
 from vla_deploy.cli.run import add_robot_arguments
 from vla_deploy.cli.session import Session
 from vla_deploy.planning.references import parse_object
-from vla_deploy.supervisor import RunOptions, Supervisor
+from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.supervisor import Supervisor
 
 COMMAND = "pick up the red cup and put it in the box"
 EXAMPLES = """  vla-deploy demo

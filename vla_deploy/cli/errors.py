@@ -4,15 +4,9 @@ CommandFailed   the robot tried and did not succeed: exit code 1
 UsageError      the request cannot be carried out as it is: exit code 2
 """
 
-from drivers.errors import DriverError
-from platforms.errors import ProfileError
-from vla_deploy.install import InstallError
-from vla_deploy.ipc import IpcError
-from vla_deploy.navigation.errors import NavigationError
-from vla_deploy.planning.errors import PlanningError
-from vla_deploy.robots import RobotFileError
-from vla_deploy.supervisor import SupervisorError
-from vla_deploy.telemetry.errors import TelemetryError
+import sys
+from collections.abc import Mapping
+from typing import Final
 
 
 class UsageError(Exception):
@@ -24,15 +18,24 @@ class CommandFailed(Exception):
 
 
 # Everything a person can mend: told in one line, exit code 2, no traceback.
-USER_ERRORS = (
-    UsageError,
-    DriverError,
-    InstallError,
-    IpcError,
-    NavigationError,
-    PlanningError,
-    ProfileError,
-    RobotFileError,
-    SupervisorError,
-    TelemetryError,
-)
+USER_ERRORS: Final[Mapping[str, str]] = {
+    "vla_deploy.cli.errors": "UsageError",
+    "drivers.errors": "DriverError",
+    "vla_deploy.install.errors": "InstallError",
+    "vla_deploy.ipc.errors": "IpcError",
+    "vla_deploy.navigation.errors": "NavigationError",
+    "vla_deploy.planning.errors": "PlanningError",
+    "platforms.errors": "ProfileError",
+    "vla_deploy.robots.errors": "RobotFileError",
+    "vla_deploy.supervisor.errors": "SupervisorError",
+    "vla_deploy.telemetry.errors": "TelemetryError",
+}
+
+
+def user_errors() -> tuple[type[Exception], ...]:
+    """Return those of them that can have been raised: the others' modules are not even loaded."""
+    return tuple(
+        getattr(sys.modules[module], name)
+        for module, name in USER_ERRORS.items()
+        if module in sys.modules
+    )

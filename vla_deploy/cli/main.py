@@ -1,56 +1,17 @@
 """Read the command line and run one command."""
 
 import argparse
+import itertools
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from importlib import import_module
 from pathlib import Path
 
-from vla_deploy.cli import (
-    bench,
-    budget,
-    can,
-    check,
-    crashes,
-    demo,
-    doctor,
-    fault,
-    flight,
-    install,
-    logs,
-    operate,
-    profile,
-    release,
-    run,
-    say,
-    servo,
-    status,
-    validate,
-)
-from vla_deploy.cli.errors import USER_ERRORS, CommandFailed
+from vla_deploy.cli.commands import COMMANDS
+from vla_deploy.cli.errors import CommandFailed, user_errors
 from vla_deploy.cli.example import OneLineParser
 
-COMMANDS = (
-    run,
-    demo,
-    say,
-    status,
-    budget,
-    logs,
-    crashes,
-    operate,
-    profile,
-    servo,
-    can,
-    fault,
-    flight,
-    check,
-    doctor,
-    bench,
-    validate,
-    install,
-    release,
-)
 EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin
@@ -59,8 +20,8 @@ EPILOG = """examples:
 """
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of every command."""
+def parser(words: Iterable[str] = tuple(COMMANDS)) -> argparse.ArgumentParser:
+    """Return the parser of the commands among `words`; of the others it knows what they are for."""
     top = OneLineParser(
         prog="vla-deploy",
         description="Run a language-commanded robot, or its digital twin.",
@@ -74,14 +35,20 @@ def parser() -> argparse.ArgumentParser:
         help="where runs live (default: /run/vla-deploy for root, else XDG_RUNTIME_DIR)",
     )
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        command.register(commands)
+    wanted = {COMMANDS[word].module for word in words if word in COMMANDS}
+    for module, members in itertools.groupby(COMMANDS, lambda name: COMMANDS[name].module):
+        if module in wanted:
+            import_module(f"vla_deploy.cli.{module}").register(commands)
+            continue
+        for name in members:
+            commands.add_parser(name, help=COMMANDS[name].summary)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; return 0 on success, 1 when the robot failed, 2 for a bad request."""
-    arguments = parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    arguments = parser(words).parse_args(words)
     try:
         code = int(arguments.run(arguments))
         sys.stdout.flush()
@@ -89,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except CommandFailed as error:
         print(f"vla-deploy: {error}", file=sys.stderr)
         return 1
-    except USER_ERRORS as error:
+    except user_errors() as error:
         print(f"vla-deploy: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -12,7 +12,7 @@ from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.planning.readiness import refusal_of
-from vla_deploy.supervisor import default_base, running
+from vla_deploy.supervisor.runtime import default_base, running
 
 WAIT_S = 5.0
 

@@ -16,9 +16,9 @@ from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor import default_base, running
 from vla_deploy.supervisor.profile_change import Outcome, Phase
 from vla_deploy.supervisor.profile_choice import choice_of, detect, start_profile
+from vla_deploy.supervisor.runtime import default_base, running
 
 TIMEOUT_NS = 90 * NS_PER_S
 _BASE = "base"

@@ -8,7 +8,7 @@ from typing import Any
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import Session
-from vla_deploy.supervisor import Supervisor
+from vla_deploy.supervisor.supervisor import Supervisor
 
 STEP_NS = NS_PER_S // 20
 

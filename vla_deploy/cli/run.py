@@ -11,8 +11,10 @@ from typing import Any
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
 from vla_deploy.logs import journal_stream
-from vla_deploy.supervisor import ProcessGivenUp, RunOptions, StartCrashed, Supervisor
+from vla_deploy.supervisor.errors import ProcessGivenUp, StartCrashed
+from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.profile_choice import start_profile
+from vla_deploy.supervisor.supervisor import Supervisor
 
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
   vla-deploy run --twin --seed 7        other places for the objects

@@ -8,10 +8,9 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.follow import follow_command
 from vla_deploy.ipc import CellReader, Sample, SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP, StopButton
-from vla_deploy.supervisor import default_base, running
+from vla_deploy.supervisor.runtime import default_base, running
 
 POLL_NS = NS_PER_S // 50
 
@@ -58,6 +57,8 @@ class Session:
         Raises:
             CommandFailed: nobody answers; raised by the iterator.
         """
+        from vla_deploy.cli.follow import follow_command  # loads pydantic: not on an estop's way
+
         command_id = f"cli-{os.getpid()}-{next(self._numbers)}"
         events = self._space.ring_reader("task_event", from_start=False)
         message = {"command_id": command_id, "source": "cli"} | utterance

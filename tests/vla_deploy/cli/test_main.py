@@ -5,11 +5,14 @@ import errno
 import json
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from vla_deploy.cli import demo
+from vla_deploy.cli.commands import COMMANDS
+from vla_deploy.cli.errors import USER_ERRORS
 from vla_deploy.cli.main import main, parser
 
 BUTLER = Path(demo.__file__).parents[1] / "robots" / "butler"
@@ -42,6 +45,30 @@ def commands() -> dict[str, argparse.ArgumentParser]:
 @pytest.mark.parametrize("name", sorted(commands()))
 def test_the_help_of_every_command_ends_with_an_example(name):
     assert f"  vla-deploy {name}" in commands()[name].format_help().split("examples:")[1]
+
+
+def test_the_list_of_commands_tells_of_each_what_it_tells_of_itself():
+    assert parser([]).format_help() == parser().format_help()
+    assert list(commands()) == list(COMMANDS)
+
+
+@pytest.mark.parametrize("word", ["--help", "status", "estop"])
+def test_no_command_loads_what_only_others_need(word):
+    spell = f"import sys; from vla_deploy.cli.main import parser; parser([{word!r}]); "
+    tell = "print(*{'can', 'cv2', 'pinocchio', 'pydantic'} & sys.modules.keys())"
+    told = subprocess.run([sys.executable, "-c", spell + tell], capture_output=True, text=True)
+    assert (told.stdout, told.stderr) == ("\n", "")
+
+
+def test_a_folder_named_like_a_command_is_a_folder(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["--runtime-base", "run", "estop"]) == 2
+    assert "no robot runs in run;" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("module", "name"), USER_ERRORS.items())
+def test_what_a_person_can_mend_is_an_exception_of_that_module(module, name):
+    assert issubclass(getattr(import_module(module), name), Exception)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from vla_deploy.supervisor import ProcessSpec, RestartPolicy, RunOptions, Supervisor
 from vla_deploy.supervisor.notify import NotifyTarget
+from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.supervisor import Supervisor
+from vla_deploy.supervisor.table import ProcessSpec, RestartPolicy
 
 CHILD = str(Path(__file__).with_name("child.py"))
 QUICK = RestartPolicy(initial_s=0.05, cap_s=0.1, max_restarts=3)

@@ -8,14 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.supervisor import (
-    AlreadyRunning,
+from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
+from vla_deploy.supervisor.runtime import (
     Owner,
-    RuntimeUnavailable,
+    Runtime,
     default_base,
+    old_logs,
+    own_start_ticks,
     running,
 )
-from vla_deploy.supervisor.runtime import Runtime, old_logs, own_start_ticks
 
 
 @pytest.fixture

@@ -9,14 +9,18 @@ import psutil
 import pytest
 
 from platforms import ProfileError
-from vla_deploy.supervisor import AlreadyRunning, StartCrashed, StartFailed, Supervisor, running
+from vla_deploy.supervisor.errors import AlreadyRunning, StartCrashed, StartFailed
+from vla_deploy.supervisor.runtime import running
+from vla_deploy.supervisor.supervisor import Supervisor
 
 pytestmark = pytest.mark.stack
 
 RUN_FOREVER = """
 import sys
 from pathlib import Path
-from vla_deploy.supervisor import ProcessSpec, RunOptions, Supervisor
+from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.supervisor import Supervisor
+from vla_deploy.supervisor.table import ProcessSpec
 child, events, base = sys.argv[1:]
 table = tuple(
     ProcessSpec(

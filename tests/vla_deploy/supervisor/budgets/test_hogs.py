@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.supervisor import ProcessSpec, RunOptions, Supervisor
+from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.supervisor import Supervisor
+from vla_deploy.supervisor.table import ProcessSpec
 
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(120)]
 
