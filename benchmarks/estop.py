@@ -23,7 +23,7 @@ import can
 
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import live_robot, reach
+from benchmarks.live_robot import arm, await_change, live_robot
 from drivers.can_hub import HubBus
 from drivers.canopen.cia402 import ControlCommand
 from drivers.clock import NS_PER_S, MonotonicClock
@@ -54,7 +54,7 @@ def measure(requests: int, seed: int) -> dict[str, Any]:
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         report = _latencies(Path(folder), requests, seed)
-    return report | {f"standstill_s_{phase.value}": _standstill_s(phase) for phase in Phase}
+    return report | {f"standstill_s_{phase.value}": standstill_s(phase) for phase in Phase}
 
 
 def _latencies(folder: Path, requests: int, seed: int) -> dict[str, Any]:
@@ -88,14 +88,14 @@ def _ask_again_and_again(session: Session, requests: int, draw: random.Random) -
     ticks = []
     with HubBus(channel=str(session.run_dir / "dev" / line.device)) as bus:
         for _ in range(requests):
-            reach(session, "arm", "armed")
+            arm(session)
             session.pause(draw.uniform(0.02, 0.1))
             if not _operates(bus, cob_id):
                 continue
             asked_ns = session.clock.now_ns()
             session.operate("estop", "bench")
             ticks.append((_stop_frame_ns(bus, cob_id) - asked_ns) / _PERIOD_NS)
-            reach(session, "reset", "disarmed")
+            await_change(session, "armed")
     return ticks
 
 
@@ -125,7 +125,7 @@ def _stop_frame_ns(bus: can.BusABC, cob_id: int) -> int:
     raise NoStop(f"no stop on the wire within {_ANSWER_S:g} s of the request")
 
 
-def _standstill_s(phase: Phase) -> float:
+def standstill_s(phase: Phase) -> float:
     """Return how long everything takes to rest after a request in a phase of the work."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         stack = LockstepControl(Path(folder))

@@ -9,8 +9,10 @@ from drivers.clock import NS_PER_S
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.cli.session import Session
 
-_ACT_S: Final = 15.0
+_ARM_S: Final = 30.0
 _LOOKS_PER_TRY: Final = 25
+_WAY: Final = {"stopped": "reset", "disarmed": "arm"}
+"""What leads from a state towards being armed; elsewhere control is under way."""
 
 
 class NotReached(Exception):
@@ -36,20 +38,29 @@ def live_robot(folder: Path, realtime_priority: int) -> Iterator[Session]:
         stack.close()
 
 
-def reach(session: Session, act: str, wanted: str) -> None:
-    """Do an operator's act, again where a busy machine gets in the way, until control is there.
+def arm(session: Session) -> None:
+    """Lead control to where it is armed, from wherever it is: a busy machine may stop the robot.
 
     Raises:
         NotReached: control stays elsewhere.
     """
-    deadline_ns = session.clock.now_ns() + round(_ACT_S * NS_PER_S)
-    status = None
-    while session.clock.now_ns() < deadline_ns:
-        session.operate(act)
-        for _ in range(_LOOKS_PER_TRY):
-            status = session.document("control_status", age_limit_s=0.5)
-            if status is not None and status["state"] == wanted:
-                return
-            session.pause()
-    found = "silent" if status is None else f"{status['state']}: {status['detail']}"
-    raise NotReached(f"{act}: control is not {wanted} after {_ACT_S:g} s, but {found}")
+    deadline_ns = session.clock.now_ns() + round(_ARM_S * NS_PER_S)
+    while (state := _state(session)) != "armed":
+        if session.clock.now_ns() > deadline_ns:
+            raise NotReached(f"control is not armed after {_ARM_S:g} s, but {state}")
+        if state in _WAY:
+            session.operate(_WAY[state])
+        await_change(session, state)
+
+
+def await_change(session: Session, state: str) -> None:
+    """Return once control is not in this state any more, or after half a second."""
+    for _ in range(_LOOKS_PER_TRY):
+        if _state(session) != state:
+            return
+        session.pause()
+
+
+def _state(session: Session) -> str:
+    status = session.document("control_status", age_limit_s=0.5)
+    return "silent" if status is None else str(status["state"])

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
-from benchmarks.live_robot import live_robot, reach
+from benchmarks.live_robot import arm, live_robot
 from drivers.clock import NS_PER_S, Clock
 from platforms import load_profile
 from vla_deploy.cli.session import Session
@@ -45,7 +45,7 @@ def measure(seconds: float) -> dict[str, Any]:
 
 def _measure(folder: Path, name: str, priority: int, seconds: float) -> dict[str, Any]:
     with live_robot(folder, priority) as session, realtime() if priority else nullcontext():
-        reach(session, "arm", "armed")
+        arm(session)
         idle = _late_ratios(session, seconds)
         with busy_cores():
             loaded = _late_ratios(session, seconds)
@@ -60,13 +60,14 @@ def _late_ratios(session: Session, seconds: float) -> tuple[float, float]:
     """Return the shares of control's late ticks and of the bare loop's."""
     session.pause(_SETTLE_S)
     before = session.document("control_status") or {}
-    bare = _sleep_bare(session.clock, _PERIOD_S, seconds)
+    bare = sleep_bare(session.clock, _PERIOD_S, seconds)
     after = session.document("control_status") or {}
     ticks = after["tick"] - before["tick"]
     return (after["late_ticks"] - before["late_ticks"]) / ticks, bare.late_ticks / bare.tick
 
 
-def _sleep_bare(clock: Clock, period_s: float, seconds: float) -> TickClock:
+def sleep_bare(clock: Clock, period_s: float, seconds: float) -> TickClock:
+    """Sleep from tick to tick as control does, do nothing else, and return the count."""
     ticks = TickClock(period_s)
     period_ns = round(period_s * NS_PER_S)
     deadline_ns = clock.now_ns()
