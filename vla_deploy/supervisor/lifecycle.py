@@ -90,15 +90,18 @@ def reconcile(
     stopped, stops = _end(table, records, seen, unwanted, State.OFF, now_ns)
     after = dict(stopped)
     actions = list(stops)
-    may_go = True
-    for spec in (spec for spec in table if spec.name not in unwanted):
+    may_go = all_before_work = True
+    for spec in table:
+        may_go = may_go if spec.with_previous else all_before_work
+        if spec.name in unwanted:
+            continue
         record, act = _run_step(
             spec, after[spec.name], seen.get(spec.name, Seen()), may_go=may_go, now_ns=now_ns
         )
         after[spec.name] = record
         if act is not None:
             actions.append((act, spec.name))
-        may_go &= _lets_others_go(record)
+        all_before_work &= _lets_others_go(record)
     return after, tuple(actions)
 
 
@@ -124,18 +127,20 @@ def _end(
 ) -> tuple[dict[str, Record], tuple[Action, ...]]:
     after = dict(records)
     actions: list[Action] = []
-    may_go = True
-    for spec in (spec for spec in reversed(table) if spec.name in unwanted):
-        record, act = _stop_step(
-            spec, after[spec.name], seen.get(spec.name, Seen()), may_go=may_go, now_ns=now_ns
-        )
-        gone_for_good = record.state is State.GIVEN_UP and end is State.OFF
-        if record.state not in RUNNING and not gone_for_good:
-            record = replace(record, state=end, reason=unwanted[spec.name] or record.reason)
-        after[spec.name] = record
-        if act is not None:
-            actions.append((act, spec.name))
-        may_go &= record.state not in RUNNING
+    may_go = all_after_ended = True
+    for spec in reversed(table):
+        if spec.name in unwanted:
+            record, act = _stop_step(
+                spec, after[spec.name], seen.get(spec.name, Seen()), may_go=may_go, now_ns=now_ns
+            )
+            gone_for_good = record.state is State.GIVEN_UP and end is State.OFF
+            if record.state not in RUNNING and not gone_for_good:
+                record = replace(record, state=end, reason=unwanted[spec.name] or record.reason)
+            after[spec.name] = record
+            if act is not None:
+                actions.append((act, spec.name))
+            all_after_ended &= record.state not in RUNNING
+        may_go = may_go if spec.with_previous else all_after_ended
     return after, tuple(actions)
 
 

@@ -1,6 +1,7 @@
 """Declare every process of the robot: the one process table, in start order.
 
-They stop in the reverse order. Whoever starts waits until all before it are ready.
+They stop in the reverse order. Whoever starts waits until all before it are ready; rows that go
+with the previous one start together, and stop together.
 """
 
 from dataclasses import dataclass
@@ -62,7 +63,8 @@ class ProcessSpec:
     `devices_command` is added where devices are served elsewhere, `viewer_command` with a viewer,
     `paced_command` where buses take their time. It runs while `when` has nothing against it. It
     is ready when `ready_topic` is fresh from its own pid and all `ready_files`, relative to the run
-    directory, exist. `watched` are the topics it writes whatever its devices do.
+    directory, exist. `watched` are the topics it writes whatever its devices do. `with_previous`
+    joins it to the row before: neither waits for the other.
     """
 
     name: str
@@ -71,6 +73,7 @@ class ProcessSpec:
     viewer_command: tuple[str, ...] = ()
     paced_command: tuple[str, ...] = ()
     when: Predicate = always
+    with_previous: bool = False
     ready_topic: str | None = None
     ready_files: tuple[str, ...] = ()
     ready_timeout_s: float = 40.0
@@ -123,6 +126,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         command=("-m", "vla_deploy.planning", *_NODE),
         devices_command=_DEVICES,
         when=all_of(budgeted("planner"), not_suspended("planner")),
+        with_previous=True,
         ready_files=("ready/planner",),
         watched=(Watched(topic="planner_status", silence_limit_s=5.0),),
     ),
@@ -131,6 +135,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         command=("-m", "vla_deploy.skills", *_NODE),
         devices_command=_DEVICES,
         when=all_of(budgeted("executor"), not_suspended("executor")),
+        with_previous=True,
         ready_topic="executor_status",
         ready_files=("ready/executor",),
         watched=(Watched(topic="executor_status", silence_limit_s=5.0),),
@@ -138,6 +143,7 @@ TABLE: tuple[ProcessSpec, ...] = (
     ProcessSpec(
         name="recorder",
         command=("-m", "vla_deploy.telemetry", *_NODE),
+        with_previous=True,
         ready_topic="recorder_status",
         ready_files=("ready/recorder",),
         watched=(Watched(topic="recorder_status", silence_limit_s=5.0),),

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,6 +20,12 @@ POLICY = RestartPolicy(initial_s=1.0, factor=2.0, cap_s=5.0, window_s=100.0, max
 ROWS = tuple(
     ProcessSpec(name=name, command=(), restart=POLICY, ready_timeout_s=10.0, stop_timeout_s=3.0)
     for name in ("a", "b", "c")
+)
+TOGETHER = (
+    ROWS[0],
+    ROWS[1],
+    replace(ROWS[2], with_previous=True),
+    replace(ROWS[2], name="d"),
 )
 READY, RUNNING = Seen(ready=True), Seen()
 
@@ -62,6 +69,33 @@ def test_each_starts_only_when_all_before_it_are_ready():
     assert play.step(a=READY) == [(Act.SPAWN, "b")]
     assert play.step(a=READY, b=RUNNING) == []
     assert play.step(a=READY, b=READY) == [(Act.SPAWN, "c")]
+
+
+def test_rows_that_go_together_start_together_and_later_rows_wait_for_all_of_them():
+    play = Play(TOGETHER)
+    assert play.step() == [(Act.SPAWN, "a")]
+    assert play.step(a=RUNNING) == []
+    assert play.step(a=READY) == [(Act.SPAWN, "b"), (Act.SPAWN, "c")]
+    assert play.step(a=READY, b=RUNNING, c=READY) == []
+    assert play.step(a=READY, b=READY, c=RUNNING) == [(Act.SPAWN, "d")]
+
+
+def test_rows_that_go_together_wait_for_those_before_them_even_if_the_first_is_not_wanted():
+    play = Play(TOGETHER)
+    assert play.step(unwanted="b") == [(Act.SPAWN, "a")]
+    assert play.step(unwanted="b", a=RUNNING) == []
+    assert play.step(unwanted="b", a=READY) == [(Act.SPAWN, "c")]
+
+
+def test_one_that_failed_does_not_hold_back_who_goes_with_it():
+    play = Play(TOGETHER)
+    play.step()
+    play.step(a=READY)
+    play.step(a=READY, b=READY, c=READY)
+    assert play.step(a=READY, b=Seen(exit_code=1), c=Seen(exit_code=1), d=READY) == []
+    play.records["b"] = Record(state=State.BACKOFF, until_ns=9 * S, was_ready=True)
+    play.now_s = 8.0
+    assert play.step(a=READY, d=READY) == [(Act.SPAWN, "c")]
 
 
 def test_nothing_is_done_while_all_are_ready():
@@ -165,6 +199,18 @@ def test_the_last_started_stops_first_and_the_next_waits_for_it():
     assert {record.state for record in play.records.values()} == {State.STOPPED}
 
 
+def test_rows_that_go_together_stop_together_and_earlier_rows_wait_for_all_of_them():
+    play = Play(TOGETHER)
+    ready, dead = dict.fromkeys("abcd", READY), Seen(exit_code=0)
+    for seen in ({}, {"a": READY}, {"a": READY, "b": READY, "c": READY}, ready):
+        play.step(**seen)
+    assert play.stop(**ready) == [(Act.TERMINATE, "d")]
+    assert play.stop(**ready) == []
+    assert play.stop(**ready | {"d": dead}) == [(Act.TERMINATE, "c"), (Act.TERMINATE, "b")]
+    assert play.stop(**ready | {"d": dead, "b": dead}) == []
+    assert play.stop(**ready | {"d": dead, "b": dead, "c": dead}) == [(Act.TERMINATE, "a")]
+
+
 def test_one_that_does_not_stop_in_time_is_killed():
     play = Play(ROWS[:1])
     play.step()
@@ -194,6 +240,8 @@ def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_
     ]
     assert [row.name for row in TABLE if row.when is twin_only] == ["twin"]
     assert all(row.ready_files or row.ready_topic for row in TABLE)
+    together = [row.name for row in TABLE if row.with_previous]
+    assert together == ["planner", "executor", "recorder"]
 
 
 def test_a_ready_process_that_falls_silent_is_aborted_and_started_again_with_that_reason():
