@@ -12,6 +12,7 @@ import gc
 import sys
 import tempfile
 from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,15 +21,15 @@ from benchmarks.spans import REST, Spans
 from benchmarks.stopwatch import answering
 from drivers.clock import NS_PER_S
 from sim_twin.stack import LockstepStack
-from vla_deploy.control import node as control_node
+from vla_deploy.control import judging
 
 _COMMAND: Final = "pick up the red cup and put it in the box"
 _PARTS: Final[dict[str, tuple[str, ...]]] = {
-    "read": ("_servos.read", "_watch.refresh", "_desk.listen", "_desk.next_act"),
-    "inputs": ("_watch.inputs",),
-    "surroundings": ("_surroundings.refresh",),
-    "record": ("_tick_record.judged", "_tick_record.sent"),
-    "plan_and_limit": ("_change_mode", "_take_commands", "_move_joints", "_move_base"),
+    "read": ("_servos.read", "_judging.watch.refresh", "_desk.listen", "_desk.next_act"),
+    "inputs": ("_judging.watch.inputs",),
+    "surroundings": ("_judging._surroundings.refresh",),
+    "record": ("_judging._record.judged", "_judging._record.sent"),
+    "plan_and_limit": ("_change_mode", "_take_commands", "_joints.move", "_move_base"),
     "write": ("_servos.write", "_wheels.cycle"),
     "tell": ("_tell",),
 }
@@ -61,8 +62,8 @@ def _instrument(spans: Spans, stack: LockstepStack) -> None:
     for part, paths in _PARTS.items():
         for path in paths:
             owner, _, name = path.rpartition(".")
-            spans.wrap(part, getattr(control, owner) if owner else control, name)
-    spans.wrap(_JUDGE, control_node, "evaluate")
+            spans.wrap(part, attrgetter(owner)(control) if owner else control, name)
+    spans.wrap(_JUDGE, judging, "evaluate")
     for owner, name in answering(stack.lockstep.twin):
         spans.wrap(_DEVICES, owner, name)
 

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import Direction
 
 
@@ -14,6 +15,17 @@ class BaseLimits:
     turn_rad_s: float
     acceleration_m_s2: float
     turn_acceleration_rad_s2: float
+
+
+def base_limits(robot: RobotDescription) -> BaseLimits:
+    """Return what the robot file allows the base."""
+    base = robot.base
+    return BaseLimits(
+        speed_m_s=base.max_speed_m_s,
+        turn_rad_s=base.max_turn_rad_s,
+        acceleration_m_s2=base.max_acceleration_m_s2,
+        turn_acceleration_rad_s2=base.max_turn_acceleration_rad_s2,
+    )
 
 
 class BaseRamp:

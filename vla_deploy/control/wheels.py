@@ -6,13 +6,14 @@ from collections.abc import Generator
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.drive_bus import DriveBus, DriveState, PowerState
+from drivers.drive_bus import DriveBus, DriveState
 from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from drivers.stepping import wait_for
 from platforms import Profile
 from vla_deploy.control.axes import Floats
 from vla_deploy.control.drive_buses import drive_bus
+from vla_deploy.control.drive_samples import drive_samples
 from vla_deploy.control.odometry import DifferentialDrive, Odometry
 from vla_deploy.control.wheel_tracking import WheelTracking
 from vla_deploy.robots import RobotDescription
@@ -21,7 +22,6 @@ from vla_deploy.safety import DriveSample
 REOPEN_NS = NS_PER_S
 BRAKE_NS = NS_PER_S
 _STILL_RAD_S = 0.02
-_UNKNOWN_FAULT = 0xFFFF
 _LOG = logging.getLogger(__name__)
 
 
@@ -39,6 +39,7 @@ class Wheels:
         self._clock = clock
         self._profile = profile
         self._wiring = robot.can_bus
+        self._joints = [drive.joint for drive in self._wiring.drives]
         self._geometry = DifferentialDrive(
             wheel_radius_m=robot.base.wheel_radius_m, track_m=robot.base.track_m
         )
@@ -129,22 +130,10 @@ class Wheels:
 
     def samples(self) -> tuple[DriveSample, ...]:
         """Return what the safety judge wants to know of each drive."""
-        state = self.state
-        if state is None:
+        if self.state is None:
             return ()
-        dropped_out, age_s = self._dropped_out, state.age_s.tolist()
-        commanded_rad_s = self._tracking.commanded_rad_s.tolist()
-        measured_rad_s = self._tracking.measured_rad_s.tolist()
-        return tuple(
-            DriveSample(
-                name=drive.joint,
-                lost=state.lost[row],
-                age_s=age_s[row],
-                fault_code=_fault_code(state, row, dropped_out=dropped_out),
-                commanded_rad_s=commanded_rad_s[row],
-                measured_rad_s=measured_rad_s[row],
-            )
-            for row, drive in enumerate(self._wiring.drives)
+        return drive_samples(
+            self._joints, self.state, self._tracking, dropped_out=self._dropped_out
         )
 
     def cycle(self, v_m_s: float, w_rad_s: float) -> None:
@@ -248,11 +237,3 @@ class Wheels:
         bus, self._bus = self._bus, None
         if bus is not None:
             bus.close()
-
-
-def _fault_code(state: DriveState, row: int, *, dropped_out: bool) -> int:
-    if not state.faulted[row]:
-        stands_off = state.power_state[row] is not PowerState.OPERATION_ENABLED
-        return _UNKNOWN_FAULT if dropped_out and stands_off else 0
-    fault = state.fault[row]
-    return _UNKNOWN_FAULT if fault is None else fault.code

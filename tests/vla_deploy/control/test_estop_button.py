@@ -25,7 +25,7 @@ def test_a_press_latches_the_emergency_stop_within_one_tick(armed: Rig) -> None:
     armed.run(0.3)
     press(armed)
     armed.tick()
-    assert armed.control._safety.estop_latched
+    assert armed.control._judging.state.estop_latched
     armed.run(0.03)
     assert armed.status["estop_latched"]
     assert armed.status["cause"] == "estop"
@@ -69,7 +69,7 @@ def test_an_act_that_waits_when_the_button_is_pressed_is_dropped(armed: Rig) -> 
 def test_an_unplugged_button_stops_the_robot_and_recovers_without_a_restart(armed: Rig) -> None:
     plug(armed).pull()
     armed.tick()
-    assert armed.control._safety.estop_latched
+    assert armed.control._judging.state.estop_latched
     armed.run(2.5)
     assert "button: " in armed.status["detail"]
     assert "plug" in armed.status["detail"]

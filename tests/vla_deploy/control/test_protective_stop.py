@@ -64,8 +64,10 @@ def test_it_ends_by_itself_and_moves_nothing_on_its_own(armed: Rig) -> None:
 
 
 def test_motion_during_standstill_becomes_a_stop_by_category(armed: Rig) -> None:
-    limits = armed.control._limits
-    armed.control._limits = replace(limits, standstill_wheel_rad_s=-1.0)  # rest is motion enough
+    limits = armed.control._judging.limits
+    armed.control._judging.limits = replace(
+        limits, standstill_wheel_rad_s=-1.0
+    )  # rest is motion enough
     armed.run(0.5)
     assert armed.state == "armed"
     demand(armed, stop=True)
@@ -74,7 +76,7 @@ def test_motion_during_standstill_becomes_a_stop_by_category(armed: Rig) -> None
     armed.run(0.5)
     assert armed.status["cause"] == "standstill_motion"
     assert armed.base()["enabled"] == 0.0
-    armed.control._limits = limits
+    armed.control._judging.limits = limits
     demand(armed, stop=False)
     armed.run(1.5)
     assert armed.state == "stopped"

@@ -38,7 +38,7 @@ def test_an_arm_that_is_blocked_on_its_way_stops_before_its_following_error(arme
 
 
 def test_an_arm_on_its_way_into_the_body_is_stopped_where_they_touch_at_most(armed: Any) -> None:
-    shapes = armed.control._surroundings._body
+    shapes = armed.control._judging._surroundings._body
     apart = shapes.distances(armed.column("position"))[0] > 0.02  # the right hand lies on the base
     least_m, causes = np.inf, set()
     inward = {"left_shoulder_yaw": -1.17, "left_shoulder_pitch": 1.2, "left_elbow": 1.5}
@@ -53,7 +53,7 @@ def test_an_arm_on_its_way_into_the_body_is_stopped_where_they_touch_at_most(arm
 
 
 def test_arms_that_lie_on_the_base_are_armed_and_leave_it_without_a_stop(armed: Any) -> None:
-    shapes = armed.control._surroundings._body
+    shapes = armed.control._judging._surroundings._body
     assert shapes.distances(armed.column("position"))[0].min() < 0.001
     armed.go(1, **armed.robot.poses["tuck"])
     causes = set()

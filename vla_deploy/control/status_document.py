@@ -1,9 +1,23 @@
-"""Put a verdict into the words and numbers of `control_status`."""
+"""Put control's state into the words and numbers of `control_status`."""
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 from vla_deploy.safety import Cause, Verdict
+
+_LONGEST_DETAIL = 1500
+
+
+class Bus(Protocol):
+    """Be a bus that counts what it carries."""
+
+    name: str
+
+    @property
+    def counters(self) -> Mapping[str, Any]:
+        """Return what it has counted; empty while it is not open."""
+        ...
 
 
 def verdict_document(verdict: Verdict) -> dict[str, Any]:
@@ -18,6 +32,16 @@ def verdict_document(verdict: Verdict) -> dict[str, Any]:
         "speed_ratio": verdict.speed_ratio,
         "blocked": sorted(verdict.blocked),
     }
+
+
+def detail(*parts: str) -> str:
+    """Return what there is to say, bounded."""
+    return "; ".join(part for part in parts if part)[:_LONGEST_DETAIL]
+
+
+def bus_document(*buses: Bus) -> dict[str, Any]:
+    """Return each bus' counters by its name."""
+    return {bus.name: bus.counters for bus in buses}
 
 
 def _number(value: float) -> float | None:

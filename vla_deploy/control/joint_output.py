@@ -1,0 +1,48 @@
+"""Move the joints: from the motions through the gate to the servos, on the only way there is."""
+
+import numpy as np
+
+from vla_deploy.control.axes import Flags, Floats
+from vla_deploy.control.gravity import GravityOffset
+from vla_deploy.control.limits import SetpointGate
+from vla_deploy.control.motions import MotionResult, MotionSet
+from vla_deploy.control.servos import ServoLine
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel
+
+
+class JointOutput:
+    """Hold the motions of all joints, and send what the gate lets through."""
+
+    def __init__(self, robot: RobotDescription, motions: MotionSet, servos: ServoLine) -> None:
+        self.motions = motions
+        self._servos = servos
+        self._gate = SetpointGate(robot.position_min, robot.position_max, robot.velocity_max)
+        self._gravity = GravityOffset(robot, RobotModel(robot).gravity)
+
+    @property
+    def sent(self) -> Floats:
+        """Return the setpoints that were sent last, without what carries the weight."""
+        return self._gate.sent
+
+    def move(self, period_s: float) -> list[MotionResult]:
+        """Advance the setpoints, bound them, add what gravity asks for, and send them."""
+        state = self._servos.state
+        loose = ~state.torque_on | (state.watchdog < 0)
+        if loose.any():
+            self.place(loose)
+        ended = self.motions.advance(period_s)
+        sent = self._gate.limit(self.motions.state.position, period_s)
+        if state.torque_on.any():
+            self._servos.write(sent + self._gravity.at(sent))
+        return ended
+
+    def place(self, joints: Flags) -> None:
+        """Let the setpoints of joints that hold nothing follow them, so that arming is bumpless."""
+        measured = self._servos.state.position_rad
+        self.motions.place(measured, joints)
+        self._gate.place(measured, joints)
+
+    def place_all(self) -> None:
+        """Let every setpoint begin where its joint is."""
+        self.place(np.ones(len(self.sent), dtype=np.bool_))

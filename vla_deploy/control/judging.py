@@ -1,0 +1,85 @@
+"""Judge each tick by what is known in it, and record by what it was judged."""
+
+from drivers.clock import Clock
+from vla_deploy.control.axes import Flags, Floats
+from vla_deploy.control.servos import ServoLine
+from vla_deploy.control.surroundings import SurroundingsWatch
+from vla_deploy.control.thresholds import safety_limits
+from vla_deploy.control.tick_recorder import TickRecorder
+from vla_deploy.control.watch import Watch
+from vla_deploy.control.wheels import Wheels
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.robots import RobotDescription
+from vla_deploy.safety import CLEAR, SafetyState, Verdict, evaluate
+from vla_deploy.safety.probes import jumped_joints
+
+
+class Judging:
+    """Hold the safety state, the limits and the newest verdict."""
+
+    def __init__(
+        self,
+        space: SharedSpace,
+        robot: RobotDescription,
+        servos: ServoLine,
+        wheels: Wheels,
+        clock: Clock,
+    ) -> None:
+        self.limits = safety_limits(robot)
+        self.state = SafetyState()
+        self.verdict: Verdict = CLEAR
+        self.tick = 0
+        self.watch = Watch(space, servos, wheels, clock)
+        self._servos = servos
+        self._wheels = wheels
+        self._surroundings = SurroundingsWatch(space, robot)
+        self._record = TickRecorder(space)
+
+    def judge(
+        self,
+        tick: int,
+        now_ns: int,
+        setpoint: Floats,
+        *,
+        energised: bool,
+        estop_source: str | None,
+        reset_requested: bool,
+        base_at_rest: bool,
+        standstill: bool,
+    ) -> Flags:
+        """Take the tick's verdict, and return the joints whose encoders have jumped in it."""
+        joints, wheels = self._servos.state, self._wheels
+        around = self._surroundings.refresh(
+            now_ns,
+            joints.position_rad,
+            joints.velocity_rad_s,
+            joints.effort_ratio,
+            setpoint,
+            wheels.v_m_s,
+            wheels.w_rad_s,
+            powered=energised and bool(joints.torque_on.all()),
+        )
+        inputs = self.watch.inputs(
+            energised=energised,
+            estop_source=estop_source,
+            reset_requested=reset_requested,
+            setpoint=setpoint,
+            base_at_rest=base_at_rest,
+            standstill=standstill,
+            surroundings=around,
+        )
+        before = self.state
+        self.state, self.verdict = evaluate(before, inputs, self.limits)
+        self.tick = tick
+        self._record.judged(tick, now_ns, before, inputs, self.limits, self.verdict)
+        return jumped_joints(inputs, self.limits)
+
+    def note_sent(self, setpoint: Floats, v_m_s: float, w_rad_s: float) -> None:
+        """Record what the tick has sent to joints and wheels."""
+        self._record.sent(setpoint, v_m_s, w_rad_s)
+
+    def close(self) -> None:
+        """Record a tick that did not come to its end, and unmap the topics."""
+        self._record.close()
+        self.watch.close()
+        self._surroundings.close()

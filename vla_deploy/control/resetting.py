@@ -1,0 +1,52 @@
+"""Carry out a reset: remove what it may remove, then wait for the judge to say that it is gone."""
+
+from typing import Final
+
+from drivers.clock import NS_PER_S
+from vla_deploy.control.servos import ServoLine
+from vla_deploy.control.wheels import Wheels
+from vla_deploy.safety import ResetOutcome
+
+RESET_NS: Final = 2 * NS_PER_S
+
+
+class Resetting:
+    """Hold the reset that is under way; it moves nothing and arms nothing."""
+
+    def __init__(self, servos: ServoLine, wheels: Wheels) -> None:
+        self._servos = servos
+        self._wheels = wheels
+        self._until_ns: int | None = None
+
+    @property
+    def under_way(self) -> bool:
+        """Tell whether the judge is to be asked."""
+        return self._until_ns is not None
+
+    def begin(self, now_ns: int, *, stopping: bool) -> str:
+        """Give the devices time to say that their fault is gone; return why not, or nothing."""
+        if stopping:
+            return "reset refused: the stop has not ended yet"
+        held_by = self._servos.faulted_but_holding
+        if held_by:
+            joints = ", ".join(held_by)
+            return (
+                f"reset refused: it would reboot {joints}, which still hold torque and would fall; "
+                "support the arm, disarm, then reset"
+            )
+        self._until_ns = now_ns + RESET_NS
+        if self._servos.state.error.any():
+            self._servos.reboot_faulted()
+        self._wheels.reset_fault()
+        return ""
+
+    def note(self, now_ns: int, outcome: ResetOutcome, *, estop_asked: bool) -> str:
+        """Take in what the judge made of it; return why it is given up, or nothing."""
+        if self._until_ns is None:
+            return ""
+        if outcome is ResetOutcome.DONE:
+            self._until_ns = None
+        elif estop_asked or now_ns >= self._until_ns:
+            self._until_ns = None
+            return "reset refused: the cause is still there"
+        return ""
