@@ -16,6 +16,7 @@ import statistics
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,6 +32,8 @@ from platforms import load_profile
 from sim_twin.campaigns.phases import Phase, Stage
 from sim_twin.stack import LockstepControl
 from vla_deploy.cli.session import Session
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc.stop_button import StopButton
 from vla_deploy.robots import load_robot
 
 _RPDO1: Final = 0x200
@@ -86,14 +89,18 @@ def _ask_again_and_again(session: Session, requests: int, draw: random.Random) -
     line = load_robot("butler").can_bus
     cob_id = _RPDO1 + line.drives[0].node_id
     ticks = []
-    with HubBus(channel=str(session.run_dir / "dev" / line.device)) as bus:
+    with (
+        closing(SharedSpace(session.run_dir / "ipc", session.clock)) as space,
+        closing(StopButton(space, "bench", session.clock)) as button,
+        HubBus(channel=str(session.run_dir / "dev" / line.device)) as bus,
+    ):
         for _ in range(requests):
             arm(session)
             session.pause(draw.uniform(0.02, 0.1))
             if not _operates(bus, cob_id):
                 continue
             asked_ns = session.clock.now_ns()
-            session.operate("estop", "bench")
+            button.press()
             ticks.append((_stop_frame_ns(bus, cob_id) - asked_ns) / _PERIOD_NS)
             await_change(session, "armed")
     return ticks
