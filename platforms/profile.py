@@ -68,7 +68,8 @@ class Profile:
     """Declare how the stack runs on one kind of computer.
 
     `bus_watchdog_s` and `can_heartbeat_s` say how long servos and wheel drives carry on when
-    control is silent. `realtime_priority` is the SCHED_FIFO priority of control, 0 for none.
+    control is silent. `realtime_priority` is the SCHED_FIFO priority of control, 0 for none; unless
+    `realtime_required`, control quietly does without where the computer does not permit it.
     `power_mode` is a name of the board's nvpmodel.conf; empty leaves the mode as it is.
     """
 
@@ -80,6 +81,7 @@ class Profile:
     perception_rate_hz: float
     executor_rate_hz: float
     realtime_priority: int
+    realtime_required: bool
     memory_lock: bool
     power_mode: str
     board: BoardLimits

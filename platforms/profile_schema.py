@@ -117,6 +117,7 @@ _TOP: Keys = {
     "perception_rate_hz": _Range(0.5, 60, "Hz"),
     "executor_rate_hz": _Range(5, 200, "Hz"),
     "realtime_priority": _Range(0, 80, "", integer=True),  # leaves the kernel's own threads ahead
+    "realtime_required": _Flag(),
     "memory_lock": _Flag(),
     "power_mode": _Text(),
 }

@@ -64,7 +64,11 @@ class HostSettings:
         priority = self._priority(profile)
         policy = os.SCHED_FIFO if priority else os.SCHED_OTHER
         if (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) != (policy, priority):
-            os.sched_setscheduler(0, policy, os.sched_param(priority))
+            try:
+                os.sched_setscheduler(0, policy, os.sched_param(priority))
+            except PermissionError:
+                if profile.realtime_required:
+                    raise
 
     def _set_lock(self, profile: Profile) -> None:
         wanted = self._wants_lock(profile) and _may_lock()
@@ -94,6 +98,8 @@ class HostSettings:
 
     def _priority_obstacle(self, profile: Profile) -> Iterator[str]:
         priority = self._priority(profile)
+        if not profile.realtime_required:
+            return
         if priority > resource.getrlimit(resource.RLIMIT_RTPRIO)[0] and not _may(_CAP_SYS_NICE):
             yield (
                 f"no SCHED_FIFO priority {priority} (grant CAP_SYS_NICE or LimitRTPRIO); ticks may "

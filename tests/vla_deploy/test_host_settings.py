@@ -4,6 +4,7 @@ import resource
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,9 +19,15 @@ NICE = os.getpriority(os.PRIO_PROCESS, os.getpid())
 
 @pytest.fixture
 def profile_of(tmp_path):
+    asks_nothing = tmp_path / "asks_nothing.toml"
+    asks_nothing.write_text(
+        'inherits = "desktop"\nrealtime_priority = 0\nrealtime_required = true\n'
+        f"processes.control.nice = {NICE}"
+    )
+
     def profile_of(text: str):
         path = tmp_path / "mine.toml"
-        path.write_text(f'inherits = "desktop"\n{text}')
+        path.write_text(f'inherits = "asks_nothing"\n{text}')
         return load_profile(path)
 
     return profile_of
@@ -62,14 +69,19 @@ def test_what_the_kernel_refuses_is_told_with_its_remedy(powerless, profile_of, 
     assert host.apply(profile) == (obstacle,)
 
 
+def test_a_priority_that_is_not_required_is_quietly_done_without(powerless, profile_of):
+    profile = replace(profile_of("realtime_priority = 40"), realtime_required=False)
+    assert HostSettings("control").apply(profile) == ()
+
+
 def test_a_profile_that_asks_for_nothing_is_never_refused(powerless, profile_of):
-    profile = profile_of(f"processes.control.nice = {NICE}")
+    profile = profile_of("")
     assert HostSettings("control").apply(profile) == ()
 
 
 def test_threads_that_have_put_themselves_aside_keep_their_nice(monkeypatch, profile_of):
     gate = threading.Event()
-    sharing = threading.Thread(target=gate.wait)
+    sharing = threading.Thread(target=gate.wait, daemon=True)
     sharing.start()
     with background() as executor:
         aside = executor.submit(threading.get_native_id).result()

@@ -24,12 +24,17 @@ def _wanted(context: Context) -> int:
     return context.profile.realtime_priority if context.profile else 0
 
 
+def _required(context: Context) -> bool:
+    profile = context.profile
+    return profile is not None and profile.realtime_required and profile.realtime_priority > 0
+
+
 def preempt_rt(context: Context) -> Iterator[Finding]:
     """Tell whether the kernel preempts everywhere."""
     version = context.tree.text("/proc/version")
     if "PREEMPT_RT" in version:
         yield ok("kernel", "PREEMPT_RT")
-    elif _wanted(context):
+    elif _required(context):
         remedy = (
             "apt-cache search nvidia-l4t-rt"
             if context.board.l4t
@@ -48,7 +53,7 @@ def fifo(context: Context) -> Iterator[Finding]:
         return
     measured = f"{rights.fifo_refusal}; RLIMIT_RTPRIO is {rights.realtime_priority_limit}"
     remedy = f'echo "$USER - rtprio 80" | sudo tee -a {LIMITS_FILE}   # then log in anew'
-    yield trouble(name, measured, remedy, fatal=bool(_wanted(context)))
+    yield trouble(name, measured, remedy, fatal=_required(context))
 
 
 def realtime_share(context: Context) -> Iterator[Finding]:
@@ -129,7 +134,7 @@ def wake_up(context: Context) -> Iterator[Finding]:
     else:
         remedy = "vla-deploy doctor   # again while the computer is idle; then see SCHED_FIFO"
         measured = f"{measured}, expected {limit_ms:.2g} ms"
-        yield trouble("wake-up", measured, remedy, fatal=bool(priority))
+        yield trouble("wake-up", measured, remedy, fatal=_required(context))
 
 
 def _lateness_ns(context: Context, period_ns: int) -> list[int]:

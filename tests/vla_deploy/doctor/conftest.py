@@ -23,10 +23,17 @@ ALL_RIGHTS = Rights(
 
 # What the checks look at, whatever the profiles of the day say.
 PROFILES: dict[str, dict[str, Any]] = {
-    "desktop": {"realtime_priority": 0, "memory_lock": False, "power_mode": "", "models": {}},
+    "desktop": {
+        "realtime_priority": 40,
+        "realtime_required": False,
+        "memory_lock": False,
+        "power_mode": "",
+        "models": {},
+    },
     "robot": {
         "name": "robot",
         "realtime_priority": 50,
+        "realtime_required": True,
         "memory_lock": True,
         "power_mode": "25W",
         "processes": {"control": ProcessSettings(affinity=(5,), nice=0, threads=1)},

@@ -39,7 +39,8 @@ def all_findings(sections: tuple[Section, ...]) -> list[Finding]:
 
 
 def examined(root: Path) -> tuple[Section, ...]:
-    profile = replace(load_profile("desktop"), realtime_priority=50, power_mode="25W")
+    real_time = {"realtime_priority": 50, "realtime_required": True}
+    profile = replace(load_profile("desktop"), power_mode="25W", **real_time)
     return examine(recorded_context(root, profile, load_robot("butler")))
 
 
