@@ -11,7 +11,7 @@ from vla_deploy.cli.session import Session
 
 _ARM_S: Final = 30.0
 _LOOKS_PER_TRY: Final = 25
-_WAY: Final = {"stopped": "reset", "disarmed": "arm"}
+_WAY: Final = {"stopped": "reset", "fault": "reset", "disarmed": "arm"}
 """What leads from a state towards being armed; elsewhere control is under way."""
 
 
