@@ -13,8 +13,8 @@ from sim_twin.sensors.imu import ImuTruth
 BEAMS = 360
 RANGE_CUTOFF_M = 25.0
 ACCELEROMETER = "imu_accelerometer"
-_WORLD_GROUPS = np.array([1, 1, 0, 0, 0, 0], np.uint8)
-_HIDDEN_GROUP = 5
+_WORLD_GROUPS = (0, 1)
+_SHOWN_GROUP = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _ENDLESS_M = 1e6
 _SLACK_M = 1e-6
 _NOWHERE = (0.0, 0.0)
@@ -25,7 +25,8 @@ class RangeProbe:
     """Cast rays in the base's plane from the lidar; they pass the robot itself by.
 
     Rays stay in one plane and within a sector, so geoms that both miss are hidden from them: they
-    cannot be hit, and MuJoCo would look at each of them for each ray. `data` must be up to date.
+    cannot be hit, and MuJoCo would look at each of them for each ray. The same goes for the robot's
+    bodies, which the rays' own model has without geoms. `data` must be up to date.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, site: str = "lidar") -> None:
@@ -34,12 +35,13 @@ class RangeProbe:
         self._rotation = data.xmat[model.body(ROBOT_ROOT).id].reshape(3, 3)
         self._centres = data.geom_xpos
         self._view = copy.copy(model)
-        self._view_groups = self._view.geom_group
-        # MuJoCo counts every group beyond the last one to it, as here where both are added.
-        self._groups = model.geom_group.copy()
+        self._hidden = self._view.geom_group
+        of_world = np.isin(model.geom_group, _WORLD_GROUPS)
+        _empty_bodies(self._view, np.bincount(model.geom_bodyid, of_world, model.nbody) == 0)
         radius_m = np.where(model.geom_type == _PLANE, _ENDLESS_M, model.geom_rbound)
         self._radius_m = radius_m
-        self._reach_m = _reach_from_level_plane(model, data, radius_m) + _SLACK_M
+        reach_m = _reach_from_level_plane(model, data, radius_m) + _SLACK_M
+        self._reach_m = np.where(of_world, reach_m, -math.inf)
         self._bound_m = np.stack([radius_m, radius_m, radius_m]) + _SLACK_M
         turn = np.tile(np.radians(np.arange(BEAMS)), 2)
         cos, sin = np.cos(turn), np.sin(turn)
@@ -62,7 +64,7 @@ class RangeProbe:
             self._data,
             self._origin,
             rays.ravel(),
-            _WORLD_GROUPS,
+            _SHOWN_GROUP,
             True,
             -1,
             geoms,
@@ -71,7 +73,7 @@ class RangeProbe:
             count,
             RANGE_CUTOFF_M,
         )
-        ranges_m[geoms < 0] = 0.0
+        np.maximum(ranges_m, 0.0, out=ranges_m)
         return ranges_m.astype(np.float32)
 
     def _hide_what_they_miss(self, first: int, count: int) -> None:
@@ -82,15 +84,11 @@ class RangeProbe:
         for cos, sin in self._inwards(first, count):
             axes.append((cos * ax + sin * bx, cos * ay + sin * by, cos * az + sin * bz))
         inside_m = np.dot(axes, np.subtract(self._centres, self._origin, out=self._offsets_m).T)
-        level_m, right_m, left_m = inside_m
-        np.abs(level_m, out=level_m)
-        np.subtract(self._reach_m, level_m, out=level_m)
-        np.multiply(self._radius_m, math.hypot(up_x, up_y), out=bound_m[0])
+        np.copysign(inside_m[0], -1.0, inside_m[0])
+        np.multiply(self._radius_m, math.hypot(up_x, up_y), bound_m[0])
+        bound_m[0] += self._reach_m
         inside_m += bound_m
-        np.minimum(level_m, right_m, out=level_m)
-        np.minimum(level_m, left_m, out=level_m)
-        np.multiply(level_m < 0.0, _HIDDEN_GROUP, out=self._view_groups)
-        self._view_groups += self._groups
+        np.less(np.minimum.reduce(inside_m), 0.0, self._hidden)
 
     def _inwards(self, first: int, count: int) -> tuple[tuple[float, float], ...]:
         """Return, in the base's plane, what is at right angles to the first and last beam."""
@@ -98,6 +96,12 @@ class RangeProbe:
             return _NOWHERE, _NOWHERE
         (cos, sin), (last_cos, last_sin) = self._heading[first], self._heading[first + count - 1]
         return (-sin, cos), (last_sin, -last_cos)
+
+
+def _empty_bodies(view: mujoco.MjModel, bodies: NDArray[np.bool_]) -> None:
+    """Take the geoms from bodies, and the volumes around them, which every ray is tried against."""
+    view.body_geomnum[bodies] = 0
+    view.body_bvhadr[bodies] = -1
 
 
 def _reach_from_level_plane(

@@ -32,7 +32,7 @@ _PACKET = np.dtype(
     ]
 )
 _CHECKED_BYTES = _PACKET.itemsize - 1
-_PLACES = np.arange(_CHECKED_BYTES)
+_PLACES = np.arange(_CHECKED_BYTES) * 256
 _LAST_POINT = POINTS_PER_PACKET - 1
 _NOISY_POINTS = POINTS_PER_S
 
@@ -46,7 +46,7 @@ def _crc_parts() -> NDArray[np.uint8]:
     return np.array(parts, np.uint8)
 
 
-_CRC_PARTS = _crc_parts()
+_CRC_PARTS = _crc_parts().ravel()
 
 
 class PacketBlock:
@@ -59,10 +59,11 @@ class PacketBlock:
         packets = np.zeros(count, _PACKET)
         packets["header"] = HEADER
         points = packets["points"]
-        self.numbers = np.arange(count)
         self._memory = packets
         self._checked = packets.view(np.uint8).reshape(count, _PACKET.itemsize)[:, :_CHECKED_BYTES]
         self._crc = packets["crc"]
+        self._crc_places = np.empty((count, _CHECKED_BYTES), np.intp)
+        self._crc_parts = np.empty((count, _CHECKED_BYTES), np.uint8)
         self.speed_deg_s = packets["speed_deg_s"]
         self.start = packets["start"]
         self.end = packets["end"]
@@ -72,7 +73,9 @@ class PacketBlock:
 
     def to_bytes(self) -> bytes:
         """Return the packets as they go over the line."""
-        np.bitwise_xor.reduce(_CRC_PARTS[_PLACES, self._checked], axis=1, out=self._crc)
+        np.add(self._checked, _PLACES, self._crc_places)
+        _CRC_PARTS.take(self._crc_places, None, self._crc_parts, "clip")
+        np.bitwise_xor.reduce(self._crc_parts, axis=1, out=self._crc)
         return self._memory.tobytes()
 
 
@@ -104,7 +107,7 @@ class LidarDevice:
         self._sigma_mm = sigma_m * _MM_PER_M
         self._random = np.random.default_rng(seed)
         self._noise_mm = np.empty(0)
-        self._points = np.empty(0)
+        self._turned_deg = np.empty(0)
         self._mounting_deg = math.degrees(mounting_yaw_rad)
         self._cast_every_ns = round(NS_PER_S / rate_hz / casts_per_turn)
         self._start_ns = 0
@@ -155,23 +158,24 @@ class LidarDevice:
         self._follow_rate()
         first, step_deg, phase_deg = self._sent_packets, self._step_deg, self._phase_deg
         packet_deg = POINTS_PER_PACKET * step_deg
+        numbers = range(first, end)
         block = self._block(end - first)
-        numbers = block.numbers + first
-        centideg = numbers * (100.0 * packet_deg)
-        centideg += 100.0 * phase_deg
-        due_ns = numbers * -NS_PER_S
-        due_ns -= NS_PER_S
-        due_ns //= -_PACKETS_PER_S
-        due_ns += self._start_ns
+        due_ns = [self._last_point_ns(number) for number in numbers]
+        # Lists, as a dozen of packets is too few for array operations to pay.
+        starts = [number * (100.0 * packet_deg) + 100.0 * phase_deg for number in numbers]
+        sweep = 100.0 * _LAST_POINT * step_deg
         block.speed_deg_s.fill(round(self.rate_hz * 360.0))
-        block.start[:] = np.rint(centideg) % _TURN_CENTIDEG
-        centideg += 100.0 * _LAST_POINT * step_deg
-        block.end[:] = np.rint(centideg) % _TURN_CENTIDEG
-        block.stamp_ms[:] = due_ns // _NS_PER_MS % STAMP_WRAP_MS
+        block.start[:] = [round(start) % _TURN_CENTIDEG for start in starts]
+        block.end[:] = [round(start + sweep) % _TURN_CENTIDEG for start in starts]
+        block.stamp_ms[:] = [due // _NS_PER_MS % STAMP_WRAP_MS for due in due_ns]
         self._look(first * packet_deg + phase_deg, block)
         data, size = block.to_bytes(), _PACKET.itemsize
         packets = [data[start : start + size] for start in range(0, len(data), size)]
-        self._waiting = deque(zip(due_ns.tolist(), packets, strict=True))
+        self._waiting = deque(zip(due_ns, packets, strict=True))
+
+    def _last_point_ns(self, number: int) -> int:
+        """Return when a packet's last point is measured, rounded up."""
+        return self._start_ns - (number + 1) * NS_PER_S // -_PACKETS_PER_S
 
     def _block(self, count: int) -> PacketBlock:
         if count not in self._blocks:
@@ -183,7 +187,9 @@ class LidarDevice:
         step_deg = self.rate_hz * 360.0 / POINTS_PER_S
         first = self._sent_packets * POINTS_PER_PACKET
         self._phase_deg += first * (self._step_deg - step_deg)
-        self._step_deg = step_deg
+        if step_deg != self._step_deg:
+            self._step_deg = step_deg
+            self._turned_deg = np.empty(0)
 
     def _look(self, start_deg: float, block: PacketBlock) -> None:
         """Measure distances: 0 where nothing is in range, at least a millimetre elsewhere."""
@@ -207,11 +213,10 @@ class LidarDevice:
 
     def _beams(self, start_deg: float, count: int) -> NDArray[np.intp]:
         """Return the beams that `count` points look along, clockwise from an angle."""
-        if count > self._points.size:
-            self._points = np.arange(count, dtype=np.float64)
-        angles_deg = self._points[:count] * -self._step_deg
-        angles_deg += start_deg
-        np.rint(angles_deg, out=angles_deg)
+        if count > self._turned_deg.size:
+            self._turned_deg = np.arange(count, dtype=np.float64) * -self._step_deg
+        angles_deg = self._turned_deg[:count] + start_deg
+        np.rint(angles_deg, angles_deg)
         return angles_deg.astype(np.intp)
 
     def _next_noise_mm(self, count: int) -> NDArray[np.float64]:
