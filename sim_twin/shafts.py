@@ -12,7 +12,6 @@ from sim_twin.errors import ModelMismatch
 Floats = NDArray[np.float64]
 ControlLaw = Callable[[int, float, float], float]
 """Return a motor's input from simulated time, its shaft's angle and its shaft's speed."""
-_multiply = np.multiply
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +24,7 @@ class Shaft:
 
 
 class Shafts:
-    """Read shaft angle, speed and torque of all motors of one kind, and set their input.
+    """Read position, speed and torque of all motors of one kind, and set their input.
 
     An array that a method returns is overwritten by its next call.
     """
@@ -40,27 +39,26 @@ class Shafts:
         self._each_zero_rad: list[float] = self.zero_rad.tolist()
         self.rad_per_joint = 1.0 / ratio
         # The state's memory is asked for once: asking MjData anew costs more than reading it.
-        self._read_qpos, self._read_qvel = _reader(data.qpos, qpos), _reader(data.qvel, qvel)
-        self._read_force = _reader(data.actuator_force, actuators)
-        self._all_ctrl, self._actuator = data.ctrl, _span(actuators)
-        self._speed = np.zeros(len(shafts))
+        self._motion = np.zeros((2, len(shafts)))
+        self._read_positions = _reader(data.qpos, qpos, self._motion[0])
+        self._read_speeds = _reader(data.qvel, qvel, self._motion[1])
+        self._force, self._all_ctrl = data.actuator_force, data.ctrl
+        self._actuator = _span(actuators)
         self._each_qpos, self._each_qvel = memoryview(data.qpos), memoryview(data.qvel)
         self._each_ctrl = memoryview(data.ctrl)
         factors = (self.rad_per_joint.tolist(), np.sign(ratio).tolist())
         self._rows = list(zip(range(len(shafts)), qpos, qvel, actuators, *factors, strict=True))
 
-    def joint_position(self) -> Floats:
-        """Return what the joints stand at; the physics may write to it."""
-        return self._read_qpos()
-
-    def velocity_rad_s(self) -> Floats:
-        """Return shaft speeds."""
-        _multiply(self._read_qvel(), self.rad_per_joint, self._speed)
-        return self._speed
+    def joint_motion(self) -> Floats:
+        """Return what the joints stand at in a first row, and their speeds in a second."""
+        self._read_positions()
+        self._read_speeds()
+        return self._motion
 
     def joint_effort(self) -> Floats:
         """Return what the motors give, in the joint's direction; the physics may write to it."""
-        return self._read_force()
+        effort: Floats = self._force[self._actuator]
+        return effort
 
     def command(self, value: Floats) -> None:
         """Set the motors' input, in the joint's direction: duty of a servo, torque of a drive."""
@@ -80,14 +78,10 @@ class Shafts:
         self._each_zero_rad[row] -= angle_rad
 
 
-def _reader(state: Floats, addresses: list[int]) -> Callable[[], Floats]:
-    """Return what reads these addresses; where they follow each other nothing is copied."""
-    span = _span(addresses)
-    if isinstance(span, slice):
-        view = state[span]
-        return lambda: view
-    gathered = np.zeros(len(addresses))
-    return lambda: state.take(span, None, gathered, "clip")
+def _reader(state: Floats, addresses: list[int], out: Floats) -> Callable[[], Floats]:
+    """Return what copies these addresses to `out` and returns it."""
+    places = np.array(addresses, np.intp)
+    return lambda: state.take(places, None, out, "clip")
 
 
 def _span(addresses: list[int]) -> slice | NDArray[np.intp]:

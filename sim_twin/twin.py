@@ -190,8 +190,7 @@ class Twin:
         shafts = engine.servos
         duty = self.servos.advance(
             now_ns,
-            shafts.joint_position(),
-            shafts.velocity_rad_s(),
+            shafts.joint_motion(),
             shafts.joint_effort(),
             self.servo_supply.volts(now_ns),
         )

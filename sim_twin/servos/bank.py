@@ -92,23 +92,20 @@ class ServoBank:
     def advance(
         self,
         now_ns: int,
-        joint_position: Floats,
-        velocity_rad_s: Floats,
+        joint_motion: Floats,
         joint_effort: Floats,
         supply_v: float = 12.0,
     ) -> Floats:
-        """Tell what joints and shafts do; return each motor's duty, -1..1, until the next call.
+        """Tell what the joints do; return each motor's duty, -1..1, until the next call.
 
-        Arrays are in the order of the servos; a shaft at 0 rad is at 2048 pulses. Position, duty
-        and effort, which is the motor's torque in N m, are the joint's, and by default that is the
-        shaft; speed is the shaft's. `joint_effort` is looked at when it is asked for. Duty is zero
-        without torque. A supply below `FirmwareOptions.brownout_v` switches the servos off.
+        Arrays are in the order of the servos; a shaft at 0 rad is at 2048 pulses. `joint_motion`
+        has a row of positions and one of speeds. They, duty and effort, which is the motor's torque
+        in N m, are the joint's, and by default that is the shaft. Duty is zero without torque. A
+        supply below `FirmwareOptions.brownout_v` switches the servos off.
         """
         if now_ns > self._now_ns:
             self._now_ns = now_ns
-        return self._firmware.advance(
-            now_ns, joint_position, velocity_rad_s, joint_effort, supply_v
-        )
+        return self._firmware.advance(now_ns, joint_motion, joint_effort, supply_v)
 
     def couple_anew(self) -> None:
         """Take over a change of the coupling that was given."""

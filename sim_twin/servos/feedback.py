@@ -45,6 +45,7 @@ class Feedback:
         self._voltage = columns.named("present_input_voltage")
         self._temperature = columns.named("present_temperature")
         self._efforts = np.zeros((EFFORT_CYCLES, len(self._tick)))
+        self._effort_rows = tuple(self._efforts)
         self._newest_effort = 0
         self.supply_v = 12.0
         self.now_ns = 0
@@ -63,8 +64,8 @@ class Feedback:
 
     def sense_effort(self, joint_effort: Floats) -> None:
         """Take in a control cycle's torque."""
-        self._newest_effort = (self._newest_effort + 1) % EFFORT_CYCLES
-        self._efforts[self._newest_effort] = joint_effort
+        self._newest_effort = newest = (self._newest_effort + 1) % EFFORT_CYCLES
+        self._effort_rows[newest][:] = joint_effort
 
     @property
     def joint_effort(self) -> Floats:
@@ -72,8 +73,9 @@ class Feedback:
 
         One cycle's would alias: duty switches from cycle to cycle in step with a host's reads.
         """
-        mean: Floats = self._efforts.mean(axis=0)
-        return mean
+        total: Floats = np.add.reduce(self._efforts)
+        total /= EFFORT_CYCLES
+        return total
 
     def refresh(self, address: int, length: int) -> None:
         """Update the registers within a range that is about to be read."""

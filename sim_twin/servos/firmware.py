@@ -83,8 +83,7 @@ class Firmware:
     def advance(
         self,
         now_ns: int,
-        joint_position: Floats,
-        velocity_rad_s: Floats,
+        joint_motion: Floats,
         joint_effort: Floats,
         supply_v: float,
     ) -> Floats:
@@ -96,7 +95,7 @@ class Firmware:
             self._reload()
         self.now_ns = now_ns
         self._reactions.set_time(now_ns)
-        self._motion.sense(joint_position, velocity_rad_s)
+        self._motion.sense(joint_motion)
         if not self._pose_known:
             self._take_first_pose()
         dt_s = (now_ns - self._advanced_ns) / NS_PER_S

@@ -82,9 +82,15 @@ class Motion:
         self._joint_stall_nm = self._motors.stall_nm * coupling.sign
         self.profile = Profile(columns)
         self.pulses = np.full(count, float(CENTRE_PULSES))
-        self.shaft_rad_s: Floats = np.zeros(count)
+        # Position and speed are rows of one array, so that one operation does for both.
+        self._sensed = np.zeros((2, count))
+        self._turned, self.shaft_rad_s = self._sensed
+        self._per_joint = np.zeros((2, count))
+        self._per_joint[1] = coupling.rad_per_joint
+        self._gains = np.zeros((2, count))
+        self._terms = np.zeros((2, count))
+        self._by_position, self._by_speed = self._terms
         self._pwm = np.zeros(count)
-        self._scratch = np.zeros(count)
         self._duty = np.zeros(count)
         self._duty_per_pwm = np.zeros(count)
         self._no_duty = np.zeros(count)
@@ -106,7 +112,7 @@ class Motion:
         self.profile.reload()
         self.direction = np.where(columns.drive_mode & _REVERSE, -1.0, 1.0)
         pulses_per_rad = self.direction / PULSE_RAD
-        self._pulses_per_joint = pulses_per_rad * self._coupling.rad_per_joint
+        self._per_joint[0] = pulses_per_rad * self._coupling.rad_per_joint
         self._offset_pulses = CENTRE_PULSES + self._turn_pulses + columns.homing_offset
         self._offset_pulses -= pulses_per_rad * self._coupling.zero_rad
         enabled = columns.torque_enable != 0
@@ -114,12 +120,13 @@ class Motion:
         self._any_enabled = bool(enabled.any())
         self.goals_moved = True
         self._share_per_pwm = self._enabled * self.direction / PWM_FULL
+        self._joint_share_per_pwm = self._share_per_pwm * self._coupling.sign
         self.set_voltage(self._nominal_ratio)
-        self._p = columns.position_p_gain / 128.0
+        self._gains[0] = columns.position_p_gain / 128.0
         self._i = columns.position_i_gain / 65536.0
-        self._d = columns.position_d_gain / 16.0
-        self._damping = self._d * self.direction / (PULSE_RAD * _MS_PER_S)
-        self._forward = self._d + columns.feedforward_1st_gain / 4.0
+        d_gain = columns.position_d_gain / 16.0
+        self._gains[1] = d_gain * self.direction / (PULSE_RAD * _MS_PER_S)
+        self._forward = d_gain + columns.feedforward_1st_gain / 4.0
         self._forward_2nd = columns.feedforward_2nd_gain / 4.0
         self._has_i = bool(self._i.any())
         self._has_2nd = bool(self._forward_2nd.any())
@@ -146,8 +153,7 @@ class Motion:
         Duty counts from the nominal voltage: a lower one does less with the same PWM.
         """
         self._nominal_ratio = nominal_ratio
-        _multiply(self._share_per_pwm, nominal_ratio, self._duty_per_pwm)
-        self._duty_per_pwm *= self._coupling.sign
+        _multiply(self._joint_share_per_pwm, nominal_ratio, self._duty_per_pwm)
 
     @property
     def duty(self) -> Floats:
@@ -167,13 +173,12 @@ class Motion:
         pwm: Floats = self._pwm * self._enabled
         return pwm
 
-    def sense(self, joint_position: Floats, velocity_rad_s: Floats) -> None:
-        """Read the encoders."""
-        pulses = self.pulses
-        _multiply(joint_position, self._pulses_per_joint, pulses)
-        _add(pulses, self._offset_pulses, pulses)
-        _rint(pulses, pulses)
-        self.shaft_rad_s = velocity_rad_s
+    def sense(self, joint_motion: Floats) -> None:
+        """Read the encoders: the joints' positions in the first row, their speeds in the second."""
+        turned = self._turned
+        _multiply(joint_motion, self._per_joint, self._sensed)
+        _add(turned, self._offset_pulses, turned)
+        _rint(turned, self.pulses)
 
     def home(self, row: int) -> None:
         """Forget the turns counted, as at power-on: the position comes back to 0..4095."""
@@ -218,18 +223,16 @@ class Motion:
 
     def _control_position(self, dt_s: float) -> None:
         """Set `pwm` to what the position loops ask for, in place: every step comes here."""
-        pwm, scratch = self._pwm, self._scratch
+        error = self._turned
         moving = self.goals_moved or self.profile.active or self._has_2nd
         if moving:
             self.goals_moved = False
             self.profile.advance(dt_s)
-        _subtract(self.profile.position, self.pulses, scratch)
-        _multiply(scratch, self._p, pwm)
+        _subtract(self.profile.position, self.pulses, error)
+        _multiply(self._sensed, self._gains, self._terms)
+        _subtract(self._by_position, self._by_speed, self._pwm)
         if self._has_i:
-            self._integrate_position(scratch, dt_s)
-        if self._has_rates:
-            _multiply(self.shaft_rad_s, self._damping, scratch)
-            _subtract(pwm, scratch, pwm)
+            self._integrate_position(error, dt_s)
         if moving:
             self._feed_forward(dt_s * _MS_PER_S)
 

@@ -58,13 +58,7 @@ class FreeServos:
     def _advance(self) -> None:
         self.now_ns += _STEP_NS
         rotors = self.rotors
-        duty = self.bank.advance(
-            self.now_ns,
-            rotors.position_rad,
-            rotors.velocity_rad_s,
-            rotors.torque_nm,
-            self.supply_v,
-        )
+        duty = self.bank.advance(self.now_ns, rotors.motion, rotors.torque_nm, self.supply_v)
         rotors.advance(duty, STEP_S)
 
 

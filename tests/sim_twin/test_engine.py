@@ -13,7 +13,12 @@ from sim_twin.shafts import Shaft
 def angles(engine: Engine) -> NDArray[np.float64]:
     """Return shaft angles as the emulated encoders have them."""
     shafts = engine.servos
-    return shafts.rad_per_joint * shafts.joint_position() - shafts.zero_rad
+    return shafts.rad_per_joint * shafts.joint_motion()[0] - shafts.zero_rad
+
+
+def speeds(engine: Engine) -> NDArray[np.float64]:
+    """Return the speeds of the shafts."""
+    return engine.servos.rad_per_joint * engine.servos.joint_motion()[1]
 
 
 def test_time_goes_by_steps_of_two_milliseconds(engine: Engine) -> None:
@@ -30,7 +35,7 @@ def test_a_shaft_reads_its_joint_through_offset_and_sign(engine: Engine) -> None
     engine.data.joint("arm").qpos[0] = 0.8
     engine.data.joint("arm").qvel[0] = 0.1
     assert angles(engine) == pytest.approx([-0.3])
-    assert engine.servos.velocity_rad_s() == pytest.approx([-0.1])
+    assert speeds(engine) == pytest.approx([-0.1])
 
 
 def test_a_shaft_of_a_finger_turns_travel_into_an_angle(room: mujoco.MjModel) -> None:
@@ -44,7 +49,7 @@ def test_a_command_in_shaft_direction_moves_a_mirrored_joint_backwards(engine: E
     for _ in range(50):
         engine.step()
     assert engine.data.joint("arm").qvel[0] < 0.0
-    assert engine.servos.velocity_rad_s()[0] > 0.0
+    assert speeds(engine)[0] > 0.0
     effort = engine.servos.joint_effort() * np.sign(engine.servos.rad_per_joint)
     assert effort == pytest.approx([0.5])
 
@@ -85,6 +90,6 @@ def test_plain_numbers_tell_the_same_motion_as_arrays(engine: Engine) -> None:
     ((now_ns, angle_rad, speed_rad_s),) = told
     assert now_ns == engine.now_ns
     assert angles(engine) == pytest.approx([angle_rad])
-    assert engine.servos.velocity_rad_s() == pytest.approx([speed_rad_s])
+    assert speeds(engine) == pytest.approx([speed_rad_s])
     assert angle_rad == pytest.approx(-0.25)
     assert engine.data.ctrl[0] == -0.25

@@ -46,13 +46,7 @@ class Bench:
     def _step(self) -> None:
         self.now_ns += STEP_NS
         rotors = self.rotors
-        self.duty = self.bank.advance(
-            self.now_ns,
-            rotors.position_rad,
-            rotors.velocity_rad_s,
-            rotors.torque_nm,
-            self.supply_v,
-        )
+        self.duty = self.bank.advance(self.now_ns, rotors.motion, rotors.torque_nm, self.supply_v)
         if self.blocked:
             rotors.velocity_rad_s[:] = 0.0
             rotors.torque_nm = np.array([m.stall_torque_nm for m in self.models]) * self.duty

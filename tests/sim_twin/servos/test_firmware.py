@@ -44,8 +44,7 @@ def test_startup_configuration_can_switch_torque_on(bench: Any) -> None:
 
 def test_servos_wake_up_where_they_are_and_count_from_the_first_turn() -> None:
     bank = ServoBank([EmulatedServoSpec(id=1, model_name="XM430-W350")])
-    zeros = np.zeros(1)
-    bank.advance(10**15, np.array([2 * pi + 1.0]), zeros, zeros)
+    bank.advance(10**15, np.array([[2 * pi + 1.0], [0.0]]), np.zeros(1))
     expected = CENTRE + round(1.0 / (2 * pi) * 4096)
     assert bank.register(1, "present_position") == expected
     assert bank.register(1, "goal_position") == expected
