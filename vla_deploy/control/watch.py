@@ -21,7 +21,7 @@ class Watch:
         self.w_rad_s = 0.0
         self._base_command = space.cell_reader("base_command")
         self._process_table = space.cell_reader("process_table")
-        self._budget = BudgetWatch(space.cell_reader("budget"))
+        self._budget = BudgetWatch(space.cell_reader("budget_stop"))
         self._servos = servos
         self._wheels = wheels
         self._clock = clock
@@ -95,7 +95,7 @@ class Watch:
         """Return how old voltage and temperature are: polled servos tell them now and then."""
         state = self._servos.state
         polled = state.climate_stamp_ns >= 0
-        if not polled.any():
+        if not np.count_nonzero(polled):
             return state.age_s
         age_s = (self._clock.now_ns() - state.climate_stamp_ns) / NS_PER_S
         return np.where(polled, age_s, state.age_s)

@@ -103,9 +103,9 @@ TOPICS: tuple[Topic, ...] = (
         name="control_status",
         kind=Kind.CELL,
         owner="control",
-        rate_hz=50,
+        rate_hz=20,
         deadline_s=0.2,
-        summary="control state, active verdict, tick statistics, as JSON",
+        summary="control state, active verdict, tick statistics, as JSON; what changes, sooner",
         fields=(Field("document", "json", 8192),),
     ),
     Topic(
@@ -313,6 +313,15 @@ TOPICS: tuple[Topic, ...] = (
         deadline_s=3.0,
         summary="every budget's line, the ladder, what is enforced how, as JSON",
         fields=(Field("document", "json", 32768),),
+    ),
+    Topic(
+        name="budget_stop",
+        kind=Kind.CELL,
+        owner="supervisor",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="whether a budget demands that the robot stops, and why, as JSON; for control",
+        fields=(Field("document", "json", 4096),),
     ),
     Topic(
         name="profile_request",

@@ -12,7 +12,7 @@ AHEAD = [-4, -3, -2, -1, 0, 1, 2, 3, 4]
 def demand(rig: Rig, stop: bool) -> None:
     reason = "memory: 900 MB, limit 800 MB" if stop else ""
     document = {"rows": [], "ladder": {"step": 0, "taken": []}, "stop": stop, "reason": reason}
-    rig.space.cell_writer("budget").put_document(document)
+    rig.space.cell_writer("budget_stop").put_document(document)
 
 
 def test_everything_ramps_within_its_limits_and_keeps_its_power(armed: Rig) -> None:

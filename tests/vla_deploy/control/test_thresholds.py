@@ -55,7 +55,7 @@ def space(tmp_path: Path) -> SharedSpace:
 
 @pytest.fixture
 def budget(space: SharedSpace) -> Iterator[BudgetWatch]:
-    watched = BudgetWatch(space.cell_reader("budget"))
+    watched = BudgetWatch(space.cell_reader("budget_stop"))
     yield watched
     watched.close()
 
@@ -73,7 +73,7 @@ def budget(space: SharedSpace) -> Iterator[BudgetWatch]:
 def test_a_budget_demands_a_stop_until_it_says_otherwise(
     space: SharedSpace, budget: BudgetWatch, told: dict[str, Any], reason: str | None
 ) -> None:
-    cell = space.cell_writer("budget")
+    cell = space.cell_writer("budget_stop")
     assert budget.reason() is None
     cell.put_document(told)
     assert budget.reason() == reason

@@ -29,6 +29,7 @@ from vla_deploy.supervisor.budgets.sampler import Feed, Snapshot
 TELL_PERIOD_NS: Final = NS_PER_S // 2
 STALE_AFTER_NS: Final = 5 * NS_PER_S
 KEPT_CHANGES: Final = 20
+_REASON_CHARACTERS: Final = 500
 WARNED_ONLY: Final = frozenset({"disk_free_mb"})
 """What no step of the ladder relieves."""
 _SUPERVISOR: Final = "supervisor"
@@ -69,6 +70,7 @@ class BudgetKeeper:
         self._measurer = Measurer()
         self._directives = space.cell_writer("resource_directives")
         self._cell = space.cell_writer("budget")
+        self._stop_cell = space.cell_writer("budget_stop")
         self._findings: dict[tuple[str, str], Finding] = {}
         self._ladder = LadderState()
         self._changes: deque[Change] = deque(maxlen=KEPT_CHANGES)
@@ -162,6 +164,7 @@ class BudgetKeeper:
         self._told_ns = now_ns
         taken = self._ladder.taken
         stop = stop_reason(taken)
+        self._stop_cell.put_document({"stop": bool(stop), "reason": stop[:_REASON_CHARACTERS]})
         self._directives.put_document(directives(taken))
         self._cell.put_document(
             {

@@ -95,9 +95,11 @@ def test_a_thermal_ramp_goes_down_the_ladder_to_the_protective_stop_and_back(wor
     ]
     assert budget["stop"]
     assert "temperature_c" in budget["reason"]
+    assert world.cell("budget_stop") == {"stop": True, "reason": budget["reason"]}
     world.readings = {"temperature_c": 40.0}
     assert world.go(60).suspended == {}
     assert not world.cell("budget")["stop"]
+    assert world.cell("budget_stop") == {"stop": False, "reason": ""}
 
 
 def test_critical_heat_stops_the_robot_at_once(world):
