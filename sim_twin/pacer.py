@@ -7,18 +7,22 @@ class Pacer:
     """Say when the next physics step is due.
 
     A machine that falls behind may catch up `lag_cap_ns` of steps; whatever is older is dropped, so
-    that simulated time slips and the buses are served between any two steps.
+    that simulated time slips and the buses are served between any two steps. `worst_lag_ns` is the
+    furthest behind since somebody set it to 0.
     """
 
     def __init__(self, step_ns: int, start_ns: int, lag_cap_ns: int = LAG_CAP_NS) -> None:
         self.slipped_ns = 0
+        self.worst_lag_ns = 0
         self._step_ns = step_ns
         self._lag_cap_ns = lag_cap_ns
         self._due_ns = start_ns
 
     def due(self, wall_ns: int) -> bool:
         """Return whether a step is due at `wall_ns`; drop the lag beyond the cap."""
-        excess_ns = wall_ns - self._due_ns - self._lag_cap_ns
+        lag_ns = wall_ns - self._due_ns
+        self.worst_lag_ns = max(self.worst_lag_ns, lag_ns)
+        excess_ns = lag_ns - self._lag_cap_ns
         if excess_ns > 0:
             self.slipped_ns += excess_ns
             self._due_ns += excess_ns

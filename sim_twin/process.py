@@ -229,12 +229,16 @@ class TwinProcess:
         }
 
     def _hazards(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Tell the hazards since the last time that somebody wanted to `begin`."""
+        """Tell the hazards since the last time that somebody wanted to `begin`.
+
+        `held_up_s` is for how long the computer let the devices stand still meanwhile.
+        """
         watch = self._twin.hazards
-        found = watch.document()
+        found = {"hazards": watch.document(), "held_up_s": self._pacer.worst_lag_ns / NS_PER_S}
         if request.get("begin"):
             watch.begin()
-        return {"hazards": found}
+            self._pacer.worst_lag_ns = 0
+        return found
 
     def _inside(self, request: Mapping[str, Any]) -> dict[str, Any]:
         names = str(request.get("object")), str(request.get("container"))

@@ -31,6 +31,9 @@ _EARLIEST_S, _LATEST_S = 0.5, 9.0
 _REST_FOR_S: Final = 0.3
 _POLL_S: Final = 0.02
 _SETTLE_S: Final = 1.0
+_TRIES: Final = 3
+_HELD_UP_S: Final = 0.02
+"""With no answer for so much longer, control may rightly take the bus for lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,6 +151,10 @@ class KillCampaign:
             seconds=(self._clock.now_ns() - began_ns) / NS_PER_S,
         )
 
+    def held_up_s(self) -> float:
+        """Return for how long the last injection's devices stood still, as real ones never do."""
+        return self._machine.held_up_s()
+
     def close(self) -> None:
         """End the robot, then its machine."""
         try:
@@ -199,17 +206,24 @@ def inject_all(chosen: Sequence[Injection], seed: int, tell: Callable[[str], Non
     with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
         campaign = KillCampaign(Path(folder), seed)
         try:
-            cases = [told(_tried(campaign, injection), tell) for injection in chosen]
+            cases = [told(_tried(campaign, injection, tell), tell) for injection in chosen]
         finally:
             campaign.close()
     return Report(campaign="kills", cases=tuple(cases), summary=_summary(cases))
 
 
-def _tried(campaign: KillCampaign, injection: Injection) -> Case:
-    try:
-        return campaign.inject(injection)
-    except NotReady as error:
-        return Case(name=injection.name, failures=(str(error),))
+def _tried(campaign: KillCampaign, injection: Injection, tell: Callable[[str], None]) -> Case:
+    """Do an injection, again where the devices themselves stood still: real ones never do."""
+    for left in reversed(range(_TRIES)):
+        try:
+            case = campaign.inject(injection)
+        except NotReady as error:
+            case = Case(name=injection.name, failures=(str(error),))
+        held_up_s = campaign.held_up_s()
+        if not case.failures or held_up_s < _HELD_UP_S or not left:
+            break
+        tell(f"{case.row}\n  void: this computer held the devices up for {held_up_s:.3f} s; again")
+    return case
 
 
 def _summary(cases: Sequence[Case]) -> dict[str, Any]:

@@ -54,6 +54,10 @@ class Machine:
         """Return the hazards since the watch began, in words."""
         return told_hazards(self.folder)
 
+    def held_up_s(self) -> float:
+        """Return for how long the computer let every device stand still since the watch began."""
+        return float(ask(self.folder, "hazards", begin="")["held_up_s"])
+
     def close(self) -> None:
         """End the twin; ending twice is allowed."""
         if self._process.poll() is None:

@@ -58,3 +58,13 @@ def test_the_real_time_factor_is_that_of_the_last_whole_window() -> None:
     assert factor.value == 1.0
     factor.update(1000 * MS, 500 * MS)
     assert factor.value == 0.5
+
+
+def test_the_furthest_behind_is_remembered_until_it_is_forgotten() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    steps_due(pacer, 35 * MS)
+    steps_due(pacer, 37 * MS)
+    assert pacer.worst_lag_ns == 35 * MS
+    pacer.worst_lag_ns = 0
+    steps_due(pacer, 40 * MS)
+    assert pacer.worst_lag_ns < 10 * MS
