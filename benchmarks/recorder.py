@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -51,7 +52,7 @@ def measure(seconds: float, seed: int) -> dict[str, Any]:
 
 def _ticks(stack: LockstepStack, seconds: float, again: Path) -> tuple[dict[str, float], int]:
     control, calls = stack.control, list[Call]()
-    tick_record = getattr(control, "_tick_record")  # noqa: B009 - not for the robot's own code
+    tick_record = attrgetter("_judging._record")(control)
     period_ns = control.period_s * NS_PER_S
     with contextlib.closing(Spans()) as spans:
         setattr(control, "step", spans.step(control.step))  # noqa: B010 - of this one node
