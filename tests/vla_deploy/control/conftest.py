@@ -1,6 +1,7 @@
 """Give the tests a robot in the twin, in lock-step, with the far ends of control's topics."""
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,25 @@ from numpy.typing import NDArray
 
 from platforms import load_profile
 from sim_twin.lockstep import Lockstep
+from sim_twin.twin import Twin
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.topics import SCAN_BEAMS
+from vla_deploy.robots import load_robot
+
+SINKS_FOR_S = 2.5
+
+
+@cache
+def at_rest() -> dict[str, float]:
+    """Return where the joints have sunk to, without power, before a robot is switched on."""
+    twin = Twin(load_robot("butler"))
+    start_ns = twin.now_ns
+    while twin.now_ns < start_ns + SINKS_FOR_S * 1e9:
+        twin.step()
+    joints = twin.engine.referee.truth()["joints"]
+    assert max(abs(joint["velocity"]) for joint in joints.values()) < 0.01
+    return {name: joint["position"] for name, joint in joints.items()}
 
 
 class EmptyFloor:
@@ -42,6 +59,7 @@ class Rig:
 
     def __init__(self, tmp_path: Path) -> None:
         self.lockstep = Lockstep(tmp_path=tmp_path)
+        self.lockstep.twin.engine.pose(at_rest())
         self.robot = self.lockstep.robot
         space = SharedSpace(tmp_path / "ipc", self.lockstep.clock)
         self._operator = space.ring_writer("operator")
@@ -61,10 +79,10 @@ class Rig:
         return ControlNode(step.context, self.robot, load_profile("desktop"), step.devices)
 
     def boot(self) -> None:
-        """Start control and let the arms, without power, come to rest."""
+        """Start control; the arms, without power, lie at rest."""
         self.lockstep.add(self.lidar)
         self.lockstep.add(self.control)
-        self.run(2.5)
+        self.run(0.5)
 
     def run(self, seconds: float) -> None:
         self.lockstep.run_for(seconds)
