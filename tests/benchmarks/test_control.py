@@ -3,7 +3,7 @@ import json
 import pytest
 
 from benchmarks.control import main
-from vla_deploy.control import node
+from vla_deploy.control import judging
 from vla_deploy.safety import evaluate
 
 PARTS = ("read", "inputs", "surroundings", "record", "plan_and_limit", "write", "tell", "judge")
@@ -17,4 +17,4 @@ def test_the_report_shares_the_tick_out_to_its_parts(capsys: pytest.CaptureFixtu
     assert all(share > 0.0 for share in shares)
     assert report["total_ratio"] == pytest.approx(sum(shares))
     assert report["guarded_cost_ratio"] > 1.0
-    assert node.evaluate is evaluate
+    assert judging.evaluate is evaluate
