@@ -16,8 +16,6 @@ class BaseOutput:
 
     def follow(self, wanted: tuple[float, float], verdict: Verdict, period_s: float) -> None:
         """Move towards what a verdict leaves of a wanted velocity."""
-        if not self._wheels.enabled:
-            wanted = (0.0, 0.0)
         v_m_s, w_rad_s = permitted(wanted, self._limits, verdict.speed_ratio, verdict.blocked)
         self._move(v_m_s, w_rad_s, period_s)
 
@@ -26,7 +24,8 @@ class BaseOutput:
         self._move(0.0, 0.0, period_s)
 
     def _move(self, v_m_s: float, w_rad_s: float, period_s: float) -> None:
-        if not self._wheels.enabled:
+        if self._wheels.enabled:
+            self.ramp.advance(v_m_s, w_rad_s, period_s)
+        else:
             self.ramp.halt()
-        self.ramp.advance(v_m_s, w_rad_s, period_s)
         self._wheels.cycle(self.ramp.v_m_s, self.ramp.w_rad_s)

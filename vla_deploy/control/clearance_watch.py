@@ -37,6 +37,8 @@ class ClearanceWatch:
         self._box_high = np.array([box.max_m for box in boxes.values()]).reshape(-1, 3)
         self._bounds = joint_bounds(robot)
         self._ahead: tuple[Stopping, Survey] | None = None
+        self._compared: tuple[int, int, float, bool] | None = None
+        self._surveys: tuple[Survey, Survey] | None = None
         self._self_m = robot.protection.clearance.self_m
         self._floor_m = robot.protection.clearance.floor_m
         self._self_least = np.full(len(body.self_pairs), self._self_m)
@@ -61,15 +63,24 @@ class ClearanceWatch:
         ahead = stopping(motion, self._bounds)
         self._ahead = ahead, self._body.survey(ahead.position)
 
-    def compare(self, powered: bool) -> None:
+    def compare(self, powered: bool) -> bool:
         """Measure from where the joints go there, and find what has the least to spare.
 
         `powered` tells whether every joint is: before that, parts may lie against each other.
+        Return whether there may be news; a robot that stands in the same pose makes none.
         """
         assert self._ahead is not None, "the caller has looked ahead"
         (ahead, there), self._ahead = self._ahead, None
-        body, time_s = self._body, ahead.time_s
-        here = body.survey(ahead.start)
+        here = self._body.survey(ahead.start)
+        before, self._compared = self._compared, (id(here), id(there), ahead.time_s, powered)
+        if before == self._compared:
+            return False
+        self._surveys = here, there  # keeps their identities theirs
+        self._find_least(here, there, ahead.time_s, powered)
+        return True
+
+    def _find_least(self, here: Survey, there: Survey, time_s: float, powered: bool) -> None:
+        body = self._body
         self._self_least = least_distances(self._self_least, here.self_m, self._self_m, powered)
         self._floor_least = least_distances(self._floor_least, here.floor_m, self._floor_m, powered)
         self.self_clearance = nearest_pair(

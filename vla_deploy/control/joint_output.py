@@ -29,11 +29,11 @@ class JointOutput:
         """Advance the setpoints, bound them, add what gravity asks for, and send them."""
         state = self._servos.state
         loose = ~state.torque_on | (state.watchdog < 0)
-        if loose.any():
+        if np.count_nonzero(loose):
             self.place(loose)
         ended = self.motions.advance(period_s)
         sent = self._gate.limit(self.motions.state.position, period_s)
-        if state.torque_on.any():
+        if np.count_nonzero(state.torque_on):
             self._servos.write(sent + self._gravity.at(sent))
         return ended
 

@@ -23,6 +23,12 @@ class JointSteps:
         known = new & np.isfinite(self._position)
         self._taken_ns = state.stamp_ns
         passed_s = (state.stamp_ns - self._stamp_ns) / NS_PER_S
+        if np.count_nonzero(known) == len(known):
+            self.step = state.position_rad - self._position
+            self.time_s = passed_s
+            self._position = state.position_rad.copy()
+            self._stamp_ns = np.full(len(known), state.stamp_ns, dtype=np.int64)
+            return
         self.step = np.where(known, state.position_rad - self._position, 0.0)
         self.time_s = np.where(known, passed_s, 0.0)
         self._position = np.where(new, state.position_rad, self._position)

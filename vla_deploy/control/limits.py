@@ -33,8 +33,12 @@ class SetpointGate:
 
     def limit(self, setpoint: Floats, period_s: float) -> Floats:
         """Return the setpoints that may be sent; NaN keeps the last one."""
+        if not np.count_nonzero(setpoint != self.sent):
+            self._clamped[:] = False
+            return self.sent
         step = self._velocity * period_s
-        wanted = np.where(np.isnan(setpoint), self.sent, setpoint)
+        unknown = np.isnan(setpoint)
+        wanted = np.where(unknown, self.sent, setpoint) if np.count_nonzero(unknown) else setpoint
         low = np.maximum(self.sent - step, np.minimum(self._lower, self.sent))
         high = np.minimum(self.sent + step, np.maximum(self._upper, self.sent))
         self.sent = np.minimum(np.maximum(wanted, low), high)

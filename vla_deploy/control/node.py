@@ -1,7 +1,8 @@
 """Run control: read, judge, plan, limit, write, tell - once per tick, in this order."""
 
 from contextlib import closing
-from typing import Any
+
+import numpy as np
 
 from drivers.clock import NS_PER_S
 from drivers.errors import DriverError
@@ -22,8 +23,8 @@ from vla_deploy.control.resetting import Resetting
 from vla_deploy.control.rest import Rest
 from vla_deploy.control.retuning import Tuning, retuned, tuning_of
 from vla_deploy.control.servos import ServoLine
-from vla_deploy.control.state_machine import Mode, status_name
-from vla_deploy.control.status_document import bus_document, detail, verdict_document
+from vla_deploy.control.state_machine import Mode
+from vla_deploy.control.status import Status
 from vla_deploy.control.stopping import Stopping
 from vla_deploy.control.telemetry import Telemetry, TickClock
 from vla_deploy.control.wheels import Wheels
@@ -79,6 +80,9 @@ class ControlNode:
         self._modes = Modes(Arming(servos, wheels, clock), self._stopping, self._motions)
         self._commands = space.ring_reader("motion_command", from_start=False)
         self._telemetry = Telemetry(space, len(robot.joint_names))
+        self._status = Status(
+            self._ticks, self._modes, self._judging, self._desk, self._motions, (servos, wheels)
+        )
 
     def start(self) -> None:
         """Open buses and button; groups of stop category 2 keep the power they have.
@@ -208,7 +212,7 @@ class ControlNode:
 
         The stop begins in this very tick; nothing may move them before.
         """
-        if jumped.any():
+        if np.count_nonzero(jumped):
             self._joints.place(jumped)
             self._telemetry.tell_results(self._motions.stop(self._judging.verdict.text))
 
@@ -230,20 +234,6 @@ class ControlNode:
         self._judging.note_sent(self._joints.sent, ramp.v_m_s, ramp.w_rad_s)
         self._telemetry.tell_joints(self._servos.state, self._joints.sent)
         self._telemetry.tell_base(self._wheels)
-        if self._ticks.tick % self._tuning.status_every == 0:
-            self._telemetry.tell_status(self._status())
-
-    def _status(self) -> dict[str, Any]:
-        verdict, ticks = self._judging.verdict, self._ticks
-        return {
-            "state": status_name(self._modes.mode, verdict.reaction),
-            "estop_latched": self._judging.state.estop_latched,
-            **verdict_document(verdict),
-            "detail": detail(verdict.text, self._modes.notice, self._desk.complaint),
-            "tick": ticks.tick,
-            "judged_tick": self._judging.tick,
-            "late_ticks": ticks.late_ticks,
-            "period_s": round(ticks.period_s, 6),
-            "buses": bus_document(self._servos, self._wheels),
-            "active_motions": self._motions.active_ids,
-        }
+        document = self._status.due(self._tuning.status_every)
+        if document is not None:
+            self._telemetry.tell_status(document)

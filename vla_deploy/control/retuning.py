@@ -8,7 +8,7 @@ from platforms import Profile, ProfileError
 from vla_deploy.node import NeedsRestart
 from vla_deploy.robots import RobotDescription
 
-STATUS_HZ: Final = 50.0
+STATUS_HZ: Final = 20.0
 # A cycle's share of the servo bus: one sync write and one fast sync read, by the servo.
 _WIRE_BITS: Final = 300
 _MAX_BUS_RATIO: Final = 0.8

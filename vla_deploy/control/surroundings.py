@@ -4,6 +4,7 @@ Each part has a rate of its own and a tick works on at most one of them, the one
 that no tick carries all the geometry.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -21,7 +22,7 @@ from vla_deploy.robots.model import RobotModel
 from vla_deploy.safety.balance import tip_margin_ratio
 from vla_deploy.safety.keep_out import judge_keep_out, seen_from
 from vla_deploy.safety.surroundings import NOTHING_KNOWN, Surroundings
-from vla_deploy.safety.zones import Footprint, Motion
+from vla_deploy.safety.zones import Footprint, Motion, braking_m
 
 BASE_REACTION_S = 0.1
 # Of each new sample, 10 times a second: a low-pass of 0.1 s.
@@ -70,6 +71,7 @@ class SurroundingsWatch:
         self._areas = {
             area.name: np.array(area.polygon_m, dtype=np.float64) for area in robot.home.zones
         }
+        self._middles = {name: _around(area) for name, area in self._areas.items()}
         self._parts = [_Part(work, NS_PER_S // rate_hz) for work, rate_hz in self._declared_rates()]
 
     def _declared_rates(self) -> tuple[tuple[Callable[[_Body], None], int], ...]:
@@ -123,13 +125,13 @@ class SurroundingsWatch:
 
     def _look_at_clearance(self, powered: bool) -> None:
         clearance = self._clearance
-        clearance.compare(powered)
-        self._known = replace(
-            self._known,
-            self_clearance=clearance.self_clearance,
-            environment_clearance=clearance.environment_clearance,
-            workspace=clearance.workspace,
-        )
+        if clearance.compare(powered):
+            self._known = replace(
+                self._known,
+                self_clearance=clearance.self_clearance,
+                environment_clearance=clearance.environment_clearance,
+                workspace=clearance.workspace,
+            )
 
     def _look_at_zones(self, body: _Body) -> None:
         zones = self._zones
@@ -146,9 +148,20 @@ class SurroundingsWatch:
         keep_out = None
         if sample is not None and body.now_ns - sample.stamp_ns <= _MAX_POSE_AGE_NS:
             x_m, y_m, yaw_rad = (float(sample.data[n]) for n in ("x_m", "y_m", "yaw_rad"))
-            areas = {name: seen_from(area, x_m, y_m, yaw_rad) for name, area in self._areas.items()}
+            near = self._areas_near(x_m, y_m, body.motion)
+            areas = {name: seen_from(area, x_m, y_m, yaw_rad) for name, area in near}
             keep_out = judge_keep_out(areas, self._footprint, body.motion, BASE_REACTION_S)
         self._known = replace(self._known, keep_out=keep_out)
+
+    def _areas_near(self, x_m: float, y_m: float, motion: Motion) -> list[tuple[str, Floats]]:
+        """Leave out the areas that the footprint cannot be in before it stands."""
+        around_m = self._footprint.radius_m + braking_m(motion, BASE_REACTION_S)
+        return [
+            (name, area)
+            for name, area in self._areas.items()
+            if math.hypot(self._middles[name][0] - x_m, self._middles[name][1] - y_m)
+            <= self._middles[name][2] + around_m
+        ]
 
     def _look_at_balance(self, body: _Body) -> None:
         tip_over, sample = self._robot.protection.tip_over, self._imu.latest()
@@ -168,3 +181,9 @@ class SurroundingsWatch:
             tip_over.max_lean_rad,
         )
         self._known = replace(self._known, tip_margin_ratio=ratio)
+
+
+def _around(area: Floats) -> tuple[float, float, float]:
+    """Return a circle around a polygon: middle and radius."""
+    x_m, y_m = area.mean(axis=0).tolist()
+    return x_m, y_m, float(np.hypot(area[:, 0] - x_m, area[:, 1] - y_m).max())

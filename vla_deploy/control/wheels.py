@@ -121,7 +121,7 @@ class Wheels:
         """Tell whether the wheels stand, or cannot be driven any more."""
         if self.lost or self.state is None:
             return True
-        return bool(np.abs(self.state.velocity_rad_s).max() < _STILL_RAD_S)
+        return all(abs(speed) < _STILL_RAD_S for speed in self.state.velocity_rad_s.tolist())
 
     @property
     def counters(self) -> dict[str, int]:
@@ -154,7 +154,7 @@ class Wheels:
             self.v_m_s = self.w_rad_s = 0.0
             return
         self.state = state
-        self._followed = self._followed or self._bus.enabled
+        self._followed = self._followed or state.enabled
         if any(state.lost):
             self._note_loss()
         self._track(wanted, state)

@@ -1,5 +1,7 @@
 """Judge what lidar and depth camera see against the zones of the robot file."""
 
+from typing import Final
+
 import numpy as np
 
 from vla_deploy.control.axes import Floats
@@ -20,6 +22,9 @@ from vla_deploy.safety.zones import (
     judge_zone,
 )
 
+# Of the base's top speed; no base that is led by control gets there.
+_FASTEST_RATIO: Final = 1.5
+
 
 class ZoneWatch:
     """Hold every zone's memory, and the findings of the last look."""
@@ -38,7 +43,7 @@ class ZoneWatch:
         self._nearby = {source: Nearby(source, space, robot, model, body) for source in ZoneSource}
         self._triggers: dict[str, Trigger] = {}
         self._stands = False
-        self._reach_m = max((reach_m(robot, zone) for zone in self._zones), default=0.0)
+        self._reach_m = reaches_m(robot)
 
     @property
     def scan_age_s(self) -> float | None:
@@ -52,8 +57,8 @@ class ZoneWatch:
 
     def look(self, now_ns: int, position: Floats, motion: Motion) -> None:
         """Judge all zones; nothing new around a base that stands leaves them as they were."""
-        points: dict[ZoneSource, Points] = {
-            source: _within(nearby.points(now_ns, position, motion), self._reach_m)
+        points = {
+            source: nearby.points(now_ns, position, motion)
             for source, nearby in self._nearby.items()
         }
         stood, self._stands = self._stands, motion.stands
@@ -67,12 +72,17 @@ class ZoneWatch:
             nearby.close()
 
     def _judge(self, points: dict[ZoneSource, Points], motion: Motion) -> list[ZoneFinding]:
+        distances2 = {source: (seen**2).sum(axis=1) for source, seen in points.items()}
         found = []
         for zone in self._zones:
+            near = self._near(zone, points, distances2)
+            before = self._triggers.get(zone.name, IDLE)
+            if before is IDLE and not len(near):
+                continue  # an idle zone stays so around which there is nothing
             trigger, finding = judge_zone(
                 zone,
-                self._triggers.get(zone.name, IDLE),
-                np.concatenate([points[source] for source in zone.sources]),
+                before,
+                near,
                 self._footprint,
                 motion,
                 fresh=any(self._nearby[source].fresh for source in zone.sources),
@@ -82,19 +92,26 @@ class ZoneWatch:
                 found.append(finding)
         return found
 
+    def _near(
+        self, zone: Zone, points: dict[ZoneSource, Points], distances2: dict[ZoneSource, Floats]
+    ) -> Points:
+        """Return the points that may matter to a zone."""
+        reach2 = self._reach_m[zone.name] ** 2
+        return np.concatenate([points[one][distances2[one] <= reach2] for one in zone.sources])
 
-def reach_m(robot: RobotDescription, zone: Zone) -> float:
-    """Return how far from the base's centre a point can matter to a zone."""
+
+def reaches_m(robot: RobotDescription) -> dict[str, float]:
+    """Return how far from the base's centre a point can matter to each zone."""
     base = robot.base
     top = Motion(
-        v_m_s=base.max_speed_m_s, w_rad_s=0.0, deceleration_m_s2=base.max_acceleration_m_s2
+        v_m_s=_FASTEST_RATIO * base.max_speed_m_s,
+        w_rad_s=0.0,
+        deceleration_m_s2=base.max_acceleration_m_s2,
     )
-    corners_m = (float(np.hypot(x, y)) for x, y in zone.polygon_m)
-    corner_m = max(corners_m, default=base.footprint_radius_m)
-    driven_m = base.max_speed_m_s * zone.time_before_collision_s
-    return corner_m + max(driven_m, braking_m(top, zone.reaction_s or 0.0))
-
-
-def _within(points: Points, reach_m: float) -> Points:
-    near: Points = points[(points**2).sum(axis=1) <= reach_m**2]
-    return near
+    reaches = {}
+    for zone in robot.protection.zones:
+        corners_m = (float(np.hypot(x, y)) for x, y in zone.polygon_m)
+        corner_m = max(corners_m, default=base.footprint_radius_m)
+        driven_m = top.v_m_s * zone.time_before_collision_s
+        reaches[zone.name] = corner_m + max(driven_m, braking_m(top, zone.reaction_s or 0.0))
+    return reaches

@@ -48,4 +48,4 @@ def tip_margin_ratio(
     whole_m = edge_distance(np.zeros(2), support)
     lean_rad = math.atan2(float(np.hypot(*acceleration_m_s2[:2])), float(acceleration_m_s2[2]))
     margin = edge_distance(point, support) / whole_m
-    return float(np.clip(min(margin, 1.0 - lean_rad / max_lean_rad), 0.0, 1.0))
+    return min(max(min(margin, 1.0 - lean_rad / max_lean_rad), 0.0), 1.0)

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from vla_deploy.safety.findings import Finding, first_joint, stale
+from vla_deploy.safety.findings import Finding, first_in, first_joint, joint_finding, stale
 from vla_deploy.safety.inputs import Flags, Floats, SafetyInputs, SafetyLimits
 
 EVERY_SERVO: Final = "every servo"
@@ -19,9 +19,11 @@ def joint_position_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding 
     """Find a powered joint beyond its range that is still moving outward."""
     above = (inputs.position > limits.position_upper) & (inputs.velocity > limits.outward_velocity)
     below = (inputs.position < limits.position_lower) & (inputs.velocity < -limits.outward_velocity)
-    outside = (above | below) & inputs.torque_enabled
-    bound = np.where(above, limits.position_upper, limits.position_lower)
-    return first_joint(outside, inputs.position, bound, inputs.sample_age_s, limits)
+    joint = first_in((above | below) & inputs.torque_enabled)
+    if joint is None:
+        return None
+    bound = limits.position_upper if above[joint] else limits.position_lower
+    return joint_finding(joint, inputs.position, bound, inputs.sample_age_s, limits)
 
 
 def joint_velocity_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
@@ -31,8 +33,11 @@ def joint_velocity_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding 
 
 def encoder_jump(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a powered joint that is said to have gone further than any joint can in that time."""
+    joint = first_in(jumped_joints(inputs, limits))
+    if joint is None:
+        return None
     step, allowed = np.abs(inputs.position_step), _possible_step(inputs, limits)
-    return first_joint(jumped_joints(inputs, limits), step, allowed, inputs.sample_age_s, limits)
+    return joint_finding(joint, step, allowed, inputs.sample_age_s, limits)
 
 
 def jumped_joints(inputs: SafetyInputs, limits: SafetyLimits) -> Flags:
@@ -64,8 +69,11 @@ def joint_voltage_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding |
     """Find a servo whose supply is lower or higher than allowed."""
     low = inputs.voltage_v < limits.voltage_min_v
     high = inputs.voltage_v > limits.voltage_max_v
-    bound = np.where(low, limits.voltage_min_v, limits.voltage_max_v)
-    return first_joint(low | high, inputs.voltage_v, bound, inputs.climate_age_s, limits)
+    joint = first_in(low | high)
+    if joint is None:
+        return None
+    bound = limits.voltage_min_v if low[joint] else limits.voltage_max_v
+    return joint_finding(joint, inputs.voltage_v, bound, inputs.climate_age_s, limits)
 
 
 def standstill_motion(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:

@@ -14,8 +14,8 @@ DESKTOP = load_profile("desktop")
 
 def test_a_rate_changes_in_motion_and_the_status_keeps_its_own():
     tuning = retuned(ROBOT, DESKTOP, replace(DESKTOP, control_rate_hz=200))
-    assert (tuning.period_s, tuning.status_every) == (0.005, 4)
-    assert tuning_of(DESKTOP).status_every == 5
+    assert (tuning.period_s, tuning.status_every) == (0.005, 10)
+    assert tuning_of(DESKTOP).status_every == 12
 
 
 @pytest.mark.parametrize(
