@@ -25,6 +25,8 @@ NEAR_M = 1.5
 OCCLUDER_M = 0.05
 OCCLUDED_SHARE = 0.2
 TOP_HIDDEN_SHARE = 0.5
+# Of a thing's left or right edge: a hand may hide a third of a box and touch little of its outline.
+END_HIDDEN_SHARE = 0.3
 PART_SHARE = 0.15
 OUTLINE_PX = 3
 
@@ -46,6 +48,15 @@ class Cluster:
     box_px: tuple[int, int, int, int]
     truncated: bool
     occluded: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Hidden:
+    """Tell how much of the outline, its top and its worse end borders on something nearer."""
+
+    outline: float
+    top: float
+    end: float
 
 
 def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
@@ -132,7 +143,7 @@ def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np
     rows, columns = np.unravel_index(pixels, heights.shape)
     box = (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1)
     at_border = box[0] <= 1 or box[1] <= 1 or box[2] >= width - 1 or box[3] >= height - 1
-    around, over_top = _hidden_shares(cloud, rows, columns)
+    hidden = _hidden_shares(cloud, rows, columns)
     return Cluster(
         support=support,
         points=cloud.points[rows, columns],
@@ -141,15 +152,12 @@ def _cluster(cloud: Cloud, support: Support, heights: Floats, pixels: NDArray[np
         pixels=pixels,
         depth_m=float(np.median(cloud.depth_m[rows, columns])),
         box_px=box,
-        truncated=at_border or over_top > TOP_HIDDEN_SHARE,
-        occluded=around > OCCLUDED_SHARE,
+        truncated=at_border or hidden.top > TOP_HIDDEN_SHARE,
+        occluded=hidden.outline > OCCLUDED_SHARE or hidden.end > END_HIDDEN_SHARE,
     )
 
 
-def _hidden_shares(
-    cloud: Cloud, rows: NDArray[np.intp], columns: NDArray[np.intp]
-) -> tuple[float, float]:
-    """Return how much of the outline, and of its upper edge, borders on something nearer."""
+def _hidden_shares(cloud: Cloud, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> _Hidden:
     top, left = max(0, int(rows.min()) - OUTLINE_PX), max(0, int(columns.min()) - OUTLINE_PX)
     around = np.s_[
         top : int(rows.max()) + OUTLINE_PX + 1, left : int(columns.max()) + OUTLINE_PX + 1
@@ -161,10 +169,15 @@ def _hidden_shares(
     ring = (cv2.dilate(member, kernel) - member).astype(np.bool_)
     beside = cv2.dilate(np.where(member > 0, depth_m, 0.0).astype(np.float32), kernel)
     nearer = cloud.own_body[around] | ((depth_m > 0.0) & (depth_m < beside - OCCLUDER_M))
-    above = np.zeros_like(ring)
+    above, left, right = (np.zeros_like(ring) for _ in range(3))
     above[:-2] = member[2:] > 0
-    above &= ring
-    return _share(nearer, ring), _share(nearer, above)
+    left[:, :-2] = member[:, 2:] > 0
+    right[:, 2:] = member[:, :-2] > 0
+    return _Hidden(
+        outline=_share(nearer, ring),
+        top=_share(nearer, above & ring),
+        end=max(_share(nearer, left & ring), _share(nearer, right & ring)),
+    )
 
 
 def _share(part: Mask, whole: Mask) -> float:

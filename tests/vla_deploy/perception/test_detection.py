@@ -87,6 +87,25 @@ def test_a_box_is_placed_by_its_opening(flat: "StillFlat") -> None:
     assert max(errors) < 0.015
 
 
+def test_a_box_whose_side_a_loaded_hand_hides_is_known_to_be_hidden(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    flat.put("book", (4.036, 0.593, 0.717), yaw_rad=0.6)
+    flat.stand(
+        Pose2D(3.7326, 0.6152, -0.597),
+        left_shoulder_yaw=0.221,
+        left_shoulder_pitch=0.097,
+        left_elbow=2.399,
+        left_wrist_pitch=-2.509,
+        left_wrist_roll=0.828,
+        head_pan=0.198,
+        head_tilt=0.96,
+    )
+    box, position = nearest(see(flat), flat.truth("box"))
+    assert box.class_name == "box"
+    assert np.linalg.norm(position[:2] - flat.truth("box")[:2]) > 0.03
+    assert box.occluded
+
+
 def test_a_turned_box_tells_its_yaw(flat: "StillFlat") -> None:
     flat.scatter(0)
     flat.put("box", (4.2, 0.46, 0.42), yaw_rad=0.35)
