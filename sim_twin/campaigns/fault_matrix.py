@@ -4,7 +4,7 @@ import argparse
 import math
 import multiprocessing
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,8 +12,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sim_twin.campaigns.phases import PAYLOAD, Phase, Stage
+from sim_twin.campaigns.phases import PAYLOAD, NotSet, Phase, Stage
 from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.separation import Separation
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
@@ -21,7 +22,7 @@ from sim_twin.faults.scenario import NO_CAUSE
 from sim_twin.faults.table import faults_of
 from sim_twin.faults.witness import Witness
 from sim_twin.hazards import Hazard
-from sim_twin.stack import LockstepControl, LockstepStack
+from sim_twin.stack import LockstepControl, LockstepStack, NotReady
 from sim_twin.truth import STANDSTILL_RAD_S
 from vla_deploy.robots import RobotDescription, load_robot
 
@@ -34,6 +35,11 @@ _SENSORS: Final = (
     *(Component.MICROPHONE, Component.SPEAKER),
 )
 """Their drivers are in perception and speech: these faults need the whole stack."""
+_WORST: Final[Mapping[tuple[Component, Fault], Mapping[str, float]]] = {
+    (Component.LIDAR, Fault.WRONG): {"ratio": 2.0},
+    (Component.CAMERA, Fault.WRONG): {"ratio": 2.0},
+}
+"""What is near is told as far: the other direction only stops the robot early."""
 _FAULT_S: Final = 2.0
 _AFTER_S: Final = 1.5
 _LOOK_S: Final = 0.02
@@ -41,11 +47,13 @@ _REST_S: Final = 1.5
 """The longest stop: 0.5 m/s at 0.6 m/s² takes 0.83 s, a debounce and a lost bus come before it."""
 _STILL_RAD: Final = 0.05
 """A servo that comes back may give in this far to where control holds it."""
+_LEAST_GAP_M: Final = 0.005
+"""Between base and furniture; where Butler grasps, tables are 0.018 m and more away."""
 _STOPPED: Final = ("stopping", "stopped", "fault")
 _WHEELS: Final = ("left_wheel", "right_wheel")
 _LIMP: Final = (Fault.BROWN_OUT, Fault.OVERHEAT, Fault.OVERLOAD)
 """These take the torque off in the servo's own firmware: what hangs on it goes limp whatever the
-software does, so its own joint may fall and its payload with it; all else must stay safe."""
+software does, so its own joint may fall with what it holds; all else must stay safe."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,17 +73,20 @@ class Cell:
         what = f"{self.fault.value}.{self.of.value}" if self.of else self.fault.value
         return f"{where}/{what}/{self.phase.value}"
 
-    @property
-    def goes_limp(self) -> bool:
-        """Tell whether the servos themselves take the torque off."""
-        servos = self.component in (Component.SERVO, Component.SERVO_BUS)
-        return servos and (self.fault in _LIMP or self.of in _LIMP)
+    def limp_joints(self, robot: RobotDescription) -> frozenset[str]:
+        """Return the joints whose servos themselves take the torque off."""
+        if self.component not in (Component.SERVO, Component.SERVO_BUS):
+            return frozenset()
+        if self.fault not in _LIMP and self.of not in _LIMP:
+            return frozenset()
+        return frozenset(robot.joint_names if self.instance is None else (self.instance,))
 
     def request(self, robot: RobotDescription) -> FaultRequest:
         """Return the checked request: it begins at once, and ends."""
         raw: dict[str, Any] = {"component": self.component, "fault": self.fault}
         raw |= {"instance": self.instance} if self.instance else {}
         raw |= {"of": self.of, "period_s": 0.2} if self.of else {}
+        raw |= _WORST.get((self.component, self.fault), {})
         return parse_request({**raw, "duration_s": _FAULT_S}, robot)
 
 
@@ -110,6 +121,8 @@ def play(cell: Cell, seed: int = 0) -> Case:
             stack.add_lidar()
         try:
             return _Trial(cell, stack).run()
+        except (NotSet, NotReady) as error:
+            return Case(name=cell.name, failures=(f"the stage could not be set: {error}",))
         finally:
             stack.close()
 
@@ -121,6 +134,9 @@ class _Trial:
         self._cell = cell
         self._stack = stack
         self._stage = Stage(stack)
+        self._limp = cell.limp_joints(stack.robot)
+        engine = stack.lockstep.twin.engine
+        self._separation = Separation(engine.model, engine.data)
         self._stopped_s = math.nan
         self._rest_s = math.nan
         self._rest_places = np.zeros(0)
@@ -131,17 +147,23 @@ class _Trial:
         lockstep, cell = self._stack.lockstep, self._cell
         self._stage.begin(cell.phase)
         lockstep.twin.hazards.begin()
-        joints = () if cell.goes_limp else self._stack.robot.joint_names
-        seen = Witness(self._stack, lockstep.now_s, (*joints, *_WHEELS))
+        firm = [name for name in self._stack.robot.joint_names if name not in self._limp]
+        seen = Witness(self._stack, lockstep.now_s, (*firm, *_WHEELS))
         lockstep.faults.inject_checked(cell.request(self._stack.robot))
         while seen.since_s < _FAULT_S + _AFTER_S:
             self._stage.run_for(_LOOK_S)
             seen.look()
+            self._separation.look()
             self._watch_stop(seen)
         return Case(
             name=cell.name,
             failures=tuple(self._failures()),
-            figures={"cause": seen.cause, "cause_s": seen.cause_s, "rest_s": self._rest_s},
+            figures={
+                "cause": seen.cause,
+                "cause_s": seen.cause_s,
+                "rest_s": self._rest_s,
+                "gap_m": self._separation.least_m,
+            },
             seconds=seen.since_s,
         )
 
@@ -167,13 +189,24 @@ class _Trial:
             yield f"never at rest after the stop at {self._stopped_s:.3f} s"
         if self._moved_rad > _STILL_RAD:
             yield f"moved on after the stop, by {self._moved_rad:.3f} rad"
-        carries = self._cell.phase is Phase.CARRYING and not self._cell.goes_limp
+        if self._separation.least_m < _LEAST_GAP_M:
+            yield f"{self._separation.least_m:.4f} m to furniture, limit {_LEAST_GAP_M}"
+        carries = self._cell.phase is Phase.CARRYING and not self._limp & self._grippers()
         if carries and not self._stage.holds_payload:
             yield f"{PAYLOAD} is no longer in the hand"
 
+    def _grippers(self) -> set[str]:
+        robot = self._stack.robot
+        return {
+            joint for hand in robot.hands.values() for joint in robot.group(hand.gripper).joints
+        }
+
     def _may(self, hazard: Hazard) -> bool:
         """Tell whether a servo without torque accounts for it."""
-        return self._cell.goes_limp and hazard.kind in ("fall", "joint speed", "joint range")
+        carries = self._cell.phase is Phase.CARRYING
+        falls = hazard.kind == "fall" and hazard.part == PAYLOAD and carries
+        swings = hazard.kind in ("joint speed", "joint range") and hazard.part in self._limp
+        return bool(self._limp) and (falls or swings)
 
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:

@@ -1,5 +1,6 @@
 """Bring a robot in lock-step into each phase of its work: at rest, driving, reaching, carrying."""
 
+import math
 from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Final
@@ -10,6 +11,12 @@ PAYLOAD: Final = "red_cup"
 """What the left hand carries; its middle is where the hand's grip site is."""
 _COMMAND_S: Final = 0.02
 _DRIVE_M_S: Final = 0.3
+_TURN_RAD_S: Final = 0.9
+_TO_THE_WALL_RAD: Final = math.pi / 3
+"""From Butler's charger past the plant: the wall comes before the fault's 2 s are over."""
+_TURN_TIMEOUT_S: Final = 8.0
+_GAZE: Final = {"head_pan": 0.0, "head_tilt": 0.3}
+"""As the executor looks where it drives."""
 _POSE_S: Final = 3.5
 _CLOSE_S: Final = 1.5
 _SETTLE_S: Final = 1.0
@@ -51,10 +58,10 @@ class Stage:
         self._motions = stack.space.ring_writer("motion_command")
         self._base = stack.space.cell_writer("base_command")
         self._number = 0
-        self._drives = False
+        self._speeds: tuple[float, float] | None = None
         self._begin: Mapping[Phase, Callable[[], None]] = {
             Phase.IDLE: lambda: None,
-            Phase.DRIVING: self._drive,
+            Phase.DRIVING: self._drive_at_the_wall,
             Phase.REACHING: lambda: self._go(_REACH, 0.7),
             Phase.CARRYING: self._carry,
         }
@@ -63,7 +70,7 @@ class Stage:
         """Arm, and return in the middle of the phase.
 
         Raises:
-            NotSet: the robot stopped, or the payload fell, while the stage was set.
+            NotSet: the robot stopped, did not turn, or the payload fell, while the stage was set.
         """
         self._stack.arm()
         self._begin[phase]()
@@ -76,8 +83,9 @@ class Stage:
         """Run on; who drives is told to go on, as the executor would."""
         end_s = self._lockstep.now_s + seconds
         while self._lockstep.now_s < end_s - 1e-9:
-            if self._drives:
-                self._base.put(v_m_s=_DRIVE_M_S, w_rad_s=0.0)
+            if self._speeds is not None:
+                v_m_s, w_rad_s = self._speeds
+                self._base.put(v_m_s=v_m_s, w_rad_s=w_rad_s)
             self._lockstep.run_for(min(_COMMAND_S, end_s - self._lockstep.now_s))
 
     @property
@@ -86,7 +94,20 @@ class Stage:
         return PAYLOAD in self._lockstep.truth()["held"]
 
     def _drive(self) -> None:
-        self._drives = True
+        self._speeds = (_DRIVE_M_S, 0.0)
+
+    def _drive_at_the_wall(self) -> None:
+        """Turn to the wall, and drive until something stops the robot: its separation counts."""
+        self._go(_GAZE, 1.0)
+        self._speeds = (0.0, _TURN_RAD_S)
+        end_s = self._lockstep.now_s + _TURN_TIMEOUT_S
+        while self._lockstep.truth()["robot"]["yaw_rad"] < _TO_THE_WALL_RAD:
+            if self._lockstep.now_s > end_s:
+                raise NotSet(f"not turned to the wall within {_TURN_TIMEOUT_S:g} s")
+            self.run_for(_COMMAND_S)
+        self._speeds = (0.0, 0.0)
+        self.run_for(_SETTLE_S)
+        self._drive()
 
     def _carry(self) -> None:
         """Put the payload into the hand, hold it there until the fingers do, and set off."""

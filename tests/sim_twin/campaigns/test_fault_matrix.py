@@ -6,7 +6,8 @@ import pytest
 
 from sim_twin.campaigns import fault_matrix
 from sim_twin.campaigns.fault_matrix import Cell, cells, play
-from sim_twin.campaigns.phases import Phase, Stage
+from sim_twin.campaigns.phases import NotSet, Phase, Stage
+from sim_twin.campaigns.separation import Separation
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.table import faults_of
 from sim_twin.stack import LockstepControl
@@ -58,6 +59,34 @@ def test_arms_that_sag_without_torque_are_unsafe_where_nothing_excuses_them(
     assert any("rest" in failure for failure in play(cell).failures)
 
 
+def test_whoever_comes_too_near_to_the_wall_is_unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fault_matrix, "_LEAST_GAP_M", 0.2)
+    case = play(CELLS["servo.left_elbow/off/driving"])
+    assert any("to furniture" in failure for failure in case.failures)
+
+
+def test_a_stage_that_cannot_be_set_fails_its_case_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(stage: Stage, phase: Phase) -> None:
+        raise NotSet(f"{phase.value}: stopped")
+
+    monkeypatch.setattr(Stage, "begin", refuse)
+    case = play(CELLS["servo.left_elbow/off/idle"])
+    assert case.failures == ("the stage could not be set: idle: stopped",)
+
+
+def test_driving_ends_before_the_wall_without_any_fault(tmp_path: Path) -> None:
+    stack = LockstepControl(tmp_path)
+    stack.add_lidar()
+    stage = Stage(stack)
+    stage.begin(Phase.DRIVING)
+    engine = stack.lockstep.twin.engine
+    separation = Separation(engine.model, engine.data)
+    stage.run_for(3.5)
+    separation.look()
+    stack.close()
+    assert 0.005 < separation.least_m < 0.1
+
+
 def test_carrying_holds_the_payload_and_moves(tmp_path: Path) -> None:
     stack = LockstepControl(tmp_path)
     stack.add_lidar()
@@ -73,9 +102,11 @@ def test_carrying_holds_the_payload_and_moves(tmp_path: Path) -> None:
 
 
 def test_only_what_servos_do_themselves_excuses_a_limp_joint() -> None:
-    def cell(component: Component, fault: Fault) -> Cell:
-        return Cell(component=component, instance=None, fault=fault, of=None, phase=Phase.IDLE)
+    def limp(component: Component, instance: str | None, fault: Fault) -> frozenset[str]:
+        cell = Cell(component=component, instance=instance, fault=fault, of=None, phase=Phase.IDLE)
+        return cell.limp_joints(ROBOT)
 
-    assert cell(Component.SERVO_BUS, Fault.BROWN_OUT).goes_limp
-    assert not cell(Component.SERVO_BUS, Fault.UNPLUG).goes_limp
-    assert not cell(Component.DRIVE, Fault.OVERHEAT).goes_limp
+    assert limp(Component.SERVO_BUS, None, Fault.BROWN_OUT) == frozenset(ROBOT.joint_names)
+    assert limp(Component.SERVO, "left_elbow", Fault.OVERHEAT) == {"left_elbow"}
+    assert not limp(Component.SERVO_BUS, None, Fault.UNPLUG)
+    assert not limp(Component.DRIVE, "left_wheel", Fault.OVERHEAT)
