@@ -1,6 +1,7 @@
 """Give the tests a robot in the twin with a flight recorder on board, in lock-step."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -66,8 +67,31 @@ class Rig(LockstepControl):
         return self.flights()[-1]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stopped:
+    """Hold the flight of a drive that an operator stopped at `stopped_ns`."""
+
+    flight: Flight
+    stopped_ns: int
+    now_ns: int
+    ticks_before: int
+
+
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[Rig]:
     rig = Rig(tmp_path)
     yield rig
+    rig.close()
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stopped]:
+    """Drive for four seconds, stop, and let whoever only reads look at the one flight."""
+    rig = Rig(tmp_path_factory.mktemp("stopped"))
+    ticks_before = rig.status()["tick"]
+    rig.drive(4.0)
+    stopped_ns = rig.lockstep.clock.now_ns()
+    rig.operate("estop")
+    flight, now_ns = rig.wait_for_flight(), rig.lockstep.clock.now_ns()
+    yield Stopped(flight=flight, stopped_ns=stopped_ns, now_ns=now_ns, ticks_before=ticks_before)
     rig.close()

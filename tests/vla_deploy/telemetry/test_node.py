@@ -3,7 +3,8 @@
 import errno
 import json
 import logging
-from typing import Any as Rig  # the class in conftest.py, which no test can import
+from typing import Any as Rig  # the classes in conftest.py, which no test can import
+from typing import Any as Stopped
 
 import numpy as np
 import pytest
@@ -25,11 +26,8 @@ def table(state: str, restarts: int) -> dict[str, object]:
     return {"processes": [row]}
 
 
-def test_a_stop_saves_what_was_before_and_three_seconds_after(rig: Rig) -> None:
-    rig.drive(4.0)
-    stopped_ns = rig.lockstep.clock.now_ns()
-    rig.operate("estop")
-    flight = rig.wait_for_flight()
+def test_a_stop_saves_what_was_before_and_three_seconds_after(stopped: Stopped) -> None:
+    flight, stopped_ns = stopped.flight, stopped.stopped_ns
     (cause,) = flight.causes
     assert (cause["kind"], cause["what"]) == ("stop", "estop")
     assert cause["at_ns"] == pytest.approx(stopped_ns, abs=50_000_000)
@@ -41,23 +39,19 @@ def test_a_stop_saves_what_was_before_and_three_seconds_after(rig: Rig) -> None:
     assert abs(moved[-1]["v_m_s"]) < 0.01
 
 
-def test_stamps_are_wall_clock_by_one_offset(rig: Rig) -> None:
-    rig.requests.publish({"source": "test", "reason": "look"})
-    flight = rig.wait_for_flight()
+def test_stamps_are_wall_clock_by_one_offset(stopped: Stopped) -> None:
+    flight = stopped.flight
     assert flight.wall_offset_ns == pytest.approx(1_800_000_000_000_000_000, abs=1)
     stamps = [message.stamp_ns for message in flight.messages("control_status")]
     assert stamps == sorted(stamps)
-    assert 0 < stamps[0] < rig.lockstep.clock.now_ns()
+    assert 0 < stamps[0] < stopped.now_ns
 
 
-def test_every_tick_is_there_and_judged_to_the_same_verdict(rig: Rig) -> None:
-    ticks_before = rig.status()["tick"]
-    rig.drive(1.0)
-    rig.operate("estop")
-    judgement = judged(rig.wait_for_flight())
+def test_every_tick_is_there_and_judged_to_the_same_verdict(stopped: Stopped) -> None:
+    judgement = judged(stopped.flight)
     assert judgement.difference is None
     assert judgement.unread == 0
-    assert judgement.ticks > ticks_before + 1000
+    assert judgement.ticks > stopped.ticks_before + 1000
 
 
 def test_ticks_outlive_a_control_that_is_killed(rig: Rig) -> None:
