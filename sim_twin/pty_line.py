@@ -80,6 +80,20 @@ class PtyLine:
             self._write(line, reply)
         return bool(request or reply)
 
+    def send_at(self, due_ns: int, now_ns: Callable[[], int]) -> None:
+        """Take what the device has ready at `due_ns`, watch the clock, and send it at that moment.
+
+        Raises:
+            LinkLost: the line is unplugged.
+        """
+        line, _ = self._plugged_ends()
+        self._device.step(due_ns)
+        reply = self._device.transmit()
+        while now_ns() < due_ns:
+            pass
+        if reply:
+            self._write(line, reply)
+
     def unplug(self) -> None:
         """Take the terminal away, as pulling the cable does: the host's reads and writes fail."""
         if self._ends is None:

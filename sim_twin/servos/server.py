@@ -104,10 +104,10 @@ def _turn(servos: FreeServos, line: PtyLine, clock: Clock) -> None:
             if _readable(line, step_ns - clock.now_ns()):
                 line.poll_once()
             return
-    if not _readable(line, due_ns - _WATCH_NS - clock.now_ns()):
-        while clock.now_ns() < due_ns:
-            pass
-    line.poll_once()
+    if _readable(line, due_ns - _WATCH_NS - clock.now_ns()):
+        line.poll_once()
+    else:
+        line.send_at(due_ns, clock.now_ns)
 
 
 def _readable(line: PtyLine, timeout_ns: int) -> bool:

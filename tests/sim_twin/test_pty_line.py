@@ -166,3 +166,21 @@ def test_a_device_is_told_the_time_before_it_is_asked(tmp_path: Path) -> None:
     line.poll_once()
     assert device.told_ns == [77]
     line.close()
+
+
+def test_bytes_are_sent_at_the_moment_they_are_due_and_not_before(
+    line: PtyLine, device: Echo
+) -> None:
+    host = open_host(line)
+    device.ready = b"reply"
+    early = []
+
+    def now_ns() -> int:
+        early.append(readable(host, 0))
+        return len(early)
+
+    line.send_at(5, now_ns)
+    assert early == [False] * 5
+    assert readable(host, 1000)
+    assert os.read(host, 16) == b"reply"
+    os.close(host)
