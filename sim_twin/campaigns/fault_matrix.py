@@ -18,7 +18,6 @@ from sim_twin.campaigns.separation import Separation
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.request import FaultRequest, parse_request
-from sim_twin.faults.scenario import NO_CAUSE
 from sim_twin.faults.table import faults_of
 from sim_twin.faults.witness import Witness
 from sim_twin.hazards import Hazard
@@ -160,9 +159,9 @@ class _Trial:
             failures=tuple(self._failures()),
             figures={
                 "cause": seen.cause,
-                "cause_s": seen.cause_s,
-                "rest_s": self._rest_s,
-                "gap_m": self._separation.least_m,
+                "cause_s": _known(seen.cause_s),
+                "rest_s": _known(self._rest_s),
+                "gap_m": _known(self._separation.least_m),
             },
             seconds=seen.since_s,
         )
@@ -209,6 +208,11 @@ class _Trial:
         return bool(self._limp) and (falls or swings)
 
 
+def _known(value: float) -> float | None:
+    """Return None for what was never reached: JSON has neither NaN nor infinity."""
+    return value if math.isfinite(value) else None
+
+
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Play every case whose name contains `options.only`, several at a time."""
     robot = load_robot("butler")
@@ -222,13 +226,15 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
 
 
 def _summary(cases: Sequence[Case]) -> dict[str, Any]:
-    """Return the longest way to rest in each phase, of the cases that stopped the robot."""
+    """Return the longest way to rest in each phase, and how near the base came to anything."""
     longest = {}
     for phase in Phase:
-        rests = [
-            float(case.figures["rest_s"])
-            for case in cases
-            if case.name.endswith(phase.value) and case.figures["cause"] != NO_CAUSE
-        ]
+        rests = _figures("rest_s", [case for case in cases if case.name.endswith(phase.value)])
         longest[f"longest_rest_s_{phase.value}"] = max(rests, default=0.0)
-    return {**longest, "unsafe": sum(bool(case.failures) for case in cases)}
+    nearest = min(_figures("gap_m", cases), default=None)
+    return {**longest, "least_gap_m": nearest, "unsafe": sum(bool(case.failures) for case in cases)}
+
+
+def _figures(name: str, cases: Sequence[Case]) -> list[float]:
+    told = [case.figures.get(name) for case in cases]
+    return [value for value in told if value is not None]

@@ -79,4 +79,6 @@ def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:
 
 
 def _short(value: object) -> str:
+    if value is None:
+        return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,5 +1,6 @@
 """The matrix must hold every fault in every phase, and its judge must be able to say no."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from sim_twin.campaigns import fault_matrix
 from sim_twin.campaigns.fault_matrix import Cell, cells, play
 from sim_twin.campaigns.phases import NotSet, Phase, Stage
+from sim_twin.campaigns.report import Case
 from sim_twin.campaigns.separation import Separation
 from sim_twin.faults import Component, Fault
 from sim_twin.faults.table import faults_of
@@ -50,6 +52,7 @@ def test_every_fault_in_every_phase_leaves_the_robot_safe(name: str) -> None:
     assert case.failures == ()
 
 
+@pytest.mark.timeout(120)
 def test_arms_that_sag_without_torque_are_unsafe_where_nothing_excuses_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -72,6 +75,17 @@ def test_a_stage_that_cannot_be_set_fails_its_case_alone(monkeypatch: pytest.Mon
     monkeypatch.setattr(Stage, "begin", refuse)
     case = play(CELLS["servo.left_elbow/off/idle"])
     assert case.failures == ("the stage could not be set: idle: stopped",)
+
+
+def test_a_case_that_never_stopped_has_no_way_to_rest_in_the_sum() -> None:
+    def case(name: str, rest_s: float | None, gap_m: float | None) -> Case:
+        return Case(name=name, figures={"rest_s": rest_s, "gap_m": gap_m})
+
+    cases = (case("a/driving", None, 0.04), case("b/driving", 0.4, None), case("c/idle", 0.1, 0.13))
+    summary = fault_matrix._summary(cases)
+    assert summary["longest_rest_s_driving"] == 0.4
+    assert summary["least_gap_m"] == 0.04
+    json.dumps(summary, allow_nan=False)
 
 
 def test_driving_ends_before_the_wall_without_any_fault(tmp_path: Path) -> None:
