@@ -29,8 +29,8 @@ def test_values_are_those_of_the_shafts_on_the_joint_side(
 ) -> None:
     bench = connected(make_bench, fast_sync=fast_sync)
     shaft_rad = np.array([0.5, -0.5, 1.0, -1.0])
-    bench.rotors.position_rad = shaft_rad.copy()
-    bench.rotors.velocity_rad_s = np.array([-1.0, 2.0, 0.0, 1.0])
+    bench.rotors.position_rad[:] = shaft_rad
+    bench.rotors.velocity_rad_s[:] = np.array([-1.0, 2.0, 0.0, 1.0])
     bench.rotors._damping = np.zeros(4)
     bench.cycle()
     state = bench.bus.state
@@ -311,7 +311,7 @@ def test_no_cycle_with_stuffed_replies_is_lost(
     bench.rotors._damping[:] = 0.0
     for cycle in range(cycles):
         if cycle % 500 == 0:
-            bench.rotors.velocity_rad_s = random.uniform(-1.5, 0.2, 16)
+            bench.rotors.velocity_rad_s[:] = random.uniform(-1.5, 0.2, 16)
         bench.cycle()
         assert bench.bus.state.valid.all()
     counters = bench.bus.counters
