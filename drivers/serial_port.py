@@ -29,6 +29,11 @@ _SPEEDS: Final = {
 _WRITE_PATIENCE_MS: Final = 50
 _WAKE_EARLY_NS: Final = 20_000
 """How long before the last byte is due a sleep ends: timers are late by some 60 us."""
+_LATER_NS: Final = 20_000
+_EARLIER_NS: Final = 2_000
+_LATEST_NS: Final = 1_000_000
+"""At leisure a sleep lasts until all bytes are there, so that one look is enough: by how much the
+next one is longer where some were missing, by how much shorter where not, and the most of it."""
 _NAPS: Final = 50
 """How often a line that was slow is slept through before it is watched again."""
 _MOST_LATENCY_MS: Final = 1
@@ -81,6 +86,8 @@ class SerialPort:
         self._clock = clock
         self._sysfs_root = sysfs_root
         self._naps = 0
+        self._late_ns = 0
+        self._burst_end_ns = clock.now_ns()
         with _mapped_open_errors(path):
             self._fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
             try:
@@ -127,12 +134,13 @@ class SerialPort:
     def read_burst(self, count: int, due_ns: int, deadline_ns: int) -> bytes:
         """Return `count` bytes, or what of them has arrived by `deadline_ns`, with few wake-ups.
 
-        Where bytes have been seen to take their time on the wire, it is slept until `due_ns`.
+        Where bytes have been seen to take their time on the wire, it is slept until `due_ns`. A
+        port that was idle for longer than the burst takes has leisure: it sleeps a little longer.
 
         Raises:
             LinkLost: the adapter is gone.
         """
-        data = self._nap(count, due_ns) if self._naps else b""
+        data = self._nap(count, due_ns, deadline_ns) if self._naps else b""
         while len(data) < count:
             more = self.read(count - len(data), deadline_ns)
             if not more:
@@ -140,7 +148,8 @@ class SerialPort:
             data += more
             if len(data) < count:
                 self._naps = _NAPS
-                data += self._nap(count - len(data), due_ns)
+                data += self._nap(count - len(data), due_ns, deadline_ns)
+        self._burst_end_ns = self._clock.now_ns()
         return data
 
     @property
@@ -216,14 +225,25 @@ class SerialPort:
             raise LinkLost(f"{self._path}: hung up; plug it in again, then reconnect")
         return data
 
-    def _nap(self, max_bytes: int, due_ns: int) -> bytes:
+    def _nap(self, max_bytes: int, due_ns: int, deadline_ns: int) -> bytes:
         """Sleep until the bytes should be there and return those that are."""
         self._naps -= 1
+        now_ns = self._clock.now_ns()
         wake_ns = due_ns - _WAKE_EARLY_NS
-        if wake_ns <= self._clock.now_ns():
+        if wake_ns <= now_ns:
             return b""
+        if now_ns - self._burst_end_ns > due_ns - now_ns:
+            return self._sleep_in(max_bytes, due_ns, deadline_ns)
         self._clock.sleep_until(wake_ns)
         return self._read_now(max_bytes)
+
+    def _sleep_in(self, max_bytes: int, due_ns: int, deadline_ns: int) -> bytes:
+        """Sleep for as long as the bytes before took, and learn from what is there."""
+        self._clock.sleep_until(min(due_ns + self._late_ns, deadline_ns))
+        data = self._read_now(max_bytes)
+        learnt_ns = -_EARLIER_NS if len(data) == max_bytes else _LATER_NS
+        self._late_ns = min(max(self._late_ns + learnt_ns, 0), _LATEST_NS)
+        return data
 
     def _wait_writable(self) -> None:
         poll = select.poll()

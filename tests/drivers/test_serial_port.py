@@ -162,15 +162,19 @@ def test_a_burst_is_the_bytes_asked_for_or_what_came_of_them(pty: tuple[int, Pat
 
 
 class NapClock:
-    """Stand still; whoever sleeps finds that the other end has sent something meanwhile."""
+    """Stand still until `idle`; whoever sleeps finds what the other end has sent meanwhile."""
 
     def __init__(self, master: int) -> None:
         self.naps_until_ns: list[int] = []
         self.sent_meanwhile: list[bytes] = []
         self._master = master
+        self._now_ns = NS_PER_S
 
     def now_ns(self) -> int:
-        return NS_PER_S
+        return self._now_ns
+
+    def idle(self, duration_ns: int) -> None:
+        self._now_ns += duration_ns
 
     def sleep_until(self, deadline_ns: int) -> None:
         self.naps_until_ns.append(deadline_ns)
@@ -193,6 +197,28 @@ def test_a_line_whose_bytes_take_their_time_is_slept_through_until_the_last_is_d
     assert port.read_burst(4, due_ns, deadline_ns) == b"abcd"
     assert len(clock.naps_until_ns) == 2
     assert all(due_ns - 1_000_000 < nap_ns <= due_ns for nap_ns in clock.naps_until_ns)
+    port.close()
+
+
+def test_a_port_at_leisure_learns_to_sleep_until_all_bytes_are_there(
+    pty: tuple[int, Path],
+) -> None:
+    master, path = pty
+    clock = NapClock(master)
+    port = SerialPort(path, 1_000_000, clock)
+    os.write(master, b"0")
+    clock.sent_meanwhile = [b"123"]
+    assert port.read_burst(4, clock.now_ns() + 3_000_000, 3 * NS_PER_S) == b"0123"
+    late_ns = []
+    for meanwhile in (b"01", b"01", b"0123", b"0123"):
+        clock.idle(10_000_000)
+        due_ns = clock.now_ns() + 3_000_000
+        clock.sent_meanwhile = [meanwhile]
+        assert port.read_burst(4, due_ns, due_ns + 5_000_000) == meanwhile
+        late_ns.append(clock.naps_until_ns[-1] - due_ns)
+    assert late_ns[0] < late_ns[1] < late_ns[2]
+    assert late_ns[3] < late_ns[2]
+    assert all(0 <= late < 1_000_000 for late in late_ns)
     port.close()
 
 
