@@ -12,6 +12,16 @@ Flags = NDArray[np.bool_]
 _TINY = 1e-9
 
 
+def any_of(flags: Flags) -> bool:
+    """Tell whether a flag is set; on a few axes, several times faster than numpy itself."""
+    return 1 in flags.tobytes()
+
+
+def all_of(flags: Flags) -> bool:
+    """Tell whether every flag is set."""
+    return 0 not in flags.tobytes()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisLimits:
     """Carry each axis' largest velocity, acceleration and jerk."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vla_deploy.control.axes import Flags, Floats
+from vla_deploy.control.axes import Flags, Floats, any_of
 from vla_deploy.control.gravity import GravityOffset
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionResult, MotionSet
@@ -29,11 +29,11 @@ class JointOutput:
         """Advance the setpoints, bound them, add what gravity asks for, and send them."""
         state = self._servos.state
         loose = ~state.torque_on | (state.watchdog < 0)
-        if np.count_nonzero(loose):
+        if any_of(loose):
             self.place(loose)
         ended = self.motions.advance(period_s)
         sent = self._gate.limit(self.motions.state.position, period_s)
-        if np.count_nonzero(state.torque_on):
+        if any_of(state.torque_on):
             self._servos.write(sent + self._gravity.at(sent))
         return ended
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from drivers.dynamixel import BusState
-from vla_deploy.control.axes import Flags, Floats
+from vla_deploy.control.axes import Flags, Floats, all_of
 
 
 class JointSteps:
@@ -23,7 +23,7 @@ class JointSteps:
         known = new & np.isfinite(self._position)
         self._taken_ns = state.stamp_ns
         passed_s = (state.stamp_ns - self._stamp_ns) / NS_PER_S
-        if np.count_nonzero(known) == len(known):
+        if all_of(known):
             self.step = state.position_rad - self._position
             self.time_s = passed_s
             self._position = state.position_rad.copy()

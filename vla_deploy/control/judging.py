@@ -1,9 +1,7 @@
 """Judge each tick by what is known in it, and record by what it was judged."""
 
-import numpy as np
-
 from drivers.clock import Clock
-from vla_deploy.control.axes import Flags, Floats
+from vla_deploy.control.axes import Flags, Floats, all_of
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.surroundings import SurroundingsWatch
 from vla_deploy.control.thresholds import safety_limits
@@ -59,7 +57,7 @@ class Judging:
             setpoint,
             wheels.v_m_s,
             wheels.w_rad_s,
-            powered=energised and np.count_nonzero(joints.torque_on) == len(joints.torque_on),
+            powered=energised and all_of(joints.torque_on),
         )
         inputs = self.watch.inputs(
             energised=energised,

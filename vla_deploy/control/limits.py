@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vla_deploy.control.axes import Flags, Floats
+from vla_deploy.control.axes import Flags, Floats, any_of
 
 # A plan that keeps its velocity limit passes untouched, also over a tick that came late.
 _STEP_SLACK = 1.25
@@ -33,12 +33,12 @@ class SetpointGate:
 
     def limit(self, setpoint: Floats, period_s: float) -> Floats:
         """Return the setpoints that may be sent; NaN keeps the last one."""
-        if not np.count_nonzero(setpoint != self.sent):
+        if not any_of(setpoint != self.sent):
             self._clamped[:] = False
             return self.sent
         step = self._velocity * period_s
         unknown = np.isnan(setpoint)
-        wanted = np.where(unknown, self.sent, setpoint) if np.count_nonzero(unknown) else setpoint
+        wanted = np.where(unknown, self.sent, setpoint) if any_of(unknown) else setpoint
         low = np.maximum(self.sent - step, np.minimum(self._lower, self.sent))
         high = np.minimum(self.sent + step, np.maximum(self._upper, self.sent))
         self.sent = np.minimum(np.maximum(wanted, low), high)

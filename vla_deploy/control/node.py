@@ -2,14 +2,12 @@
 
 from contextlib import closing
 
-import numpy as np
-
 from drivers.clock import NS_PER_S
 from drivers.errors import DriverError
 from drivers.opener import DeviceOpener
 from platforms import Profile
 from vla_deploy.control.arming import Arming
-from vla_deploy.control.axes import Flags
+from vla_deploy.control.axes import Flags, any_of
 from vla_deploy.control.base_output import BaseOutput
 from vla_deploy.control.dispatch import Dispatcher, axis_limits
 from vla_deploy.control.estop_button import EstopButton
@@ -212,7 +210,7 @@ class ControlNode:
 
         The stop begins in this very tick; nothing may move them before.
         """
-        if np.count_nonzero(jumped):
+        if any_of(jumped):
             self._joints.place(jumped)
             self._telemetry.tell_results(self._motions.stop(self._judging.verdict.text))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from vla_deploy.control.axes import Floats
+from vla_deploy.control.axes import Floats, all_of
 from vla_deploy.control.body_shapes import BodyShapes
 from vla_deploy.control.clearance_watch import ClearanceWatch
 from vla_deploy.control.contact_torque import ContactTorque
@@ -102,7 +102,7 @@ class SurroundingsWatch:
             self._look_at_clearance(powered)
             return self._known
         part = min(self._parts, key=lambda one: one.due_ns)
-        if now_ns >= part.due_ns and np.isfinite(position).all() and np.isfinite(velocity).all():
+        if now_ns >= part.due_ns and _is_known(position) and _is_known(velocity):
             part.due_ns = max(part.due_ns, now_ns - part.period_ns) + part.period_ns
             deceleration = self._robot.base.max_acceleration_m_s2
             motion = Motion(v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=deceleration)
@@ -187,3 +187,7 @@ def _around(area: Floats) -> tuple[float, float, float]:
     """Return a circle around a polygon: middle and radius."""
     x_m, y_m = area.mean(axis=0).tolist()
     return x_m, y_m, float(np.hypot(area[:, 0] - x_m, area[:, 1] - y_m).max())
+
+
+def _is_known(values: Floats) -> bool:
+    return all_of(np.isfinite(values))

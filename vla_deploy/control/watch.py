@@ -3,7 +3,7 @@
 import numpy as np
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.control.axes import Floats
+from vla_deploy.control.axes import Floats, any_of
 from vla_deploy.control.joint_steps import JointSteps
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.wheels import Wheels
@@ -95,7 +95,7 @@ class Watch:
         """Return how old voltage and temperature are: polled servos tell them now and then."""
         state = self._servos.state
         polled = state.climate_stamp_ns >= 0
-        if not np.count_nonzero(polled):
+        if not any_of(polled):
             return state.age_s
         age_s = (self._clock.now_ns() - state.climate_stamp_ns) / NS_PER_S
         return np.where(polled, age_s, state.age_s)

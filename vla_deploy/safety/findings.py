@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from vla_deploy.safety.inputs import Flags, Floats, SafetyInputs, SafetyLimits
 from vla_deploy.safety.surroundings import Direction
 
@@ -37,9 +35,8 @@ def first_joint(
 
 def first_in(mask: Flags) -> int | None:
     """Return the place of the first joint that a mask names."""
-    if not np.count_nonzero(mask):  # several times faster than `any` on a few joints
-        return None
-    return int(mask.argmax())
+    place = mask.tobytes().find(1)  # on a few joints, several times faster than numpy itself
+    return None if place < 0 else place
 
 
 def joint_finding(

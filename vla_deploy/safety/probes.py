@@ -137,9 +137,9 @@ def servo_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None
 
 def servo_watchdog_tripped(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a servo whose Bus Watchdog has stopped it."""
-    if not np.count_nonzero(inputs.watchdog_tripped):
+    joint = first_in(inputs.watchdog_tripped)
+    if joint is None:
         return None
-    joint = int(inputs.watchdog_tripped.argmax())
     return Finding(subject=limits.joint_names[joint], age_s=float(inputs.sample_age_s[joint]))
 
 

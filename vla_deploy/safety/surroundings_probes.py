@@ -103,7 +103,7 @@ def collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 def _moves_by_itself(inputs: SafetyInputs) -> bool:
     """Tell whether every joint is under power: a limp arm that sinks is not stopped by a ramp."""
-    return inputs.energised and bool(inputs.torque_enabled.all())
+    return inputs.energised and 0 not in inputs.torque_enabled.tobytes()
 
 
 def _too_close(
