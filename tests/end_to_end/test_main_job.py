@@ -42,6 +42,17 @@ def test_the_same_seed_moves_every_joint_the_same_to_the_last_bit(make_stack: Ma
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("thing", ["book", "bottle"])
+def test_what_hides_the_box_while_it_is_carried_ends_in_it_too(
+    stack: LockstepStack, thing: str
+) -> None:
+    outcome = stack.say(f"pick up the {thing} and put it in the box")
+    assert outcome["error"] is None
+    assert stack.lockstep.inside(thing, "box")["inside"]
+
+
+@pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_at_least_eight_of_ten_seeds_succeed_and_failures_say_why(make_stack: MakeStack) -> None:
     results = []
