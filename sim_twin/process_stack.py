@@ -15,12 +15,14 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.faults.remote import RemoteFaults
 from sim_twin.referee import ask
 from sim_twin.truth import fastest_joint
+from vla_deploy.cli.session import Session
 from vla_deploy.supervisor.orphans import run_id_of
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli")
 _POLL_NS: Final = NS_PER_S // 50
 _ANSWER_S: Final = 90.0
 _END_S: Final = 60.0
+_FRESH_S: Final = 1.0
 
 
 class StackFailed(Exception):
@@ -38,6 +40,7 @@ class ProcessStack:
         self.base = base
         self.run_dir = base
         self._clock = MonotonicClock()
+        self._session: Session | None = None
         self.process = subprocess.Popen(
             self._words("run", "--twin", *options),
             stdout=subprocess.PIPE,
@@ -108,8 +111,13 @@ class ProcessStack:
 
     def state(self) -> str:
         """Return control's state, "silent" where control tells none."""
-        control = self.status()["control"]
-        return str(control["state"]) if control else "silent"
+        return str(self.document("control_status", _FRESH_S).get("state", "silent"))
+
+    def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
+        """Return the newest document of a cell, empty when there is none that young."""
+        if self._session is None:
+            self._session = Session(self.run_dir, self._clock)
+        return self._session.document(topic, age_limit_s) or {}
 
     # --- as an adversary ----------------------------------------------------------------------
 
@@ -119,7 +127,7 @@ class ProcessStack:
         Raises:
             KeyError: there is no such process.
         """
-        rows = {row["name"]: row for row in self.status()["process_table"]["processes"]}
+        rows = {row["name"]: row for row in self.document("process_table")["processes"]}
         row: dict[str, Any] = rows[name]
         return row
 
@@ -184,6 +192,9 @@ class ProcessStack:
 
     def close(self) -> None:
         """End the run in order; ending twice is allowed."""
+        if self._session is not None:
+            self._session.close()
+            self._session = None
         if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGTERM)
         self.process.wait(_END_S)

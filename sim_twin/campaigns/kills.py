@@ -25,7 +25,7 @@ _COMMANDS: Final = (
     "pick up the red cup and put it in the box",
     "go to the kitchen",
     "pick up the blue ball and put it on the coffee table",
-    "go home",
+    "go to the charging station",
 )
 _EARLIEST_S, _LATEST_S = 0.5, 9.0
 _REST_FOR_S: Final = 0.3

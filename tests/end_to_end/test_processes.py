@@ -25,7 +25,8 @@ DRIVE = "go to the kitchen"
 class Run(ProcessStack):
     def drive(self) -> "subprocess.Popen[str]":
         saying = self.begin("say", DRIVE)
-        assert self.wait_until(lambda: self.fastest_rad_s() > MOVING_RAD_S)
+        moves = self.wait_until(lambda: self.fastest_rad_s() > MOVING_RAD_S)
+        assert moves, (saying.poll(), self.status())
         return saying
 
 
@@ -142,7 +143,7 @@ def test_kill_9_of_the_executor_tells_the_command_as_lost(run: Run) -> None:
 
 def stops_with(run: Run, *causes: str) -> bool:
     def is_stopped() -> bool:
-        control = run.status()["control"]
+        control = run.document("control_status")
         return bool(control) and control["state"] == "stopped" and control["cause"] in causes
 
     return run.wait_until(is_stopped, 10.0)
