@@ -7,9 +7,9 @@ from typing import Any
 
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
+from vla_deploy.state_dir import state_dir_of
 from vla_deploy.supervisor.crash_reports import crash_folder
 from vla_deploy.supervisor.runtime import default_base
-from vla_deploy.supervisor.state_folder import state_dir_of
 
 EXAMPLES = """  vla-deploy crashes list
   vla-deploy crashes show 000003-perception

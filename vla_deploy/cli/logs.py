@@ -11,6 +11,7 @@ from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
 from vla_deploy.logs import LOGS_DIR
+from vla_deploy.state_dir import state_dir_of
 from vla_deploy.supervisor.log_files import (
     LogLine,
     LogTail,
@@ -20,7 +21,6 @@ from vla_deploy.supervisor.log_files import (
     read_log,
 )
 from vla_deploy.supervisor.runtime import default_base, old_logs, running
-from vla_deploy.supervisor.state_folder import state_dir_of
 
 EXAMPLES = """  vla-deploy logs                          all processes of the run, in order of time
   vla-deploy logs control --follow         one process, as it goes on

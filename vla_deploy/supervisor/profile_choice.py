@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from platforms.board import identify
+from vla_deploy.state_dir import state_dir_of
 from vla_deploy.supervisor.runtime import default_base
-from vla_deploy.supervisor.state_folder import state_dir_of
 
 _SYSTEM_STATE: Final = Path("/var/lib/vla-deploy")
 _NAME: Final = "profile.json"

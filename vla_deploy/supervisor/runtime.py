@@ -12,10 +12,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
+from vla_deploy.state_dir import state_dir_of, user_base
 from vla_deploy.supervisor.errors import AlreadyRunning, RuntimeUnavailable
 from vla_deploy.supervisor.orphans import end_orphans
 from vla_deploy.supervisor.proc_files import read_stat
-from vla_deploy.supervisor.state_folder import BoundedFolder, state_dir_of, user_base
+from vla_deploy.supervisor.state_folder import BoundedFolder
 
 SHARED_MEMORY = Path("/dev/shm")
 KEEP_LOGS_OF_RUNS = 20

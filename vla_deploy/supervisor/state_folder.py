@@ -1,33 +1,10 @@
 """Keep what outlives a run - logs, crash reports - in bounded folders."""
 
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-_ROOT_BASE = Path("/run/vla-deploy")
-_ROOT_STATE = Path("/var/log/vla-deploy")
 _DIGITS = 6
-
-
-def state_dir_of(base: Path) -> Path:
-    """Return where the runs of a runtime directory leave what outlives them."""
-    if base == _ROOT_BASE:
-        return _ROOT_STATE
-    if base == user_base():
-        home = os.environ.get("XDG_STATE_HOME")
-        return (Path(home) if home else Path.home() / ".local" / "state") / "vla-deploy"
-    return base.with_name(f"{base.name}-state")
-
-
-def user_base() -> Path:
-    """Return where runs of a user who is not root live unless told otherwise."""
-    user_runtime = os.environ.get("XDG_RUNTIME_DIR")
-    return (
-        Path(user_runtime) / "vla-deploy"
-        if user_runtime
-        else Path(f"/tmp/vla-deploy-{os.getuid()}")
-    )
 
 
 class BoundedFolder:

@@ -7,7 +7,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from vla_deploy.supervisor.state_folder import state_dir_of
+from vla_deploy.state_dir import state_dir_of
 from vla_deploy.telemetry.errors import FlightMissing
 
 _log = logging.getLogger(__name__)

@@ -1,8 +1,4 @@
-from pathlib import Path
-
-import pytest
-
-from vla_deploy.supervisor.state_folder import BoundedFolder, state_dir_of, user_base
+from vla_deploy.supervisor.state_folder import BoundedFolder
 
 
 def fill(folder: BoundedFolder, *names: str) -> list[str]:
@@ -44,20 +40,3 @@ def test_what_somebody_else_put_there_stays(tmp_path):
 
 def test_a_folder_that_does_not_exist_is_empty(tmp_path):
     assert BoundedFolder(tmp_path / "none", keep=1).entries() == []
-
-
-@pytest.mark.parametrize(
-    ("base", "state"),
-    [("/run/vla-deploy", "/var/log/vla-deploy"), ("/tmp/x/base", "/tmp/x/base-state")],
-)
-def test_what_outlives_a_run_lies_beside_a_chosen_runtime_directory(base, state):
-    assert state_dir_of(Path(base)) == Path(state)
-
-
-def test_a_users_runs_leave_it_in_the_users_state_directory(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", "/run/user/1000")
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    assert state_dir_of(user_base()) == tmp_path / "vla-deploy"
-    monkeypatch.delenv("XDG_STATE_HOME")
-    monkeypatch.setenv("HOME", "/home/ann")
-    assert state_dir_of(user_base()) == Path("/home/ann/.local/state/vla-deploy")

@@ -1,0 +1,45 @@
+"""Find the folders that outlive a run: logs, models, what was built from models."""
+
+import os
+from pathlib import Path
+from typing import Final
+
+_ROOT_BASE: Final = Path("/run/vla-deploy")
+_ROOT_STATE: Final = Path("/var/log/vla-deploy")
+_ROOT_LIBRARY: Final = Path("/var/lib/vla-deploy")
+_MODELS: Final = "models"
+_ENGINES: Final = "engines"
+
+
+def state_dir_of(base: Path) -> Path:
+    """Return where the runs of a runtime directory leave what outlives them."""
+    if base == _ROOT_BASE:
+        return _ROOT_STATE
+    if base == user_base():
+        home = os.environ.get("XDG_STATE_HOME")
+        return (Path(home) if home else Path.home() / ".local" / "state") / "vla-deploy"
+    return base.with_name(f"{base.name}-state")
+
+
+def models_dir_of(base: Path) -> Path:
+    """Return where the models lie that a person has added."""
+    return _library_of(base) / _MODELS
+
+
+def engines_dir_of(base: Path) -> Path:
+    """Return where execution providers keep what they build from models; it may be deleted."""
+    return _library_of(base) / _ENGINES
+
+
+def user_base() -> Path:
+    """Return where runs of a user who is not root live unless told otherwise."""
+    user_runtime = os.environ.get("XDG_RUNTIME_DIR")
+    return (
+        Path(user_runtime) / "vla-deploy"
+        if user_runtime
+        else Path(f"/tmp/vla-deploy-{os.getuid()}")
+    )
+
+
+def _library_of(base: Path) -> Path:
+    return _ROOT_LIBRARY if base == _ROOT_BASE else state_dir_of(base)
