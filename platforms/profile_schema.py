@@ -133,6 +133,7 @@ _MODEL: Keys = {
     "precision": _OneOf(_PRECISIONS),
     "threads": _Range(1, 64, "", integer=True),
     "cpu_fallback": _Flag(),
+    "memory_arena": _Flag(),
 }
 _BUDGET: Keys = {"memory_mb": _MEMORY_MB, "cpu_ratio": _CORES}
 _TOTAL: Keys = {**_BUDGET, "disk_free_mb": _Range(0, 1e7, "MB")}

@@ -32,6 +32,7 @@ providers = ["CPUExecutionProvider"]
 precision = "fp16"
 threads = 1
 cpu_fallback = 1
+memory_arena = true
 """
 
 

@@ -44,6 +44,7 @@ PROFILES: dict[str, dict[str, Any]] = {
                 precision="int8",
                 threads=1,
                 cpu_fallback=True,
+                memory_arena=True,
             )
             for role, tiers in (("detector", ("medium", "small")), ("planner", ("planner_1b",)))
         },

@@ -1,0 +1,267 @@
+import dataclasses
+import hashlib
+import itertools
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from platforms import ModelChoice
+from vla_deploy.inference.manifest import (
+    Detection,
+    Fit,
+    ImageInput,
+    Layout,
+    Manifest,
+    ModelFile,
+    Tensor,
+    Variant,
+)
+from vla_deploy.inference.manifest_file import write_manifest
+
+CLASSES = ("red", "green", "blue")
+WIDTH_PX, HEIGHT_PX, CELL_PX, BOX_PX = 96, 64, 8, 20
+CELLS = (WIDTH_PX // CELL_PX) * (HEIGHT_PX // CELL_PX)
+CPU_CHOICE = ModelChoice(
+    tiers=("blobs",),
+    providers=("CPUExecutionProvider",),
+    precision="fp32",
+    threads=1,
+    cpu_fallback=False,
+    memory_arena=True,
+)
+FLOAT, INT32 = 1, 6  # as onnx.TensorProto numbers them
+
+
+class BlobGraphs:
+    """Build detectors by hand: each cell of 8x8 pixels that is plainly red, green or blue scores.
+
+    Its box is 20 px wide around the cell's middle, so that neighbouring cells tell of one thing.
+    """
+
+    width_px, height_px, cell_px, box_px = WIDTH_PX, HEIGHT_PX, CELL_PX, BOX_PX
+
+    def raw(self, *, transposed: bool = False, names: str = "") -> Any:
+        """Tell (1, 7, cells): middle, size, a score for each class."""
+        nodes = [*self._network(), self._node("Concat", ["boxes", "scores"], "table", axis=1)]
+        if transposed:
+            nodes.append(self._node("Transpose", ["table"], "output", perm=[0, 2, 1]))
+            return self._model(nodes, {"output": [1, CELLS, 7]}, names)
+        nodes.append(self._node("Identity", ["table"], "output"))
+        return self._model(nodes, {"output": [1, 7, CELLS]}, names)
+
+    def end_to_end(self, count: int = 12) -> Any:
+        """Tell (1, count, 6): corners, score, class of the surest cells, as YOLO v10 does."""
+        nodes = [
+            *self._network(),
+            self._node("ReduceMax", ["scores"], "best", axes=[1], keepdims=0),
+            self._node("ArgMax", ["scores"], "which", axis=1, keepdims=0),
+            self._node("TopK", ["best", "count"], ("top", "at")),
+            self._node("GatherElements", ["which", "at"], "class_number", axis=1),
+            self._node("Cast", ["class_number"], "class_float", to=FLOAT),
+            self._node("Squeeze", ["at", "zero"], "at_flat"),
+            self._node("Transpose", ["corners"], "corner_rows", perm=[0, 2, 1]),
+            self._node("Gather", ["corner_rows", "at_flat"], "top_corners", axis=1),
+            self._node("Unsqueeze", ["top", "two"], "top_column"),
+            self._node("Unsqueeze", ["class_float", "two"], "class_column"),
+            self._node("Concat", ["top_corners", "top_column", "class_column"], "output", axis=2),
+        ]
+        constants = {
+            "count": np.array([count]),
+            "zero": np.array([0]),
+            "two": np.array([2]),
+            "corners": self._corners(),
+        }
+        return self._model(nodes, {"output": [1, count, 6]}, constants=constants)
+
+    def counted(self, count: int = 10, iou: float = 0.3) -> Any:
+        """Tell count, boxes, scores, classes; ONNX's own NonMaxSuppression removes doubles.
+
+        What lies behind the count is a box that was left over: a red one in cell 13.
+        """
+        nodes = [
+            *self._network(),
+            self._node("Transpose", ["corners"], "rows", perm=[0, 2, 1]),
+            self._node("NonMaxSuppression", ["rows", "scores", "most", "iou", "least"], "chosen"),
+            self._node("Shape", ["chosen"], "chosen_shape"),
+            self._node("Slice", ["chosen_shape", "zero", "one"], "found"),
+            self._node("Cast", ["found"], "found_small", to=INT32),
+            self._node("Reshape", ["found_small", "square"], "num"),
+            self._node("Sub", ["room", "found"], "missing"),
+            self._node("Concat", ["missing", "one"], "repeats", axis=0),
+            self._node("Tile", ["left_over", "repeats"], "filling"),
+            self._node("Concat", ["chosen", "filling"], "padded", axis=0),
+            self._node("Slice", ["padded", "one", "two", "one"], "class_column"),
+            self._node("Slice", ["padded", "two", "three", "one"], "cell_column"),
+            self._node("Squeeze", ["cell_column", "one"], "cells"),
+            self._node("Gather", ["rows", "cells"], "det_boxes", axis=1),
+            self._node("Concat", ["class_column", "cell_column"], "class_and_cell", axis=1),
+            self._node("Squeeze", ["scores", "zero"], "score_table"),
+            self._node("GatherND", ["score_table", "class_and_cell"], "flat_scores"),
+            self._node("Unsqueeze", ["flat_scores", "zero"], "det_scores"),
+            self._node("Cast", ["class_column"], "class_small", to=INT32),
+            self._node("Transpose", ["class_small"], "det_classes", perm=[1, 0]),
+        ]
+        constants = {
+            "corners": self._corners(),
+            "most": np.array([count]),
+            "iou": np.array([iou], dtype=np.float32),
+            "least": np.array([0.2], dtype=np.float32),
+            "room": np.array([count]),
+            "square": np.array([1, 1]),
+            "left_over": np.array([[0, 0, 13]]),
+            **{name: np.array([n]) for n, name in enumerate(("zero", "one", "two", "three"))},
+        }
+        outputs = {
+            "num": [1, 1],
+            "det_boxes": [1, count, 4],
+            "det_scores": [1, count],
+            "det_classes": [1, count],
+        }
+        dtypes = {"num": INT32, "det_classes": INT32}
+        return self._model(nodes, outputs, constants=constants, dtypes=dtypes)
+
+    def score_table(self, rgb: np.ndarray) -> np.ndarray:
+        """Return what each cell scores (classes, cells), by loops instead of a network."""
+        table = []
+        for own, others in ((0, (1, 2)), (1, (0, 2)), (2, (0, 1))):
+            pixels = rgb.astype(np.float64) / 255.0
+            plain = pixels[..., own] - pixels[..., others[0]] - pixels[..., others[1]]
+            plain = np.maximum(plain, 0.0)
+            corners = itertools.product(range(0, HEIGHT_PX, CELL_PX), range(0, WIDTH_PX, CELL_PX))
+            table.append([plain[y : y + CELL_PX, x : x + CELL_PX].mean() for y, x in corners])
+        return np.array(table)
+
+    def _network(self) -> list[Any]:
+        return [
+            self._node("Conv", ["images", "contrast"], "plain"),
+            self._node("Relu", ["plain"], "lit"),
+            self._node("Conv", ["lit", "mean"], "pooled", group=3, strides=[CELL_PX] * 2),
+            self._node("Conv", ["pooled", "same"], "head"),
+            self._node("Clip", ["head", "low", "high"], "clipped"),
+            self._node("Reshape", ["clipped", "flat"], "scores"),
+        ]
+
+    def _constants(self) -> dict[str, np.ndarray]:
+        eye = np.eye(3, dtype=np.float32)
+        return {
+            "contrast": (2 * eye - 1).reshape(3, 3, 1, 1),
+            "mean": np.full((3, 1, CELL_PX, CELL_PX), 1 / CELL_PX**2, dtype=np.float32),
+            "same": eye.reshape(3, 3, 1, 1),
+            "low": np.array(0, dtype=np.float32),
+            "high": np.array(1, dtype=np.float32),
+            "flat": np.array([1, 3, CELLS]),
+            "boxes": self._boxes(),
+        }
+
+    def _boxes(self) -> np.ndarray:
+        across = WIDTH_PX // CELL_PX
+        cells = np.arange(CELLS)
+        middles = [(cells % across + 0.5) * CELL_PX, (cells // across + 0.5) * CELL_PX]
+        sizes = [np.full(CELLS, BOX_PX)] * 2
+        return np.array([*middles, *sizes], dtype=np.float32)[None]
+
+    def _corners(self) -> np.ndarray:
+        boxes = self._boxes()
+        return np.concatenate([boxes[:, :2] - BOX_PX / 2, boxes[:, :2] + BOX_PX / 2], axis=1)
+
+    def _node(
+        self, kind: str, inputs: list[str], outputs: str | tuple[str, ...], **attributes: Any
+    ) -> Any:
+        from onnx import helper  # most tests do without it
+
+        listed = [outputs] if isinstance(outputs, str) else list(outputs)
+        return helper.make_node(kind, inputs, listed, name=f"{kind}_{listed[0]}", **attributes)
+
+    def _model(
+        self,
+        nodes: list[Any],
+        outputs: Mapping[str, list[int]],
+        names: str = "",
+        constants: Mapping[str, np.ndarray] | None = None,
+        dtypes: Mapping[str, int] | None = None,
+    ) -> Any:
+        from onnx import checker, helper, numpy_helper
+
+        used = {name for node in nodes for name in node.input}
+        held = {**self._constants(), **(constants or {})}
+        image = helper.make_tensor_value_info("images", FLOAT, [1, 3, HEIGHT_PX, WIDTH_PX])
+        told = [
+            helper.make_tensor_value_info(name, (dtypes or {}).get(name, FLOAT), shape)
+            for name, shape in outputs.items()
+        ]
+        weights = [
+            numpy_helper.from_array(value, name) for name, value in held.items() if name in used
+        ]
+        graph = helper.make_graph(nodes, "blobs", [image], told, weights)
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
+        model.ir_version = 9
+        if names:
+            helper.set_model_props(model, {"names": names})
+        checker.check_model(model)
+        return model
+
+
+@pytest.fixture(scope="session")
+def blobs() -> BlobGraphs:
+    return BlobGraphs()
+
+
+@pytest.fixture(scope="session")
+def cpu_choice() -> Callable[..., ModelChoice]:
+    """Return the choice to run on the CPU, with some values replaced."""
+
+    def choice(**changes: Any) -> ModelChoice:
+        return dataclasses.replace(CPU_CHOICE, **changes)
+
+    return choice
+
+
+@pytest.fixture(scope="session")
+def blob_manifest() -> Manifest:
+    """Describe the raw blob detector; its files are empty yet."""
+    image = ImageInput(
+        width_px=WIDTH_PX,
+        height_px=HEIGHT_PX,
+        layout=Layout.NCHW,
+        colour="rgb",
+        fit=Fit.LETTERBOX,
+        fill=114,
+        scale=1 / 255,
+        mean=(0.0, 0.0, 0.0),
+        std=(1.0, 1.0, 1.0),
+    )
+    detection = Detection(
+        adapter="yolo", classes=CLASSES, score_threshold=0.25, iou_threshold=0.3, image=image
+    )
+    return Manifest(
+        name="blobs",
+        role="detector",
+        summary="coloured blobs",
+        licence="Apache-2.0",
+        card="",
+        inputs=(Tensor(name="images", shape=(1, 3, HEIGHT_PX, WIDTH_PX), dtype="float32"),),
+        outputs=(Tensor(name="output", shape=(1, 7, CELLS), dtype="float32"),),
+        files={},
+        detection=detection,
+    )
+
+
+@pytest.fixture(scope="session")
+def lay_out() -> Callable[[Path, Manifest, Mapping[Variant, bytes]], Path]:
+    """Write a model's folder, its manifest naming what the files hold."""
+
+    def write(root: Path, manifest: Manifest, contents: Mapping[Variant, bytes]) -> Path:
+        folder = root / manifest.name
+        folder.mkdir(parents=True)
+        files = {}
+        for variant, content in contents.items():
+            (folder / f"{variant}.onnx").write_bytes(content)
+            digest = hashlib.sha256(content).hexdigest()
+            files[variant] = ModelFile(path=f"{variant}.onnx", sha256=digest)
+        write_manifest(folder, dataclasses.replace(manifest, files=files))
+        return folder
+
+    return write

@@ -1,0 +1,137 @@
+import dataclasses
+
+import pytest
+
+from vla_deploy.inference.errors import ManifestInvalid
+from vla_deploy.inference.manifest import ModelFile, Tensor, Variant
+from vla_deploy.inference.manifest_file import read_manifest, write_manifest
+
+WRITTEN = """
+name = "mine"
+role = "detector"
+summary = "what it sees"
+licence = "MIT"
+
+[[inputs]]
+name = "images"
+shape = [1, 3, 480, 640]
+dtype = "float32"
+
+[[outputs]]
+name = "output0"
+shape = [1, 6, "boxes"]
+dtype = "float32"
+
+[files.fp32]
+path = "mine.onnx"
+sha256 = "0000000000000000000000000000000000000000000000000000000000000000"
+
+[detection]
+adapter = "yolo"
+classes = ["cup", "ball"]
+score_threshold = 0.25
+iou_threshold = 0.45
+
+[detection.image]
+width_px = 640
+height_px = 480
+layout = "nchw"
+colour = "rgb"
+fit = "letterbox"
+fill = 114
+scale = 0.00392156862745098
+mean = [0, 0, 0]
+std = [1, 1, 1]
+"""
+
+
+@pytest.fixture
+def faults_of(tmp_path):
+    def faults_of(text: str, folder: str = "mine") -> tuple[str, ...]:
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "model.toml").write_text(text)
+        with pytest.raises(ManifestInvalid) as caught:
+            read_manifest(tmp_path / folder)
+        assert str(caught.value).startswith(str(tmp_path / folder / "model.toml"))
+        return caught.value.faults
+
+    return faults_of
+
+
+def test_a_manifest_that_a_person_wrote_is_read(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "model.toml").write_text(WRITTEN)
+    manifest = read_manifest(tmp_path / "mine")
+    assert manifest.outputs == (Tensor(name="output0", shape=(1, 6, "boxes"), dtype="float32"),)
+    assert manifest.detection is not None
+    assert manifest.detection.classes == ("cup", "ball")
+    assert manifest.detection.image.std == (1, 1, 1)
+    assert manifest.card == ""
+
+
+def test_what_is_written_is_read_as_the_same(tmp_path, blob_manifest):
+    files = {variant: ModelFile(path=f"{variant}.onnx", sha256="ab" * 32) for variant in Variant}
+    full = dataclasses.replace(
+        blob_manifest, files=files, card="card.md", summary='sagt "Käse" \\ und\nnoch mehr'
+    )
+    plain = dataclasses.replace(full, role="planner", detection=None, card="")
+    for manifest in (full, plain):
+        folder = tmp_path / manifest.role / "blobs"
+        folder.mkdir(parents=True)
+        write_manifest(folder, manifest)
+        assert read_manifest(folder) == manifest
+
+
+def test_every_fault_is_told_at_once(faults_of):
+    text = (
+        WRITTEN.replace('role = "detector"', 'role = "cook"\ncolour = 3')
+        .replace('"float32"\n\n[files', '"float128"\n\n[files')
+        .replace("mine.onnx", "../mine.onnx")
+        .replace('"0000', '"zz')
+        .replace('["cup", "ball"]', '["cup", "cup"]')
+        .replace("iou_threshold = 0.45", "iou_threshold = 45")
+        .replace("std = [1, 1, 1]", "std = [1, 0, 1]")
+        .replace("fill = 114\n", "")
+    )
+    expected = (
+        "colour: got an unknown key, expected one of name, role, ",
+        "role: got 'cook', expected one of detector, planner, ",
+        "outputs[0].dtype: got 'float128', expected one of float32, ",
+        "files.fp32.path: got '../mine.onnx', expected a file in the model's folder",
+        "files.fp32.sha256: got 'zz00",
+        "detection.classes: got ['cup', 'cup'], expected a list of names, none twice",
+        "detection.iou_threshold: got 45, expected a number from 0 to 1",
+        "detection.image.fill: got nothing, expected an integer in 0..255",
+        "detection.image.std: got [1, 0, 1], expected three numbers above 0",
+    )
+    faults = faults_of(text)
+    assert len(faults) == len(expected)
+    for fault, beginning in zip(faults, expected, strict=True):
+        assert fault.startswith(beginning)
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (("480, 640]", "640, 480]"), "inputs: got shapes [[1, 3, 640, 480]], expected one of shap"),
+        (('layout = "nchw"', 'layout = "nhwc"'), "inputs: got shapes [[1, 3, 480, 640]], expected"),
+        (('name = "mine"', 'name = "ours"'), "name: got 'ours', expected 'mine', as its folder"),
+        (("[files.fp32]", "[files.fp64]"), "files.fp64: got an unknown key, expected one of fp32"),
+        (("[[outputs]]", "[[inputs]]"), "outputs: got nothing, expected a list of tables"),
+    ],
+)
+def test_what_does_not_fit_together_is_told(faults_of, change, fault):
+    assert faults_of(WRITTEN.replace(*change, 1))[0].startswith(fault)
+
+
+def test_a_detector_needs_to_say_how_it_is_read(faults_of):
+    (fault,) = faults_of(WRITTEN[: WRITTEN.index("[detection]")])
+    assert fault == "detection: got nothing, expected a table, as the role is detector"
+
+
+@pytest.mark.parametrize("text", ["name = ", "name = 'mine'\x00", "\udcff"])
+def test_what_is_no_toml_is_told(tmp_path, text):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "model.toml").write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(ManifestInvalid, match="expected a TOML document"):
+        read_manifest(tmp_path / "mine")

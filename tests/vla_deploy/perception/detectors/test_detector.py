@@ -1,0 +1,147 @@
+"""Switch the model of a stepping node, through the topics of the supervisor."""
+
+import dataclasses
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from drivers.clock import MonotonicClock
+from platforms import Profile, load_profile
+from vla_deploy.adapting import AdaptingNode
+from vla_deploy.aside import background
+from vla_deploy.inference.errors import ManifestInvalid, ModelUnknown, RunFailed
+from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.store import ModelStore
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.perception.detectors.detector import Detector, open_detector
+
+NO_HOST = type("NoHost", (), {"obstacles": lambda *_: (), "apply": lambda *_: ()})()
+
+
+class Looker:
+    """Look at the same image in every step, as perception would at the camera's."""
+
+    period_s = 0.1
+
+    def __init__(self, shelf: ModelShelf, profile: Profile, rgb: np.ndarray) -> None:
+        self.shelf, self.rgb = shelf, rgb
+        self.detector = open_detector(shelf, profile, 0)
+        self.seen: list[tuple[str, int]] = []
+
+    def start(self) -> None: ...
+
+    def step(self) -> None:
+        self.seen.append((self.detector.stats().model, len(self.detector.detect(self.rgb))))
+
+    def stop(self) -> None:
+        self.detector.close()
+
+    def prepare(self, profile: Profile, model_tier: int) -> Detector:
+        return open_detector(self.shelf, profile, model_tier)
+
+    def commit(self, prepared: Detector) -> Detector:
+        before, self.detector = self.detector, prepared
+        return before
+
+    def discard(self, prepared: Detector) -> None:
+        prepared.close()
+
+
+@pytest.fixture
+def shelf(tmp_path, lay_out, blob_manifest, blobs):
+    for name in ("medium", "small"):
+        manifest = dataclasses.replace(blob_manifest, name=name)
+        lay_out(tmp_path / "models", manifest, {Variant.INT8_U8S8: blobs.raw().SerializeToString()})
+    return ModelShelf(
+        store=ModelStore(tmp_path / "models", tmp_path / "none"),
+        engines=tmp_path / "engines",
+        clock=MonotonicClock(),
+    )
+
+
+@pytest.fixture
+def profile():
+    desktop = load_profile("desktop")
+    choice = dataclasses.replace(desktop.models["detector"], tiers=("medium", "small"))
+    return dataclasses.replace(desktop, models=MappingProxyType({"detector": choice}))
+
+
+@pytest.fixture
+def rgb():
+    image = np.full((64, 96, 3), 90, dtype=np.uint8)
+    image[16:32, 16:32] = (255, 0, 0)
+    return image
+
+
+@pytest.mark.parametrize(("tier", "name"), [(0, "medium"), (1, "small"), (7, "small")])
+def test_a_tier_names_the_model_and_the_last_one_is_the_smallest(shelf, profile, tier, name):
+    detector = open_detector(shelf, profile, tier)
+    assert (detector.stats().model, detector.stats().variant) == (name, Variant.INT8_U8S8)
+    assert detector.classes == ("red", "green", "blue")
+
+
+def test_a_profile_without_a_detector_is_told(shelf, profile):
+    bare = dataclasses.replace(profile, models={})
+    with pytest.raises(ModelUnknown, match=r"profile desktop has no \[models.detector\], only: no"):
+        open_detector(shelf, bare, 0)
+
+
+def test_a_tier_that_names_no_model_is_told(shelf, profile):
+    choice = dataclasses.replace(profile.models["detector"], tiers=("large",))
+    with pytest.raises(ModelUnknown, match="no model 'large': expected one of medium, small"):
+        open_detector(shelf, dataclasses.replace(profile, models={"detector": choice}), 0)
+
+
+def test_a_model_of_another_role_is_told(shelf, profile, tmp_path):
+    text = (tmp_path / "models" / "small" / "model.toml").read_text()
+    spoken = text.replace('role = "detector"', 'role = "planner"')
+    (tmp_path / "models" / "small" / "model.toml").write_text(spoken)
+    with pytest.raises(ModelUnknown, match=r"models.detector.tiers: small is a planner"):
+        open_detector(shelf, profile, 1)
+
+
+def test_the_model_changes_between_two_steps_and_no_step_is_missed(tmp_path, shelf, profile, rgb):
+    clock = MonotonicClock()
+    looker = Looker(shelf, profile, rgb)
+    first, aside = looker.detector, background()
+    node = AdaptingNode(
+        "perception", looker, profile, ipc=tmp_path, clock=clock, host=NO_HOST, aside=aside
+    )
+    node.start()
+    directives = SharedSpace(tmp_path, clock).cell_writer("resource_directives")
+    node.step()
+    directives.put_document({"rate_ratio": {}, "model_tier": {"perception": 1}})
+    steps = 1
+    while looker.seen[-1][0] == "medium":
+        node.step()
+        steps += 1
+    assert {name for name, _ in looker.seen} == {"medium", "small"}
+    assert len(looker.seen) == steps
+    assert len({count for _, count in looker.seen}) == 1, "both see the same"
+    with pytest.raises(RunFailed, match="medium: its session is closed"):
+        first.detect(rgb)
+    node.stop()
+
+
+def test_a_model_that_cannot_be_opened_leaves_the_present_one_at_work(
+    tmp_path, shelf, profile, rgb, caplog
+):
+    clock = MonotonicClock()
+    looker = Looker(shelf, profile, rgb)
+    (tmp_path / "models" / "small" / "model.toml").write_text("role = 'detector'")
+    node = AdaptingNode(
+        "perception", looker, profile, ipc=tmp_path, clock=clock, host=NO_HOST, aside=background()
+    )
+    node.start()
+    SharedSpace(tmp_path, clock).cell_writer("resource_directives").put_document(
+        {"rate_ratio": {}, "model_tier": {"perception": 1}}
+    )
+    while "degraded: no models of tier 1" not in caplog.text:
+        node.step()
+    assert "small/model.toml: " in caplog.text
+    assert {name for name, _ in looker.seen} == {"medium"}
+    with pytest.raises(ManifestInvalid):
+        open_detector(shelf, profile, 1)
+    node.stop()

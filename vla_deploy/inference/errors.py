@@ -1,0 +1,70 @@
+"""Group the errors of models by what the caller can do about them.
+
+InferenceError
+├── ModelUnknown         no model of that name, or a name that is taken: list what there is
+├── ManifestInvalid      model.toml has faults: mend every one that is listed
+├── ModelFileSpoiled     a file is missing, cut off or not what was checked in: add it again
+├── ModelMismatch        the graph is not what the manifest says: mend the manifest, or export anew
+├── ProviderUnavailable  nothing here runs it as the profile asks: mend profile or installation
+├── RunFailed            a run failed, or told what cannot be: a robot goes on without the answer
+├── ImagesInvalid        images or labels to measure with cannot be used: mend the folder
+├── ToolMissing          an optional package is not installed: install it
+└── AccuracyLost         quantising costs more accuracy than allowed: nothing was installed
+"""
+
+from pathlib import Path
+
+
+class InferenceError(Exception):
+    """Base of everything that models raise."""
+
+
+class ModelUnknown(InferenceError):
+    """Say that a name means no model, or may not be given to one."""
+
+
+class ManifestInvalid(InferenceError):
+    """Report every fault of one manifest at once."""
+
+    def __init__(self, file: Path, faults: tuple[str, ...]) -> None:
+        super().__init__(_listed(str(file), faults))
+        self.file = file
+        self.faults = faults
+
+
+class ModelFileSpoiled(InferenceError):
+    """Say that a model's file cannot be used."""
+
+
+class ModelMismatch(InferenceError):
+    """Report every difference between a graph and its manifest at once."""
+
+    def __init__(self, model: str, faults: tuple[str, ...]) -> None:
+        super().__init__(_listed(model, faults))
+        self.faults = faults
+
+
+class ProviderUnavailable(InferenceError):
+    """Say that no execution provider runs a model that the profile allows."""
+
+
+class RunFailed(InferenceError):
+    """Say that a run of a model failed."""
+
+
+class ImagesInvalid(InferenceError):
+    """Say that images or labels cannot be used."""
+
+
+class ToolMissing(InferenceError):
+    """Say that an optional package is missing, and how to install it."""
+
+
+class AccuracyLost(InferenceError):
+    """Say that quantising costs more than was allowed."""
+
+
+def _listed(subject: str, faults: tuple[str, ...]) -> str:
+    if len(faults) == 1:
+        return f"{subject}: {faults[0]}"
+    return "\n".join([f"{subject}: {len(faults)} faults", *(f"  {fault}" for fault in faults)])

@@ -1,0 +1,38 @@
+"""Check that a model's files are those that were checked in."""
+
+import hashlib
+from pathlib import Path
+
+from vla_deploy.inference.errors import ModelFileSpoiled
+from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.store import Model
+
+
+def checked_file(model: Model, variant: Variant) -> Path:
+    """Return the path of one of a model's files, whose content is what the manifest says.
+
+    Raises:
+        ModelFileSpoiled: it is missing, cannot be read, or its SHA-256 is another one.
+    """
+    entry = model.manifest.files[variant]
+    path = model.folder / entry.path
+    got = sha256_of(path)
+    if got != entry.sha256:
+        raise ModelFileSpoiled(
+            f"{path}: expected SHA-256 {entry.sha256}, got {got} over {path.stat().st_size} bytes; "
+            "it was cut off or replaced: add the model again"
+        )
+    return path
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file.
+
+    Raises:
+        ModelFileSpoiled: it is missing or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise ModelFileSpoiled(f"{path}: {error.strerror or error}") from error

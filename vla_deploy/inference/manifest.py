@@ -1,0 +1,98 @@
+"""Declare what a model is: its files, its tensors, and how its outputs are to be read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+# A dimension is a size, or a name for one that is free.
+Dimension = int | str
+
+
+class Variant(StrEnum):
+    """Name the files a model may have: activations, then weights, of the two int8 ones.
+
+    CPUs are fast with unsigned activations, TensorRT takes only symmetric signed ones.
+    """
+
+    FP32 = "fp32"
+    FP16 = "fp16"
+    INT8_U8S8 = "int8_u8s8"
+    INT8_S8S8 = "int8_s8s8"
+
+
+class Layout(StrEnum):
+    """Name the order of an image tensor's dimensions."""
+
+    NCHW = "nchw"
+    NHWC = "nhwc"
+
+
+class Fit(StrEnum):
+    """Say how an image is brought to the size of the input.
+
+    `letterbox` keeps its proportions and pads, centred; `stretch` does not.
+    """
+
+    LETTERBOX = "letterbox"
+    STRETCH = "stretch"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tensor:
+    """Declare an input or output of the graph; `dtype` is numpy's name."""
+
+    name: str
+    shape: tuple[Dimension, ...]
+    dtype: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelFile:
+    """Name a file in the model's folder and what it must hold."""
+
+    path: str
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageInput:
+    """Declare how an image becomes the input: (pixel * `scale` - `mean`) / `std` per channel."""
+
+    width_px: int
+    height_px: int
+    layout: Layout
+    colour: str
+    fit: Fit
+    fill: int
+    scale: float
+    mean: tuple[float, float, float]
+    std: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """Declare how a detector's outputs are read; `adapter` names the reader.
+
+    Boxes of one class that overlap by more than `iou_threshold` count as one thing.
+    """
+
+    adapter: str
+    classes: tuple[str, ...]
+    score_threshold: float
+    iou_threshold: float
+    image: ImageInput
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manifest:
+    """Declare one model; `detection` is there for detectors, `card` where there is one."""
+
+    name: str
+    role: str
+    summary: str
+    licence: str
+    card: str
+    inputs: tuple[Tensor, ...]
+    outputs: tuple[Tensor, ...]
+    files: Mapping[Variant, ModelFile]
+    detection: Detection | None

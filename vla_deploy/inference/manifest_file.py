@@ -1,0 +1,123 @@
+"""Read and write `model.toml`, the manifest that lies beside a model's files."""
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from vla_deploy.inference.errors import ManifestInvalid
+from vla_deploy.inference.manifest import (
+    Detection,
+    Fit,
+    ImageInput,
+    Layout,
+    Manifest,
+    ModelFile,
+    Tensor,
+    Variant,
+)
+from vla_deploy.inference.manifest_schema import manifest_faults
+
+MANIFEST: Final = "model.toml"
+Document = Mapping[str, Any]
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Return the manifest of a model's folder.
+
+    Raises:
+        ManifestInvalid: it is missing, is no TOML, or has faults; all of them are listed.
+    """
+    file = folder / MANIFEST
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ManifestInvalid(file, ("no such file; each model has one",)) from error
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ManifestInvalid(file, (f"expected a TOML document: {error}",)) from error
+    faults = tuple(str(fault) for fault in manifest_faults(document, folder.name))
+    if faults:
+        raise ManifestInvalid(file, faults)
+    return _build(document)
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write the manifest of a model's folder; reading it gives the same again.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    text = "\n".join(_lines("", _document(manifest))).lstrip("\n")
+    (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
+
+
+def _build(document: Document) -> Manifest:
+    detection = document.get("detection")
+    return Manifest(
+        name=document["name"],
+        role=document["role"],
+        summary=document["summary"],
+        licence=document["licence"],
+        card=document.get("card", ""),
+        inputs=_tensors(document["inputs"]),
+        outputs=_tensors(document["outputs"]),
+        files={Variant(name): ModelFile(**file) for name, file in document["files"].items()},
+        detection=None if detection is None else _detection(detection),
+    )
+
+
+def _tensors(records: list[Document]) -> tuple[Tensor, ...]:
+    return tuple(Tensor(**{**record, "shape": tuple(record["shape"])}) for record in records)
+
+
+def _detection(table: Document) -> Detection:
+    image = table["image"]
+    return Detection(
+        **{
+            **table,
+            "classes": tuple(table["classes"]),
+            "image": ImageInput(
+                **{
+                    **image,
+                    "layout": Layout(image["layout"]),
+                    "fit": Fit(image["fit"]),
+                    "mean": tuple(image["mean"]),
+                    "std": tuple(image["std"]),
+                }
+            ),
+        }
+    )
+
+
+def _document(manifest: Manifest) -> dict[str, Any]:
+    """Return the manifest as tables; what is empty or absent is left out."""
+    return {key: value for key, value in asdict(manifest).items() if value not in ("", None)}
+
+
+def _lines(prefix: str, table: Document) -> Iterator[str]:
+    """Yield TOML: plain values first, then tables, then lists of tables."""
+    for key, value in table.items():
+        if not _is_nested(value):
+            yield f"{key} = {_value(value)}"
+    for key, value in table.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, dict):
+            if not all(_is_nested(inner) for inner in value.values()):
+                yield f"\n[{name}]"
+            yield from _lines(f"{name}.", value)
+        elif _is_nested(value):
+            for row in value:
+                yield f"\n[[{name}]]"
+                yield from _lines(f"{name}.", row)
+
+
+def _is_nested(value: object) -> bool:
+    rows = isinstance(value, tuple | list) and bool(value) and isinstance(value[0], dict)
+    return isinstance(value, dict) or rows
+
+
+def _value(value: object) -> str:
+    """Return a plain value as TOML, which JSON's form is for all that a manifest holds."""
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,182 @@
+"""Declare which keys a manifest has and what each may hold."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath
+from typing import Any, Final
+
+from platforms.profile_schema import ROLES
+from vla_deploy.inference.manifest import Fit, Layout, Variant
+from vla_deploy.robots.schema import (
+    OPTIONAL_TABLE,
+    OPTIONAL_TEXT,
+    POSITIVE,
+    TABLE,
+    TABLES,
+    TEXT,
+    Check,
+    Fault,
+    Shape,
+    check_record,
+    is_number,
+    one_of,
+)
+
+DTYPES: Final = ("float32", "float16", "uint8", "int8", "int32", "int64", "bool")
+COLOURS: Final = ("rgb", "bgr")
+DETECTOR: Final = "detector"
+_NAME: Final = re.compile(r"[a-z0-9][a-z0-9_.-]{0,63}")
+_SHA256: Final = re.compile(r"[0-9a-f]{64}")
+
+
+def is_name(value: object) -> bool:
+    """Tell whether a value may name a model: it is a folder's name too."""
+    return isinstance(value, str) and _NAME.fullmatch(value) is not None
+
+
+def _is_count(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value > 0
+
+
+def _is_shape(value: object) -> bool:
+    return isinstance(value, list) and all(
+        _is_count(one) or (isinstance(one, str) and one != "") for one in value
+    )
+
+
+def _is_file_name(value: object) -> bool:
+    """Tell whether a value names a file below the model's folder."""
+    if not isinstance(value, str) or not value:
+        return False
+    path = PurePosixPath(value)
+    return not path.is_absolute() and ".." not in path.parts
+
+
+def _is_three(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
+
+
+def _are_classes(value: object) -> bool:
+    return (
+        isinstance(value, list)
+        and value != []
+        and all(isinstance(one, str) and one for one in value)
+        and len(set(value)) == len(value)
+    )
+
+
+NAME: Final = Check(expected="small letters, digits, '_', '-' or '.'", holds=is_name)
+FILE_NAME: Final = Check(expected="a file in the model's folder", holds=_is_file_name)
+RATIO: Final = Check(
+    expected="a number from 0 to 1", holds=lambda value: is_number(value) and 0 <= value <= 1
+)
+COUNT: Final = Check(expected="an integer above 0", holds=_is_count)
+THREE: Final = Check(expected="three numbers", holds=_is_three)
+
+_TOP: Shape = {
+    "name": NAME,
+    "role": one_of(*ROLES),
+    "summary": TEXT,
+    "licence": TEXT,
+    "card": OPTIONAL_TEXT,
+    "inputs": TABLES,
+    "outputs": TABLES,
+    "files": TABLE,
+    "detection": OPTIONAL_TABLE,
+}
+_TENSOR: Shape = {
+    "name": TEXT,
+    "shape": Check(
+        expected="a list of sizes, or of names for those that are free", holds=_is_shape
+    ),
+    "dtype": one_of(*DTYPES),
+}
+_FILE: Shape = {
+    "path": FILE_NAME,
+    "sha256": Check(
+        expected="64 hexadecimal digits",
+        holds=lambda value: isinstance(value, str) and _SHA256.fullmatch(value) is not None,
+    ),
+}
+_DETECTION: Shape = {
+    "adapter": TEXT,
+    "classes": Check(expected="a list of names, none twice", holds=_are_classes),
+    "score_threshold": RATIO,
+    "iou_threshold": RATIO,
+    "image": TABLE,
+}
+_IMAGE: Shape = {
+    "width_px": COUNT,
+    "height_px": COUNT,
+    "layout": one_of(*Layout),
+    "colour": one_of(*COLOURS),
+    "fit": one_of(*Fit),
+    "fill": Check(
+        expected="an integer in 0..255",
+        holds=lambda value: isinstance(value, int) and 0 <= value <= 255,
+    ),
+    "scale": POSITIVE,
+    "mean": THREE,
+    "std": Check(
+        expected="three numbers above 0",
+        holds=lambda value: _is_three(value) and min(value) > 0,
+    ),
+}
+
+
+def manifest_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fault]:
+    """Find every key that is unknown, missing or wrong, then what does not fit together."""
+    faults = [*_key_faults(document)]
+    yield from faults or _cross_faults(document, folder_name)
+
+
+def _key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
+    yield from check_record(document, "", _TOP)
+    for group in ("inputs", "outputs"):
+        for number, record in enumerate(_rows(document.get(group))):
+            yield from check_record(record, f"{group}[{number}]", _TENSOR)
+    files = _table(document.get("files"))
+    for name in files:
+        if name not in tuple(Variant):
+            expected = f"one of {', '.join(Variant)}"
+            yield Fault(key=f"files.{name}", got="an unknown key", expected=expected)
+        yield from check_record(_table(files[name]), f"files.{name}", _FILE)
+    if isinstance(document.get("detection"), dict):
+        detection = document["detection"]
+        yield from check_record(detection, "detection", _DETECTION)
+        if isinstance(detection.get("image"), dict):
+            yield from check_record(detection["image"], "detection.image", _IMAGE)
+
+
+def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fault]:
+    if document["name"] != folder_name:
+        expected = f"{folder_name!r}, as its folder"
+        yield Fault(key="name", got=repr(document["name"]), expected=expected)
+    for group in ("inputs", "outputs", "files"):
+        if not document[group]:
+            yield Fault(key=group, got="none", expected="one at least")
+    if document["role"] == DETECTOR and "detection" not in document:
+        yield Fault(key="detection", got="nothing", expected="a table, as the role is detector")
+    if "detection" in document and document["inputs"]:
+        yield from _image_faults(document)
+
+
+def _image_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
+    """Compare the image with the input it is for."""
+    image, shape = document["detection"]["image"], document["inputs"][0]["shape"]
+    width, height = image["width_px"], image["height_px"]
+    wanted = [1, 3, height, width] if image["layout"] == Layout.NCHW else [1, height, width, 3]
+    fits = len(shape) == 4 and all(
+        isinstance(got, str) or got == want for got, want in zip(shape, wanted, strict=True)
+    )
+    if len(document["inputs"]) != 1 or not fits:
+        got = [record["shape"] for record in document["inputs"]]
+        yield Fault(key="inputs", got=f"shapes {got}", expected=f"one of shape {wanted}")
+
+
+def _rows(value: object) -> list[Mapping[str, Any]]:
+    return [row for row in value if isinstance(row, dict)] if isinstance(value, list) else []
+
+
+def _table(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}

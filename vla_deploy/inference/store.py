@@ -1,0 +1,107 @@
+"""Find models: those that come with the software, and those that a person has added."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from vla_deploy.inference.errors import ModelUnknown
+from vla_deploy.inference.manifest import Manifest
+from vla_deploy.inference.manifest_file import MANIFEST, read_manifest
+from vla_deploy.inference.manifest_schema import is_name
+
+EMBEDDED: Final = Path(__file__).resolve().parent.parent / "models"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Model:
+    """Hold a model's manifest and the folder that its files lie in."""
+
+    manifest: Manifest
+    folder: Path
+    is_embedded: bool
+
+
+class ModelStore:
+    """Look models up by name in both places; no name is in both."""
+
+    def __init__(self, user: Path, embedded: Path = EMBEDDED) -> None:
+        self.user = user
+        self.embedded = embedded
+
+    def names(self) -> tuple[str, ...]:
+        """Return the name of every model, sorted; a spoiled manifest has one too."""
+        return tuple(sorted({*_names(self.embedded), *_names(self.user)}))
+
+    def load(self, name: str) -> Model:
+        """Return a model by its name.
+
+        Raises:
+            ModelUnknown: there is none of that name.
+            ManifestInvalid: its manifest has faults.
+        """
+        for folder, is_embedded in ((self.embedded / name, True), (self.user / name, False)):
+            if is_name(name) and (folder / MANIFEST).is_file():
+                manifest = read_manifest(folder)
+                return Model(manifest=manifest, folder=folder, is_embedded=is_embedded)
+        known = ", ".join(self.names()) or "none"
+        raise ModelUnknown(
+            f"no model {name!r}: expected one of {known}, from {self.embedded} or {self.user}; "
+            "add one by: vla-deploy models add"
+        )
+
+    def draft(self, name: str) -> Path:
+        """Return an empty folder to prepare a model in; `install` brings it to its place.
+
+        Raises:
+            ModelUnknown: the name cannot be used, or comes with the software.
+            OSError: the folder cannot be made.
+        """
+        if not is_name(name):
+            raise ModelUnknown(
+                f"a model cannot be called {name!r}: expected small letters, digits, '_', '-', '.'"
+            )
+        if name in _names(self.embedded):
+            raise ModelUnknown(f"{name!r} comes with the software; choose another name")
+        folder = self.user / f".{name}-{os.getpid()}" / name
+        shutil.rmtree(folder.parent, ignore_errors=True)
+        folder.mkdir(parents=True)
+        return folder
+
+    def install(self, draft: Path) -> Path:
+        """Put a prepared folder into its place; what was there before is replaced.
+
+        Raises:
+            OSError: the folder cannot be moved.
+        """
+        place = self.user / draft.name
+        if place.exists():
+            place.rename(draft.parent / "replaced")
+        draft.rename(place)
+        self.abandon(draft)
+        return place
+
+    def abandon(self, draft: Path) -> None:
+        """Remove what was prepared and not installed."""
+        shutil.rmtree(draft.parent, ignore_errors=True)
+
+    def remove(self, name: str) -> None:
+        """Delete a model that a person has added.
+
+        Raises:
+            ModelUnknown: there is none of that name, or it comes with the software.
+            OSError: it cannot be deleted.
+        """
+        if name not in _names(self.user):
+            own = ", ".join(sorted(_names(self.user))) or "none"
+            raise ModelUnknown(f"no model {name!r} was added; {self.user} holds: {own}")
+        shutil.rmtree(self.user / name)
+
+
+def _names(folder: Path) -> Iterator[str]:
+    if folder.is_dir():
+        for path in folder.iterdir():
+            if is_name(path.name) and (path / MANIFEST).is_file():
+                yield path.name

@@ -1,0 +1,110 @@
+"""Read the outputs of YOLO exports: as the network gives them, or thinned out in the graph.
+
+Coordinates are pixels of the input. Scores are those after the sigmoid, which exports of v8 to v12
+have in the graph.
+"""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.inference.manifest import Detection, Dimension, Tensor
+from vla_deploy.perception.detectors.boxes import Boxes, sound, without_doubles
+
+Outputs = tuple[NDArray[Any], ...]
+_COORDINATES: Final = 4
+_END_TO_END: Final = 6  # left, top, right, bottom, score, class
+
+
+def raw_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
+    """Find why this is no output (1, 4 + classes, boxes), or that transposed."""
+    channels = _COORDINATES + len(detection.classes)
+    shapes = [tensor.shape for tensor in outputs]
+    if (
+        len(shapes) != 1
+        or len(shapes[0]) != 3
+        or not any(_is(one, channels) for one in shapes[0][1:])
+    ):
+        yield (
+            f"expected one output [1, {channels}, boxes]: 4 coordinates and "
+            f"{len(detection.classes)} classes, got {_shown(shapes)}; is the list of classes right?"
+        )
+
+
+def read_raw(outputs: Outputs, detection: Detection) -> Boxes:
+    """Return the boxes of (1, 4 + classes, n) or (1, n, 4 + classes); doubles are removed here."""
+    table = np.asarray(outputs[0][0], dtype=np.float32)
+    if table.shape[0] != _COORDINATES + len(detection.classes):
+        table = table.T
+    by_class = table[_COORDINATES:]
+    classes = by_class.argmax(axis=0)
+    scores = by_class[classes, np.arange(by_class.shape[1])]
+    promising = scores >= detection.score_threshold
+    centre, half = table[:2, promising].T, 0.5 * table[2:_COORDINATES, promising].T
+    boxes = Boxes(
+        corners_px=np.hstack([centre - half, centre + half]),
+        scores=scores[promising],
+        classes=classes[promising],
+    )
+    return without_doubles(sound(boxes, detection.score_threshold), detection.iou_threshold)
+
+
+def end_to_end_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
+    """Find why this is no output (1, boxes, 6)."""
+    shapes = [tensor.shape for tensor in outputs]
+    if len(shapes) != 1 or len(shapes[0]) != 3 or not _is(shapes[0][2], _END_TO_END):
+        yield (
+            f"expected one output [1, boxes, {_END_TO_END}]: corners, score, class; "
+            f"got {_shown(shapes)}"
+        )
+
+
+def read_end_to_end(outputs: Outputs, detection: Detection) -> Boxes:
+    """Return the boxes of (1, n, 6), which have no doubles: v10, and exports with NMS in them."""
+    table = np.asarray(outputs[0][0], dtype=np.float32)
+    boxes = Boxes(corners_px=table[:, :4], scores=table[:, 4], classes=_class_numbers(table[:, 5]))
+    return sound(boxes, detection.score_threshold)
+
+
+def counted_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
+    """Find why these are not the outputs count, boxes (1, n, 4), scores (1, n), classes (1, n)."""
+    shapes = [tensor.shape for tensor in outputs]
+    fits = (
+        [len(shape) for shape in shapes[1:]] == [3, 2, 2]
+        and len(shapes[0]) in (1, 2)
+        and _is(shapes[1][2], _COORDINATES)
+    )
+    if not fits:
+        yield (
+            "expected four outputs in this order: count [1, 1], boxes [1, n, 4], scores [1, n], "
+            f"classes [1, n]; got {_shown(shapes)}"
+        )
+
+
+def read_counted(outputs: Outputs, detection: Detection) -> Boxes:
+    """Return the boxes of four outputs; what lies behind the count is left over from before."""
+    number, corners, scores, classes = outputs
+    count = int(number.reshape(-1)[0])
+    boxes = Boxes(
+        corners_px=np.asarray(corners[0, :count], dtype=np.float32),
+        scores=np.asarray(scores[0, :count], dtype=np.float32),
+        classes=_class_numbers(classes[0, :count]),
+    )
+    return sound(boxes, detection.score_threshold)
+
+
+def _class_numbers(values: NDArray[Any]) -> NDArray[np.intp]:
+    """Return numbers that may have come as floats; what is no number becomes -1."""
+    finite = np.isfinite(values)
+    return np.where(finite, np.rint(np.where(finite, values, 0)), -1).astype(np.intp)
+
+
+def _is(dimension: Dimension, size: int) -> bool:
+    """Tell whether a dimension may have a size: one that is free may."""
+    return isinstance(dimension, str) or dimension == size
+
+
+def _shown(shapes: list[tuple[Dimension, ...]]) -> str:
+    return " and ".join(str(list(shape)) for shape in shapes) or "none"
