@@ -182,7 +182,7 @@ class KillCampaign:
     def _is_back(self, rule: Rule, process: str, pid: int) -> bool:
         if rule.ends:
             return self._robot.has_ended()
-        return self._robot.is_ready() and self._robot.pid_of(process) != pid
+        return self._robot.is_ready() and self._robot.pid_of(process) not in (0, pid)
 
 
 def _late(rule: Rule, rest_s: float, ready_s: float, mover: str) -> list[str]:
