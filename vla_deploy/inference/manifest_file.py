@@ -49,7 +49,7 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    text = "\n".join(_lines("", _document(manifest))).lstrip("\n")
+    text = "\n".join(_lines("", document_of(manifest))).lstrip("\n")
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
 
 
@@ -91,7 +91,7 @@ def _detection(table: Document) -> Detection:
     )
 
 
-def _document(manifest: Manifest) -> dict[str, Any]:
+def document_of(manifest: Manifest) -> dict[str, Any]:
     """Return the manifest as tables; what is empty or absent is left out."""
     return {key: value for key, value in asdict(manifest).items() if value not in ("", None)}
 

@@ -13,8 +13,8 @@ from typing import Any, Final
 from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelFileSpoiled, ModelMismatch, ProviderUnavailable
 from vla_deploy.inference.file_check import checked_file
-from vla_deploy.inference.graph_check import graph_faults
-from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.graph_check import class_names, graph_faults, tensors_of
+from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.providers import (
     CPU,
     TENSORRT,
@@ -39,6 +39,17 @@ _ENTRIES: Final[Mapping[str, str]] = {
 }
 
 
+# To look at a model by itself, as no profile is needed for.
+PLAIN_CHOICE: Final = ModelChoice(
+    tiers=(),
+    providers=(CPU,),
+    precision="fp32",
+    threads=1,
+    cpu_fallback=False,
+    memory_arena=True,
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Opened:
     """Hold a session of onnxruntime, what runs it, and where that is not what was asked."""
@@ -47,6 +58,15 @@ class Opened:
     variant: Variant
     provider: str
     notices: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Graph:
+    """Hold what an ONNX file itself tells: inputs, outputs, and classes where it names them."""
+
+    inputs: tuple[Tensor, ...]
+    outputs: tuple[Tensor, ...]
+    classes: tuple[str, ...]
 
 
 class _Refused(Exception):
@@ -81,6 +101,20 @@ def open_with_choice(
             notices=(*refusals, *opened.notices),
         )
     raise ProviderUnavailable(_no_provider(model, choice, refusals))
+
+
+def read_graph(path: Path) -> Graph:
+    """Return what a file tells of its graph.
+
+    Raises:
+        ModelFileSpoiled: it is no ONNX graph that a CPU can run.
+    """
+    session = _create(path, CPU, [(CPU, {})], session_options(PLAIN_CHOICE))
+    return Graph(
+        inputs=tensors_of(session.get_inputs()),
+        outputs=tensors_of(session.get_outputs()),
+        classes=class_names(session),
+    )
 
 
 def _open(

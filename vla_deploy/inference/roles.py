@@ -1,5 +1,6 @@
 """Find which model plays a role under a profile, and what it would run on."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.state_dir import engines_dir_of, models_dir_of
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +49,10 @@ class ModelShelf:
                 f"profile {profile.name}, models.{role}.tiers: {name} is a "
                 f"{model.manifest.role}; see: vla-deploy models list"
             )
-        return open_session(model, choice, engines=self.engines, clock=self.clock)
+        session = open_session(model, choice, engines=self.engines, clock=self.clock)
+        for notice in session.notices:
+            _log.warning("degraded: %s", notice)
+        return session
 
 
 def choice_for(role: str, profile: Profile) -> ModelChoice:

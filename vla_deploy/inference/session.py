@@ -80,6 +80,7 @@ class ModelSession:
             provider=self.provider,
             threads=self._threads,
             runs=latency.count,
+            busy_s=latency.total_ns / NS_PER_S,
             failures=self._failures,
             p50_s=latency.percentile_ns(0.5) / NS_PER_S,
             p95_s=latency.percentile_ns(0.95) / NS_PER_S,

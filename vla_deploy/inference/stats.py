@@ -16,7 +16,8 @@ class SessionStats:
     """Hold what one session is and what it has cost so far.
 
     `memory_mb` is by how much the process grew while the session was opened and warmed up; other
-    threads of the process may have a share in it. `notices` tell where it is not as was asked.
+    threads of the process may have a share in it. `busy_s` is the time of all runs. `notices`
+    tell where it is not as was asked.
     """
 
     model: str
@@ -25,6 +26,7 @@ class SessionStats:
     provider: str
     threads: int
     runs: int
+    busy_s: float
     failures: int
     p50_s: float
     p95_s: float

@@ -102,6 +102,14 @@ def test_a_model_of_another_role_is_told(shelf, profile, tmp_path):
         open_detector(shelf, profile, 1)
 
 
+def test_a_model_that_does_not_run_as_asked_is_told_to_the_log(shelf, profile, caplog):
+    choice = dataclasses.replace(
+        profile.models["detector"], providers=("CUDAExecutionProvider",), cpu_fallback=True
+    )
+    open_detector(shelf, dataclasses.replace(profile, models={"detector": choice}), 0).close()
+    assert "degraded: CUDAExecutionProvider: this onnxruntime" in caplog.text
+
+
 def test_the_model_changes_between_two_steps_and_no_step_is_missed(tmp_path, shelf, profile, rgb):
     clock = MonotonicClock()
     looker = Looker(shelf, profile, rgb)

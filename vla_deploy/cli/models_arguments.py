@@ -1,0 +1,169 @@
+"""Declare the arguments of `vla-deploy models`."""
+
+import argparse
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from vla_deploy.cli.example import add_command
+from vla_deploy.inference.manifest import Fit
+from vla_deploy.inference.manifest_schema import COLOURS
+from vla_deploy.perception.detectors.adapters import ADAPTERS
+
+EXAMPLES: Final = """  vla-deploy models list
+  vla-deploy models add mugs --onnx best.onnx --classes classes.txt
+  vla-deploy models quantise mugs --images photos --labelled validation
+  vla-deploy models bench mugs
+  vla-deploy models verify
+"""
+_SIZE: Final = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4})")
+_PIXEL: Final = 1 / 255
+Run = Callable[[argparse.Namespace], int]
+
+
+def register_acts(commands: Any, runs: Mapping[str, Run]) -> None:
+    """Add the command; `runs` says which function does each act."""
+    models = add_command(
+        commands, "models", "add, list, measure, quantise and verify models", EXAMPLES
+    )
+    acts = models.add_subparsers(dest="act", required=True, metavar="ACT")
+    add_command(acts, "list", "list the models, and who uses them", "  vla-deploy models list\n")
+    show = add_command(
+        acts, "show", "show what a model is", "  vla-deploy models show detector_small\n"
+    )
+    remove = add_command(
+        acts, "remove", "delete a model that was added", "  vla-deploy models remove mugs\n"
+    )
+    for act in (show, remove):
+        act.add_argument("name", help="of the model")
+    _add(acts)
+    _bench(acts)
+    _quantise(acts)
+    _verify(acts)
+    for name, act in acts.choices.items():
+        act.add_argument("--json", action="store_true", help="print JSON")
+        act.set_defaults(run=runs[name])
+
+
+def _add(acts: Any) -> None:
+    add = add_command(
+        acts,
+        "add",
+        "add a detector of your own, after a check and a trial run",
+        "  vla-deploy models add mugs --onnx best.onnx --classes classes.txt\n"
+        "  vla-deploy models add mugs --onnx best.onnx --adapter yolo_end_to_end --licence MIT\n",
+    )
+    add.add_argument("name", help="to call it by; profiles name it as a tier")
+    add.add_argument("--onnx", type=Path, required=True, metavar="FILE", help="the model, in fp32")
+    add.add_argument(
+        "--classes",
+        type=Path,
+        metavar="FILE",
+        help="a name in each line, in the order of the numbers (default: as the export names them)",
+    )
+    listed = "; ".join(f"{name}: {one.summary}" for name, one in ADAPTERS.items())
+    add.add_argument(
+        "--adapter",
+        choices=[*ADAPTERS],
+        help=f"how its outputs are read (default: as they fit): {listed}",
+    )
+    add.add_argument("--size", type=_size, metavar="WxH", help="of the input, where it is free")
+    add.add_argument("--score", type=float, default=0.25, help="least score (default: 0.25)")
+    add.add_argument("--iou", type=float, default=0.45, help="overlap of doubles (default: 0.45)")
+    _add_image_arguments(add)
+    add.add_argument("--summary", default="a detector that was added", help="what it is")
+    add.add_argument("--licence", default="not stated", help="the licence of its weights")
+    add.add_argument("--card", type=Path, metavar="FILE", help="a model card to keep with it")
+    add.add_argument("--replace", action="store_true", help="replace one of that name")
+
+
+def _add_image_arguments(add: argparse.ArgumentParser) -> None:
+    add.add_argument("--colour", choices=COLOURS, default="rgb", help="order (default: rgb)")
+    add.add_argument(
+        "--fit", choices=[*Fit], default=Fit.LETTERBOX, help="to its size (default: letterbox)"
+    )
+    add.add_argument("--fill", type=int, default=114, help="grey of the padding (default: 114)")
+    add.add_argument(
+        "--scale", type=float, default=_PIXEL, help="factor for pixels (default: 1/255)"
+    )
+    add.add_argument(
+        "--mean", type=float, nargs=3, default=[0.0, 0.0, 0.0], help="subtracted after the factor"
+    )
+    add.add_argument("--std", type=float, nargs=3, default=[1.0, 1.0, 1.0], help="divided by last")
+
+
+def _bench(acts: Any) -> None:
+    bench = add_command(
+        acts,
+        "bench",
+        "measure fp32 beside int8, a run of each in turn",
+        "  vla-deploy models bench detector_small\n"
+        "  vla-deploy models bench mugs --images photos --profile jetson_orin_nx --json\n",
+    )
+    bench.add_argument("name", help="of the model")
+    bench.add_argument("--images", type=Path, metavar="DIR", help="to run on (default: noise)")
+    bench.add_argument("--rounds", type=_count, default=60, help="frames of each (default: 60)")
+    _profile(bench)
+    bench.add_argument("--threads", type=_count, help="(default: as the profile says)")
+
+
+def _quantise(acts: Any) -> None:
+    quantise = add_command(
+        acts,
+        "quantise",
+        "make the int8 files with your images, and keep them if it still sees as well",
+        "  vla-deploy models quantise mugs --images photos --labelled validation\n"
+        "  vla-deploy models quantise mugs --images photos --labelled coco.json --max-drop 0.5\n",
+    )
+    quantise.add_argument("name", help="of the model")
+    quantise.add_argument(
+        "--images",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="to calibrate with, as the robot sees them; a hundred do",
+    )
+    quantise.add_argument(
+        "--labelled",
+        type=Path,
+        required=True,
+        metavar="PATH",
+        help="to measure with: a folder with YOLO text files, or a COCO file",
+    )
+    quantise.add_argument(
+        "--max-drop", type=float, default=1.0, metavar="POINTS", help="of mAP50 (default: 1.0)"
+    )
+    quantise.add_argument("--as", dest="new_name", help="install it under another name")
+    quantise.add_argument(
+        "--limit", type=_count, default=200, help="images to calibrate with (default: 200)"
+    )
+
+
+def _verify(acts: Any) -> None:
+    verify = add_command(
+        acts,
+        "verify",
+        "check files, graphs and a trial run, and what a profile makes of a model",
+        "  vla-deploy models verify\n"
+        "  vla-deploy models verify mugs --profile jetson_orin_nx     builds TensorRT's engine\n",
+    )
+    verify.add_argument("names", nargs="*", help="of models (default: all)")
+    _profile(verify)
+
+
+def _profile(act: argparse.ArgumentParser) -> None:
+    act.add_argument("--profile", help="name or path (default: the one of the next start)")
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = _SIZE.fullmatch(text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, such as 640x480, got {text!r}")
+    return int(match[1]), int(match[2])
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}")
+    return int(text)

@@ -1,0 +1,89 @@
+"""Measure a detector on labelled images: average precision at an overlap of one half."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.inference.errors import ImagesInvalid
+from vla_deploy.perception.detectors.boxes import Boxes, iou
+from vla_deploy.perception.model_tools.labelled import Labels
+
+HIT_IOU: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Accuracy:
+    """Hold average precision at IoU 0.5, 0..1: for each class that occurs, and their mean."""
+
+    map50: float
+    by_class: Mapping[str, float]
+    images: int
+    things: int
+
+
+class AccuracyCount:
+    """Collect what was found and what was there, image by image."""
+
+    def __init__(self, classes: tuple[str, ...]) -> None:
+        self._classes = classes
+        self._scores: list[list[float]] = [[] for _ in classes]
+        self._hits: list[list[bool]] = [[] for _ in classes]
+        self._present = [0] * len(classes)
+        self._images = 0
+
+    def add(self, found: Boxes, labels: Labels) -> None:
+        """Count one image: the surest box of a class takes the thing that it overlaps most."""
+        self._images += 1
+        for number in range(len(self._classes)):
+            boxes = found.where(found.classes == number)
+            truth = labels.corners_px[labels.classes == number]
+            self._present[number] += len(truth)
+            self._scores[number].extend(boxes.scores.tolist())
+            self._hits[number].extend(_hits(boxes, truth))
+
+    def result(self) -> Accuracy:
+        """Return the accuracy over all images.
+
+        Raises:
+            ImagesInvalid: nothing was labelled.
+        """
+        by_class = {
+            name: average_precision(self._scores[number], self._hits[number], self._present[number])
+            for number, name in enumerate(self._classes)
+            if self._present[number]
+        }
+        if not by_class:
+            raise ImagesInvalid(f"nothing is labelled in {self._images} images: no accuracy")
+        return Accuracy(
+            map50=float(np.mean(list(by_class.values()))),
+            by_class=by_class,
+            images=self._images,
+            things=sum(self._present),
+        )
+
+
+def average_precision(scores: Iterable[float], hits: Iterable[bool], present: int) -> float:
+    """Return the area under precision over recall, where precision never rises with recall."""
+    order = np.argsort(-np.array(list(scores)), kind="stable")
+    right = np.array(list(hits), dtype=bool)[order]
+    true = np.cumsum(right)
+    precision: NDArray[np.float64] = true / np.arange(1, len(true) + 1)
+    best_from_here = np.maximum.accumulate(precision[::-1])[::-1]
+    return float(best_from_here[right].sum() / present)
+
+
+def _hits(boxes: Boxes, truth: NDArray[np.float32]) -> list[bool]:
+    """Tell for each box, the surest first, whether it is the first on a thing."""
+    free = np.ones(len(truth), dtype=bool)
+    hits = []
+    for box in boxes.corners_px:
+        overlaps = np.where(free, iou(box, truth), 0.0)
+        best = int(overlaps.argmax()) if len(truth) else -1
+        hit = best >= 0 and bool(overlaps[best] >= HIT_IOU)
+        if hit:
+            free[best] = False
+        hits.append(hit)
+    return hits

@@ -1,0 +1,211 @@
+"""Add a person's detector: describe it, try it out, and only then keep it."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from drivers.clock import Clock
+from vla_deploy.inference.errors import ImagesInvalid, ModelMismatch, ModelUnknown
+from vla_deploy.inference.file_check import sha256_of
+from vla_deploy.inference.manifest import (
+    Detection,
+    Fit,
+    ImageInput,
+    Layout,
+    Manifest,
+    ModelFile,
+    Tensor,
+    Variant,
+)
+from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.opening import PLAIN_CHOICE, Graph, read_graph
+from vla_deploy.inference.session import open_session
+from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.perception.detectors.adapters import ADAPTERS
+from vla_deploy.perception.detectors.detector import ROLE, Detector
+from vla_deploy.perception.model_tools.trial import Trial, try_out
+
+_CARD: Final = "card.md"
+_CHANNELS: Final = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """Hold what a person tells of a model; what is None is taken from the file itself.
+
+    `size_px` is width and height, for a graph whose input has none.
+    """
+
+    name: str
+    onnx: Path
+    classes: Path | None
+    adapter: str | None
+    size_px: tuple[int, int] | None
+    summary: str
+    licence: str
+    card: Path | None
+    colour: str
+    fit: Fit
+    fill: int
+    scale: float
+    mean: tuple[float, float, float]
+    std: tuple[float, float, float]
+    score_threshold: float
+    iou_threshold: float
+
+
+def add_model(
+    store: ModelStore, request: Request, *, engines: Path, clock: Clock, replace: bool = False
+) -> tuple[Model, Trial]:
+    """Check a model, try it out and keep it; when anything is wrong, nothing has changed.
+
+    Raises:
+        ModelUnknown: the name cannot be used, or is taken and `replace` is not set.
+        ModelFileSpoiled: the file is no ONNX graph that runs.
+        ModelMismatch: input, outputs, classes and adapter do not fit together.
+        ImagesInvalid: the file of classes cannot be used.
+        RunFailed: it fails on an empty image, or tells what cannot be.
+        OSError: the model cannot be stored.
+    """
+    if request.name in store.names() and not replace:
+        raise ModelUnknown(f"there is a model {request.name!r} already; give --replace, or a name")
+    manifest = describe(request, read_graph(request.onnx))
+    draft = store.draft(request.name)
+    try:
+        _fill(draft, request, manifest)
+        model = Model(manifest=manifest, folder=draft, is_embedded=False)
+        trial = try_model(model, engines=engines, clock=clock)
+        folder = store.install(draft)
+    finally:
+        store.abandon(draft)
+    return Model(manifest=manifest, folder=folder, is_embedded=False), trial
+
+
+def try_model(model: Model, *, engines: Path, clock: Clock) -> Trial:
+    """Run a detector on the CPU, on images with nothing in them.
+
+    Raises:
+        InferenceError: it does not run; each kind says why.
+    """
+    detector = Detector(open_session(model, PLAIN_CHOICE, engines=engines, clock=clock))
+    try:
+        return try_out(detector)
+    finally:
+        detector.close()
+
+
+def describe(request: Request, graph: Graph) -> Manifest:
+    """Return the manifest for a request and the graph that it is about.
+
+    Raises:
+        ModelMismatch: they do not fit together.
+        ImagesInvalid: the file of classes cannot be used.
+    """
+    tensor, image = _image_input(request, graph)
+    classes = _classes(request, graph)
+    detection = Detection(
+        adapter=request.adapter or "",
+        classes=classes,
+        score_threshold=request.score_threshold,
+        iou_threshold=request.iou_threshold,
+        image=image,
+    )
+    return Manifest(
+        name=request.name,
+        role=ROLE,
+        summary=request.summary,
+        licence=request.licence,
+        card=_CARD if request.card else "",
+        inputs=(tensor,),
+        outputs=graph.outputs,
+        files={Variant.FP32: ModelFile(path=_file_name(request), sha256=sha256_of(request.onnx))},
+        detection=_with_adapter(request, graph, detection),
+    )
+
+
+def _with_adapter(request: Request, graph: Graph, detection: Detection) -> Detection:
+    """Return the detection with an adapter: the one that was named, or the only one that fits."""
+    fitting = [
+        name
+        for name, adapter in ADAPTERS.items()
+        if request.adapter in (None, name) and not any(adapter.faults(graph.outputs, detection))
+    ]
+    if len(fitting) == 1:
+        return Detection(
+            adapter=fitting[0],
+            classes=detection.classes,
+            score_threshold=detection.score_threshold,
+            iou_threshold=detection.iou_threshold,
+            image=detection.image,
+        )
+    if fitting:
+        fault = f"outputs fit {' and '.join(fitting)}; say which by --adapter"
+        raise ModelMismatch(str(request.onnx), (fault,))
+    wanted = [request.adapter] if request.adapter else [*ADAPTERS]
+    faults = tuple(
+        f"adapter {name}: {fault}"
+        for name in wanted
+        for fault in ADAPTERS[name].faults(graph.outputs, detection)
+    )
+    raise ModelMismatch(str(request.onnx), faults)
+
+
+def _image_input(request: Request, graph: Graph) -> tuple[Tensor, ImageInput]:
+    """Return the input as declared, its free dimensions settled, and how an image becomes it."""
+    if len(graph.inputs) != 1 or len(graph.inputs[0].shape) != 4:
+        shapes = [list(tensor.shape) for tensor in graph.inputs]
+        fault = f"expected one image as input, [1, 3, height, width], got {shapes}"
+        raise ModelMismatch(str(request.onnx), (fault,))
+    (tensor,) = graph.inputs
+    layout = Layout.NHWC if tensor.shape[3] == _CHANNELS else Layout.NCHW
+    height, width = tensor.shape[1:3] if layout == Layout.NHWC else tensor.shape[2:4]
+    if isinstance(width, str) or isinstance(height, str):
+        if request.size_px is None:
+            fault = f"its input {list(tensor.shape)} has no size; give one by --size WIDTHxHEIGHT"
+            raise ModelMismatch(str(request.onnx), (fault,))
+        width, height = request.size_px
+    shape = (1, 3, height, width) if layout == Layout.NCHW else (1, height, width, 3)
+    image = ImageInput(
+        width_px=width,
+        height_px=height,
+        layout=layout,
+        colour=request.colour,
+        fit=request.fit,
+        fill=request.fill,
+        scale=request.scale,
+        mean=request.mean,
+        std=request.std,
+    )
+    return Tensor(name=tensor.name, shape=shape, dtype=tensor.dtype), image
+
+
+def _classes(request: Request, graph: Graph) -> tuple[str, ...]:
+    """Return the classes by the file that was given, else those that the export names."""
+    if request.classes is None:
+        if graph.classes:
+            return graph.classes
+        raise ModelMismatch(
+            str(request.onnx), ("it names no classes; give them by --classes FILE",)
+        )
+    try:
+        lines = request.classes.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ImagesInvalid(f"{request.classes}: expected a name in each line: {error}") from error
+    names = tuple(line.strip() for line in lines if line.strip())
+    if not names or len(set(names)) != len(names):
+        raise ImagesInvalid(
+            f"{request.classes}: expected a name in each line, none twice; got {names}"
+        )
+    return names
+
+
+def _fill(draft: Path, request: Request, manifest: Manifest) -> None:
+    shutil.copyfile(request.onnx, draft / _file_name(request))
+    if request.card is not None:
+        shutil.copyfile(request.card, draft / _CARD)
+    write_manifest(draft, manifest)
+
+
+def _file_name(request: Request) -> str:
+    return f"{request.name}.onnx"
