@@ -10,7 +10,10 @@ from sim_twin.campaigns.troubles import Trouble
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """Hold what one trouble led to; NaN is what never came."""
+    """Hold what one trouble led to; NaN is what never came.
+
+    `states` are those in which control was, each with what control said the first time.
+    """
 
     taken: tuple[str, ...]
     undone: tuple[str, ...]
@@ -18,7 +21,7 @@ class Seen:
     before: Ticks
     during: Ticks
     after: Ticks
-    states: frozenset[str]
+    states: Mapping[str, str]
     replaced: frozenset[str]
     crashed: tuple[str, ...]
     hazards: tuple[str, ...]
@@ -42,8 +45,8 @@ def judge(trouble: Trouble, seen: Seen) -> Iterator[str]:
         limit = late_limit(seen.before)
         if ticks.late_ratio > limit:
             yield f"{ticks.late_ratio:.2%} of the ticks late {what}, limit {limit:.2%}"
-    if strange := seen.states - set(trouble.states):
-        yield f"control was {', '.join(sorted(strange))}"
+    for state in sorted(set(seen.states) - set(trouble.states)):
+        yield f"control was {state} ({seen.states[state]})"
     if ended := seen.replaced - set(trouble.replaced):
         yield f"{', '.join(sorted(ended))} ended"
     if crashed := sorted(set(seen.crashed) - set(trouble.replaced)):

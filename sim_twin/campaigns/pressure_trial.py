@@ -20,7 +20,7 @@ _JOBS: Final = (
     "pick up the red cup and put it in the box",
     "look right",
     "go to the kitchen",
-    "go home",
+    "go to the charging station",
 )
 _PROOF: Final = "look left"
 
@@ -34,7 +34,7 @@ class Trial:
         self._clock = clock
         self._jobs = 0
         self._next_job_ns = 0
-        self._states: set[str] = set()
+        self._states: dict[str, str] = {}
         self._over: set[str] = set()
         self._history_before = 0
 
@@ -64,7 +64,7 @@ class Trial:
             before=before,
             during=during,
             after=robot.ticks().since(pressed),
-            states=frozenset(self._states),
+            states=self._states,
             replaced=frozenset(name for name in pids if later.get(name) != pids[name]),
             crashed=tuple(scene.crashes()),
             hazards=robot.hazards(),
@@ -134,7 +134,7 @@ class Trial:
     def _look(self, until: Callable[[], bool], limit_s: float) -> bool:
         def look() -> bool:
             self._scene.talk.listen()
-            self._states.add(self._scene.robot.state())
+            self._states.setdefault(*self._scene.robot.state_and_why())
             rows = self._scene.budget().get("rows", ())
             self._over |= {row["metric"] for row in rows if row["over"]}
             return until()

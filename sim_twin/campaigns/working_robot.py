@@ -82,7 +82,12 @@ class WorkingRobot:
 
     def state(self) -> str:
         """Return control's state, "silent" where it tells none."""
-        return str(self.document("control_status", _FRESH_STATUS_S).get("state", "silent"))
+        return self.state_and_why()[0]
+
+    def state_and_why(self) -> tuple[str, str]:
+        """Return control's state, "silent" where it tells none, and what it says of it."""
+        status = self.document("control_status", _FRESH_STATUS_S)
+        return str(status.get("state", "silent")), str(status.get("detail", ""))
 
     def ticks(self) -> Ticks:
         """Return what control has counted since it started."""
