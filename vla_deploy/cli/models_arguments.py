@@ -29,9 +29,7 @@ def register_acts(commands: Any, runs: Mapping[str, Run]) -> None:
     )
     acts = models.add_subparsers(dest="act", required=True, metavar="ACT")
     add_command(acts, "list", "list the models, and who uses them", "  vla-deploy models list\n")
-    show = add_command(
-        acts, "show", "show what a model is", "  vla-deploy models show detector_small\n"
-    )
+    show = add_command(acts, "show", "show what a model is", "  vla-deploy models show detector\n")
     remove = add_command(
         acts, "remove", "delete a model that was added", "  vla-deploy models remove mugs\n"
     )
@@ -98,7 +96,7 @@ def _bench(acts: Any) -> None:
         acts,
         "bench",
         "measure fp32 beside int8, a run of each in turn",
-        "  vla-deploy models bench detector_small\n"
+        "  vla-deploy models bench detector\n"
         "  vla-deploy models bench mugs --images photos --profile jetson_orin_nx --json\n",
     )
     bench.add_argument("name", help="of the model")

@@ -15,6 +15,7 @@ from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import Model
 from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.perception.detectors.image_input import Image
+from vla_deploy.perception.model_tools.memory import memory_mb
 
 _PRECISIONS: Final = ("fp32", "fp16", "int8")
 _INT8: Final = (Variant.INT8_U8S8, Variant.INT8_S8S8)
@@ -24,7 +25,7 @@ _INT8: Final = (Variant.INT8_U8S8, Variant.INT8_S8S8)
 class Row:
     """Hold the figures of one file: frames, from the image to its boxes, and the runs in them.
 
-    95 % of them take no longer than `_p95_s`.
+    95 % of them take no longer than `_p95_s`. `memory_mb` is what a fresh process grows by.
     """
 
     variant: Variant
@@ -59,8 +60,9 @@ class Bench:
 class _Timed:
     """Open one file and time its frames."""
 
-    def __init__(self, session: ModelSession) -> None:
+    def __init__(self, session: ModelSession, choice: ModelChoice) -> None:
         self.session = session
+        self.choice = choice
         self.detector = Detector(session)
         self.frames_s: list[float] = []
         self.runs_s: list[float] = []
@@ -71,7 +73,7 @@ class _Timed:
         self.frames_s.append((clock.now_ns() - started_ns) / NS_PER_S)
         self.runs_s.append(self.session.stats().busy_s - busy_s)
 
-    def row(self) -> Row:
+    def row(self, shelf: ModelShelf) -> Row:
         stats = self.session.stats()
         return Row(
             variant=stats.variant,
@@ -82,7 +84,7 @@ class _Timed:
             run_median_s=float(np.median(self.runs_s)),
             run_p95_s=float(np.percentile(self.runs_s, 95)),
             load_s=stats.load_s,
-            memory_mb=stats.memory_mb,
+            memory_mb=memory_mb(self.session, self.choice, shelf),
             notices=stats.notices,
         )
 
@@ -101,7 +103,7 @@ def bench(
             first = number % len(timed)
             for one in (*timed[first:], *timed[:first]):
                 one.frame(images[number % len(images)], shelf.clock)
-        rows = tuple(one.row() for one in timed)
+        rows = tuple(one.row(shelf) for one in timed)
     finally:
         for one in timed:
             one.detector.close()
@@ -119,7 +121,7 @@ def _open_all(shelf: ModelShelf, model: Model, choice: ModelChoice) -> Iterator[
             session.close()
             continue
         seen.add(session.variant)
-        yield _Timed(session)
+        yield _Timed(session, asked)
 
 
 def _speedup(rows: tuple[Row, ...]) -> float | None:
