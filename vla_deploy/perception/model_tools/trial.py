@@ -22,9 +22,9 @@ class Trial:
     boxes: Mapping[str, int]
 
     def __str__(self) -> str:
-        return "boxes in empty images: " + ", ".join(
-            f"{name} {count}" for name, count in self.boxes.items()
-        )
+        told = ", ".join(f"{name} {count}" for name, count in self.boxes.items())
+        doubt = "; it sees things where nothing is: is the input as it was trained?"
+        return f"boxes in empty images: {told}{doubt if any(self.boxes.values()) else ''}"
 
 
 def empty_images() -> dict[str, Image]:

@@ -77,6 +77,12 @@ def test_a_detector_is_added_as_it_describes_itself(add, shelf, blobs, tmp_path)
     assert [path.name for path in shelf.store.user.iterdir()] == ["mine"]
 
 
+def test_a_detector_that_sees_things_where_nothing_is_is_kept_and_said_so(add):
+    _, trial = add(mean=(0.0, 0.9, 0.9))
+    assert trial.boxes["white"] > 0
+    assert str(trial).endswith("it sees things where nothing is: is the input as it was trained?")
+
+
 def test_an_export_with_nms_in_the_graph_is_recognised(add, blobs):
     model, _ = add(blobs.end_to_end())
     assert model.manifest.detection is not None
