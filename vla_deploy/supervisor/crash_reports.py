@@ -104,11 +104,24 @@ class CrashReports:
     def _write(self, name: str, report: Mapping[str, Any]) -> None:
         try:
             path = self._folder.claim(f"{name}.json")
-            path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+            _write_whole(path, json.dumps(report, indent=2) + "\n")
         except OSError as error:
             _log.warning("no crash report of %s: %s", name, error)
         else:
             _log.info("%s: crash report: vla-deploy crashes show %s", name, path.stem)
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a file or, as on a full disk, leave none.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def signal_name(exit_code: int | None) -> str | None:

@@ -1,4 +1,5 @@
 import json
+import resource
 
 import pytest
 
@@ -111,3 +112,16 @@ def test_a_logged_traceback_goes_before_what_the_interpreter_wrote():
     assert traceback_of([], output) == output[1:]
     assert traceback_of([{"traceback": "a\nb"}], output) == ["a", "b"]
     assert traceback_of([], ["nothing", "of note"]) == []
+
+
+def test_a_report_that_does_not_fit_on_the_disk_leaves_no_broken_one(crashes, folder, caplog):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        end(crashes, State.READY, State.BACKOFF, exit_code=-9)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert folder.entries() == []
+    assert "no crash report of planner" in caplog.text
+    end(crashes, State.READY, State.BACKOFF, exit_code=-9)
+    assert len(folder.entries()) == 1
