@@ -23,7 +23,7 @@ from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import Model
 from vla_deploy.perception.model_tools.adding import Request, add_model
 from vla_deploy.perception.model_tools.benching import Bench, bench
-from vla_deploy.perception.model_tools.images import read_images
+from vla_deploy.perception.model_tools.images import read_image, spread_paths
 from vla_deploy.perception.model_tools.labelled import read_labelled
 from vla_deploy.perception.model_tools.quantising import Quantised, quantise
 from vla_deploy.perception.model_tools.trial import empty_images
@@ -109,7 +109,7 @@ def bench_model(arguments: argparse.Namespace) -> int:
     if arguments.threads:
         choice = dataclasses.replace(choice, threads=arguments.threads)
     images = (
-        list(read_images(arguments.images, _BENCH_IMAGES))
+        [read_image(path) for path in spread_paths(arguments.images, _BENCH_IMAGES)]
         if arguments.images
         else [empty_images()["noise"]]
     )
@@ -129,8 +129,8 @@ def quantise_model(arguments: argparse.Namespace) -> int:
             shelf.store,
             model,
             name=arguments.new_name or arguments.name,
-            calibration=list(read_images(arguments.images, arguments.limit)),
-            labelled=list(read_labelled(arguments.labelled, classes)),
+            calibration=spread_paths(arguments.images, arguments.limit),
+            labelled=read_labelled(arguments.labelled, classes),
             max_drop_points=arguments.max_drop,
             engines=shelf.engines,
             clock=shelf.clock,

@@ -1,11 +1,13 @@
 import dataclasses
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivers.clock import MonotonicClock
 from vla_deploy.inference.errors import ModelFileSpoiled, ModelMismatch, ProviderUnavailable
 from vla_deploy.inference.manifest import Tensor, Variant
-from vla_deploy.inference.opening import session_options
+from vla_deploy.inference.opening import read_graph, session_options
 from vla_deploy.inference.runtime import available_providers
 from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import ModelStore
@@ -155,3 +157,18 @@ def test_threads_and_memory_are_as_the_profile_says(cpu_choice, arena):
     options = session_options(cpu_choice(threads=3, memory_arena=arena))
     assert (options.intra_op_num_threads, options.inter_op_num_threads) == (3, 1)
     assert (options.enable_cpu_mem_arena, options.enable_mem_pattern) == (arena, arena)
+
+
+@given(st.data())
+def test_a_spoiled_graph_is_read_or_refused_and_never_ends_the_process(
+    tmp_path_factory, blobs, data
+):
+    whole = bytearray(blobs.raw().SerializeToString())
+    for _ in range(data.draw(st.integers(1, 8))):
+        whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path_factory.getbasetemp() / "spoiled.onnx"
+    path.write_bytes(whole[: data.draw(st.integers(0, len(whole)))])
+    try:
+        read_graph(path)
+    except ModelFileSpoiled as error:
+        assert str(path) in str(error)

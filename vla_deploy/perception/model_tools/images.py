@@ -1,6 +1,5 @@
 """Read the images of a folder, in the order of their names."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -38,13 +37,12 @@ def read_image(path: Path) -> Image:
     return rgb
 
 
-def read_images(folder: Path, most: int) -> Iterator[Image]:
-    """Yield at most so many images, spread over the folder.
+def spread_paths(folder: Path, most: int) -> list[Path]:
+    """Return at most so many images, spread over the folder.
 
     Raises:
-        ImagesInvalid: there is none, or one cannot be read.
+        ImagesInvalid: there is none.
     """
     paths = image_paths(folder)
     step = max(1.0, len(paths) / most)
-    for number in range(min(most, len(paths))):
-        yield read_image(paths[int(number * step)])
+    return [paths[int(number * step)] for number in range(min(most, len(paths)))]

@@ -6,7 +6,7 @@ share a tensor there, and one scale for both would leave nothing of the scores.
 """
 
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -29,22 +29,23 @@ _TOOL_ERRORS: tuple[type[Exception], ...] = (*SESSION_ERRORS, AssertionError, Ty
 Feed = dict[str, NDArray[Any]]
 
 
-def write_int8(source: Path, paths: Mapping[Variant, Path], inputs: Iterable[Feed]) -> None:
-    """Write the int8 files.
+def write_int8(
+    source: Path, paths: Mapping[Variant, Path], inputs: Callable[[], Iterator[Feed]]
+) -> None:
+    """Write the int8 files; `inputs` begins the calibration inputs, for each file anew.
 
     Raises:
         ToolMissing: the packages to do so are not installed.
         ModelFileSpoiled: the graph cannot be quantised.
     """
     onnx, tools = _tools()
-    feeds = list(inputs)
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
         try:
             _prepare(onnx, tools, source, prepared)
             heads = head_nodes(onnx.load(str(prepared)).graph)
             for variant, path in paths.items():
-                _quantise_file(tools, prepared, path, variant, _Reader(feeds), heads)
+                _quantise_file(tools, prepared, path, variant, _Reader(inputs()), heads)
         except _TOOL_ERRORS as error:
             told = " ".join(str(error).split())
             raise ModelFileSpoiled(f"{source}: it cannot be quantised: {told}") from error
@@ -119,8 +120,8 @@ def _tools() -> tuple[Any, Any]:
 class _Reader:
     """Give onnxruntime the calibration inputs one by one."""
 
-    def __init__(self, feeds: Iterable[Feed]) -> None:
-        self._left: Iterator[Feed] = iter(feeds)
+    def __init__(self, feeds: Iterator[Feed]) -> None:
+        self._left = feeds
 
     def get_next(self) -> Feed | None:
         return next(self._left, None)

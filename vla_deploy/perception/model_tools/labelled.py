@@ -39,26 +39,43 @@ class Labels:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LabelledImage:
-    """Hold an image, where it was read from, and what is in it."""
+    """Hold where an image is, and what is in it: class and box of each thing.
+
+    Boxes (n, 4) are corners in pixels, or shares of the image, whose size is not known yet.
+    """
 
     path: Path
-    rgb: Image
-    labels: Labels
+    classes: Indices
+    corners: Floats
+    are_shares: bool
+
+    def read(self) -> tuple[Image, Labels]:
+        """Return the image and what is in it.
+
+        Raises:
+            ImagesInvalid: the image cannot be read.
+        """
+        rgb = read_image(self.path)
+        size = [rgb.shape[1], rgb.shape[0]] if self.are_shares else [1, 1]
+        corners = self.corners * np.array([*size, *size], dtype=np.float32)
+        return rgb, Labels(corners_px=corners, classes=self.classes)
 
 
-def read_labelled(path: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
-    """Yield the labelled images of a folder, or of a COCO file, with the numbers of `classes`.
+def read_labelled(path: Path, classes: tuple[str, ...]) -> list[LabelledImage]:
+    """Return the labelled images of a folder, or of a COCO file, with the numbers of `classes`.
+
+    All labels are checked here; images are read later, as they do not fit into memory together.
 
     Raises:
         ImagesInvalid: images or labels are missing or wrong, or name other classes.
     """
     if path.suffix.lower() == ".json":
-        return _coco(path, classes)
+        return list(_coco(path, classes))
     if not path.is_dir():
         raise ImagesInvalid(
             f"{path}: expected a folder with labels, or a COCO file ending in .json"
         )
-    return _yolo(path, classes)
+    return list(_yolo(path, classes))
 
 
 def _yolo(folder: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
@@ -67,16 +84,16 @@ def _yolo(folder: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
     if not any(label.is_file() for _, label in labelled):
         raise ImagesInvalid(f"{folder}: no image has labels; the first would be {labelled[0][1]}")
     for path, label in labelled:
-        rgb = read_image(path)
-        rows = (
-            _rows(label, len(classes)) if label.is_file() else []
-        )  # without labels: nothing there
+        # An image without a file of labels shows nothing.
+        rows = _rows(label, len(classes)) if label.is_file() else []
         table = np.array(rows, dtype=np.float32).reshape(-1, _VALUES)
-        size = np.array([rgb.shape[1], rgb.shape[0]], dtype=np.float32)
-        middle, half = table[:, 1:3] * size, 0.5 * table[:, 3:5] * size
-        corners = np.hstack([middle - half, middle + half])
-        labels = Labels(corners_px=corners, classes=table[:, 0].astype(np.intp))
-        yield LabelledImage(path=path, rgb=rgb, labels=labels)
+        middle, half = table[:, 1:3], 0.5 * table[:, 3:5]
+        yield LabelledImage(
+            path=path,
+            classes=table[:, 0].astype(np.intp),
+            corners=np.hstack([middle - half, middle + half]),
+            are_shares=True,
+        )
 
 
 def _check_names(file: Path, classes: tuple[str, ...]) -> None:
@@ -145,8 +162,7 @@ def _coco(file: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
         )
     for image in document["images"]:
         path = _image_of(file, image["file_name"])
-        labels = _coco_labels(file, by_image[image["id"]], numbers)
-        yield LabelledImage(path=path, rgb=read_image(path), labels=labels)
+        yield _coco_image(file, path, by_image[image["id"]], numbers)
 
 
 def _document(file: Path) -> Mapping[str, Any]:
@@ -190,9 +206,9 @@ def _image_of(file: Path, name: str) -> Path:
     raise ImagesInvalid(f"{file}: image {name!r} is neither {places[0]} nor {places[1]}")
 
 
-def _coco_labels(
-    file: Path, annotations: list[Mapping[str, Any]], numbers: Mapping[Any, int]
-) -> Labels:
+def _coco_image(
+    file: Path, path: Path, annotations: list[Mapping[str, Any]], numbers: Mapping[Any, int]
+) -> LabelledImage:
     for annotation in annotations:
         if annotation["category_id"] not in numbers:
             raise ImagesInvalid(f"{file}: category {annotation['category_id']} is not declared")
@@ -202,4 +218,4 @@ def _coco_labels(
     boxes = np.array([one["bbox"] for one in annotations], dtype=np.float32).reshape(-1, 4)
     corners = np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
     found = np.array([numbers[one["category_id"]] for one in annotations], dtype=np.intp)
-    return Labels(corners_px=corners, classes=found)
+    return LabelledImage(path=path, classes=found, corners=corners, are_shares=False)

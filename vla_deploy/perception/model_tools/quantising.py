@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from numpy.typing import NDArray
-
 from drivers.clock import Clock
 from vla_deploy.inference.errors import (
     AccuracyLost,
@@ -22,9 +20,10 @@ from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.perception.detectors.detector import Detector
-from vla_deploy.perception.detectors.image_input import Image, fit_image
+from vla_deploy.perception.detectors.image_input import fit_image
 from vla_deploy.perception.model_tools.accuracy import Accuracy, AccuracyCount
-from vla_deploy.perception.model_tools.int8_files import TYPES, write_int8
+from vla_deploy.perception.model_tools.images import read_image
+from vla_deploy.perception.model_tools.int8_files import TYPES, Feed, write_int8
 from vla_deploy.perception.model_tools.labelled import LabelledImage
 from vla_deploy.perception.model_tools.verifying import only
 
@@ -50,7 +49,7 @@ def quantise(
     model: Model,
     *,
     name: str,
-    calibration: Sequence[Image],
+    calibration: Sequence[Path],
     labelled: Sequence[LabelledImage],
     max_drop_points: float,
     engines: Path,
@@ -76,7 +75,7 @@ def quantise(
     try:
         _copy_original(model, source, draft, name)
         paths = {variant: draft / f"{name}_{variant}.onnx" for variant in TYPES}
-        write_int8(source, paths, _inputs(model.manifest, detection, calibration))
+        write_int8(source, paths, lambda: _inputs(model.manifest, detection, calibration))
         made = _describe(model, draft, name, paths)
         accuracy = {
             variant: measure(made, variant, labelled, engines=engines, clock=clock)
@@ -112,7 +111,8 @@ def measure(
     count = AccuracyCount(detection.classes)
     try:
         for image in labelled:
-            count.add(detector.detect(image.rgb), image.labels)
+            rgb, labels = image.read()
+            count.add(detector.detect(rgb), labels)
     finally:
         detector.close()
     return count.result()
@@ -152,9 +152,8 @@ def _judge(accuracy: Mapping[Variant, Accuracy], max_drop_points: float) -> floa
     return drops[worst]
 
 
-def _inputs(
-    manifest: Manifest, detection: Detection, images: Sequence[Image]
-) -> Iterator[dict[str, NDArray[Any]]]:
+def _inputs(manifest: Manifest, detection: Detection, images: Sequence[Path]) -> Iterator[Feed]:
     (tensor,) = manifest.inputs
-    for image in images:
-        yield {tensor.name: fit_image(image, detection.image, tensor.dtype)[0]}
+    for path in images:
+        fitted, _ = fit_image(read_image(path), detection.image, tensor.dtype)
+        yield {tensor.name: fitted}

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vla_deploy.inference.errors import ImagesInvalid
-from vla_deploy.perception.model_tools.images import read_images
+from vla_deploy.perception.model_tools.images import read_image, spread_paths
 from vla_deploy.perception.model_tools.labelled import read_labelled
 
 CLASSES = ("cup", "ball")
@@ -43,18 +43,19 @@ def test_yolo_files_are_found_beside_and_in_labels(tmp_path, image, picture, lab
     (tmp_path / label).parent.mkdir(exist_ok=True)
     (tmp_path / label).write_text("1 0.5 0.5 0.1 0.2\n\n0 0.25 0.5 0.5 1\n")
     (one,) = read_labelled(tmp_path, CLASSES)
-    assert one.labels.classes.tolist() == [1, 0]
-    assert one.labels.corners_px.tolist() == [[90, 40, 110, 60], [0, 0, 100, 100]]
-    assert one.rgb[50, 50].tolist() == [255, 0, 0]
+    rgb, labels = one.read()
+    assert labels.classes.tolist() == [1, 0]
+    assert labels.corners_px == pytest.approx(np.array([[90, 40, 110, 60], [0, 0, 100, 100]]))
+    assert rgb[50, 50].tolist() == [255, 0, 0]
 
 
 def test_an_image_without_labels_shows_nothing_as_long_as_others_have_some(tmp_path, image):
     image("a.png")
     image("b.png")
     with pytest.raises(ImagesInvalid, match=r"no image has labels; the first would be .*a\.txt"):
-        list(read_labelled(tmp_path, CLASSES))
+        read_labelled(tmp_path, CLASSES)
     (tmp_path / "b.txt").write_text("0 0.5 0.5 0.1 0.1\n")
-    assert [len(one.labels.classes) for one in read_labelled(tmp_path, CLASSES)] == [0, 1]
+    assert [len(one.classes) for one in read_labelled(tmp_path, CLASSES)] == [0, 1]
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_a_line_that_is_no_label_is_told(tmp_path, image, line, told):
     image("a.png")
     (tmp_path / "a.txt").write_text(line)
     with pytest.raises(ImagesInvalid) as caught:
-        list(read_labelled(tmp_path, CLASSES))
+        read_labelled(tmp_path, CLASSES)
     assert told in str(caught.value)
 
 
@@ -80,7 +81,7 @@ def test_a_list_of_classes_in_another_order_is_told(tmp_path, image):
     image("a.png")
     (tmp_path / "classes.txt").write_text("ball\ncup\n")
     with pytest.raises(ImagesInvalid, match=r"expected the model's classes \['cup', 'ball'\], got"):
-        list(read_labelled(tmp_path, CLASSES))
+        read_labelled(tmp_path, CLASSES)
 
 
 @pytest.mark.parametrize("folder", ["", "images/"])
@@ -89,9 +90,10 @@ def test_a_coco_file_is_read_by_the_names_of_its_categories(tmp_path, image, fol
     image(f"{folder}b.png")
     (tmp_path / "all.json").write_text(json.dumps(coco()))
     first, second = read_labelled(tmp_path / "all.json", CLASSES)
-    assert first.labels.classes.tolist() == [1]
-    assert first.labels.corners_px.tolist() == [[10, 20, 40, 60]]
-    assert len(second.labels.classes) == 0
+    labels = first.read()[1]
+    assert labels.classes.tolist() == [1]
+    assert labels.corners_px.tolist() == [[10, 20, 40, 60]]
+    assert len(second.classes) == 0
     assert first.path.name == "a.png"
 
 
@@ -124,15 +126,15 @@ def test_a_coco_file_with_a_fault_is_told(tmp_path, image, document, told):
     text = document if isinstance(document, str) else json.dumps(coco(**document))
     (tmp_path / "all.json").write_text(text)
     with pytest.raises(ImagesInvalid) as caught:
-        list(read_labelled(tmp_path / "all.json", CLASSES))
+        read_labelled(tmp_path / "all.json", CLASSES)
     assert told in str(caught.value)
 
 
 def test_what_holds_no_images_is_told(tmp_path):
     with pytest.raises(ImagesInvalid, match=r"holds no image; expected files ending in \.bmp, "):
-        list(read_images(tmp_path, 3))
+        spread_paths(tmp_path, 3)
     with pytest.raises(ImagesInvalid, match="no such folder"):
-        list(read_images(tmp_path / "none", 3))
+        spread_paths(tmp_path / "none", 3)
     with pytest.raises(ImagesInvalid, match="expected a folder with labels, or a COCO file"):
         read_labelled(tmp_path / "none", CLASSES)
 
@@ -140,11 +142,11 @@ def test_what_holds_no_images_is_told(tmp_path):
 def test_a_spoiled_image_is_told(tmp_path):
     (tmp_path / "a.jpg").write_bytes(b"no image")
     with pytest.raises(ImagesInvalid, match=r"a\.jpg: no image that can be read"):
-        list(read_images(tmp_path, 3))
+        read_image(tmp_path / "a.jpg")
 
 
 def test_fewer_images_are_spread_over_all(tmp_path, image):
     for number in range(10):
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((4, 4, 3), number, dtype=np.uint8))
-    assert [int(one[0, 0, 0]) for one in read_images(tmp_path, 4)] == [0, 2, 5, 7]
-    assert len(list(read_images(tmp_path, 99))) == 10
+    assert [path.stem for path in spread_paths(tmp_path, 4)] == ["0", "2", "5", "7"]
+    assert len(spread_paths(tmp_path, 99)) == 10

@@ -8,7 +8,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from vla_deploy.inference.errors import AccuracyLost, ImagesInvalid, ModelMismatch, ToolMissing
 from vla_deploy.inference.manifest import Variant
-from vla_deploy.perception.model_tools.images import read_images
+from vla_deploy.perception.model_tools.images import spread_paths
 from vla_deploy.perception.model_tools.int8_files import head_nodes
 from vla_deploy.perception.model_tools.labelled import read_labelled
 from vla_deploy.perception.model_tools.quantising import quantise
@@ -23,8 +23,8 @@ def quantised(shelf, photographs):
         folder = photographs()
         arguments = {
             "name": model.manifest.name,
-            "calibration": list(read_images(folder, 4)),
-            "labelled": list(read_labelled(folder, ("red", "green", "blue"))),
+            "calibration": spread_paths(folder, 4),
+            "labelled": read_labelled(folder, ("red", "green", "blue")),
             "max_drop_points": 1.0,
             "engines": shelf.engines,
             "clock": shelf.clock,
