@@ -173,7 +173,7 @@ def test_a_detector_that_tells_an_unknown_class_in_an_empty_image_is_not_kept(ad
     cast.input[0] = "shifted"
     with pytest.raises(RunFailed, match=r"told class \[7\], .* \(on an image that is black\)"):
         add(graph)
-    assert shelf.store.names() == ()
+    assert list(shelf.store.user.iterdir()) == []
 
 
 def test_a_taken_name_is_replaced_only_when_asked(add, shelf):

@@ -69,6 +69,25 @@ def test_both_int8_files_are_installed_and_see_as_well(shelf, installed, quantis
     ]
 
 
+def test_each_channel_of_the_weights_has_a_scale_of_its_own(shelf, installed, quantised):
+    quantised(installed())
+    model = shelf.store.load("blobs")
+    for variant in (Variant.INT8_U8S8, Variant.INT8_S8S8):
+        graph = onnx.load(str(model.folder / model.manifest.files[variant].path)).graph
+        held = {tensor.name: tensor for tensor in graph.initializer}
+        scales = [
+            held[node.input[1]].dims
+            for node in graph.node
+            if node.op_type == "DequantizeLinear" and len(held_dims(held, node)) == 4
+        ]
+        assert scales == [[3], [3]]
+
+
+def held_dims(held, node) -> list[int]:
+    """Return the dimensions of the weights that a node reads, none where they are activations."""
+    return held[node.input[0]].dims if node.input[0] in held else []
+
+
 def test_activations_are_unsigned_for_cpus_and_signed_and_centred_for_tensorrt(
     shelf, installed, quantised
 ):
