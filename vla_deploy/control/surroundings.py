@@ -38,7 +38,6 @@ class _Body:
     now_ns: int
     position: Floats
     velocity: Floats
-    effort_ratio: Floats
     setpoint: Floats
     motion: Motion
 
@@ -98,6 +97,7 @@ class SurroundingsWatch:
 
         `powered` tells whether every joint is: before that, parts may lie against each other.
         """
+        self._contact.note(velocity, effort_ratio)
         if self._clearance.has_looked_ahead:
             self._look_at_clearance(powered)
             return self._known
@@ -106,7 +106,7 @@ class SurroundingsWatch:
             part.due_ns = max(part.due_ns, now_ns - part.period_ns) + part.period_ns
             deceleration = self._robot.base.max_acceleration_m_s2
             motion = Motion(v_m_s=v_m_s, w_rad_s=w_rad_s, deceleration_m_s2=deceleration)
-            part.work(_Body(now_ns, position, velocity, effort_ratio, setpoint, motion))
+            part.work(_Body(now_ns, position, velocity, setpoint, motion))
         return self._known
 
     def close(self) -> None:
@@ -116,7 +116,7 @@ class SurroundingsWatch:
         self._imu.close()
 
     def _look_at_contact(self, body: _Body) -> None:
-        torque = self._contact.update(body.now_ns, body.position, body.velocity, body.effort_ratio)
+        torque = self._contact.update(body.now_ns, body.position)
         self._known = replace(self._known, external_torque_nm=torque)
 
     def _look_ahead(self, body: _Body) -> None:

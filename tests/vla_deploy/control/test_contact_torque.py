@@ -16,8 +16,13 @@ PITCH = ROBOT.joint_index["left_shoulder_pitch"]
 STEP_NS = 20_000_000
 
 
+def look(contact: ContactTorque, step: int, effort: np.ndarray) -> np.ndarray | None:
+    contact.note(STILL, effort)
+    return contact.update(step * STEP_NS, POSE)
+
+
 def settle(contact: ContactTorque, effort: np.ndarray, steps: int = 40) -> np.ndarray:
-    told = [contact.update(n * STEP_NS, POSE, STILL, effort) for n in range(1, steps + 1)]
+    told = [look(contact, n, effort) for n in range(1, steps + 1)]
     assert told[-1] is not None
     return told[-1]
 
@@ -44,7 +49,7 @@ def test_a_short_push_passes_the_filter_in_part() -> None:
     settle(contact, holding())
     loaded = holding()
     loaded[PITCH] += 2.0 / STALL[PITCH]
-    told = contact.update(41 * STEP_NS, POSE, STILL, loaded)
+    told = look(contact, 41, loaded)
     assert told is not None
     assert told[PITCH] == pytest.approx(-2.0 * 0.02 / (FILTER_S + 0.02))
 
@@ -61,9 +66,21 @@ def test_servos_that_measure_no_current_are_not_judged() -> None:
 def test_a_gap_or_a_missing_value_begins_anew() -> None:
     contact = ContactTorque(ROBOT, MODEL)
     settle(contact, holding())
-    assert contact.update(100 * STEP_NS, POSE, STILL, holding()) is None
+    assert look(contact, 100, holding()) is None
     missing = holding()
     missing[0] = np.nan
-    assert contact.update(101 * STEP_NS, POSE, STILL, missing) is None
-    assert contact.update(102 * STEP_NS, POSE, STILL, holding()) is None
-    assert contact.update(103 * STEP_NS, POSE, STILL, holding()) is not None
+    assert look(contact, 101, missing) is None
+    assert look(contact, 102, holding()) is None
+    assert look(contact, 103, holding()) is not None
+
+
+def test_a_servo_that_rings_in_step_with_the_looks_shows_no_torque() -> None:
+    contact, told = ContactTorque(ROBOT, MODEL), None
+    for tick in range(300):
+        ringing = holding()
+        ringing[PITCH] += 0.25 * np.cos(2.0 * np.pi * tick / 2.5)
+        contact.note(STILL, ringing)
+        if tick % 5 == 0:
+            told = contact.update(tick * STEP_NS // 5, POSE)
+    assert told is not None
+    assert abs(told[PITCH]) < 0.01 * STALL[PITCH]
