@@ -1,0 +1,66 @@
+"""Draw a stage: colour, and which geom each pixel shows."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_twin.renderer import GLContext, fixed_camera
+from training.detector.pose import CAMERA
+from training.detector.scene_model import Stage
+
+WIDTH_PX, HEIGHT_PX = 320, 240
+VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
+MAX_GEOMS = 2500
+Image = NDArray[np.uint8]
+
+
+class Drawing:
+    """Draw images of one stage in an OpenGL context that outlives it."""
+
+    def __init__(self, gl: GLContext, stage: Stage) -> None:
+        gl.make_current()
+        self._stage = stage
+        self._context: Any = mujoco.MjrContext(
+            stage.model, mujoco.mjtFontScale.mjFONTSCALE_100.value
+        )
+        self._scene = mujoco.MjvScene(stage.model, maxgeom=MAX_GEOMS)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[:] = VISIBLE_GROUPS
+        self._rect = mujoco.MjrRect(0, 0, WIDTH_PX, HEIGHT_PX)
+        self._camera = fixed_camera(stage.model, CAMERA)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+
+    def draw(self) -> tuple[Image, NDArray[np.int32]]:
+        """Return the RGB image and the geom of each pixel, -1 where there is none."""
+        stage = self._stage
+        mujoco.mjv_updateScene(
+            stage.model, stage.data, self._option, mujoco.MjvPerturb(), self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value, self._scene,
+        )  # fmt: skip
+        rgb = self._pixels(segments=False)
+        codes = self._pixels(segments=True).astype(np.int32)
+        index = codes[..., 0] + (codes[..., 1] << 8) + (codes[..., 2] << 16)
+        return rgb, self._geoms()[index]
+
+    def close(self) -> None:
+        """Release what this stage took of the context."""
+        self._context.free()
+
+    def _pixels(self, segments: bool) -> Image:
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = segments
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = segments
+        rgb = np.empty((HEIGHT_PX, WIDTH_PX, 3), np.uint8)
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        mujoco.mjr_readPixels(rgb, None, self._rect, self._context)
+        return np.ascontiguousarray(np.flipud(rgb))
+
+    def _geoms(self) -> NDArray[np.int32]:
+        """Return the model's geom for each segment code; code 0 is the background."""
+        table = np.full(self._scene.ngeom + 2, -1, np.int32)
+        for geom in self._scene.geoms[: self._scene.ngeom]:
+            if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM.value and geom.segid >= 0:
+                table[geom.segid + 1] = geom.objid
+        return table

@@ -1,0 +1,38 @@
+"""Spoil a clean render as a real camera would: exposure, colour, blur, noise."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from training.detector.parts import Random, between
+
+Image = NDArray[np.uint8]
+CLEAN_CHANCE = 0.35
+NOISE_SIGMA = 9.0
+
+
+def spoil(image: Image, random: Random) -> Image:
+    """Return the image as a cheap camera might have taken it; a third stay as they are."""
+    if random.random() < CLEAN_CHANCE:
+        return image
+    values = image.astype(np.float32)
+    values *= np.float32(between(random, 0.7, 1.4)) * random.uniform(0.88, 1.12, 3).astype(
+        np.float32
+    )
+    values = 255 * (values.clip(0, 255) / 255) ** np.float32(between(random, 0.75, 1.3))
+    if random.random() < 0.4:
+        values = _blurred(values, random)
+    sigma = between(random, 0, NOISE_SIGMA)
+    values += np.float32(sigma) * random.standard_normal(values.shape, dtype=np.float32)
+    return np.asarray(values.clip(0, 255), np.uint8)
+
+
+def _blurred(values: NDArray[np.float32], random: Random) -> NDArray[np.float32]:
+    if random.random() < 0.5:
+        return np.asarray(cv2.GaussianBlur(values, (0, 0), between(random, 0.4, 1.2)), np.float32)
+    length = int(random.integers(2, 6))
+    kernel = np.zeros((length, length), np.float32)
+    cv2.line(
+        kernel, (0, int(random.integers(length))), (length - 1, int(random.integers(length))), 1.0
+    )
+    return np.asarray(cv2.filter2D(values, -1, kernel / kernel.sum()), np.float32)
