@@ -29,7 +29,14 @@ def _data(out: Path, settings: Settings) -> None:
         generate(out / "data", split, range(shards), settings.seed)
 
 
-STEPS = {"data": _data}
+def _train(out: Path, settings: Settings) -> None:
+    # Torch is imported by the steps that need it: data are drawn without it.
+    from training.detector.training import train
+
+    train(out, settings)
+
+
+STEPS = {"data": _data, "train": _train}
 
 if __name__ == "__main__":
     main()

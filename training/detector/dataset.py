@@ -1,4 +1,4 @@
-"""Draw labelled images in shards: the same seed gives the same images on any number of processes."""
+"""Draw labelled images in shards; the same seed gives the same images, whatever is drawn first."""
 
 import logging
 from dataclasses import dataclass

@@ -74,7 +74,7 @@ def _area(box: NDArray[np.float64]) -> float:
 
 
 def _extent(model: Any, data: Any, members: list[int]) -> NDArray[np.float64] | None:
-    """Return the box that the whole thing would fill, or none where it reaches behind the camera."""
+    """Return the box that the whole thing would fill; none where it reaches behind the camera."""
     centre, half = model.geom_aabb[members, :3], model.geom_aabb[members, 3:]
     local = centre[:, None] + half[:, None] * _CORNERS
     turn = data.geom_xmat[members].reshape(-1, 3, 3)

@@ -5,13 +5,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Hold what decides the result besides the code; shards per split hold 20 images each."""
+    """Hold what decides the result besides the code; shards per split hold 20 images each.
+
+    First come `epochs` on pieces of the images, which show most of the things for half the work,
+    then `settling_epochs` on whole images, during which the learning rate falls to nothing.
+    """
 
     seed: int = 0
     shards: tuple[tuple[str, int], ...]
     epochs: int
+    settling_epochs: int
+    piece_px: tuple[int, int] = (176, 240)
     batch: int = 24
-    learning_rate: float = 2.5e-3
+    learning_rate: float = 2e-3
     calibration_images: int = 200
 
     def shard_count(self, split: str) -> int:
@@ -19,9 +25,13 @@ class Settings:
         return dict(self.shards)[split]
 
 
-FULL = Settings(shards=(("heldout", 50), ("check", 20), ("flat", 20), ("train", 800)), epochs=12)
+FULL = Settings(
+    shards=(("heldout", 50), ("check", 20), ("flat", 20), ("train", 400)),
+    epochs=6,
+    settling_epochs=2,
+)
 TINY = Settings(
     shards=(("heldout", 1), ("check", 1), ("flat", 1), ("train", 2)),
-    epochs=1, batch=4, calibration_images=4,
+    epochs=1, settling_epochs=1, batch=4, calibration_images=4,
 )  # fmt: skip
 SIZES = {"full": FULL, "tiny": TINY}

@@ -1,0 +1,110 @@
+"""Judge found boxes against labels: average precision, and how many centres are hit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.detector.classes import CLASSES
+from vla_deploy.perception.centre_net import Boxes, overlap
+
+IOU = 0.5
+SURE_SCORE = 0.35
+"""Score from which a box counts as a find for recall and false finds."""
+Rows = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """Hold the figures of one class, from 0 to 1, and how many labels were judged.
+
+    `recall` is the share of labels whose centre lies in a sure box of the class that overlaps it;
+    `precision` the share of sure boxes that fit a label.
+    """
+
+    ap50: float
+    ap75: float
+    recall: float
+    precision: float
+    labels: int
+
+
+def judge(found: Sequence[Boxes], labels: Sequence[Rows]) -> dict[str, Judgement]:
+    """Return a judgement for each class over all images, in the images' order."""
+    return {name: _judge_class(index, found, labels) for index, name in enumerate(CLASSES)}
+
+
+def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> Judgement:
+    at50 = [_match(index, boxes, rows, IOU) for boxes, rows in zip(found, labels, strict=True)]
+    at75 = [_match(index, boxes, rows, 0.75) for boxes, rows in zip(found, labels, strict=True)]
+    count = sum(int(_judged(index, rows).sum()) for rows in labels)
+    hits = sum(_centres_hit(index, boxes, rows) for boxes, rows in zip(found, labels, strict=True))
+    scores, right = (np.concatenate(column) for column in zip(*at50, strict=True))
+    sure = scores >= SURE_SCORE
+    return Judgement(
+        ap50=_average_precision(scores, right, count),
+        ap75=_average_precision(*(np.concatenate(c) for c in zip(*at75, strict=True)), count),
+        recall=hits / max(count, 1),
+        precision=float(right[sure].mean()) if sure.any() else 0.0,
+        labels=count,
+    )
+
+
+def _judged(index: int, rows: Rows) -> NDArray[np.bool_]:
+    return np.asarray((rows[:, 1] == index) & (rows[:, 6] > 0))
+
+
+def _passed_over(index: int, rows: Rows) -> NDArray[np.bool_]:
+    """Mark labels that may be found or not: too little is seen, or they are not to be judged."""
+    return np.asarray((rows[:, 6] == 0) & ((rows[:, 1] == index) | (rows[:, 1] < 0)))
+
+
+def _match(
+    index: int, boxes: Boxes, rows: Rows, iou: float
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return the scores of the boxes of a class, and which of them fit a label of their own."""
+    wanted, spare = rows[_judged(index, rows), 2:6], rows[_passed_over(index, rows), 2:6]
+    free = np.ones(len(wanted), bool)
+    scores, right = [], []
+    for number in np.flatnonzero(boxes.classes == index):
+        box = boxes.edges_px[number]
+        ious = overlap(box, wanted) * free
+        best = int(np.argmax(ious)) if len(ious) else -1
+        fits = best >= 0 and bool(ious[best] >= iou)
+        if fits:
+            free[best] = False
+        elif _mostly_inside(box, spare):
+            continue
+        scores.append(boxes.scores[number])
+        right.append(fits)
+    return np.array(scores, np.float32), np.array(right, bool)
+
+
+def _mostly_inside(box: Rows, spare: Rows) -> bool:
+    shared = np.minimum(box[2:], spare[:, 2:]) - np.maximum(box[:2], spare[:, :2])
+    area = float((box[2] - box[0]) * (box[3] - box[1]))
+    return bool((shared.clip(0).prod(axis=1) >= 0.5 * area).any())
+
+
+def _centres_hit(index: int, boxes: Boxes, rows: Rows) -> int:
+    """Count labels whose centre lies in a box of their class that overlaps them notably."""
+    mine = (boxes.classes == index) & (boxes.scores >= SURE_SCORE)
+    hits = 0
+    for label in rows[_judged(index, rows), 2:6]:
+        x, y = (label[0] + label[2]) / 2, (label[1] + label[3]) / 2
+        near = boxes.edges_px[mine]
+        around = (near[:, 0] <= x) & (x <= near[:, 2]) & (near[:, 1] <= y) & (y <= near[:, 3])
+        hits += bool((around & (overlap(label, near) >= 0.3)).any())
+    return hits
+
+
+def _average_precision(scores: NDArray[np.float32], right: NDArray[np.bool_], count: int) -> float:
+    """Return the area under precision over recall, precision made to fall from right to left."""
+    if not count or not len(scores):
+        return 0.0
+    ranked = right[np.argsort(-scores, kind="stable")]
+    hits = np.cumsum(ranked)
+    precision = hits / np.arange(1, len(ranked) + 1)
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    return float(envelope[ranked].sum() / count)

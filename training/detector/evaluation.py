@@ -1,0 +1,93 @@
+"""Run ONNX files on labelled images and write what came out as JSON."""
+
+import json
+import logging
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from training.detector.average_precision import IOU, SURE_SCORE, Judgement, judge
+from training.detector.dataset import Shard, load
+from training.detector.network import STRIDE_PX
+from training.detector.settings import Settings
+from vla_deploy.perception.centre_net import Boxes, decode
+
+METRICS = "metrics.json"
+LOW_SCORE = 0.05
+"""Average precision needs also the boxes that nobody would trust."""
+_LOG = logging.getLogger(__name__)
+
+
+def evaluate(folder: Path, data: Path, files: Mapping[str, str], settings: Settings) -> None:
+    """Judge the files, named by precision, on the held-out splits; write `metrics.json` there.
+
+    Raises:
+        FileNotFoundError: data or a model are not there.
+    """
+    report: dict[str, Any] = {"iou": IOU, "sure_score": SURE_SCORE, "splits": {}}
+    for split in ("heldout", "flat"):
+        shard = load(data, split, settings.shard_count(split))
+        report["splits"][split] = {"images": len(shard.images), "models": {}}
+        for precision, name in files.items():
+            figures = judge_file(folder / name, shard)
+            report["splits"][split]["models"][precision] = figures
+            told = {key: round(figures[key], 4) for key in ("map50", "map75", "recall")}
+            _LOG.info("%s %s: %s", split, precision, told)
+    text = json.dumps(report, indent=1) + "\n"
+    (folder / METRICS).write_text(text, encoding="utf-8")
+
+
+def judge_file(model: Path, shard: Shard) -> dict[str, Any]:
+    """Return the figures of one ONNX file on labelled images."""
+    found = list(run(model, shard.images))
+    labels = rows_by_image(shard)
+    return summary(judge(found, labels))
+
+
+def run(model: Path, images: NDArray[np.uint8]) -> list[Boxes]:
+    """Return the boxes that an ONNX file finds in each image (N x H x W x 3, RGB)."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    name = session.get_inputs()[0].name
+    boxes = []
+    for image in images:
+        heat, edges = session.run(None, {name: as_input(image)})
+        boxes.append(decode(heat[0], edges[0], stride_px=STRIDE_PX, min_score=LOW_SCORE))
+    return boxes
+
+
+def as_input(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return an RGB image as the network wants it: 1 x 3 x H x W, from 0 to 1."""
+    return np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32) / np.float32(255)
+
+
+def rows_by_image(shard: Shard) -> list[NDArray[np.float32]]:
+    """Return the label rows of each image."""
+    bounds = np.searchsorted(shard.labels[:, 0], np.arange(len(shard.images) + 1))
+    return [shard.labels[a:b] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+
+
+def summary(judgements: Mapping[str, Judgement]) -> dict[str, Any]:
+    """Return mean figures over the classes that occur, and those of each class."""
+    there = {name: found for name, found in judgements.items() if found.labels}
+    labels = sum(found.labels for found in there.values())
+    return {
+        "map50": float(np.mean([found.ap50 for found in there.values()])),
+        "map75": float(np.mean([found.ap75 for found in there.values()])),
+        "recall": sum(found.recall * found.labels for found in there.values()) / labels,
+        "labels": labels,
+        "classes": {
+            name: {key: _rounded(value) for key, value in asdict(found).items()}
+            for name, found in there.items()
+        },
+    }
+
+
+def _rounded(value: float) -> float:
+    return round(value, 4)
