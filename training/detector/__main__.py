@@ -2,9 +2,12 @@
 
 import argparse
 import logging
+from collections.abc import Callable
 from pathlib import Path
 
+from training.detector.card import describe
 from training.detector.dataset import generate
+from training.detector.files import FILES
 from training.detector.settings import SIZES, Settings
 
 
@@ -29,14 +32,38 @@ def _data(out: Path, settings: Settings) -> None:
         generate(out / "data", split, range(shards), settings.seed)
 
 
+# The steps below import torch and onnx, which the first does not need.
 def _train(out: Path, settings: Settings) -> None:
-    # Torch is imported by the steps that need it: data are drawn without it.
     from training.detector.training import train
 
     train(out, settings)
 
 
-STEPS = {"data": _data, "train": _train}
+def _export(out: Path, settings: Settings) -> None:
+    from training.detector.export import export, quantise
+
+    export(out, out / MODELS)
+    quantise(out, out / MODELS, settings)
+
+
+def _evaluate(out: Path, settings: Settings) -> None:
+    from training.detector.evaluation import evaluate
+
+    evaluate(out / MODELS, out / "data", FILES, settings)
+
+
+def _card(out: Path, settings: Settings) -> None:
+    describe(out / MODELS, settings)
+
+
+MODELS = "models"
+STEPS: dict[str, Callable[[Path, Settings], None]] = {
+    "data": _data,
+    "train": _train,
+    "export": _export,
+    "evaluate": _evaluate,
+    "card": _card,
+}
 
 if __name__ == "__main__":
     main()

@@ -4,6 +4,7 @@ import json
 import logging
 from collections.abc import Mapping
 from dataclasses import asdict
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,11 @@ from numpy.typing import NDArray
 
 from training.detector.average_precision import IOU, SURE_SCORE, Judgement, judge
 from training.detector.dataset import Shard, load
-from training.detector.network import STRIDE_PX
+from training.detector.files import METRICS
 from training.detector.settings import Settings
+from training.detector.targets import STRIDE_PX
 from vla_deploy.perception.centre_net import Boxes, decode
 
-METRICS = "metrics.json"
 LOW_SCORE = 0.05
 """Average precision needs also the boxes that nobody would trust."""
 _LOG = logging.getLogger(__name__)
@@ -70,7 +71,7 @@ def as_input(image: NDArray[np.uint8]) -> NDArray[np.float32]:
 def rows_by_image(shard: Shard) -> list[NDArray[np.float32]]:
     """Return the label rows of each image."""
     bounds = np.searchsorted(shard.labels[:, 0], np.arange(len(shard.images) + 1))
-    return [shard.labels[a:b] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [shard.labels[a:b] for a, b in pairwise(bounds)]
 
 
 def summary(judgements: Mapping[str, Judgement]) -> dict[str, Any]:

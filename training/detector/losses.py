@@ -4,7 +4,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from training.detector.network import BOX_LOG_RANGE, STRIDE_PX
+from training.detector.network import BOX_LOG_RANGE
+from training.detector.targets import STRIDE_PX
 
 BOX_WEIGHT = 5.0
 

@@ -3,7 +3,8 @@
 import torch
 from torch import Tensor, nn
 
-STRIDE_PX = 4
+from training.detector.targets import STRIDE_PX
+
 HEAT_PRIOR = -4.0
 BOX_LOG_RANGE = (-2.0, 4.6)
 """Bounds of ln(distance to an edge / stride)."""

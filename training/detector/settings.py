@@ -26,7 +26,7 @@ class Settings:
 
 
 FULL = Settings(
-    shards=(("heldout", 50), ("check", 20), ("flat", 20), ("train", 400)),
+    shards=(("heldout", 50), ("check", 20), ("flat", 20), ("train", 320)),
     epochs=6,
     settling_epochs=2,
 )

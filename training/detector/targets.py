@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.detector.classes import CLASSES
-from training.detector.network import STRIDE_PX
 
+STRIDE_PX = 4
 SPREAD_RATIO = 0.54
 """Share of a box, in each direction, over which its cells learn."""
 Floats = NDArray[np.float32]
