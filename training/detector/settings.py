@@ -15,8 +15,8 @@ class Settings:
     shards: tuple[tuple[str, int], ...]
     epochs: int
     settling_epochs: int
-    piece_px: tuple[int, int] = (176, 240)
-    batch: int = 24
+    piece_px: tuple[int, int] = (160, 208)
+    batch: int = 8
     learning_rate: float = 2e-3
     calibration_images: int = 200
 

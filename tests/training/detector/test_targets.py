@@ -1,0 +1,50 @@
+import numpy as np
+
+from training.detector.classes import CLASSES
+from training.detector.targets import STRIDE_PX, make_targets
+from vla_deploy.perception.centre_net import decode
+
+CUP, BOX = CLASSES.index("cup"), CLASSES.index("box")
+
+
+def rows(*labels: tuple[int, int, int, int, int, int]) -> np.ndarray:
+    """Return rows of (class, left, top, right, bottom, judged) of image 0."""
+    return np.array([(0, *label) for label in labels], np.float32)
+
+
+def test_what_the_maps_should_say_decodes_to_the_labels() -> None:
+    made = make_targets(rows((CUP, 40, 60, 64, 90, 1), (BOX, 100, 20, 190, 110, 1)), 240, 320)
+
+    boxes = decode(made.heat, made.edges, stride_px=STRIDE_PX, min_score=0.99)
+
+    found = sorted(zip(boxes.classes.tolist(), boxes.edges_px.tolist(), strict=True))
+    assert found == [(CUP, [40, 60, 64, 90]), (BOX, [100, 20, 190, 110])]
+
+
+def test_a_thing_in_a_box_is_learnt_where_it_covers_the_box() -> None:
+    made = make_targets(rows((CUP, 130, 50, 160, 80, 1), (BOX, 100, 20, 190, 110, 1)), 240, 320)
+
+    boxes = decode(made.heat, made.edges, stride_px=STRIDE_PX, min_score=0.99)
+
+    assert boxes.edges_px[boxes.classes == CUP].tolist() == [[130, 50, 160, 80]]
+
+
+def test_what_is_hardly_seen_is_neither_right_nor_wrong() -> None:
+    made = make_targets(rows((CUP, 40, 60, 64, 90, 0)), 240, 320)
+
+    assert made.heat.max() == 0.0
+    assert made.ignored[CUP, 15:22, 10:16].all()
+    assert made.ignored.sum() == made.ignored[CUP].sum() == 8 * 6
+
+
+def test_what_nobody_can_name_counts_for_no_class() -> None:
+    made = make_targets(rows((-1, 40, 60, 64, 90, 0)), 240, 320)
+
+    assert made.ignored[:, 15, 10].all()
+
+
+def test_large_and_small_things_weigh_alike_but_for_the_logarithm() -> None:
+    small = make_targets(rows((CUP, 40, 60, 50, 70, 1)), 240, 320).share.sum()
+    large = make_targets(rows((CUP, 40, 60, 140, 160, 1)), 240, 320).share.sum()
+
+    assert large / small == np.float32(2.0)
