@@ -9,6 +9,7 @@ from training.detector.card import describe
 from training.detector.dataset import generate
 from training.detector.files import FILES
 from training.detector.settings import SIZES, Settings
+from training.detector.shipping import ship
 
 
 def main() -> None:
@@ -18,13 +19,14 @@ def main() -> None:
         description=__doc__,
         epilog="example: nice python -m training.detector all --out /data/detector",
     )
-    parser.add_argument("step", choices=[*STEPS, "all"])
+    parser.add_argument("step", choices=[*STEPS, "ship", "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for data and models")
     parser.add_argument("--size", choices=SIZES, default="full")
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
+    every = {**STEPS, "ship": _ship}
     for step in STEPS if arguments.step == "all" else [arguments.step]:
-        STEPS[step](arguments.out, SIZES[arguments.size])
+        every[step](arguments.out, SIZES[arguments.size])
 
 
 def _data(out: Path, settings: Settings) -> None:
@@ -56,6 +58,10 @@ def _card(out: Path, settings: Settings) -> None:
     describe(out / MODELS, settings)
 
 
+def _ship(out: Path, _settings: Settings) -> None:
+    ship(out / MODELS)
+
+
 MODELS = "models"
 STEPS: dict[str, Callable[[Path, Settings], None]] = {
     "data": _data,
@@ -64,6 +70,7 @@ STEPS: dict[str, Callable[[Path, Settings], None]] = {
     "evaluate": _evaluate,
     "card": _card,
 }
+"""What `all` does, in this order; shipping is a decision of its own."""
 
 if __name__ == "__main__":
     main()
