@@ -13,6 +13,8 @@ IOU = 0.5
 SURE_SCORE = 0.35
 """Score from which a box counts as a find for recall and false finds."""
 Rows = NDArray[np.float32]
+Matches = tuple[NDArray[np.float32], NDArray[np.bool_]]
+"""Scores of boxes, and which of them fit a label."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,15 +42,20 @@ def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> 
     at75 = [_match(index, boxes, rows, 0.75) for boxes, rows in zip(found, labels, strict=True)]
     count = sum(int(_judged(index, rows).sum()) for rows in labels)
     hits = sum(_centres_hit(index, boxes, rows) for boxes, rows in zip(found, labels, strict=True))
-    scores, right = (np.concatenate(column) for column in zip(*at50, strict=True))
+    scores, right = _joined(at50)
     sure = scores >= SURE_SCORE
     return Judgement(
         ap50=_average_precision(scores, right, count),
-        ap75=_average_precision(*(np.concatenate(c) for c in zip(*at75, strict=True)), count),
+        ap75=_average_precision(*_joined(at75), count),
         recall=hits / max(count, 1),
         precision=float(right[sure].mean()) if sure.any() else 0.0,
         labels=count,
     )
+
+
+def _joined(matches: Sequence[Matches]) -> Matches:
+    scores, right = zip(*matches, strict=True)
+    return np.concatenate(scores), np.concatenate(right)
 
 
 def _judged(index: int, rows: Rows) -> NDArray[np.bool_]:
@@ -60,9 +67,7 @@ def _passed_over(index: int, rows: Rows) -> NDArray[np.bool_]:
     return np.asarray((rows[:, 6] == 0) & ((rows[:, 1] == index) | (rows[:, 1] < 0)))
 
 
-def _match(
-    index: int, boxes: Boxes, rows: Rows, iou: float
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+def _match(index: int, boxes: Boxes, rows: Rows, iou: float) -> Matches:
     """Return the scores of the boxes of a class, and which of them fit a label of their own."""
     wanted, spare = rows[_judged(index, rows), 2:6], rows[_passed_over(index, rows), 2:6]
     free = np.ones(len(wanted), bool)

@@ -18,9 +18,8 @@ from training.detector.pose import pose_robot
 from training.detector.scene_model import Stage, build_studio
 from training.detector.spoil import spoil
 
-SPLITS = {"train": 1, "check": 2, "heldout": 3, "flat": 4}
-"""Training; choosing among checkpoints; judging on unseen scenes, lights and textures; judging in
-the flat as it is."""
+SPLITS = {"train": 1, "heldout": 2, "flat": 3}
+"""Training; judging on unseen scenes, lights and textures; judging in the flat as it is."""
 IMAGES_PER_SHARD = 20
 EMPTY_KEPT_CHANCE = 0.3
 FLAT_SHARE = 0.35

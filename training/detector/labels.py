@@ -12,8 +12,8 @@ from training.detector.layout import Layout
 from training.detector.pose import CAMERA
 from training.detector.scene_model import Stage
 
-MIN_PIXELS = 24
-MIN_LONG_PX, MIN_SHORT_PX = 8.0, 3.0
+MIN_PIXELS = 36
+MIN_LONG_PX, MIN_SHORT_PX = 10.0, 4.0
 MIN_SEEN_RATIO = 0.3
 MIN_IN_IMAGE_RATIO = 0.35
 MIN_IN_IMAGE_LARGE_RATIO = 0.06

@@ -14,7 +14,9 @@ CAMERA_HEIGHT_M = 1.2
 FLAT_SIZE_M = (8.0, 6.0)
 TRIES = 12
 CONTENT_CHANCE, STACK_CHANCE, FLOOR_CHANCE = 0.45, 0.3, 0.15
-LARGE_CHANCE = {"person": 0.32, "chair": 0.42}
+LARGE_CHANCE = {"person": 0.5, "chair": 0.5}
+ROOM_CHANCE = 0.2
+"""Chance of a look around the room rather than at a table."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -48,10 +50,11 @@ def arrange(stage: Stage, random: Random) -> Layout:
 def _in_studio(stage: Stage, random: Random) -> Layout:
     """Stand tables in front of the robot, which is at the origin, and walls behind them."""
     surfaces: list[Surface] = []
-    far = 0.0
+    far, around = 0.0, random.random() < ROOM_CHANCE
     for table in stage.tables[: int(random.integers(1, len(stage.tables) + 1))]:
         half_x, half_y = table.thing.extra["half_depth_m"], table.thing.extra["half_width_m"]
-        near = between(random, 0.28, 0.65) if not surfaces else far + between(random, 0.1, 0.8)
+        first = between(random, 1.0, 2.2) if around else between(random, 0.28, 0.65)
+        near = far + between(random, 0.1, 0.8) if surfaces else first
         side = between(random, -0.35, 0.35) if not surfaces else between(random, -1.2, 1.2)
         yaw = between(random, -0.25, 0.25)
         surface = Surface(
@@ -61,14 +64,15 @@ def _in_studio(stage: Stage, random: Random) -> Layout:
         far = near + 2 * half_x
         surfaces.append(surface)
         stage.show(table, (surface.x_m, side, surface.height_m), about_z(yaw))
-        layout_shown = surfaces[0]
     assert stage.walls is not None
     stage.show(
         stage.walls,
         (far + between(random, 0.3, 3.0), 0.0, 0.0),
         about_z(between(random, -0.4, 0.4)),
     )
-    target = (*layout_shown.point(random, 0.05), layout_shown.height_m)
+    at = surfaces[0]
+    height_m = between(random, 0.2, 1.2) if around else at.height_m
+    target = (*at.point(random, 0.05), height_m)
     view = Viewpoint(x_m=0.0, y_m=0.0, yaw_rad=between(random, -0.15, 0.15), target=target)
     return Layout(view=view, surfaces=tuple(surfaces))
 

@@ -42,8 +42,8 @@ class CentreNet(nn.Module):
         self.join_quarter = _block(40, 40)
         self.grow = nn.Upsample(scale_factor=2, mode="nearest")
         self.last = nn.Conv2d(40, classes + 4, 1)
-        nn.init.constant_(self.last.bias[:classes], HEAT_PRIOR)
-        nn.init.constant_(self.last.bias[classes:], 1.0)
+        with torch.no_grad():
+            self.last.bias.copy_(torch.tensor([HEAT_PRIOR] * classes + [1.0] * 4))
         self.classes = classes
 
     def raw(self, image: Tensor) -> tuple[Tensor, Tensor]:

@@ -82,5 +82,6 @@ def _hold(stage: Stage, layout: Layout, random: Random) -> None:
     site = stage.data.site(GRIPS[int(random.integers(len(GRIPS)))])
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, site.xmat)
-    stage.show(prop, tuple(site.xpos), tuple(quat))
+    x, y, z = site.xpos
+    stage.show(prop, (x, y, z), (quat[0], quat[1], quat[2], quat[3]))
     layout.shown.append(prop)

@@ -26,12 +26,12 @@ class Settings:
 
 
 FULL = Settings(
-    shards=(("heldout", 50), ("check", 20), ("flat", 20), ("train", 320)),
-    epochs=6,
-    settling_epochs=2,
+    shards=(("heldout", 50), ("flat", 20), ("train", 500)),
+    epochs=8,
+    settling_epochs=1,
 )
 TINY = Settings(
-    shards=(("heldout", 1), ("check", 1), ("flat", 1), ("train", 2)),
+    shards=(("heldout", 1), ("flat", 1), ("train", 2)),
     epochs=1, settling_epochs=1, batch=4, calibration_images=4,
 )  # fmt: skip
 SIZES = {"full": FULL, "tiny": TINY}

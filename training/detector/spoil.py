@@ -15,10 +15,8 @@ def spoil(image: Image, random: Random) -> Image:
     """Return the image as a cheap camera might have taken it; a third stay as they are."""
     if random.random() < CLEAN_CHANCE:
         return image
-    values = image.astype(np.float32)
-    values *= np.float32(between(random, 0.7, 1.4)) * random.uniform(0.88, 1.12, 3).astype(
-        np.float32
-    )
+    gain = between(random, 0.7, 1.4) * random.uniform(0.88, 1.12, 3)
+    values = image.astype(np.float32) * gain.astype(np.float32)
     values = 255 * (values.clip(0, 255) / 255) ** np.float32(between(random, 0.75, 1.3))
     if random.random() < 0.4:
         values = _blurred(values, random)

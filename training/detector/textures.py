@@ -16,18 +16,18 @@ _Y, _X = np.mgrid[0:SIZE_PX, 0:SIZE_PX].astype(np.float32) / SIZE_PX
 
 def _noise(random: Random) -> Pattern:
     coarse = random.random((SIZE_PX, SIZE_PX), dtype=np.float32)
-    return cv2.GaussianBlur(coarse, (0, 0), between(random, 0.5, 4.0))
+    return np.asarray(cv2.GaussianBlur(coarse, (0, 0), between(random, 0.5, 4.0)), np.float32)
 
 
 def _checker(random: Random) -> Pattern:
     count = int(random.integers(2, 9))
-    return ((np.floor(_X * count) + np.floor(_Y * count)) % 2).astype(np.float32)
+    return np.asarray((np.floor(_X * count) + np.floor(_Y * count)) % 2, np.float32)
 
 
 def _stripes(random: Random) -> Pattern:
     count, share = int(random.integers(1, 9)), between(random, 0.2, 0.8)
     along = _X if random.random() < 0.5 else _Y
-    return ((along * count) % 1.0 < share).astype(np.float32)
+    return np.asarray((along * count) % 1.0 < share, np.float32)
 
 
 def _gradient(random: Random) -> Pattern:
@@ -60,14 +60,14 @@ def _print(random: Random) -> Pattern:
 
 def _dots(random: Random) -> Pattern:
     count, radius = int(random.integers(2, 9)), between(random, 0.15, 0.45)
-    return (np.hypot((_X * count) % 1 - 0.5, (_Y * count) % 1 - 0.5) < radius).astype(np.float32)
+    return np.asarray(np.hypot((_X * count) % 1 - 0.5, (_Y * count) % 1 - 0.5) < radius, np.float32)
 
 
 def _cells(random: Random) -> Pattern:
     """Return patches around random seeds, each of one shade."""
     seeds, shade = random.random((14, 2)), random.random(14).astype(np.float32)
     far = np.hypot(_X[..., None] - seeds[:, 0], _Y[..., None] - seeds[:, 1])
-    return shade[np.argmin(far, axis=2)]
+    return np.asarray(shade[np.argmin(far, axis=2)], np.float32)
 
 
 def _waves(random: Random) -> Pattern:
@@ -94,7 +94,7 @@ TRAINING: tuple[Callable[[Random], Pattern], ...] = (
     _noise, _checker, _stripes, _gradient, _boards, _print
 )  # fmt: skip
 UNSEEN: tuple[Callable[[Random], Pattern], ...] = (_dots, _cells, _waves, _plaid, _scratches)
-FAMILIES = {"train": TRAINING, "check": TRAINING, "heldout": UNSEEN, "flat": TRAINING}
+FAMILIES = {"train": TRAINING, "heldout": UNSEEN, "flat": TRAINING}
 
 
 def draw_texture(random: Random, split: str) -> Image:

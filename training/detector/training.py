@@ -65,7 +65,7 @@ class _Run:
         self._device = device
         self._settings = settings
         self._per_epoch = steps_per_epoch
-        self.model = CentreNet(len(CLASSES)).to(device, memory_format=torch.channels_last)
+        self.model = CentreNet(len(CLASSES)).to(device).to(memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.model).eval()
         self._steps = 0
         self._optimiser = torch.optim.AdamW(self.model.parameters(), weight_decay=WEIGHT_DECAY)
