@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.detector.classes import CLASSES
-from vla_deploy.perception.centre_net import Boxes, overlap
+from vla_deploy.perception.detectors.boxes import Boxes, iou
 
-IOU = 0.5
+MATCH_IOU, TIGHT_IOU = 0.5, 0.75
 SURE_SCORE = 0.35
 """Score from which a box counts as a find for recall and false finds."""
 Rows = NDArray[np.float32]
@@ -38,8 +38,12 @@ def judge(found: Sequence[Boxes], labels: Sequence[Rows]) -> dict[str, Judgement
 
 
 def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> Judgement:
-    at50 = [_match(index, boxes, rows, IOU) for boxes, rows in zip(found, labels, strict=True)]
-    at75 = [_match(index, boxes, rows, 0.75) for boxes, rows in zip(found, labels, strict=True)]
+    at50 = [
+        _match(index, boxes, rows, MATCH_IOU) for boxes, rows in zip(found, labels, strict=True)
+    ]
+    at75 = [
+        _match(index, boxes, rows, TIGHT_IOU) for boxes, rows in zip(found, labels, strict=True)
+    ]
     count = sum(int(_judged(index, rows).sum()) for rows in labels)
     hits = sum(_centres_hit(index, boxes, rows) for boxes, rows in zip(found, labels, strict=True))
     scores, right = _joined(at50)
@@ -67,16 +71,16 @@ def _passed_over(index: int, rows: Rows) -> NDArray[np.bool_]:
     return np.asarray((rows[:, 6] == 0) & ((rows[:, 1] == index) | (rows[:, 1] < 0)))
 
 
-def _match(index: int, boxes: Boxes, rows: Rows, iou: float) -> Matches:
+def _match(index: int, boxes: Boxes, rows: Rows, least_iou: float) -> Matches:
     """Return the scores of the boxes of a class, and which of them fit a label of their own."""
     wanted, spare = rows[_judged(index, rows), 2:6], rows[_passed_over(index, rows), 2:6]
     free = np.ones(len(wanted), bool)
     scores, right = [], []
     for number in np.flatnonzero(boxes.classes == index):
-        box = boxes.edges_px[number]
-        ious = overlap(box, wanted) * free
+        box = boxes.corners_px[number]
+        ious = iou(box, wanted) * free
         best = int(np.argmax(ious)) if len(ious) else -1
-        fits = best >= 0 and bool(ious[best] >= iou)
+        fits = best >= 0 and bool(ious[best] >= least_iou)
         if fits:
             free[best] = False
         elif _mostly_inside(box, spare):
@@ -98,9 +102,9 @@ def _centres_hit(index: int, boxes: Boxes, rows: Rows) -> int:
     hits = 0
     for label in rows[_judged(index, rows), 2:6]:
         x, y = (label[0] + label[2]) / 2, (label[1] + label[3]) / 2
-        near = boxes.edges_px[mine]
+        near = boxes.corners_px[mine]
         around = (near[:, 0] <= x) & (x <= near[:, 2]) & (near[:, 1] <= y) & (y <= near[:, 3])
-        hits += bool((around & (overlap(label, near) >= 0.3)).any())
+        hits += bool((around & (iou(label, near) >= 0.3)).any())
     return hits
 
 

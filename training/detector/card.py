@@ -6,14 +6,15 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from training.detector.average_precision import SURE_SCORE
 from training.detector.classes import CLASSES
 from training.detector.dataset import FLAT_SHARE, IMAGES_PER_SHARD
 from training.detector.drawing import HEIGHT_PX, WIDTH_PX
+from training.detector.evaluation import SAME_CLASS_IOU
 from training.detector.files import CARD, FILES, MANIFEST, METRICS
 from training.detector.labels import MIN_LONG_PX, MIN_PIXELS, MIN_SEEN_RATIO
 from training.detector.settings import Settings
 from training.detector.targets import STRIDE_PX
-from vla_deploy.perception.centre_net import MIN_SCORE, SAME_CLASS_IOU
 
 TEMPLATE = Path(__file__).with_name("card_template.md")
 TITLES = {
@@ -107,7 +108,7 @@ card = "{CARD}"
 [detection]
 adapter = "centre_net"
 classes = {json.dumps(CLASSES)}
-score_threshold = {MIN_SCORE}
+score_threshold = {SURE_SCORE}
 iou_threshold = {SAME_CLASS_IOU}
 
 [detection.image]

@@ -9,16 +9,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
-from training.detector.average_precision import IOU, SURE_SCORE, Judgement, judge
+from training.detector.average_precision import MATCH_IOU, SURE_SCORE, Judgement, judge
 from training.detector.dataset import Shard, load
 from training.detector.files import METRICS
 from training.detector.settings import Settings
 from training.detector.targets import STRIDE_PX
-from vla_deploy.perception.centre_net import Boxes, decode
+from vla_deploy.inference.runtime import InferenceSession, SessionOptions
+from vla_deploy.perception.detectors.boxes import Boxes
+from vla_deploy.perception.detectors.centre_net import decode
 
+SAME_CLASS_IOU = 0.5
+"""Boxes of one class that overlap more are one thing, for the manifest too."""
 LOW_SCORE = 0.05
 """Average precision needs also the boxes that nobody would trust."""
 _LOG = logging.getLogger(__name__)
@@ -30,7 +33,7 @@ def evaluate(folder: Path, data: Path, files: Mapping[str, str], settings: Setti
     Raises:
         FileNotFoundError: data or a model are not there.
     """
-    report: dict[str, Any] = {"iou": IOU, "sure_score": SURE_SCORE, "splits": {}}
+    report: dict[str, Any] = {"iou": MATCH_IOU, "sure_score": SURE_SCORE, "splits": {}}
     for split in ("heldout", "flat"):
         shard = load(data, split, settings.shard_count(split))
         report["splits"][split] = {"images": len(shard.images), "models": {}}
@@ -52,14 +55,22 @@ def judge_file(model: Path, shard: Shard) -> dict[str, Any]:
 
 def run(model: Path, images: NDArray[np.uint8]) -> list[Boxes]:
     """Return the boxes that an ONNX file finds in each image (N x H x W x 3, RGB)."""
-    options = onnxruntime.SessionOptions()
+    options = SessionOptions()
     options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    session = InferenceSession(model, options, providers=["CPUExecutionProvider"])
     name = session.get_inputs()[0].name
     boxes = []
     for image in images:
         heat, edges = session.run(None, {name: as_input(image)})
-        boxes.append(decode(heat[0], edges[0], stride_px=STRIDE_PX, min_score=LOW_SCORE))
+        boxes.append(
+            decode(
+                heat[0],
+                edges[0],
+                stride_px=STRIDE_PX,
+                score_threshold=LOW_SCORE,
+                iou_threshold=SAME_CLASS_IOU,
+            )
+        )
     return boxes
 
 

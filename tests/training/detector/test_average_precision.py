@@ -3,7 +3,7 @@ import pytest
 
 from training.detector.average_precision import judge
 from training.detector.classes import CLASSES
-from vla_deploy.perception.centre_net import Boxes
+from vla_deploy.perception.detectors.boxes import Boxes
 
 CUP, CAN = CLASSES.index("cup"), CLASSES.index("can")
 PLACE = (10.0, 10.0, 30.0, 30.0)
@@ -12,8 +12,8 @@ ELSEWHERE = (100.0, 100.0, 130.0, 120.0)
 
 def boxes(*found: tuple[int, float, tuple[float, ...]]) -> Boxes:
     return Boxes(
-        edges_px=np.array([edges for _, _, edges in found], np.float32).reshape(-1, 4),
-        classes=np.array([index for index, _, _ in found], np.int32),
+        corners_px=np.array([edges for _, _, edges in found], np.float32).reshape(-1, 4),
+        classes=np.array([index for index, _, _ in found], np.intp),
         scores=np.array([score for _, score, _ in found], np.float32),
     )
 

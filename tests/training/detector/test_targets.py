@@ -1,8 +1,9 @@
 import numpy as np
 
 from training.detector.classes import CLASSES
-from training.detector.targets import STRIDE_PX, make_targets
-from vla_deploy.perception.centre_net import decode
+from training.detector.targets import STRIDE_PX, Targets, make_targets
+from vla_deploy.perception.detectors.boxes import Boxes
+from vla_deploy.perception.detectors.centre_net import decode
 
 CUP, BOX = CLASSES.index("cup"), CLASSES.index("box")
 
@@ -12,21 +13,27 @@ def rows(*labels: tuple[int, int, int, int, int, int]) -> np.ndarray:
     return np.array([(0, *label) for label in labels], np.float32)
 
 
+def surest(made: Targets) -> Boxes:
+    return decode(
+        made.heat, made.edges, stride_px=STRIDE_PX, score_threshold=0.99, iou_threshold=0.5
+    )
+
+
 def test_what_the_maps_should_say_decodes_to_the_labels() -> None:
     made = make_targets(rows((CUP, 40, 60, 64, 90, 1), (BOX, 100, 20, 190, 110, 1)), 240, 320)
 
-    boxes = decode(made.heat, made.edges, stride_px=STRIDE_PX, min_score=0.99)
+    boxes = surest(made)
 
-    found = sorted(zip(boxes.classes.tolist(), boxes.edges_px.tolist(), strict=True))
+    found = sorted(zip(boxes.classes.tolist(), boxes.corners_px.tolist(), strict=True))
     assert found == [(CUP, [40, 60, 64, 90]), (BOX, [100, 20, 190, 110])]
 
 
 def test_a_thing_in_a_box_is_learnt_where_it_covers_the_box() -> None:
     made = make_targets(rows((CUP, 130, 50, 160, 80, 1), (BOX, 100, 20, 190, 110, 1)), 240, 320)
 
-    boxes = decode(made.heat, made.edges, stride_px=STRIDE_PX, min_score=0.99)
+    boxes = surest(made)
 
-    assert boxes.edges_px[boxes.classes == CUP].tolist() == [[130, 50, 160, 80]]
+    assert boxes.corners_px[boxes.classes == CUP].tolist() == [[130, 50, 160, 80]]
 
 
 def test_what_is_hardly_seen_is_neither_right_nor_wrong() -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.inference.manifest import Detection, Tensor
-from vla_deploy.perception.detectors import yolo
+from vla_deploy.perception.detectors import centre_net, yolo
 from vla_deploy.perception.detectors.boxes import Boxes
 
 Outputs = yolo.Outputs
@@ -25,6 +25,11 @@ class Adapter:
 
 
 ADAPTERS: Final[Mapping[str, Adapter]] = {
+    "centre_net": Adapter(
+        summary="the embedded detector: heat [1, classes, h, w] and edges [1, 4, h, w] in pixels",
+        faults=centre_net.faults,
+        read=centre_net.read,
+    ),
     "yolo": Adapter(
         summary="YOLO v8, v9, v11, v12 as exported: [1, 4 + classes, boxes], doubles removed here",
         faults=yolo.raw_faults,
