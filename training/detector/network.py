@@ -43,6 +43,7 @@ class CentreNet(nn.Module):
         self.grow = nn.Upsample(scale_factor=2, mode="nearest")
         self.last = nn.Conv2d(40, classes + 4, 1)
         with torch.no_grad():
+            assert self.last.bias is not None
             self.last.bias.copy_(torch.tensor([HEAT_PRIOR] * classes + [1.0] * 4))
         self.classes = classes
 

@@ -26,7 +26,7 @@ class Settings:
 
 
 FULL = Settings(
-    shards=(("heldout", 50), ("flat", 20), ("train", 500)),
+    shards=(("heldout", 50), ("flat", 20), ("train", 400)),
     epochs=8,
     settling_epochs=1,
 )

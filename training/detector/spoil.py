@@ -17,7 +17,8 @@ def spoil(image: Image, random: Random) -> Image:
         return image
     gain = between(random, 0.7, 1.4) * random.uniform(0.88, 1.12, 3)
     values = image.astype(np.float32) * gain.astype(np.float32)
-    values = 255 * (values.clip(0, 255) / 255) ** np.float32(between(random, 0.75, 1.3))
+    gamma = np.float32(between(random, 0.75, 1.3))
+    values = np.asarray(255 * (values.clip(0, 255) / 255) ** gamma, np.float32)
     if random.random() < 0.4:
         values = _blurred(values, random)
     sigma = between(random, 0, NOISE_SIGMA)

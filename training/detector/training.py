@@ -103,7 +103,7 @@ class _Run:
         for group in self._optimiser.param_groups:
             group["lr"] = self._learning_rate()
         self._optimiser.zero_grad()
-        (of_heat + of_boxes).backward()
+        (of_heat + of_boxes).backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), MAX_GRADIENT)
         self._optimiser.step()
         self._follow()

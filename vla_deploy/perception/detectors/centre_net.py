@@ -34,7 +34,7 @@ def faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
         return
     high, wide = shapes[0][2:]
     sizes = isinstance(high, int) and isinstance(wide, int)
-    if sizes and image.width_px * high != image.height_px * wide:  # type: ignore[operator]
+    if sizes and image.width_px * high != image.height_px * wide:
         yield f"expected maps in the image's proportions, got {wide} x {high} cells"
 
 
