@@ -2,6 +2,8 @@
 
 import argparse
 import logging
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,9 +26,17 @@ def main() -> None:
     parser.add_argument("--size", choices=SIZES, default="full")
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
-    every = {**STEPS, "ship": _ship}
-    for step in STEPS if arguments.step == "all" else [arguments.step]:
-        every[step](arguments.out, SIZES[arguments.size])
+    if arguments.step == "all":
+        _run_all(arguments.out, arguments.size)
+    else:
+        {**STEPS, "ship": _ship}[arguments.step](arguments.out, SIZES[arguments.size])
+
+
+def _run_all(out: Path, size: str) -> None:
+    """Run each step in a process of its own: Mesa's LLVM and torch crash each other in one."""
+    for step in STEPS:
+        command = [sys.executable, "-m", "training.detector", step]
+        subprocess.run([*command, "--out", str(out), "--size", size], check=True)
 
 
 def _data(out: Path, settings: Settings) -> None:
