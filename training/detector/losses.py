@@ -7,17 +7,20 @@ from torch.nn import functional
 from training.detector.network import BOX_LOG_RANGE
 from training.detector.targets import STRIDE_PX
 
-BOX_WEIGHT = 5.0
+HEAT_WEIGHT, BOX_WEIGHT = 10.0, 5.0
+SEEN_HEAT = 0.1
 
 
 def heat_loss(logits: Tensor, heat: Tensor, ignored: Tensor) -> Tensor:
-    """Return the focal loss of the heat, per centre; cells near centres count less as misses."""
-    probability = logits.sigmoid()
-    centre = (heat >= 1.0).float()
-    hit = -functional.logsigmoid(logits) * (1 - probability) ** 2 * centre
-    away = (1 - heat) ** 4 * (1 - centre) * (1 - ignored)
-    miss = -functional.logsigmoid(-logits) * probability**2 * away
-    return (hit.sum() + miss.sum()) / centre.sum().clamp(min=1.0)
+    """Return the quality focal loss of the heat, per thing.
+
+    Each cell has a value to reach, however near to a centre it is: a loss with one right cell per
+    thing would ask for a centre more exactly than an image of this size shows it.
+    """
+    entropy = functional.binary_cross_entropy_with_logits(logits, heat, reduction="none")
+    counts = 1 - ignored * (heat < SEEN_HEAT)
+    loss = entropy * (logits.sigmoid() - heat) ** 2 * counts
+    return HEAT_WEIGHT * loss.sum() / heat.sum().clamp(min=1.0)
 
 
 def box_loss(logs: Tensor, edges: Tensor, share: Tensor) -> Tensor:

@@ -54,7 +54,8 @@ class CentreNet(nn.Module):
         sixteenth = self.sixteenth(eighth)
         eighth = self.join_eighth(eighth + self.grow(self.to_eighth(sixteenth)))
         fine = self.join_quarter(self.from_quarter(quarter) + self.grow(self.to_quarter(eighth)))
-        last = self.last(fine)
+        with torch.autocast(fine.device.type, enabled=False):
+            last = self.last(fine.float())
         return last[:, : self.classes], last[:, self.classes :]
 
     def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:

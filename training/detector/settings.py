@@ -28,7 +28,7 @@ class Settings:
 FULL = Settings(
     shards=(("heldout", 50), ("flat", 20), ("train", 400)),
     epochs=8,
-    settling_epochs=1,
+    settling_epochs=2,
 )
 TINY = Settings(
     shards=(("heldout", 1), ("flat", 1), ("train", 2)),

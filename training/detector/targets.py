@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from training.detector.classes import CLASSES
 
 STRIDE_PX = 4
-SPREAD_RATIO = 0.54
-"""Share of a box, in each direction, over which its cells learn."""
+SPREAD_RATIO, MIN_SPREAD_CELLS = 0.12, 0.8
+"""Standard deviation of the heat around a centre, as a share of the box, and at least."""
+LEAST_HEAT, LEAST_SHARE = 0.02, 0.1
+"""Heat below the first is none; cells above the second learn the box's edges."""
 Floats = NDArray[np.float32]
 
 
@@ -54,24 +56,23 @@ def _pass_over(targets: Targets, class_index: int, box: Floats) -> None:
 def _learn(targets: Targets, class_index: int, box: Floats) -> None:
     """Write one box over what larger ones wrote before."""
     h, w = targets.share.shape
-    x, y = (float(box[0] + box[2]) / 2 / STRIDE_PX, float(box[1] + box[3]) / 2 / STRIDE_PX)
-    column, row = min(int(x), w - 1), min(int(y), h - 1)
-    reach = [int((box[2 + k] - box[k]) / STRIDE_PX / 2 * SPREAD_RATIO) for k in (0, 1)]
-    columns = np.arange(max(0, column - reach[0]), min(w, column + reach[0] + 1))
-    rows = np.arange(max(0, row - reach[1]), min(h, row + reach[1] + 1))
-    bell = np.outer(_bell(rows - row, reach[1]), _bell(columns - column, reach[0]))
-    area = np.ix_(rows, columns)
-    heat = targets.heat[class_index]
-    heat[area] = np.maximum(heat[area], bell)
-    centre_x, centre_y = (columns + 0.5) * STRIDE_PX, (rows + 0.5)[:, None] * STRIDE_PX
-    for k, distance in enumerate(
-        (centre_x - box[0], centre_y - box[1], box[2] - centre_x, box[3] - centre_y)
-    ):
-        targets.edges[k][area] = np.broadcast_to(distance, bell.shape).clip(0.5)
+    rows, columns = np.arange(h), np.arange(w)
+    bell = np.outer(_bell(rows, box[1::2]), _bell(columns, box[::2]))
+    targets.heat[class_index] = np.maximum(targets.heat[class_index], bell)
+    x, y = (columns + 0.5) * STRIDE_PX, (rows + 0.5)[:, None] * STRIDE_PX
+    distances = np.stack(
+        np.broadcast_arrays(x - box[0], y - box[1], box[2] - x, box[3] - y)
+    ).astype(np.float32)
+    area = (bell >= LEAST_SHARE) & (distances.min(axis=0) > 0)
+    targets.edges[:, area] = distances[:, area].clip(0.5)
     size = max(float((box[2] - box[0]) * (box[3] - box[1])), 1.0)
-    targets.share[area] = bell * (math.log(size) / bell.sum())
+    targets.share[area] = bell[area] * (math.log(size) / bell[area].sum())
 
 
-def _bell(offsets: NDArray[np.int_], reach: int) -> Floats:
-    sigma = (2 * reach + 1) / 6
-    return np.asarray(np.exp(-(offsets**2) / (2 * sigma**2)), np.float32)
+def _bell(cells: NDArray[np.int_], span: Floats) -> Floats:
+    """Return how near each row or column of cells is to the middle: 1 at the nearest one."""
+    middle, size = float(span[0] + span[1]) / 2 / STRIDE_PX, float(span[1] - span[0]) / STRIDE_PX
+    nearest = min(int(middle), len(cells) - 1)
+    sigma = max(SPREAD_RATIO * size, MIN_SPREAD_CELLS)
+    bell = np.exp(-((cells - nearest) ** 2) / (2 * sigma**2))
+    return np.where(bell > LEAST_HEAT, bell, 0.0).astype(np.float32)

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from training.detector.classes import CLASSES
 from training.detector.targets import STRIDE_PX, Targets, make_targets
@@ -54,4 +55,4 @@ def test_large_and_small_things_weigh_alike_but_for_the_logarithm() -> None:
     small = make_targets(rows((CUP, 40, 60, 50, 70, 1)), 240, 320).share.sum()
     large = make_targets(rows((CUP, 40, 60, 140, 160, 1)), 240, 320).share.sum()
 
-    assert large / small == np.float32(2.0)
+    assert large / small == pytest.approx(2.0)
