@@ -84,6 +84,7 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
         "sure_score": metrics["sure_score"],
         "tables": tables(metrics),
         "calibration_images": settings.calibration_images,
+        "size": settings.name,
         "seed": settings.seed,
         "epochs": settings.epochs,
         "settling_epochs": settings.settling_epochs,

@@ -64,6 +64,8 @@ def _learn(targets: Targets, class_index: int, box: Floats) -> None:
         np.broadcast_arrays(x - box[0], y - box[1], box[2] - x, box[3] - y)
     ).astype(np.float32)
     area = (bell >= LEAST_SHARE) & (distances.min(axis=0) > 0)
+    if not area.any():
+        return
     targets.edges[:, area] = distances[:, area].clip(0.5)
     size = max(float((box[2] - box[0]) * (box[3] - box[1])), 1.0)
     targets.share[area] = bell[area] * (math.log(size) / bell[area].sum())
