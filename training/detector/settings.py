@@ -8,12 +8,13 @@ class Settings:
     """Hold what decides the result besides the code; shards per split hold 20 images each.
 
     First come `epochs` on pieces of the images, which show most of the things for half the work,
-    then `settling_epochs` on whole images, during which the learning rate falls to nothing.
+    then `settling_epochs` on whole images. After `steady_epochs` the learning rate falls.
     """
 
     name: str
     seed: int = 0
     shards: tuple[tuple[str, int], ...]
+    steady_epochs: int
     epochs: int
     settling_epochs: int
     piece_px: tuple[int, int] = (160, 208)
@@ -27,13 +28,14 @@ class Settings:
 
 
 IMAGES = (("heldout", 50), ("flat", 20), ("train", 400))
-FULL = Settings(name="full", shards=IMAGES, epochs=60, settling_epochs=4)
+FULL = Settings(name="full", shards=IMAGES, steady_epochs=4, epochs=60, settling_epochs=4)
 """About three hours on one core."""
-SHORT = Settings(name="short", shards=IMAGES, epochs=10, settling_epochs=1)
+SHORT = Settings(name="short", shards=IMAGES, steady_epochs=4, epochs=8, settling_epochs=1)
 """About half an hour; begins like the full one, which can go on from its state."""
 TINY = Settings(
     name="tiny",
     shards=(("heldout", 1), ("flat", 1), ("train", 2)),
+    steady_epochs=1,
     epochs=1,
     settling_epochs=1,
     batch=4,

@@ -22,6 +22,8 @@ AVERAGE_DECAY = 0.998
 WEIGHT_DECAY = 1e-4
 MAX_GRADIENT = 10.0
 WARM_STEPS = 300
+LAST_RATE_RATIO = 0.01
+"""Learning rate at the end over that in the beginning."""
 TELL_EVERY_STEPS = 50
 _LOG = logging.getLogger(__name__)
 
@@ -113,10 +115,12 @@ class _Run:
         return losses
 
     def _learning_rate(self) -> float:
-        """Rise, stay, and in the settling epochs fall to nothing."""
+        """Rise, stay, then fall by the same share in each epoch."""
         settings, epoch = self._settings, self._steps / self._per_epoch
-        left = (settings.epochs + settings.settling_epochs - epoch) / settings.settling_epochs
-        return settings.learning_rate * min((self._steps + 1) / WARM_STEPS, left, 1.0)
+        last = settings.epochs + settings.settling_epochs
+        fallen = max(0.0, (epoch - settings.steady_epochs) / (last - settings.steady_epochs))
+        rise = min(1.0, (self._steps + 1) / WARM_STEPS)
+        return settings.learning_rate * rise * float(LAST_RATE_RATIO**fallen)
 
     @torch.no_grad()
     def _follow(self) -> None:
