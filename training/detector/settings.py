@@ -27,11 +27,22 @@ class Settings:
         return dict(self.shards)[split]
 
 
-IMAGES = (("heldout", 50), ("flat", 20), ("train", 400))
-FULL = Settings(name="full", shards=IMAGES, steady_epochs=4, epochs=60, settling_epochs=4)
+FULL = Settings(
+    name="full",
+    shards=(("heldout", 50), ("flat", 20), ("train", 800)),
+    steady_epochs=2,
+    epochs=30,
+    settling_epochs=2,
+)
 """About three hours on one core."""
-SHORT = Settings(name="short", shards=IMAGES, steady_epochs=4, epochs=8, settling_epochs=1)
-"""About half an hour; begins like the full one, which can go on from its state."""
+SHORT = Settings(
+    name="short",
+    shards=(("heldout", 50), ("flat", 20), ("train", 400)),
+    steady_epochs=4,
+    epochs=8,
+    settling_epochs=1,
+)
+"""About half an hour on one core."""
 TINY = Settings(
     name="tiny",
     shards=(("heldout", 1), ("flat", 1), ("train", 2)),

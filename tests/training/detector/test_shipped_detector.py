@@ -1,3 +1,4 @@
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from sim_twin.renderer import open_gl_context
 from training.detector.dataset import Shard, draw_shard
 from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import judge_file, run
-from training.detector.files import FILES
+from training.detector.files import FILES, METRICS
 
 SHIPPED = Path(__file__).parents[3] / "vla_deploy" / "models" / "detector"
 NEVER_DRAWN_BEFORE = 9000
@@ -24,11 +25,13 @@ def fresh() -> Iterator[Shard]:
 
 @pytest.mark.gl
 @pytest.mark.parametrize("name", FILES.values())
-def test_things_in_a_fresh_unseen_scene_are_found(fresh: Shard, name: str) -> None:
+def test_fresh_unseen_scenes_are_seen_as_well_as_the_card_says(fresh: Shard, name: str) -> None:
+    stated = json.loads((SHIPPED / METRICS).read_text())["splits"]["heldout"]["models"]
+
     figures = judge_file(SHIPPED / name, fresh)
 
     assert figures["labels"] >= 20
-    assert figures["recall"] >= 0.8
+    assert figures["recall"] >= 0.8 * stated["fp32"]["recall"]
 
 
 @pytest.mark.parametrize("name", FILES.values())
