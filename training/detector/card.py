@@ -16,6 +16,7 @@ from training.detector.labels import MIN_LONG_PX, MIN_PIXELS, MIN_SEEN_RATIO
 from training.detector.settings import Settings
 from training.detector.targets import STRIDE_PX
 
+AIM_MAP50, AIM_RECALL = 0.90, 0.93
 TEMPLATE = Path(__file__).with_name("card_template.md")
 TITLES = {
     "heldout": "Unseen scenes, lights and textures",
@@ -62,6 +63,18 @@ def _table(metrics: dict[str, Any], split: str, title: str) -> str:
     return "\n".join([*lines, ""])
 
 
+def verdict(metrics: dict[str, Any]) -> str:
+    """Return a sentence on whether the fp32 file does on unseen scenes what is asked of it."""
+    told = metrics["splits"]["heldout"]["models"]["fp32"]
+    figures = f"mAP50 {told['map50']:.3f} and recall {told['recall']:.3f} on unseen scenes"
+    if told["map50"] >= AIM_MAP50 and told["recall"] >= AIM_RECALL:
+        return f"It reaches its aim ({AIM_MAP50:.2f}, {AIM_RECALL:.2f}): {figures}."
+    return (
+        f"**It does not reach its aim of mAP50 {AIM_MAP50:.2f} and recall {AIM_RECALL:.2f}: it has "
+        f"{figures}.** Do not let the robot act on it alone; train it longer."
+    )
+
+
 def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
     """Return the model card."""
     sizes = ", ".join(
@@ -69,6 +82,7 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
     )
     images = settings.shard_count("train") * IMAGES_PER_SHARD
     values = {
+        "verdict": verdict(metrics),
         "classes": ", ".join(CLASSES),
         "sizes": sizes,
         "width_px": WIDTH_PX,

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from training.detector.card import describe, manifest, tables
+from training.detector.card import describe, manifest, tables, verdict
 from training.detector.classes import CLASSES
 from training.detector.files import CARD, FILES, MANIFEST, METRICS
 from training.detector.settings import FULL
@@ -37,3 +37,15 @@ def test_card_and_manifest_are_written_beside_the_files(tmp_path: Path) -> None:
 
     assert "**Real photographs.**" in (tmp_path / CARD).read_text()
     assert (tmp_path / MANIFEST).read_text() == (SHIPPED / MANIFEST).read_text()
+
+
+@pytest.mark.parametrize(
+    ("map50", "recall", "told"),
+    [(0.9, 0.93, "It reaches"), (0.89, 0.95, "does not reach"), (0.95, 0.92, "does not reach")],
+)
+def test_the_card_begins_with_whether_the_aim_is_reached(
+    map50: float, recall: float, told: str
+) -> None:
+    models = {"fp32": {"map50": map50, "recall": recall}}
+
+    assert told in verdict({"splits": {"heldout": {"models": models}}})
