@@ -52,7 +52,9 @@ def quantise(out: Path, models: Path, settings: Settings) -> None:
     random = np.random.default_rng([settings.seed, 200])
     picks = random.permutation(len(shard.images))[: settings.calibration_images]
     paths = {Variant(name): models / file for name, file in FILES.items() if name != "fp32"}
-    feeds = ({"image": as_input(image)} for image in shard.images[picks])
-    write_int8(models / FILES["fp32"], paths, feeds)
+    images = shard.images[picks]
+    write_int8(
+        models / FILES["fp32"], paths, lambda: ({"image": as_input(image)} for image in images)
+    )
     for path in paths.values():
         _LOG.info("%s: %d bytes", path.name, path.stat().st_size)
