@@ -25,11 +25,6 @@ class Adapter:
 
 
 ADAPTERS: Final[Mapping[str, Adapter]] = {
-    "centre_net": Adapter(
-        summary="the embedded detector: heat [1, classes, h, w] and edges [1, 4, h, w] in pixels",
-        faults=centre_net.faults,
-        read=centre_net.read,
-    ),
     "yolo": Adapter(
         summary="YOLO v8, v9, v11, v12 as exported: [1, 4 + classes, boxes], doubles removed here",
         faults=yolo.raw_faults,
@@ -44,5 +39,10 @@ ADAPTERS: Final[Mapping[str, Adapter]] = {
         summary="NMS in the graph, four outputs: count, boxes [1, n, 4], scores, classes",
         faults=yolo.counted_faults,
         read=yolo.read_counted,
+    ),
+    "centre_net": Adapter(
+        summary="the embedded detector: heat [1, classes, h, w] and edges [1, 4, h, w] in pixels",
+        faults=centre_net.faults,
+        read=centre_net.read,
     ),
 }
