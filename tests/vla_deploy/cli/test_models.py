@@ -124,7 +124,10 @@ def test_a_quantised_model_that_sees_worse_is_refused_with_code_1(vla, files, ad
 def test_verify_returns_1_when_a_check_fails(vla, added, base):
     code, out, _ = vla("verify", "--profile", "desktop")
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == ["ok"] * 4
+    rows = [line.split()[:2] for line in out.splitlines()]
+    assert {name for _, name in rows} == {added, "detector"}
+    assert {verdict for verdict, _ in rows} == {"ok"}
+    assert [name for _, name in rows].count(added) == 4
     code, out, _ = vla("verify", added, "--profile", "jetson_orin_nx", "--json")
     assert code == 1
     (failed,) = (one for one in json.loads(out) if not one["is_ok"])
