@@ -70,10 +70,22 @@ class ImageInput:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """Declare how good a detector was on images that it had not seen, at its own threshold.
+
+    `precision` is the share of its boxes that were right, `recall` that of the things it found.
+    """
+
+    precision: float
+    recall: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Detection:
     """Declare how a detector's outputs are read; `adapter` names the reader.
 
-    Boxes of one class that overlap by more than `iou_threshold` count as one thing.
+    Boxes of one class that overlap by more than `iou_threshold` count as one thing. `measured` is
+    None where nobody has measured it.
     """
 
     adapter: str
@@ -81,6 +93,7 @@ class Detection:
     score_threshold: float
     iou_threshold: float
     image: ImageInput
+    measured: Measured | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

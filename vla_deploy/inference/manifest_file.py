@@ -14,6 +14,7 @@ from vla_deploy.inference.manifest import (
     ImageInput,
     Layout,
     Manifest,
+    Measured,
     ModelFile,
     Tensor,
     Variant,
@@ -78,6 +79,7 @@ def _detection(table: Document) -> Detection:
         **{
             **table,
             "classes": tuple(table["classes"]),
+            "measured": Measured(**table["measured"]) if "measured" in table else None,
             "image": ImageInput(
                 **{
                     **image,
@@ -93,7 +95,11 @@ def _detection(table: Document) -> Detection:
 
 def document_of(manifest: Manifest) -> dict[str, Any]:
     """Return the manifest as tables; what is empty or absent is left out."""
-    return {key: value for key, value in asdict(manifest).items() if value not in ("", None)}
+    return asdict(manifest, dict_factory=_present)
+
+
+def _present(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {key: value for key, value in pairs if value not in ("", None)}
 
 
 def _lines(prefix: str, table: Document) -> Iterator[str]:

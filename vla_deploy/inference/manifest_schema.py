@@ -104,7 +104,9 @@ _DETECTION: Shape = {
     "score_threshold": RATIO,
     "iou_threshold": RATIO,
     "image": TABLE,
+    "measured": OPTIONAL_TABLE,
 }
+_MEASURED: Shape = {"precision": RATIO, "recall": RATIO}
 _IMAGE: Shape = {
     "width_px": COUNT,
     "height_px": COUNT,
@@ -144,6 +146,8 @@ def _key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
     if isinstance(document.get("detection"), dict):
         detection = document["detection"]
         yield from check_record(detection, "detection", _DETECTION)
+        if isinstance(detection.get("measured"), dict):
+            yield from check_record(detection["measured"], "detection.measured", _MEASURED)
         if isinstance(detection.get("image"), dict):
             yield from check_record(detection["image"], "detection.image", _IMAGE)
 

@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from vla_deploy.inference.errors import ManifestInvalid
-from vla_deploy.inference.manifest import ModelFile, Tensor, Variant
+from vla_deploy.inference.manifest import Measured, ModelFile, Tensor, Variant
 from vla_deploy.inference.manifest_file import read_manifest, write_manifest
 
 WRITTEN = """
@@ -135,3 +135,20 @@ def test_what_is_no_toml_is_told(tmp_path, text):
     (tmp_path / "mine" / "model.toml").write_bytes(text.encode(errors="surrogateescape"))
     with pytest.raises(ManifestInvalid, match="expected a TOML document"):
         read_manifest(tmp_path / "mine")
+
+
+def test_what_a_detector_was_measured_at_is_read_and_written_again(tmp_path):
+    measured = WRITTEN + "\n[detection.measured]\nprecision = 0.8\nrecall = 0.7\n"
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "model.toml").write_text(measured)
+    manifest = read_manifest(tmp_path / "mine")
+    assert manifest.detection is not None
+    assert manifest.detection.measured == Measured(precision=0.8, recall=0.7)
+    write_manifest(tmp_path / "mine", manifest)
+    assert read_manifest(tmp_path / "mine") == manifest
+
+
+def test_a_measurement_that_no_detector_can_have_is_a_fault(faults_of):
+    faults = faults_of(WRITTEN + "\n[detection.measured]\nprecision = 80\n")
+    assert any("detection.measured.precision" in fault and "0 to 1" in fault for fault in faults)
+    assert any("detection.measured.recall" in fault for fault in faults)
