@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
+from benchmarks.perception_tracks import IdentityWatch
 from sim_twin.stack import LockstepStack
 
 COMMAND = "pick up the red cup and put it in the box"
@@ -13,10 +14,39 @@ MakeStack = Callable[[int], LockstepStack]
 pytestmark = pytest.mark.gl
 
 
+class SceneWatcher:
+    """Compare what perception tells with the truth, ten times a second."""
+
+    period_s = 0.1
+
+    def __init__(self, stack: LockstepStack) -> None:
+        self.identities = IdentityWatch()
+        self._stack = stack
+        self._scene = stack.space.cell_reader("scene")
+
+    def start(self) -> None:
+        pass
+
+    def step(self) -> None:
+        sample = self._scene.latest()
+        if sample is not None:
+            real = self._stack.lockstep.truth()["objects"]
+            self.identities.look(sample.document()["objects"], real)
+
+    def stop(self) -> None:
+        self._scene.close()
+
+
 @pytest.mark.timeout(240)
 def test_the_cup_ends_in_the_box_and_every_action_is_told(stack: LockstepStack) -> None:
+    watcher = SceneWatcher(stack)
+    stack.lockstep.add(watcher)
     outcome = stack.say(COMMAND)
     assert outcome["error"] is None
+    # On the table, in the hand and in the box it is one and the same cup.
+    assert watcher.identities.switches == []
+    assert watcher.identities.ids["red_cup"] == "cup_1"
+    assert watcher.identities.ids["box"] == "box_1"
     assert outcome["success"]
     assert stack.lockstep.inside("red_cup", "box")["inside"]
     told = [

@@ -220,11 +220,15 @@ class PerceptionNode:
         positions = self._joints.at(self._clock.now_ns(), STALE_JOINTS_NS)
         if sample is None or positions is None:
             return
-        for name, held in sample.document().get("holding", {}).items():
-            if held and name in self._robot.hands:
-                pose = self._model.site_pose(self._robot.hands[name].grip_site, positions)
-                grip = (float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3]))
-                self._scene.carry(held, grip, self._localiser.pose, self._clock.now_ns())
+        told = sample.document().get("holding", {})
+        for name, hand in self._robot.hands.items():
+            held = told.get(name)
+            if not held:
+                self._scene.release(name)
+                continue
+            pose = self._model.site_pose(hand.grip_site, positions)
+            grip = (float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3]))
+            self._scene.carry(name, held, grip, self._localiser.pose, self._clock.now_ns())
 
     def _camera_turn(self, stamp_ns: int) -> float:
         """Return how fast the camera turned, in the map frame, up to a moment."""

@@ -11,9 +11,12 @@ from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.localisation import Pose2D
 from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
+from vla_deploy.perception.filtering import Estimate
+from vla_deploy.perception.noise import covariance_of
 from vla_deploy.perception.shapes import half_turn
 from vla_deploy.perception.supports import Support, find_supports
-from vla_deploy.perception.tracking import Track, Tracker, View
+from vla_deploy.perception.track import Sighting, Track
+from vla_deploy.perception.tracking import Tracker, View
 
 # A missing thing is missed only where its kind would surely be found.
 CLEAR_RANGE_M = 1.6
@@ -45,18 +48,23 @@ class Scene:
         cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body)
         supports = find_supports(cloud)
         self._surfaces = [_surface(s, base) for s in supports if not s.is_floor]
-        self.detections = [_on_map(detection, base) for detection in detect(cloud, supports)]
+        sightings = [_sighting(found, base, stamp_ns) for found in detect(cloud, supports)]
+        self.detections = [sighting.detection for sighting in sightings]
         views = {
             id(track): _view(track, cloud, camera, base_from_camera, base)
             for track in self._tracker.tracks
         }
-        self._tracker.update(self.detections, views, stamp_ns)
+        self._tracker.update(sightings, views, stamp_ns)
         self.stamp_ns = stamp_ns
 
-    def carry(self, class_name: str, grip: Vector, base: Pose2D, stamp_ns: int) -> None:
+    def carry(self, hand: str, class_name: str, grip: Vector, base: Pose2D, stamp_ns: int) -> None:
         """Take note that a hand holds a thing; `grip` is where, in the base frame."""
         placed = base.compose(Pose2D(grip[0], grip[1], 0.0))
-        self._tracker.carry(class_name, (placed.x_m, placed.y_m, grip[2]), stamp_ns)
+        self._tracker.carry(hand, class_name, (placed.x_m, placed.y_m, grip[2]), stamp_ns)
+
+    def release(self, hand: str) -> None:
+        """Take note that a hand holds nothing."""
+        self._tracker.release(hand)
 
     def document(self) -> dict[str, Any]:
         """Return the scene topic's document."""
@@ -74,14 +82,20 @@ def _surface(support: Support, base: Pose2D) -> dict[str, Any]:
     }
 
 
-def _on_map(detection: Detection, base: Pose2D) -> Detection:
+def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
+    """Return a detection of the base frame as a sight in the map."""
     x, y, z = detection.position_m
     placed = base.compose(Pose2D(x, y, 0.0))
-    return replace(
+    on_map = replace(
         detection,
         position_m=(placed.x_m, placed.y_m, z),
         yaw_rad=half_turn(detection.yaw_rad + base.yaw_rad),
     )
+    covariance = covariance_of(detection, math.hypot(x, y))
+    seen = Estimate(
+        position_m=np.array(on_map.position_m), covariance_m2=covariance, stamp_ns=stamp_ns
+    )
+    return Sighting(on_map, seen)
 
 
 def _view(

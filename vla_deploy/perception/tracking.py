@@ -2,25 +2,21 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
 
 from vla_deploy.perception.classes import OTHER
-from vla_deploy.perception.detection import Detection, Vector
-from vla_deploy.perception.shapes import half_turn
+from vla_deploy.perception.detection import Vector
+from vla_deploy.perception.identity import is_missing, likeliest, may_be, take_over
+from vla_deploy.perception.matching import match
+from vla_deploy.perception.track import Sighting, Track, absorb, gap_m, new_track, take_in_hand
 
 CONFIRM_HITS = 2
-# Something of the same class and colour may have been pushed; anything else must be right there.
-SAME_GATE_M = 0.12
-OTHER_GATE_M = 0.05
+CONFIRM_SHARE = 0.5
 CARRY_GATE_M = 0.2
-LEAST_GAIN = 0.2
-DOUBTFUL_GAIN = 0.05
-UNKNOWN_WEIGHT = 0.25
 MISSES_TO_FORGET = 5
 UNCONFIRMED_MISSES = 2
 MAX_OBJECTS = 64
+MAX_TRACKS = 128
 VANISHED_KEPT = 32
 
 
@@ -31,61 +27,8 @@ class View(Enum):
     HIDDEN = "out of the image, too far, or something is in front"
 
 
-@dataclass(slots=True, eq=False)
-class Track:
-    """Hold what is known of one thing; `object_id` is empty until it is confirmed."""
-
-    position_m: Vector
-    size_m: Vector
-    yaw_rad: float
-    confidence: float
-    last_seen_ns: int
-    seen_count: int = 0
-    misses: int = 0
-    object_id: str = ""
-    classes: Counter[str] = field(default_factory=Counter)
-    colours: Counter[str] = field(default_factory=Counter)
-
-    @property
-    def class_name(self) -> str:
-        """Return the class most often seen; not to recognise a thing says little against one."""
-        votes = self._votes()
-        return max(votes, key=lambda name: votes[name]) if votes else OTHER
-
-    @property
-    def certainty(self) -> float:
-        """Return the share of sights that agree on the class."""
-        votes = self._votes()
-        return votes[self.class_name] / sum(votes.values()) if votes else 0.0
-
-    def _votes(self) -> dict[str, float]:
-        return {
-            name: count * (UNKNOWN_WEIGHT if name == OTHER else 1.0)
-            for name, count in self.classes.items()
-        }
-
-    @property
-    def colour(self) -> str:
-        """Return the colour most often seen."""
-        return self.colours.most_common(1)[0][0] if self.colours else "grey"
-
-    def document(self) -> dict[str, Any]:
-        """Return the thing as the scene topic tells it."""
-        return {
-            "id": self.object_id,
-            "class": self.class_name,
-            "colour": self.colour,
-            "position_m": [round(v, 4) for v in self.position_m],
-            "size_m": [round(v, 4) for v in self.size_m],
-            "yaw_rad": round(self.yaw_rad, 4),
-            "last_seen_ns": self.last_seen_ns,
-            "seen_count": self.seen_count,
-            "confidence": round(self.confidence * self.certainty, 3),
-        }
-
-
 class Tracker:
-    """Match detections (map frame) to tracks; confirm, remember and forget."""
+    """Match sights to things; confirm, remember and forget."""
 
     def __init__(self) -> None:
         self._tracks: list[Track] = []
@@ -103,63 +46,77 @@ class Tracker:
         """Return every track, confirmed or not: their places are what `views` judges."""
         return list(self._tracks)
 
-    def update(self, detections: list[Detection], views: dict[int, View], stamp_ns: int) -> None:
-        """Take one image's detections; `views` maps `id(track)` to what is seen at its place."""
-        pairs = self._match(detections)
-        matched = {id(track) for track, _ in pairs}
-        taken = {id(detection) for _, detection in pairs}
-        for track in self._tracks:
-            if id(track) not in matched and views.get(id(track)) is View.CLEAR:
-                track.misses += 1
-        for track, detection in pairs:
-            _absorb(track, detection, stamp_ns)
-        for detection in detections:
-            if id(detection) not in taken and _is_sure(detection) and not self._is_part(detection):
-                self._tracks.append(_new_track(detection, stamp_ns))
-        self._forget()
-        self._drop_doubles([track for track, _ in pairs])
-        for track in self._tracks:
-            if not track.object_id and track.seen_count >= CONFIRM_HITS:
-                track.object_id = self._name(track)
+    @property
+    def vanished(self) -> list[Track]:
+        """Return what is no longer where it was and has not been found again, the oldest first."""
+        return list(self._vanished)
 
-    def carry(self, class_name: str, grip_m: Vector, stamp_ns: int) -> None:
-        """Move the thing that a hand holds along with the hand: it is not where it was seen."""
+    def update(self, sightings: list[Sighting], views: dict[int, View], stamp_ns: int) -> None:
+        """Take one image's sights; `views` maps `id(track)` to what is seen at its place."""
+        pairs = match(self._tracks, sightings, stamp_ns)
+        matched = {id(track) for track, _, _ in pairs}
+        taken = {id(sighting) for _, sighting, _ in pairs}
+        for track in self._tracks:
+            is_clear = views.get(id(track)) is View.CLEAR and not track.held_by
+            if is_clear and id(track) not in matched:
+                track.misses += 1
+        for track, sighting, was_moved in pairs:
+            absorb(track, sighting, stamp_ns, was_moved=was_moved)
+        for sighting in sightings:
+            if id(sighting) not in taken and _is_sure(sighting) and not self._is_part(sighting):
+                self._tracks.append(new_track(sighting, stamp_ns))
+        self._forget()
+        self._drop_doubles([track for track, _, _ in pairs])
+        for track in list(self._tracks):
+            if not track.object_id and _is_believed(track):
+                self._name(track)
+
+    def carry(self, hand: str, class_name: str, grip_m: Vector, stamp_ns: int) -> Track | None:
+        """Move the thing that a hand holds along with the hand; return it, None for none known.
+
+        The first call takes the nearest thing of the class within reach of the grip, later ones
+        stay with it.
+        """
+        held = self.held_by(hand)
+        if held is None or class_name not in (held.class_name, OTHER):
+            self.release(hand)
+            held = self._nearest(class_name, grip_m)
+        if held is not None:
+            take_in_hand(held, hand, grip_m, stamp_ns)
+        return held
+
+    def held_by(self, hand: str) -> Track | None:
+        """Return the thing that a hand carries, or None."""
+        return next((track for track in self._tracks if track.held_by == hand), None)
+
+    def release(self, hand: str) -> None:
+        """Take note that a hand has let go: the thing is near where the hand was."""
+        held = self.held_by(hand)
+        if held is not None:
+            held.held_by = ""
+
+    def _nearest(self, class_name: str, grip_m: Vector) -> Track | None:
         near = [
-            (gap_m, track.object_id, track)
+            (distance_m, track.object_id, track)
             for track in self._tracks
             if track.object_id
+            and not track.held_by
             and track.class_name == class_name
-            and (gap_m := math.dist(track.position_m, grip_m)) < CARRY_GATE_M
+            and (distance_m := math.dist(track.position_m, grip_m)) < CARRY_GATE_M
         ]
-        if near:
-            _, _, held = min(near)
-            held.position_m, held.last_seen_ns, held.misses = grip_m, stamp_ns, 0
+        return min(near)[2] if near else None
 
-    def _match(self, detections: list[Detection]) -> list[tuple[Track, Detection]]:
-        """Pair each track with at most one detection, the closest pairs first."""
-        candidates = [
-            (distance_m, i, j)
-            for i, track in enumerate(self._tracks)
-            for j, detection in enumerate(detections)
-            if (distance_m := _distance(track, detection)) is not None
-        ]
-        pairs, used_tracks, used_detections = [], set(), set()
-        for _, i, j in sorted(candidates):
-            if i not in used_tracks and j not in used_detections:
-                used_tracks.add(i)
-                used_detections.add(j)
-                pairs.append((self._tracks[i], detections[j]))
-        return pairs
-
-    def _is_part(self, detection: Detection) -> bool:
+    def _is_part(self, sighting: Sighting) -> bool:
         """Tell whether this is a half-hidden part of a known thing, seen a second time."""
-        return detection.occluded and any(
-            (track.class_name, track.colour) == (detection.class_name, detection.colour)
-            and math.dist(track.position_m, detection.position_m) < 0.5 * max(track.size_m)
+        seen = sighting.detection
+        return seen.occluded and any(
+            (track.class_name, track.colour) == (seen.class_name, seen.colour)
+            and math.dist(track.position_m, seen.position_m) < 0.5 * max(track.size_m)
             for track in self._tracks
         )
 
     def _forget(self) -> None:
+        """Drop what has left its place; a younger thing that it may have become takes its id."""
         gone = [
             track
             for track in self._tracks
@@ -167,86 +124,56 @@ class Tracker:
         ]
         for track in gone:
             self._tracks.remove(track)
-        self._vanished += [track for track in gone if track.object_id]
+        for track in gone:
+            if track.object_id and not self._live_on(track):
+                self._vanished.append(track)
         del self._vanished[:-VANISHED_KEPT]
+        while len(self._tracks) > MAX_TRACKS:
+            self._tracks.remove(min(self._tracks, key=lambda one: one.last_seen_ns))
+
+    def _live_on(self, gone: Track) -> bool:
+        """Give a thing's id to one that appeared elsewhere after it was last seen."""
+        younger = [
+            track
+            for track in self._tracks
+            if track.object_id and track.first_seen_ns > gone.last_seen_ns and may_be(gone, track)
+        ]
+        if not younger:
+            return False
+        take_over(min(younger, key=lambda one: gap_m(gone, one)), gone)
+        return True
 
     def _drop_doubles(self, seen: list[Track]) -> None:
         """Let what is seen now take over the id of an unseen thing like it in the same place."""
         for track in seen:
             for other in [one for one in self._tracks if one not in seen]:
-                gap_m = math.dist(other.position_m[:2], track.position_m[:2])
-                alike = other.class_name == track.class_name
-                if alike and gap_m < 0.5 * min(track.size_m[:2]):
+                apart_m = math.dist(other.position_m[:2], track.position_m[:2])
+                alike = other.class_name == track.class_name and not other.held_by
+                if alike and apart_m < 0.5 * min(track.size_m[:2]):
                     self._tracks.remove(other)
-                    track.object_id = other.object_id or track.object_id
+                    if other.object_id:
+                        take_over(track, other)
 
-    def _name(self, track: Track) -> str:
-        """Return the id of the same kind of thing that has left its place, or a new id."""
-        kind = (track.class_name, track.colour)
-        missing = [t for t in self._tracks if t.object_id and t.misses > 0]
-        for pool in (self._vanished, missing):
-            for old in reversed(pool):
-                if (old.class_name, old.colour) == kind:
-                    if pool is self._vanished:
-                        pool.remove(old)
-                    else:
-                        self._tracks.remove(old)
-                    return old.object_id
+    def _name(self, track: Track) -> None:
+        """Give a track the id of the same kind of thing that has left its place, or a new one."""
+        missing = [one for one in self._tracks if is_missing(one)]
+        elder = likeliest(self._vanished, track) or likeliest(missing, track)
+        if elder is not None:
+            (self._vanished if elder in self._vanished else self._tracks).remove(elder)
+            take_over(track, elder)
+            return
         self._used[track.class_name] += 1
-        return f"{track.class_name}_{self._used[track.class_name]}"
+        track.object_id = f"{track.class_name}_{self._used[track.class_name]}"
 
 
-def _is_sure(detection: Detection) -> bool:
+def _is_sure(sighting: Sighting) -> bool:
     """Tell whether a sight is good enough to begin a track with."""
-    vague = detection.occluded and detection.class_name == OTHER
-    return not (detection.truncated or vague)
+    seen = sighting.detection
+    return not (seen.truncated or (seen.occluded and seen.class_name == OTHER))
 
 
-def _distance(track: Track, detection: Detection) -> float | None:
-    """Return how far apart they are, or None where they cannot be the same thing."""
-    distance_m = math.dist(track.position_m, detection.position_m)
-    doubtful = detection.truncated or detection.occluded
-    alike = detection.class_name == track.class_name and detection.colour == track.colour
-    reach_m = 0.5 * max(track.size_m[:2]) if doubtful else 0.0
-    gate_m = max(SAME_GATE_M if alike or doubtful else OTHER_GATE_M, reach_m)
-    return distance_m if distance_m < gate_m else None
-
-
-def _new_track(detection: Detection, stamp_ns: int) -> Track:
-    track = Track(
-        position_m=detection.position_m,
-        size_m=detection.size_m,
-        yaw_rad=detection.yaw_rad,
-        confidence=detection.confidence,
-        last_seen_ns=stamp_ns,
+def _is_believed(track: Track) -> bool:
+    """Tell whether enough looks agree on what a thing is."""
+    return (
+        track.seen_count >= CONFIRM_HITS and track.classes.share(track.class_name) > CONFIRM_SHARE
     )
-    _vote(track, detection)
-    track.seen_count = 1
-    return track
-
-
-def _absorb(track: Track, detection: Detection, stamp_ns: int) -> None:
-    track.misses = 0
-    track.last_seen_ns = stamp_ns
-    track.seen_count += 1
-    doubtful = detection.truncated or detection.occluded
-    gain = DOUBTFUL_GAIN if doubtful else max(LEAST_GAIN, 1.0 / track.seen_count)
-    if not doubtful:
-        _vote(track, detection)
-        if math.dist(track.position_m, detection.position_m) > OTHER_GATE_M:
-            gain = 1.0  # it was moved: its old place says nothing
-    track.position_m = _blend(track.position_m, detection.position_m, gain)
-    track.size_m = _blend(track.size_m, detection.size_m, gain)
-    track.yaw_rad = half_turn(track.yaw_rad + gain * half_turn(detection.yaw_rad - track.yaw_rad))
-    if detection.class_name == track.class_name:
-        track.confidence += gain * (detection.confidence - track.confidence)
-
-
-def _vote(track: Track, detection: Detection) -> None:
-    track.classes[detection.class_name] += 1
-    track.colours[detection.colour] += 1
-
-
-def _blend(old: Vector, new: Vector, gain: float) -> Vector:
-    x, y, z = (a + gain * (b - a) for a, b in zip(old, new, strict=True))
-    return (x, y, z)

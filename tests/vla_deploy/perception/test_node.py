@@ -300,6 +300,17 @@ def test_a_cup_that_is_carried_off_is_forgotten_and_keeps_its_id_elsewhere(
     assert math.dist(rig.known()["cup_1"]["position_m"][:2], (2.2, 1.42)) < 0.03
 
 
+def test_what_moves_while_the_camera_is_away_is_not_noticed(make_rig: Callable[..., Rig]) -> None:
+    """All that perception knows of things has come over the camera's wire."""
+    rig = make_rig()
+    rig.run_for(1.0)
+    before = rig.known()["cup_1"]
+    rig.lines["camera"].unplug()
+    rig.flat.put("red_cup", (6.3, 4.4, 0.5475))
+    rig.run_for(1.0)
+    assert rig.known()["cup_1"] == before
+
+
 def reach(flat: "StillFlat", target: np.ndarray) -> dict[str, float]:
     """Return right-arm joints that bring the grip near a point of the base frame."""
     random = np.random.default_rng(0)

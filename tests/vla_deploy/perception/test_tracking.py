@@ -1,8 +1,12 @@
 from typing import Any
 
+import numpy as np
 import pytest
 
 from vla_deploy.perception.detection import Detection
+from vla_deploy.perception.filtering import Estimate
+from vla_deploy.perception.noise import covariance_of
+from vla_deploy.perception.track import Sighting
 from vla_deploy.perception.tracking import Tracker, View
 
 CLEAR, HIDDEN = View.CLEAR, View.HIDDEN
@@ -28,6 +32,13 @@ def seen(
     return Detection(**(fields | changes))
 
 
+def sighting(detection: Detection, stamp_ns: int) -> Sighting:
+    """As from 0.8 m away."""
+    position_m, covariance = np.array(detection.position_m), covariance_of(detection, 0.8)
+    seen_there = Estimate(position_m=position_m, covariance_m2=covariance, stamp_ns=stamp_ns)
+    return Sighting(detection, seen_there)
+
+
 class Watcher:
     """Feed a tracker one image after the other."""
 
@@ -38,7 +49,8 @@ class Watcher:
     def image(self, *detections: Detection, view: View = CLEAR) -> list[dict[str, Any]]:
         self.images += 1
         views = {id(track): view for track in self.tracker.tracks}
-        self.tracker.update(list(detections), views, self.images * 200_000_000)
+        stamp_ns = self.images * 200_000_000
+        self.tracker.update([sighting(one, stamp_ns) for one in detections], views, stamp_ns)
         return [track.document() for track in self.tracker.objects]
 
 
@@ -153,7 +165,7 @@ def test_what_a_hand_holds_moves_with_the_hand_and_is_not_missed() -> None:
     watcher.image(*pair)
     watcher.image(*pair)
     for i in range(20):
-        watcher.tracker.carry("cup", (1.0, 2.0, 0.5 + 0.02 * i), 0)
+        watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.5 + 0.02 * i), 0)
         objects = watcher.image(pair[1])
     heights = {o["id"]: o["position_m"][2] for o in objects}
     assert heights == {"cup_1": pytest.approx(0.88), "cup_2": 0.5}
@@ -163,8 +175,8 @@ def test_a_hand_that_holds_something_unknown_moves_nothing() -> None:
     watcher = Watcher()
     watcher.image(seen())
     watcher.image(seen())
-    watcher.tracker.carry("ball", (1.0, 2.0, 0.6), 0)
-    watcher.tracker.carry("cup", (1.0, 2.0, 1.2), 0)
+    watcher.tracker.carry("right", "ball", (1.0, 2.0, 0.6), 0)
+    watcher.tracker.carry("left", "cup", (1.0, 2.0, 1.2), 0)
     (cup,) = watcher.image(seen())
     assert cup["position_m"] == [1.0, 2.0, 0.5]
 
@@ -212,3 +224,116 @@ def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
     for _ in range(4):
         boxes = watcher.image(box, part)
     assert [one["id"] for one in boxes] == ["box_1"]
+
+
+def test_crossing_sights_of_two_alike_things_are_shared_out_as_a_whole() -> None:
+    """The nearest pair alone would leave the second thing without its sight."""
+    watcher = Watcher()
+    pair = (seen(at=(1.0, 2.0, 0.5)), seen(at=(1.05, 2.0, 0.5)))
+    for _ in range(4):
+        watcher.image(*pair)
+    objects = watcher.image(seen(at=(1.028, 2.0, 0.5)), seen(at=(1.09, 2.0, 0.5)))
+    assert {o["id"] for o in objects} == {"cup_1", "cup_2"}
+    first, second = sorted(objects, key=lambda o: str(o["id"]))
+    assert first["position_m"][0] < second["position_m"][0]
+    assert first["seen_count"] == second["seen_count"] == 5
+
+
+def test_one_look_that_sees_something_else_does_not_confirm() -> None:
+    watcher = Watcher()
+    watcher.image(seen("cup"))
+    assert watcher.image(seen("phone", at=(1.01, 2.0, 0.5))) == []
+    (thing,) = watcher.image(seen("cup"))
+    assert thing["class"] == "cup"
+
+
+def test_it_tells_how_sure_it_is_of_place_class_and_colour() -> None:
+    watcher = Watcher()
+    for name in ("cup", "cup", "bottle", "cup"):
+        objects = watcher.image(seen(name))
+    (cup,) = objects
+    assert cup["classes"] == {"cup": 0.75, "bottle": 0.25}
+    assert cup["colours"] == {"red": 1.0}
+    assert max(cup["sigma_m"]) < 0.015
+    for _ in range(300):
+        (later,) = watcher.image(view=HIDDEN)
+    assert later["sigma_m"] == cup["sigma_m"]  # as it was seen last; `grown` tells of the present
+
+
+def test_a_thing_found_elsewhere_before_its_old_place_was_seen_empty_gets_its_old_id() -> None:
+    watcher = Watcher()
+    watcher.image(seen())
+    watcher.image(seen())
+    for _ in range(20):
+        watcher.image(view=HIDDEN)
+    elsewhere = seen(at=(4.0, 0.5, 0.6))
+    for _ in range(2):
+        both = watcher.image(elsewhere, view=HIDDEN)
+    assert {o["id"] for o in both} == {"cup_1", "cup_2"}
+    for _ in range(5):
+        objects = watcher.image(elsewhere)
+    assert [(o["id"], o["aliases"]) for o in objects] == [("cup_1", ["cup_2"])]
+
+
+def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
+    watcher = Watcher()
+    pair = (seen(), seen(at=(4.0, 0.5, 0.6)))
+    watcher.image(*pair)
+    watcher.image(*pair)
+    for _ in range(6):
+        objects = watcher.image(pair[1])
+    assert [(o["id"], o.get("aliases")) for o in objects] == [("cup_2", None)]
+    assert [one.object_id for one in watcher.tracker.vanished] == ["cup_1"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"colour": "blue"}, "another colour"),
+        ({"size_m": (0.13, 0.13, 0.2)}, "twice the size"),
+        ({"at": (60.0, 2.0, 0.5)}, "nobody runs that fast"),
+    ],
+)
+def test_what_cannot_be_the_missing_thing_is_a_new_one(changes: dict[str, Any], why: str) -> None:
+    watcher = Watcher()
+    watcher.image(seen())
+    watcher.image(seen())
+    for _ in range(6):
+        watcher.image()
+    other = seen(**({"at": (2.0, 2.0, 0.5)} | changes))
+    watcher.image(other)
+    (thing,) = watcher.image(other)
+    assert thing["id"] == "cup_2", why
+
+
+def test_a_hand_keeps_what_it_took_when_it_passes_another_one_like_it() -> None:
+    watcher = Watcher()
+    pair = (seen(), seen(at=(1.3, 2.0, 0.5)))
+    watcher.image(*pair)
+    watcher.image(*pair)
+    for step in range(16):
+        watcher.tracker.carry("left", "cup", (1.0 + 0.02 * step, 2.0, 0.62), 0)
+        objects = watcher.image(pair[1])
+    held = {o["id"]: o.get("held_by") for o in objects}
+    assert held == {"cup_1": "left", "cup_2": None}
+
+
+def test_what_was_let_go_is_found_where_it_has_come_to_rest() -> None:
+    watcher = Watcher()
+    watcher.image(seen())
+    watcher.image(seen())
+    watcher.tracker.carry("left", "cup", (3.0, 1.0, 0.6), 0)
+    watcher.tracker.release("left")
+    (cup,) = watcher.image(seen(at=(3.02, 1.0, 0.52)))
+    assert (cup["id"], "held_by" in cup) == ("cup_1", False)
+    assert cup["position_m"][2] < 0.54
+
+
+def test_the_memory_of_tracks_is_bounded() -> None:
+    watcher = Watcher()
+    for number in range(200):
+        spot = seen("object", at=(number * 1.0, 0.0, 0.5))
+        watcher.image(spot, view=HIDDEN)
+        watcher.image(spot, view=HIDDEN)
+    assert len(watcher.tracker.tracks) <= 128
+    assert len(watcher.tracker.objects) <= 64

@@ -1,0 +1,163 @@
+"""Hold what is known of one thing, and take in one more sight of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from vla_deploy.perception.belief import Belief
+from vla_deploy.perception.classes import OTHER
+from vla_deploy.perception.detection import Detection, Vector
+from vla_deploy.perception.filtering import Estimate, carried, corrected
+from vla_deploy.perception.shapes import half_turn
+
+LEAST_GAIN = 0.2
+DOUBTFUL_GAIN = 0.05
+# Half-hidden sights in a row are wrong in the same way: so many of them count as one.
+DOUBTFUL_LOOKS = 9.0
+# Not to recognise a thing says little against one that knew it.
+CLASS_WEIGHTS: Mapping[str, float] = MappingProxyType({OTHER: 0.25})
+TOLD_CLASSES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """Hold one image's detection in the map frame, and where its thing is by this sight alone."""
+
+    detection: Detection
+    seen: Estimate
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Tell whether a part of the thing is hidden, so that class and size are guesses."""
+        return self.detection.truncated or self.detection.occluded
+
+
+def _no_class() -> Belief:
+    return Belief(OTHER, CLASS_WEIGHTS)
+
+
+def _no_colour() -> Belief:
+    return Belief("grey")
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class Track:
+    """Hold one thing; `object_id` is empty until it is confirmed, `held_by` names a hand.
+
+    `aliases` are ids under which the same thing was known before it was found to be the same.
+    """
+
+    estimate: Estimate
+    size_m: Vector
+    yaw_rad: float
+    confidence: float
+    first_seen_ns: int
+    last_seen_ns: int
+    seen_count: int = 0
+    misses: int = 0
+    object_id: str = ""
+    aliases: tuple[str, ...] = ()
+    held_by: str = ""
+    classes: Belief = field(default_factory=_no_class)
+    colours: Belief = field(default_factory=_no_colour)
+
+    @property
+    def position_m(self) -> Vector:
+        """Return the place of its centre in the map frame."""
+        x_m, y_m, z_m = (float(value) for value in self.estimate.position_m)
+        return (x_m, y_m, z_m)
+
+    @property
+    def class_name(self) -> str:
+        """Return the likeliest class."""
+        return self.classes.best
+
+    @property
+    def colour(self) -> str:
+        """Return the likeliest colour."""
+        return self.colours.best
+
+    def document(self) -> dict[str, Any]:
+        """Return the thing as the scene topic tells it."""
+        told: dict[str, Any] = {
+            "id": self.object_id,
+            "class": self.class_name,
+            "colour": self.colour,
+            "position_m": [round(v, 4) for v in self.position_m],
+            "size_m": [round(v, 4) for v in self.size_m],
+            "yaw_rad": round(self.yaw_rad, 4),
+            "last_seen_ns": self.last_seen_ns,
+            "seen_count": self.seen_count,
+            "confidence": round(self.confidence * self.classes.share(self.class_name), 3),
+            "sigma_m": [round(float(v), 4) for v in self.estimate.sigma_m],
+            "classes": _rounded(self.classes.shares(TOLD_CLASSES)),
+            "colours": _rounded(self.colours.shares(TOLD_CLASSES)),
+        }
+        if self.aliases:
+            told["aliases"] = list(self.aliases)
+        if self.held_by:
+            told["held_by"] = self.held_by
+        return told
+
+
+def new_track(sighting: Sighting, stamp_ns: int) -> Track:
+    """Return the track that a sight begins."""
+    detection = sighting.detection
+    track = Track(
+        estimate=sighting.seen,
+        size_m=detection.size_m,
+        yaw_rad=detection.yaw_rad,
+        confidence=detection.confidence,
+        first_seen_ns=stamp_ns,
+        last_seen_ns=stamp_ns,
+        seen_count=1,
+    )
+    _vote(track, detection)
+    return track
+
+
+def absorb(track: Track, sighting: Sighting, stamp_ns: int, *, was_moved: bool) -> None:
+    """Take in a sight; of what `was_moved` the old place says nothing."""
+    detection = sighting.detection
+    track.misses = 0
+    track.last_seen_ns = stamp_ns
+    track.seen_count += 1
+    gain = DOUBTFUL_GAIN if sighting.is_doubtful else max(LEAST_GAIN, 1.0 / track.seen_count)
+    if not sighting.is_doubtful:
+        _vote(track, detection)
+    if was_moved:
+        gain, track.estimate = 1.0, sighting.seen
+    else:
+        looks = DOUBTFUL_LOOKS if sighting.is_doubtful else 1.0
+        track.estimate = corrected(track.estimate, sighting.seen, looks)
+    track.size_m = _blend(track.size_m, detection.size_m, gain)
+    track.yaw_rad = half_turn(track.yaw_rad + gain * half_turn(detection.yaw_rad - track.yaw_rad))
+    if detection.class_name == track.class_name:
+        track.confidence += gain * (detection.confidence - track.confidence)
+
+
+def take_in_hand(track: Track, hand: str, grip_m: Vector, stamp_ns: int) -> None:
+    """Seat a thing where the hand is that holds it."""
+    track.estimate = carried(grip_m, stamp_ns)
+    track.held_by, track.last_seen_ns, track.misses = hand, stamp_ns, 0
+
+
+def gap_m(one: Track, other: Track) -> float:
+    """Return the distance between two things' centres."""
+    return math.dist(one.position_m, other.position_m)
+
+
+def _vote(track: Track, detection: Detection) -> None:
+    track.classes.add(detection.class_name)
+    track.colours.add(detection.colour)
+
+
+def _blend(old: Vector, new: Vector, gain: float) -> Vector:
+    x, y, z = (a + gain * (b - a) for a, b in zip(old, new, strict=True))
+    return (x, y, z)
+
+
+def _rounded(shares: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(share, 3) for name, share in shares.items()}
