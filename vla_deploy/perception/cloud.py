@@ -15,6 +15,8 @@ MIN_DEPTH_M = 0.2
 MAX_DEPTH_M = 3.0
 # Stereo depth noise grows with the square of the distance.
 DEPTH_SIGMA_PER_M = 0.0012
+# Encoders and mounting of a head that stands still.
+AIM_SIGMA_RAD = 0.0005
 SMOOTHING_PX = 3
 UPRIGHT = 0.9
 EDGE_RATIO = 0.15
@@ -22,7 +24,10 @@ EDGE_RATIO = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cloud:
-    """Hold an image's points; `points` is (h, w, 3) in metres, x forward, z up from the floor."""
+    """Hold an image's points; `points` is (h, w, 3) in metres, x forward, z up from the floor.
+
+    `aim_sigma_rad` is how well the camera's direction is known.
+    """
 
     rgb: NDArray[np.uint8]
     depth_m: Floats
@@ -31,6 +36,7 @@ class Cloud:
     own_body: Mask
     camera_position: NDArray[np.float64]
     focal_px: float
+    aim_sigma_rad: float
 
     def sigma_m(self) -> Floats:
         """Return the depth noise to expect at each pixel."""
@@ -44,10 +50,12 @@ def make_cloud(
     camera: Intrinsics,
     base_from_camera: NDArray[np.float64],
     body: Mask | None = None,
+    aim_sigma_rad: float = AIM_SIGMA_RAD,
 ) -> Cloud:
     """Back-project an image; `base_from_camera` is 4x4 from the optical frame (z forward).
 
-    `body` marks pixels that show the robot itself.
+    `body` marks pixels that show the robot itself; `aim_sigma_rad` is how well the direction of the
+    camera is known.
     """
     valid = (depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)
     own_body = np.zeros_like(valid) if body is None else body
@@ -59,6 +67,7 @@ def make_cloud(
         own_body=own_body,
         camera_position=base_from_camera[:3, 3].copy(),
         focal_px=camera.fx,
+        aim_sigma_rad=aim_sigma_rad,
     )
 
 

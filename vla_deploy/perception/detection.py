@@ -1,7 +1,6 @@
 """Find things in an RGB-D image: supports, clusters on them, their form, colour and class."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +9,16 @@ from vla_deploy.perception.classes import OTHER, classify
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.clusters import Cluster, find_clusters, part_of, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
-from vla_deploy.perception.shapes import Rectangle, Shape, inside_rectangle, measure
+from vla_deploy.perception.placement import place
+from vla_deploy.perception.shapes import Rectangle, inside_rectangle, measure
 from vla_deploy.perception.supports import Support
-
-Vector = tuple[float, float, float]
+from vla_deploy.perception.uncertainty import (
+    UNKNOWN_MATRIX,
+    UNKNOWN_SIZE_SIGMA_M,
+    UNKNOWN_YAW_SIGMA_RAD,
+    Matrix,
+)
+from vla_deploy.perception.uncertainty import Vector as Vector
 
 CONFIDENCE_KNOWN = 0.9
 CONFIDENCE_OTHER = 0.5
@@ -30,7 +35,8 @@ class Detection:
 
     `position_m` is its centre: for a box that of its rim's rectangle, half its height below the
     rim. `size_m` is length along yaw, width, height. Of a truncated thing, class and measures are
-    guesses: the image's border or something nearer hides its end or its top.
+    guesses: the image's border or something nearer hides its end or its top. The covariance of the
+    position and the sigmas of size and yaw say how sure each is; they grow with what is not seen.
     """
 
     class_name: str
@@ -42,49 +48,9 @@ class Detection:
     truncated: bool
     occluded: bool
     box_px: tuple[int, int, int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class _Pose:
-    xy: tuple[float, float]
-    length_m: float
-    width_m: float
-    yaw_rad: float
-
-
-def _as_round(shape: Shape) -> _Pose:
-    """Take the middle of the top: it is seen whole, while the far side is hidden."""
-    return _Pose(shape.top.centre, shape.across_m, shape.across_m, 0.0)
-
-
-def _as_cup(shape: Shape) -> _Pose:
-    """Take the rim: a handle sticks out below it."""
-    rim_m = 0.5 * (shape.top.length_m + shape.top.width_m)
-    return _Pose(shape.top.centre, rim_m, rim_m, 0.0)
-
-
-def _as_ball(shape: Shape) -> _Pose:
-    sphere = shape.sphere
-    assert sphere is not None, "only what fits a sphere is called a ball"
-    return _Pose(sphere.centre[:2], 2 * sphere.radius_m, 2 * sphere.radius_m, 0.0)
-
-
-def _as_box(shape: Shape) -> _Pose:
-    rim = shape.top
-    return _Pose(rim.centre, rim.length_m, rim.width_m, rim.yaw_rad)
-
-
-def _as_block(shape: Shape) -> _Pose:
-    base = shape.footprint
-    return _Pose(base.centre, base.length_m, base.width_m, base.yaw_rad)
-
-
-PLACEMENT: dict[str, Callable[[Shape], _Pose]] = {
-    "bottle": _as_round,
-    "cup": _as_cup,
-    "ball": _as_ball,
-    "box": _as_box,
-}
+    covariance_m2: Matrix = UNKNOWN_MATRIX
+    size_sigma_m: Vector = UNKNOWN_SIZE_SIGMA_M
+    yaw_sigma_rad: float = UNKNOWN_YAW_SIGMA_RAD
 
 
 def detect(cloud: Cloud, supports: list[Support]) -> list[Detection]:
@@ -145,19 +111,21 @@ def _detection(cluster: Cluster, cloud: Cloud) -> Detection:
     shape = measure(cluster, cloud.camera_position, cloud.focal_px)
     name = classify(shape) if shape.height_m > _least_height_m(cluster) else OTHER
     colour, share = dominant_colour(cluster.rgb)
-    pose = PLACEMENT.get(name, _as_block)(shape)
-    ground_m = cluster.support.height_m(*pose.xy)
+    placed = place(cluster, shape, name, cloud)
     known = CONFIDENCE_OTHER if name == OTHER else CONFIDENCE_KNOWN
     enough = min(1.0, math.sqrt(len(cluster.points) / FEW_PIXELS))
     whole = 0.6 if cluster.truncated or cluster.occluded else 1.0
     return Detection(
         class_name=name,
         colour=colour,
-        position_m=(*pose.xy, ground_m + 0.5 * shape.height_m),
-        size_m=(pose.length_m, pose.width_m, shape.height_m),
-        yaw_rad=pose.yaw_rad,
+        position_m=placed.position_m,
+        size_m=placed.size_m,
+        yaw_rad=placed.yaw_rad,
         confidence=float(np.round(known * enough * whole * (0.7 + 0.3 * share), 3)),
         truncated=cluster.truncated,
         occluded=cluster.occluded,
         box_px=cluster.box_px,
+        covariance_m2=placed.covariance_m2,
+        size_sigma_m=placed.size_sigma_m,
+        yaw_sigma_rad=placed.yaw_sigma_rad,
     )

@@ -17,6 +17,7 @@ from vla_deploy.perception.shapes import half_turn
 from vla_deploy.perception.supports import Support, find_supports
 from vla_deploy.perception.track import Sighting, Track
 from vla_deploy.perception.tracking import Tracker, View
+from vla_deploy.perception.uncertainty import turned
 
 # A missing thing is missed only where its kind would surely be found.
 CLEAR_RANGE_M = 1.6
@@ -90,6 +91,7 @@ def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
         detection,
         position_m=(placed.x_m, placed.y_m, z),
         yaw_rad=half_turn(detection.yaw_rad + base.yaw_rad),
+        covariance_m2=turned(detection.covariance_m2, base.yaw_rad),
     )
     covariance = covariance_of(detection, math.hypot(x, y))
     seen = Estimate(
