@@ -30,7 +30,7 @@ TURN_PX = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class Placement:
     """Hold where a thing is, in the frame of its cloud; covariance and sigmas are one sigma.
 
     `yaw_sigma_rad` is that of the direction of the sides: which of two like sides is the length is
@@ -76,7 +76,7 @@ class _Sight:
         return math.atan2(sight[1], sight[0])
 
 
-def place(cluster: Cluster, shape: Shape, class_name: str, cloud: Cloud) -> Estimate:
+def place(cluster: Cluster, shape: Shape, class_name: str, cloud: Cloud) -> Placement:
     """Return the place of one thing of a class; "object" where the class is not known."""
     sight = _Sight(cluster, shape, cloud)
     spot = _lying(sight) if class_name not in NEVER_LIE else None
@@ -88,7 +88,7 @@ def place(cluster: Cluster, shape: Shape, class_name: str, cloud: Cloud) -> Esti
     aim_m = cloud.aim_sigma_rad * cluster.depth_m
     further_m = math.hypot(hidden, noise_m(cluster), aim_m)
     extent_m = math.hypot(EXTENT_PX * grain, 2.0 * hidden)
-    return Estimate(
+    return Placement(
         position_m=(*spot.xy, ground_m + 0.5 * height_m),
         size_m=(spot.length_m, spot.width_m, height_m),
         yaw_rad=spot.yaw_rad,
