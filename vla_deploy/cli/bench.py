@@ -5,7 +5,7 @@ import subprocess
 import sys
 from typing import Any
 
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 
 # Started by name: the robot's code never imports the benchmarks.
 BENCHMARKS = {
@@ -21,10 +21,9 @@ BENCHMARKS = {
 
 def register(commands: Any) -> None:
     """Add the command."""
-    bench = add_command(
+    bench = add_top_command(
         commands,
         "bench",
-        "measure beside a peer or a limit, in the same run",
         "  vla-deploy bench bus --json\n  vla-deploy bench twin\n",
     )
     listed = "; ".join(f"{name}: {summary}" for name, summary in BENCHMARKS.items())

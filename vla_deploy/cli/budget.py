@@ -5,7 +5,7 @@ import json
 from typing import Any, Final
 
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
 
 AGE_LIMIT_S: Final = 3.0
@@ -23,10 +23,9 @@ _CLEAR_SCREEN: Final = "\x1b[2J\x1b[H"
 
 def register(commands: Any) -> None:
     """Add the command."""
-    budget = add_command(
+    budget = add_top_command(
         commands,
         "budget",
-        "tell what the robot uses of its budgets, and what is done about an excess",
         "  vla-deploy budget\n  vla-deploy budget --watch\n  vla-deploy budget --json\n",
     )
     budget.add_argument("--json", action="store_true", help="print everything as JSON")

@@ -17,7 +17,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.errors import ProtocolError
 from drivers.stepping import wait_for
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.description import CanBus
 
@@ -33,10 +33,9 @@ _PROTOCOL_OF_ROBOT = {"cia402": "canopen", "odrive": "odrive"}
 
 def register(commands: Any) -> None:
     """Add the group of commands."""
-    group = add_command(
+    group = add_top_command(
         commands,
         "can",
-        "find CAN nodes and watch the traffic",
         "  vla-deploy can scan --robot butler\n"
         "  vla-deploy can monitor --interface slcan --channel /dev/ttyACM0 --bitrate 500000\n",
     ).add_subparsers(dest="can_command", required=True, metavar="CAN_COMMAND")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from platforms import load_profile
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import read_plan
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.node import world_of
@@ -17,19 +17,16 @@ from vla_deploy.robots import load_robot
 
 def register(commands: Any) -> None:
     """Add the commands."""
-    check = add_command(
+    check = add_top_command(
         commands,
         "check",
-        "check a robot, a profile or a plan, and report all faults",
         "  vla-deploy check --robot butler\n  vla-deploy check --plan plan.json\n",
     )
     check.add_argument("--robot", default="butler", help="name or folder of a robot")
     check.add_argument("--profile", default="desktop", help="name or file of a profile")
     check.add_argument("--plan", type=Path, help="a plan to check against the robot")
     check.set_defaults(run=run)
-    schema = add_command(
-        commands, "schema", "print the JSON Schema of a plan", "  vla-deploy schema\n"
-    )
+    schema = add_top_command(commands, "schema", "  vla-deploy schema\n")
     schema.set_defaults(run=run_schema)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.supervisor.crash_reports import crash_folder
 from vla_deploy.supervisor.runtime import default_base
@@ -19,7 +19,7 @@ EXAMPLES = """  vla-deploy crashes list
 
 def register(commands: Any) -> None:
     """Add the command."""
-    crashes = add_command(commands, "crashes", "list and show crash reports", EXAMPLES)
+    crashes = add_top_command(commands, "crashes", EXAMPLES)
     crashes.add_argument("act", choices=("list", "show"), help="all in a line each, or one whole")
     crashes.add_argument("crash", nargs="?", help="its name in the list (default: the newest)")
     crashes.add_argument("--json", action="store_true", help="print JSON")

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.narrate import action_words, line_of
 from vla_deploy.cli.referee import SteppingClock, ask_referee
 from vla_deploy.cli.run import add_robot_arguments
@@ -32,7 +32,7 @@ ARM_TIMEOUT_S = 20.0
 
 def register(commands: Any) -> None:
     """Add the command."""
-    demo = add_command(commands, "demo", "do the main job on the twin", EXAMPLES)
+    demo = add_top_command(commands, "demo", EXAMPLES)
     add_robot_arguments(demo)
     demo.add_argument("--command", dest="order", default=COMMAND, help=f'default: "{COMMAND}"')
     demo.add_argument("--out", type=Path, default=Path("out"), help="folder for film and outcome")

@@ -14,7 +14,7 @@ from platforms.probes import ProbeSet, Reading, open_probes, read_power_modes
 from platforms.tree import Tree
 from vla_deploy import doctor
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.profile_choice import detect, start_profile
 
@@ -29,10 +29,9 @@ _SCALES: Mapping[str, tuple[float, str]] = {
 
 def register(commands: Any) -> None:
     """Add the commands."""
-    examined = add_command(
+    examined = add_top_command(
         commands,
         "doctor",
-        "examine this computer, and say how to mend what is wrong",
         "  vla-deploy doctor\n"
         "  vla-deploy doctor --robot butler --profile jetson_orin_nx\n"
         "  vla-deploy doctor --json | jq '.findings[] | select(.level == \"fail\")'\n",
@@ -43,10 +42,9 @@ def register(commands: Any) -> None:
     )
     _add_common(examined)
     examined.set_defaults(run=run)
-    probes = add_command(
+    probes = add_top_command(
         commands,
         "probes",
-        "print load, memory, power, heat and throttling of this computer",
         "  vla-deploy probes\n  vla-deploy probes --watch 1\n  vla-deploy probes --json\n",
     )
     probes.add_argument("--watch", type=_period_s, metavar="S", help="again every S seconds")

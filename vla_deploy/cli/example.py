@@ -3,6 +3,8 @@
 import argparse
 from typing import Any, NoReturn
 
+from vla_deploy.cli.commands import COMMANDS
+
 
 class OneLineParser(argparse.ArgumentParser):
     """Say in one line what is wrong with the arguments; its commands do the same."""
@@ -25,3 +27,8 @@ def add_command(
         aliases=list(aliases),
     )
     return added
+
+
+def add_top_command(commands: Any, name: str, examples: str) -> argparse.ArgumentParser:
+    """Add one of `COMMANDS`, which says what it is for."""
+    return add_command(commands, name, COMMANDS[name].summary, examples)

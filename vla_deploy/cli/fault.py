@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.cli.twin_link import ask_twin
 
@@ -34,7 +34,7 @@ _TIMES: Final = {
 
 def register(commands: Any) -> None:
     """Add the command."""
-    fault = add_command(commands, "fault", "make the twin's devices fail", _EXAMPLES)
+    fault = add_top_command(commands, "fault", _EXAMPLES)
     actions = fault.add_subparsers(dest="action", required=True, metavar="ACTION")
     listing = _add(actions, "list", "what can fail, and what does now", "list --json")
     listing.set_defaults(run=run_list)

@@ -9,7 +9,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.supervisor.runtime import default_base
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
@@ -29,7 +29,7 @@ EXAMPLES = """  vla-deploy flight list
 
 def register(commands: Any) -> None:
     """Add the commands."""
-    flight = add_command(commands, "flight", "look into what the flight recorder saved", EXAMPLES)
+    flight = add_top_command(commands, "flight", EXAMPLES)
     acts = flight.add_subparsers(dest="act", required=True, metavar="ACT")
     listing = _add(acts, "list", "list the flights, the oldest first", run_list)
     show = _add(acts, "show", "tell what happened in a flight, line by line", run_show)

@@ -11,7 +11,7 @@ from typing import Any
 
 from platforms import load_profile
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.install import (
     Change,
     Credential,
@@ -47,9 +47,7 @@ UNINSTALL_EXAMPLES = """  vla-deploy uninstall --dry-run
 
 def register(commands: Any) -> None:
     """Add the commands."""
-    install = add_command(
-        commands, "install", "install the robot as a service of this computer", INSTALL_EXAMPLES
-    )
+    install = add_top_command(commands, "install", INSTALL_EXAMPLES)
     add_layout_arguments(install)
     install.add_argument("--robot", default="butler", help="name or folder (default: butler)")
     install.add_argument(
@@ -67,9 +65,7 @@ def register(commands: Any) -> None:
         help="give the service a secret from a file that only root can read",
     )
     install.set_defaults(run=run_install)
-    uninstall = add_command(
-        commands, "uninstall", "remove exactly what install wrote", UNINSTALL_EXAMPLES
-    )
+    uninstall = add_top_command(commands, "uninstall", UNINSTALL_EXAMPLES)
     add_layout_arguments(uninstall)
     uninstall.add_argument(
         "--purge", action="store_true", help="remove state, logs, releases and the user, too"

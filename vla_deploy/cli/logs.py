@@ -9,7 +9,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.logs import LOGS_DIR
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.supervisor.log_files import (
@@ -34,7 +34,7 @@ _POLL_NS = NS_PER_S // 5
 
 def register(commands: Any) -> None:
     """Add the command."""
-    logs = add_command(commands, "logs", "show what the processes log", EXAMPLES)
+    logs = add_top_command(commands, "logs", EXAMPLES)
     logs.add_argument("process", nargs="?", help="one process of the table, e.g. control")
     logs.add_argument("--follow", action="store_true", help="go on until Ctrl-C or the run's end")
     logs.add_argument("--level", choices=LEVELS, default="info", help="the least level to show")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.inference.manifest import Fit
 from vla_deploy.inference.manifest_schema import COLOURS
 from vla_deploy.perception.detectors.adapters import ADAPTERS
@@ -24,9 +24,7 @@ Run = Callable[[argparse.Namespace], int]
 
 def register_acts(commands: Any, runs: Mapping[str, Run]) -> None:
     """Add the command; `runs` says which function does each act."""
-    models = add_command(
-        commands, "models", "add, list, measure, quantise and verify models", EXAMPLES
-    )
+    models = add_top_command(commands, "models", EXAMPLES)
     acts = models.add_subparsers(dest="act", required=True, metavar="ACT")
     add_command(acts, "list", "list the models, and who uses them", "  vla-deploy models list\n")
     show = add_command(acts, "show", "show what a model is", "  vla-deploy models show detector\n")

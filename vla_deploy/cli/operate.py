@@ -9,7 +9,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.supervisor.runtime import default_base, running
@@ -18,41 +18,28 @@ WAIT_S = 5.0
 
 Reached = Callable[[Mapping[str, Any]], bool]
 
-ACTS: Mapping[str, tuple[str, Reached]] = {
-    "estop": (
-        "stop the robot now and latch the stop (a software stop)",
-        lambda status: bool(status["estop_latched"]),
+ACTS: Mapping[str, Reached] = {
+    "estop": lambda status: bool(status["estop_latched"]),
+    "reset": lambda status: (
+        status["state"] in ("disarmed", "armed", "protective_stop") and not status["estop_latched"]
     ),
-    "reset": (
-        "release a latched stop; nothing moves, arm the robot next",
-        lambda status: (
-            status["state"] in ("disarmed", "armed", "protective_stop")
-            and not status["estop_latched"]
-        ),
-    ),
-    "arm": (
-        "put power on the joints where they are, so that commands may move them",
-        lambda status: status["state"] == "armed",
-    ),
-    "disarm": ("take power off the joints", lambda status: status["state"] == "disarmed"),
+    "arm": lambda status: status["state"] == "armed",
+    "disarm": lambda status: status["state"] == "disarmed",
 }
 
 
 def register(commands: Any) -> None:
     """Add the commands."""
-    for act, (summary, _) in ACTS.items():
-        command = add_command(commands, act, summary, f"  vla-deploy {act}\n")
+    for act in ACTS:
+        command = add_top_command(commands, act, f"  vla-deploy {act}\n")
         command.add_argument("--reason", default="", help="why, for the log")
         command.add_argument("--json", action="store_true", help="print control's status as JSON")
         command.set_defaults(run=run, act=act)
-    stop = add_command(
-        commands, "stop", "stop what the robot does; it stays ready", "  vla-deploy stop\n"
-    )
+    stop = add_top_command(commands, "stop", "  vla-deploy stop\n")
     stop.set_defaults(run=run_stop)
-    shutdown = add_command(
+    shutdown = add_top_command(
         commands,
         "shutdown",
-        "end the run in order, as Ctrl-C does; power goes off, so support the arms",
         "  vla-deploy shutdown\n",
     )
     shutdown.set_defaults(run=run_shutdown)
@@ -66,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     session = attach(arguments.runtime_base)
     session.operate(arguments.act, arguments.reason)
-    status = _wait(session, ACTS[arguments.act][1])
+    status = _wait(session, ACTS[arguments.act])
     if arguments.json:
         print(json.dumps(status, indent=2))
     else:

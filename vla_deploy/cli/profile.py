@@ -13,7 +13,7 @@ from platforms.power_switch import PowerSwitch
 from platforms.profile import PROFILES, profile_from, profile_names
 from platforms.profile_source import Source, flat, read_source
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.profile_change import Outcome, Phase
@@ -32,7 +32,7 @@ EXAMPLES = """  vla-deploy profile list
 
 def register(commands: Any) -> None:
     """Add the command."""
-    profile = add_command(commands, "profile", "choose how the stack uses this computer", EXAMPLES)
+    profile = add_top_command(commands, "profile", EXAMPLES)
     acts = profile.add_subparsers(dest="act", required=True, metavar="ACT")
     listing = add_command(acts, "list", "list the profiles", "  vla-deploy profile list\n")
     listing.set_defaults(run=list_profiles)

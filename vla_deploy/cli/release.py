@@ -14,7 +14,7 @@ import psutil
 
 from drivers.clock import MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.install import add_layout_arguments, layout_of
 from vla_deploy.install.layout import SERVICE_RUNTIME, Layout
 from vla_deploy.install.manifest import installed_choice
@@ -34,9 +34,7 @@ _ID_DIGITS = 8
 
 def register(commands: Any) -> None:
     """Add the command."""
-    release = add_command(
-        commands, "release", "add releases, switch between them, go back", EXAMPLES
-    )
+    release = add_top_command(commands, "release", EXAMPLES)
     add_layout_arguments(release)
     release.add_argument("act", choices=sorted(_ACTS), metavar="|".join(_ACTS))
     release.add_argument("target", nargs="?", help="a wheel to add; else the id of a release")

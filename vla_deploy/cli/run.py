@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.logs import journal_stream
 from vla_deploy.supervisor.errors import ProcessGivenUp, StartCrashed
 from vla_deploy.supervisor.options import RunOptions
@@ -28,7 +28,7 @@ _STDERR = 2
 
 def register(commands: Any) -> None:
     """Add the command."""
-    run = add_command(commands, "run", "run the robot until Ctrl-C", EXAMPLES)
+    run = add_top_command(commands, "run", EXAMPLES)
     add_robot_arguments(run)
     run.add_argument("--twin", action="store_true", help="replace the hardware by the twin")
     run.add_argument("--viewer", action="store_true", help="show the twin in a window")

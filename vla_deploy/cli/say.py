@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vla_deploy.cli.errors import CommandFailed, UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.narrate import line_of
 from vla_deploy.cli.session import Session, attach
 
@@ -18,7 +18,7 @@ EXAMPLES = """  vla-deploy say "go to the kitchen"
 
 def register(commands: Any) -> None:
     """Add the command."""
-    say = add_command(commands, "say", "give the robot a command and follow it", EXAMPLES)
+    say = add_top_command(commands, "say", EXAMPLES)
     what = say.add_mutually_exclusive_group(required=True)
     what.add_argument("text", nargs="?", help="the command in words")
     what.add_argument("--plan", type=Path, help="a plan as JSON, in any of the known dialects")

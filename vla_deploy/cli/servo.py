@@ -3,17 +3,16 @@
 from typing import Any
 
 from vla_deploy.cli import servo_calibrate, servo_change, servo_find, servo_monitor
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 
 PARTS = (servo_find, servo_monitor, servo_calibrate, servo_change)
 
 
 def register(commands: Any) -> None:
     """Add the group of commands."""
-    servo = add_command(
+    servo = add_top_command(
         commands,
         "servo",
-        "find, look at, set up and calibrate servos",
         "  vla-deploy servo scan --port /dev/ttyUSB0\n  vla-deploy servo monitor --robot butler\n",
     )
     group = servo.add_subparsers(dest="servo_command", required=True, metavar="SERVO_COMMAND")

@@ -5,17 +5,16 @@ import json
 import math
 from typing import Any
 
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.supervisor.profile_change import Outcome
 
 
 def register(commands: Any) -> None:
     """Add the command."""
-    status = add_command(
+    status = add_top_command(
         commands,
         "status",
-        "tell what runs and how the robot is",
         "  vla-deploy status\n  vla-deploy status --json\n",
     )
     status.add_argument("--json", action="store_true", help="print everything as JSON")

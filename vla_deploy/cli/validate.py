@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
 
 # Started by name: the robot's code never imports the twin.
 CAMPAIGNS = {
@@ -24,7 +24,7 @@ _PASSED_ON = ("only", "count", "hours", "seed", "workers", "junit")
 
 def register(commands: Any) -> None:
     """Add the command."""
-    validate = add_command(commands, "validate", "run a campaign against the twin", EXAMPLES)
+    validate = add_top_command(commands, "validate", EXAMPLES)
     listed = "; ".join(f"{name}: {summary}" for name, summary in CAMPAIGNS.items())
     validate.add_argument("campaign", choices=tuple(CAMPAIGNS), help=listed)
     validate.add_argument("--only", metavar="TEXT", help="only cases whose name contains this")
