@@ -31,6 +31,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import load_profile
 from sim_twin.campaigns.phases import Phase, Stage
 from sim_twin.stack import LockstepControl
+from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
@@ -40,7 +41,6 @@ _RPDO1: Final = 0x200
 _COMMAND_BITS: Final = 0x0F
 _ANSWER_S: Final = 1.0
 _PERIOD_NS: Final = NS_PER_S / load_profile("desktop").control_rate_hz
-_STANDSTILL_RAD_S: Final = 0.02
 _LONGEST_S: Final = 5.0
 _LOOK_S: Final = 0.004
 
@@ -144,16 +144,11 @@ def standstill_s(phase: Phase) -> float:
             stack.operate("estop")
             while stack.lockstep.now_s - began_s < _LONGEST_S:
                 stage.run_for(_LOOK_S)
-                if _fastest_rad_s(stack) < _STANDSTILL_RAD_S:
+                if fastest_joint(stack.lockstep.truth())[1] < STANDSTILL_RAD_S:
                     return stack.lockstep.now_s - began_s
         finally:
             stack.close()
     raise NoStop(f"{phase.value}: not at rest {_LONGEST_S:g} s after the request")
-
-
-def _fastest_rad_s(stack: LockstepControl) -> float:
-    joints = stack.lockstep.truth()["joints"].values()
-    return max(abs(float(joint["velocity"])) for joint in joints)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

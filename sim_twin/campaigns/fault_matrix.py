@@ -190,15 +190,10 @@ class _Trial:
             yield f"moved on after the stop, by {self._moved_rad:.3f} rad"
         if self._separation.least_m < _LEAST_GAP_M:
             yield f"{self._separation.least_m:.4f} m to furniture, limit {_LEAST_GAP_M}"
-        carries = self._cell.phase is Phase.CARRYING and not self._limp & self._grippers()
+        limp_grippers = self._limp & self._stack.robot.gripper_joints
+        carries = self._cell.phase is Phase.CARRYING and not limp_grippers
         if carries and not self._stage.holds_payload:
             yield f"{PAYLOAD} is no longer in the hand"
-
-    def _grippers(self) -> set[str]:
-        robot = self._stack.robot
-        return {
-            joint for hand in robot.hands.values() for joint in robot.group(hand.gripper).joints
-        }
 
     def _may(self, hazard: Hazard) -> bool:
         """Tell whether a servo without torque accounts for it."""

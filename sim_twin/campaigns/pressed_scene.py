@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import os
 import subprocess
 import tempfile
 from collections.abc import Iterator
@@ -36,20 +35,19 @@ _BOARD: Final = {
 PROFILE: Final = """inherits = "desktop"
 control_rate_hz = 125
 executor_rate_hz = 25
-realtime_priority = {priority}
 ladder = [
-  {{ action = "slow", process = "perception", ratio = 0.5 }},
-  {{ action = "smaller_model", process = "perception" }},
-  {{ action = "suspend", process = "planner" }},
-  {{ action = "restart", process = "perception" }},
-  {{ action = "protective_stop" }},
+  { action = "slow", process = "perception", ratio = 0.5 },
+  { action = "smaller_model", process = "perception" },
+  { action = "suspend", process = "planner" },
+  { action = "restart", process = "perception" },
+  { action = "protective_stop" },
 ]
-ladder_timing = {{ rise_s = 2.0, fall_s = 3.0, release_ratio = 0.9 }}
+ladder_timing = { rise_s = 2.0, fall_s = 3.0, release_ratio = 0.9 }
 [board]
 cpu_count = 64
 [budgets]
-perception = {{ memory_mb = 600, cpu_ratio = 0.9 }}
-planner = {{ memory_mb = 300, cpu_ratio = 1.5 }}
+perception = { memory_mb = 600, cpu_ratio = 0.9 }
+planner = { memory_mb = 300, cpu_ratio = 1.5 }
 [budgets.total]
 memory_mb = 4000
 cpu_ratio = 64
@@ -172,8 +170,7 @@ class Scene:
 
     def _start(self) -> WorkingRobot:
         profile = self.folder / "pressed.toml"
-        text = PROFILE.format(priority=40 if may_use_fifo() else 0)
-        profile.write_text(text, encoding="utf-8")
+        profile.write_text(PROFILE, encoding="utf-8")
         words = {
             "--profile": profile,
             "--probe-root": self.board,
@@ -187,18 +184,6 @@ class Scene:
             log=self.folder / "robot.log",
             environment=self.shift.environment if self.shift is not None else None,
         )
-
-
-def may_use_fifo() -> bool:
-    """Tell whether control may be scheduled in real time here."""
-    child = os.fork()
-    if child == 0:
-        try:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-        except OSError:
-            os._exit(1)
-        os._exit(0)
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
 @contextlib.contextmanager

@@ -80,9 +80,7 @@ def _registers(robot: RobotDescription, name: str) -> Floats:
 
 
 def _following_error(robot: RobotDescription) -> Floats:
-    grippers = {
-        joint for hand in robot.hands.values() for joint in robot.group(hand.gripper).joints
-    }
+    grippers = robot.gripper_joints
     return np.array(
         [
             np.inf if servo.joint in grippers else _FOLLOWING_ERROR_RAD * servo.travel_per_rad

@@ -247,6 +247,12 @@ class RobotDescription:
     protection: Protection = NOTHING_DECLARED
 
     @property
+    def gripper_joints(self) -> frozenset[str]:
+        """Return the joints of all grippers."""
+        groups = [self.group(hand.gripper) for hand in self.hands.values()]
+        return frozenset(joint for group in groups for joint in group.joints)
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Return the servo joints in the canonical order of every joint array."""
         return tuple(servo.joint for servo in self.servo_bus.servos)

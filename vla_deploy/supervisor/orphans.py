@@ -45,10 +45,9 @@ def end_leftovers(run_id: str, process_name: str | None = None) -> list[int]:
 
 def _environment(process: psutil.Process) -> Mapping[str, str]:
     try:
-        ended = process.status() == psutil.STATUS_ZOMBIE
-        return {} if ended else process.environ()
+        return process.environ()
     except (psutil.AccessDenied, psutil.NoSuchProcess, OSError):
-        return {}  # another user's, a kernel thread, or gone meanwhile: not ours
+        return {}  # another user's, a kernel thread, ended or gone: not ours
 
 
 def _signal(process: psutil.Process, *, kill: bool) -> None:

@@ -22,7 +22,7 @@ def test_the_profile_is_valid_and_declares_every_step_that_a_trouble_expects(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "pressed.toml"
-    path.write_text(PROFILE.format(priority=40))
+    path.write_text(PROFILE)
     profile = load_profile(str(path))
     declared = [" ".join(filter(None, (step.action, step.process))) for step in profile.ladder]
     for trouble in TROUBLES:

@@ -1,7 +1,7 @@
 """Add a person's detector: describe it, try it out, and only then keep it."""
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -132,13 +132,7 @@ def _with_adapter(request: Request, graph: Graph, detection: Detection) -> Detec
         if request.adapter in (None, name) and not any(adapter.faults(graph.outputs, detection))
     ]
     if len(fitting) == 1:
-        return Detection(
-            adapter=fitting[0],
-            classes=detection.classes,
-            score_threshold=detection.score_threshold,
-            iou_threshold=detection.iou_threshold,
-            image=detection.image,
-        )
+        return replace(detection, adapter=fitting[0])
     if fitting:
         fault = f"outputs fit {' and '.join(fitting)}; say which by --adapter"
         raise ModelMismatch(str(request.onnx), (fault,))
