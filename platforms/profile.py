@@ -54,7 +54,7 @@ class ModelChoice:
 
     `providers` are execution providers in order of preference. Running on the CPU where it is not
     listed is an error unless `cpu_fallback`. `memory_arena` keeps what a run needed for the next
-    one: faster, and never given back.
+    one: faster, and never given back. Where one is `required`, a process does not start without it.
     """
 
     tiers: tuple[str, ...]
@@ -63,6 +63,7 @@ class ModelChoice:
     threads: int
     cpu_fallback: bool
     memory_arena: bool
+    required: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -135,6 +135,7 @@ _MODEL: Keys = {
     "cpu_fallback": _Flag(),
     "memory_arena": _Flag(),
 }
+_MODEL_OPTIONAL: Keys = {"required": _Flag()}
 _BUDGET: Keys = {"memory_mb": _MEMORY_MB, "cpu_ratio": _CORES}
 _TOTAL: Keys = {**_BUDGET, "disk_free_mb": _Range(0, 1e7, "MB")}
 _TOTAL_OPTIONAL: Keys = {
@@ -166,7 +167,7 @@ def schema_faults(values: Table) -> Iterator[Fault]:
 
 def _model_faults(models: object) -> Iterator[Fault]:
     given = tuple(role for role in ROLES if isinstance(models, dict) and role in models)
-    yield from _group_faults("models", models, given, _MODEL, known=ROLES)
+    yield from _group_faults("models", models, given, _MODEL, _MODEL_OPTIONAL, known=ROLES)
 
 
 def _budget_faults(budgets: object) -> Iterator[Fault]:
@@ -188,7 +189,12 @@ def _ladder_faults(ladder: object) -> Iterator[Fault]:
 
 
 def _group_faults(
-    where: str, group: object, wanted: tuple[str, ...], keys: Keys, known: tuple[str, ...] = ()
+    where: str,
+    group: object,
+    wanted: tuple[str, ...],
+    keys: Keys,
+    optional: Keys | None = None,
+    known: tuple[str, ...] = (),
 ) -> Iterator[Fault]:
     """Check tables of tables, one for each name wanted."""
     names = known or wanted
@@ -199,7 +205,7 @@ def _group_faults(
     for name in sorted(group.keys() - set(names)):
         yield Fault(key=f"{where}.{name}", text=f"unknown, expected one of {', '.join(names)}")
     for name in wanted:
-        yield from _table_faults(f"{where}.{name}", group.get(name), keys)
+        yield from _table_faults(f"{where}.{name}", group.get(name), keys, optional)
 
 
 def _table_faults(

@@ -12,7 +12,7 @@ from platforms import Profile
 from platforms.profile import profile_from
 from platforms.profile_source import Source
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import Adaptable, NeedsRestart, Node
+from vla_deploy.node import Adaptable, NeedsRestart, Node, Slowable
 
 MIN_RATE_RATIO: Final = 0.8
 _PACE_WEIGHT: Final = 0.01
@@ -260,6 +260,8 @@ class AdaptingNode:
             self._directives_sequence = sample.sequence
             document = sample.document()
             self._rate_ratio = float(document.get("rate_ratio", {}).get(self._name, 1.0))
+            if isinstance(self._node, Slowable):
+                self._node.slow(self._rate_ratio)
             self._want_tier(int(document.get("model_tier", {}).get(self._name, 0)))
         if self._tier_future is not None and self._tier_future.done() and self._change is None:
             self._take_tier(self._tier_future)

@@ -22,6 +22,11 @@ class AtOnce(Executor):
         return future
 
 
+def beside(name: str) -> Executor:
+    """Return one thread of the same priority as the steps: for work that they wait for."""
+    return ThreadPoolExecutor(1, thread_name_prefix=name)
+
+
 def background() -> Executor:
     """Return one thread that lets the steps of its process go first."""
     return ThreadPoolExecutor(1, thread_name_prefix="prepare", initializer=_give_way)

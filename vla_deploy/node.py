@@ -59,6 +59,15 @@ class Adaptable(Protocol[PreparedT]):
         ...
 
 
+@runtime_checkable
+class Slowable(Protocol):
+    """Do costly work more seldom where the budgets ask for it; steps are paced by their caller."""
+
+    def slow(self, rate_ratio: float) -> None:
+        """Do the costly part of the work at this share of the profile's rate from now on."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeContext:
     """Carry what every process is started with.

@@ -15,6 +15,7 @@ from vla_deploy.adapting import AdaptingNode
 from vla_deploy.aside import AtOnce, background
 from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_CRASHED, EXIT_OK
 from vla_deploy.host_settings import REALTIME_PROCESS, HostSettings
+from vla_deploy.inference.errors import InferenceError
 from vla_deploy.ipc import IpcError
 from vla_deploy.logs import process_log
 from vla_deploy.navigation.errors import MapInvalid
@@ -22,6 +23,15 @@ from vla_deploy.node import Node, NodeContext, run_node
 from vla_deploy.robots import RobotFileError
 
 READY_DIR = "ready"
+# Starting again mends none of them: a person has to.
+CONFIGURATION_ERRORS = (
+    DriverError,
+    RobotFileError,
+    ProfileError,
+    IpcError,
+    MapInvalid,
+    InferenceError,
+)
 _PR_SET_NAME = 15
 _log = logging.getLogger(__name__)
 
@@ -49,7 +59,7 @@ def _run(
     try:
         node = _Announced(_adapting(name, build, context), context.run_dir / READY_DIR / name)
         run_node(node, context.clock, should_stop)
-    except (DriverError, RobotFileError, ProfileError, IpcError, MapInvalid) as error:
+    except CONFIGURATION_ERRORS as error:
         _log.error("%s", error)
         return EXIT_CONFIGURATION
     except Exception:  # the last place where a crash can be told to the log

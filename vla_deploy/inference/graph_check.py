@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.inference.manifest import Dimension, Manifest, Tensor
 
+MAX_NAN_SHARE: Final = 0.25
 _NAMES_KEY: Final = "names"
 _DTYPES: Final[Mapping[str, str]] = {"float": "float32", "double": "float64"}
 
@@ -34,12 +35,21 @@ def graph_faults(session: Any, manifest: Manifest) -> Iterator[str]:
         yield from _class_faults(named, manifest.detection.classes)
 
 
-def output_faults(outputs: Mapping[str, NDArray[np.generic]], manifest: Manifest) -> Iterator[str]:
-    """Find outputs of a run whose shape is not the declared one."""
+def output_faults(outputs: Mapping[str, NDArray[Any]], manifest: Manifest) -> Iterator[str]:
+    """Find outputs of a run whose shape is not the declared one, or whose values are no numbers."""
     for tensor in manifest.outputs:
         shape = outputs[tensor.name].shape
         if not _same_shape(shape, tensor.shape):
             yield _shape_text("output", tensor.name, shape, tensor.shape)
+    yield from number_faults(outputs)
+
+
+def number_faults(outputs: Mapping[str, NDArray[Any]]) -> Iterator[str]:
+    """Find outputs of which too much is NaN, as spoiled weights make it; a few may be left out."""
+    for name, values in outputs.items():
+        count = int(np.count_nonzero(np.isnan(values))) if values.dtype.kind == "f" else 0
+        if count > MAX_NAN_SHARE * values.size:
+            yield f"output {name!r}: {count} of its {values.size} values are no numbers"
 
 
 def class_names(session: Any) -> tuple[str, ...]:

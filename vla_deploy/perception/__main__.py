@@ -6,6 +6,7 @@ import sys
 from drivers.opener import PathOpener
 from drivers.recording_opener import RECORD_VARIABLE, recorded_if_asked
 from platforms import load_profile
+from vla_deploy.aside import beside
 from vla_deploy.node import NodeContext
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.process_main import main
@@ -20,7 +21,8 @@ def build(context: NodeContext) -> PerceptionNode:
     opener = recorded_if_asked(
         PathOpener(links, context.clock), context.clock, os.environ.get(RECORD_VARIABLE)
     )
-    return PerceptionNode(context, robot, load_profile(context.profile), opener)
+    profile = load_profile(context.profile)
+    return PerceptionNode(context, robot, profile, opener, beside("network"))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,8 @@
-"""Tell what a thing is by its measures: one table of rules, the first that holds wins."""
+"""Tell by its measures what a thing is, what it may also be, and what it cannot be.
+
+One table of rules: the first that names and holds gives the name. A second table bounds what a
+thing of a class can measure at all, however it lies.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,8 +48,13 @@ def _roundness(shape: Shape) -> float:
     return 1.0 if agrees else 0.0
 
 
+def _longest_m(shape: Shape) -> float:
+    return max(shape.height_m, shape.across_m, shape.footprint.length_m)
+
+
 MEASURES: dict[str, Measure] = {
     "height_m": lambda shape: shape.height_m,
+    "longest_m": _longest_m,
     "across_m": lambda shape: shape.across_m,
     "length_m": lambda shape: shape.footprint.length_m,
     "width_m": lambda shape: shape.footprint.width_m,
@@ -63,10 +72,24 @@ MEASURES: dict[str, Measure] = {
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Name a class and bound the measures that it must meet, bounds included."""
+    """Name a class and bound the measures that it must meet, bounds included.
+
+    A rule that does not `name` by itself only says that a thing looks like one: a can looks like a
+    cup too.
+    """
 
     name: str
     bounds: dict[str, Range]
+    names: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Form:
+    """Hold what a thing's measures say: its `name`, what it `fits`, what it is `impossible` for."""
+
+    name: str
+    fits: frozenset[str]
+    impossible: frozenset[str]
 
 
 OTHER = "object"
@@ -112,12 +135,62 @@ RULES: tuple[Rule, ...] = (
             "flatness": (0.04, 0.8),
         },
     ),
+    Rule(
+        "can",
+        {
+            "height_m": (0.08, 0.18),
+            "across_m": (0.045, 0.1),
+            "slenderness": (1.1, 2.8),
+            "squareness": (0.55, 1.0),
+        },
+        names=False,
+    ),
+    Rule(
+        "bowl",
+        {"height_m": (0.03, 0.11), "across_m": (0.09, 0.26), "slenderness": (0.2, 0.75)},
+        names=False,
+    ),
+    Rule(
+        "remote",
+        {"height_m": (0.006, 0.035), "length_m": (0.1, 0.26), "width_m": (0.025, 0.075)},
+        names=False,
+    ),
 )
 
+# However it stands or lies: its height, and the longest of its measures.
+POSSIBLE: dict[str, dict[str, Range]] = {
+    "cup": {"height_m": (0.03, 0.18), "longest_m": (0.04, 0.22)},
+    "ball": {"height_m": (0.02, 0.35), "longest_m": (0.02, 0.4)},
+    "book": {"height_m": (0.004, 0.35), "longest_m": (0.08, 0.42)},
+    "bottle": {"height_m": (0.03, 0.4), "longest_m": (0.1, 0.42)},
+    "phone": {"height_m": (0.003, 0.18), "longest_m": (0.09, 0.2)},
+    "keys": {"height_m": (0.003, 0.05), "longest_m": (0.02, 0.16)},
+    "box": {"height_m": (0.03, 0.45), "longest_m": (0.08, 0.6), "hole_m": (0.02, 0.5)},
+    "bowl": {"height_m": (0.03, 0.16), "longest_m": (0.08, 0.36)},
+    "can": {"height_m": (0.04, 0.2), "longest_m": (0.06, 0.22)},
+    "remote": {"height_m": (0.004, 0.06), "longest_m": (0.08, 0.3)},
+}
+BYSTANDERS: frozenset[str] = frozenset({"person", "chair"})
+"""What stands in the way and is never a thing to take: no thing's form is possible for them."""
 
-def classify(shape: Shape) -> str:
-    """Return the class of the first rule whose every bound holds, or "object"."""
-    for rule in RULES:
-        if all(low <= MEASURES[name](shape) <= high for name, (low, high) in rule.bounds.items()):
-            return rule.name
-    return OTHER
+
+def judge_form(shape: Shape, *, whole: bool = True) -> Form:
+    """Return what a shape says; of one that is half hidden, only what is too large is certain."""
+    fits = [rule for rule in RULES if _holds(rule.bounds, shape)]
+    return Form(
+        name=next((rule.name for rule in fits if rule.names), OTHER),
+        fits=frozenset(rule.name for rule in fits),
+        impossible=BYSTANDERS
+        | {name for name, bounds in POSSIBLE.items() if not _can_be(bounds, shape, whole)},
+    )
+
+
+def _holds(bounds: dict[str, Range], shape: Shape) -> bool:
+    return all(low <= MEASURES[name](shape) <= high for name, (low, high) in bounds.items())
+
+
+def _can_be(bounds: dict[str, Range], shape: Shape, whole: bool) -> bool:
+    return all(
+        (low <= MEASURES[name](shape) or not whole) and MEASURES[name](shape) <= high
+        for name, (low, high) in bounds.items()
+    )

@@ -1,16 +1,18 @@
-"""Find things in an RGB-D image: supports, clusters on them, their form, colour and class."""
+"""Find things in an RGB-D image: clusters on supports, named by form and network, with a colour."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from vla_deploy.perception.classes import OTHER, classify
+from vla_deploy.perception.classes import OTHER, Form, judge_form
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.clusters import Cluster, find_clusters, part_of, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
+from vla_deploy.perception.naming import Name, Source, by_both, by_form
+from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.placement import place
-from vla_deploy.perception.shapes import Rectangle, inside_rectangle, measure
+from vla_deploy.perception.shapes import Rectangle, Shape, inside_rectangle, measure
 from vla_deploy.perception.supports import Support
 from vla_deploy.perception.uncertainty import (
     UNKNOWN_MATRIX,
@@ -20,8 +22,6 @@ from vla_deploy.perception.uncertainty import (
 )
 from vla_deploy.perception.uncertainty import Vector as Vector
 
-CONFIDENCE_KNOWN = 0.9
-CONFIDENCE_OTHER = 0.5
 FEW_PIXELS = 60
 FLAT_SIGMAS = 4.0
 BOX_FLOOR_M = 0.02
@@ -51,13 +51,29 @@ class Detection:
     covariance_m2: Matrix = UNKNOWN_MATRIX
     size_sigma_m: Vector = UNKNOWN_SIZE_SIGMA_M
     yaw_sigma_rad: float = UNKNOWN_YAW_SIGMA_RAD
+    named_by: Source = Source.FORM
 
 
-def detect(cloud: Cloud, supports: list[Support]) -> list[Detection]:
-    """Return the things that stand on the supports, the nearest first."""
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """Hold one image: its points, and what a network saw in it, if there is one at work."""
+
+    cloud: Cloud
+    network: NetworkView | None
+
+
+def detect(
+    cloud: Cloud, supports: list[Support], network: NetworkView | None = None
+) -> list[Detection]:
+    """Return the things that stand on the supports, the nearest first.
+
+    Where they are and how large comes from their points alone; what they are, from their form and
+    what a network saw.
+    """
+    look = _Look(cloud, network)
     clusters = find_clusters(cloud, supports)
     clusters.sort(key=lambda cluster: cluster.depth_m)
-    found = [detection for cluster in clusters for detection in _detections(cluster, cloud)]
+    found = [detection for cluster in clusters for detection in _detections(cluster, look)]
     boxes = [detection for detection in found if detection.class_name == "box"]
     return [
         detection
@@ -79,25 +95,25 @@ def _is_bare_face(detection: Detection) -> bool:
     return detection.class_name == OTHER and width_m < FACE_WIDTH_M and height_m > FACE_HEIGHT_M
 
 
-def _detections(cluster: Cluster, cloud: Cloud) -> list[Detection]:
+def _detections(cluster: Cluster, look: _Look) -> list[Detection]:
     """Return one thing, or several that touch where each part by itself is a known one."""
-    whole = _detection(cluster, cloud)
+    whole = _detection(cluster, look)
     if whole.class_name == "box":
-        return [whole, *_contents(whole, cluster, cloud)]
-    if whole.class_name != OTHER:
+        return [whole, *_contents(whole, cluster, look)]
+    if whole.named_by in (Source.FORM, Source.BOTH):
         return [whole]
-    parts = [_detection(part, cloud) for part in split_by_colour(cluster, cloud)]
+    parts = [_detection(part, look) for part in split_by_colour(cluster, look.cloud)]
     return [whole] if any(part.class_name == OTHER for part in parts) else parts
 
 
-def _contents(box: Detection, cluster: Cluster, cloud: Cloud) -> list[Detection]:
+def _contents(box: Detection, cluster: Cluster, look: _Look) -> list[Detection]:
     """Return the known thing that stands within a box's walls, if there is one."""
     x, y, _ = box.position_m
     length_m, width_m, _ = box.size_m
     rim = Rectangle(centre=(x, y), length_m=length_m, width_m=width_m, yaw_rad=box.yaw_rad)
     within = inside_rectangle(cluster.points[:, :2], rim, WALL_M)
-    part = part_of(cluster, cloud, within & (cluster.heights > BOX_FLOOR_M))
-    content = _detection(part, cloud) if part is not None else None
+    part = part_of(cluster, look.cloud, within & (cluster.heights > BOX_FLOOR_M))
+    content = _detection(part, look) if part is not None else None
     known = content is not None and content.class_name != OTHER and content.colour != box.colour
     return [content] if content is not None and known else []
 
@@ -107,25 +123,35 @@ def _least_height_m(cluster: Cluster) -> float:
     return FLAT_SIGMAS * DEPTH_SIGMA_PER_M * cluster.depth_m**2
 
 
-def _detection(cluster: Cluster, cloud: Cloud) -> Detection:
-    shape = measure(cluster, cloud.camera_position, cloud.focal_px)
-    name = classify(shape) if shape.height_m > _least_height_m(cluster) else OTHER
+def _name(cluster: Cluster, shape: Shape, network: NetworkView | None) -> Name:
+    form = judge_form(shape, whole=not (cluster.truncated or cluster.occluded))
+    if shape.height_m <= _least_height_m(cluster):
+        form = Form(name=OTHER, fits=frozenset(), impossible=form.impossible)
+    if network is None:
+        return by_form(form)
+    word = network.word_for(cluster.box_px)
+    return by_form(form, network.silence(cluster.box_px)) if word is None else by_both(form, word)
+
+
+def _detection(cluster: Cluster, look: _Look) -> Detection:
+    shape = measure(cluster, look.cloud.camera_position, look.cloud.focal_px)
+    name = _name(cluster, shape, look.network)
     colour, share = dominant_colour(cluster.rgb)
-    placed = place(cluster, shape, name, cloud)
-    known = CONFIDENCE_OTHER if name == OTHER else CONFIDENCE_KNOWN
+    placed = place(cluster, shape, name.class_name, look.cloud)
     enough = min(1.0, math.sqrt(len(cluster.points) / FEW_PIXELS))
     whole = 0.6 if cluster.truncated or cluster.occluded else 1.0
     return Detection(
-        class_name=name,
+        class_name=name.class_name,
         colour=colour,
         position_m=placed.position_m,
         size_m=placed.size_m,
         yaw_rad=placed.yaw_rad,
-        confidence=float(np.round(known * enough * whole * (0.7 + 0.3 * share), 3)),
+        confidence=float(np.round(name.confidence * enough * whole * (0.7 + 0.3 * share), 3)),
         truncated=cluster.truncated,
         occluded=cluster.occluded,
         box_px=cluster.box_px,
         covariance_m2=placed.covariance_m2,
         size_sigma_m=placed.size_sigma_m,
         yaw_sigma_rad=placed.yaw_sigma_rad,
+        named_by=name.source,
     )

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.perception.bystanders import Bystander, find_bystanders
 from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
 from vla_deploy.perception.filtering import Estimate
+from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.noise import covariance_of
 from vla_deploy.perception.shapes import half_turn
 from vla_deploy.perception.supports import Support, find_supports
@@ -34,6 +36,7 @@ class Scene:
         self.stamp_ns = 0
         self.detections: list[Detection] = []
         self._surfaces: list[dict[str, Any]] = []
+        self._bystanders: list[Bystander] = []
 
     def look(
         self,
@@ -44,13 +47,19 @@ class Scene:
         base: Pose2D,
         body: NDArray[np.bool_],
         stamp_ns: int,
+        network: NetworkView | None = None,
     ) -> None:
-        """Take one image; `base` is the robot's map pose, `body` masks the robot itself."""
+        """Take one image; `base` is the robot's map pose, `body` masks the robot itself.
+
+        `network` is what a network saw in it, if one is at work.
+        """
         cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body)
         supports = find_supports(cloud)
         self._surfaces = [_surface(s, base) for s in supports if not s.is_floor]
-        sightings = [_sighting(found, base, stamp_ns) for found in detect(cloud, supports)]
+        found = detect(cloud, supports, network)
+        sightings = [_sighting(detection, base, stamp_ns) for detection in found]
         self.detections = [sighting.detection for sighting in sightings]
+        self._bystanders = find_bystanders(cloud, network, base)
         views = {
             id(track): _view(track, cloud, camera, base_from_camera, base)
             for track in self._tracker.tracks
@@ -70,7 +79,12 @@ class Scene:
     def document(self) -> dict[str, Any]:
         """Return the scene topic's document."""
         objects = [track.document() for track in self._tracker.objects]
-        return {"stamp_ns": self.stamp_ns, "objects": objects, "surfaces": self._surfaces}
+        return {
+            "stamp_ns": self.stamp_ns,
+            "objects": objects,
+            "surfaces": self._surfaces,
+            "bystanders": [bystander.document() for bystander in self._bystanders],
+        }
 
 
 def _surface(support: Support, base: Pose2D) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from platforms import Profile
 from vla_deploy.inference.errors import ModelMismatch, RunFailed
+from vla_deploy.inference.graph_check import number_faults
 from vla_deploy.inference.manifest import Detection
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession
@@ -37,6 +38,11 @@ class Detector:
         """Return what the class numbers of boxes mean."""
         return self._detection.classes
 
+    @property
+    def detection(self) -> Detection:
+        """Return how its outputs are read, and how good it was measured to be."""
+        return self._detection
+
     def detect(self, rgb: Image) -> Boxes:
         """Return the boxes in an RGB image (h, w, 3), in its pixels, the surest first.
 
@@ -46,6 +52,9 @@ class Detector:
         tensor, placement = fit_image(rgb, self._detection.image, self._input.dtype)
         outputs = self._session.run({self._input.name: tensor})
         ordered = tuple(outputs[name] for name in self._outputs)
+        faults = tuple(number_faults(outputs))
+        if faults:
+            raise RunFailed(f"{self._session.model.manifest.name}: {'; '.join(faults)}")
         boxes = self._adapter.read(ordered, self._detection)
         self._check(boxes)
         return placement.to_image(boxes)

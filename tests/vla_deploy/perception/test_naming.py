@@ -1,0 +1,79 @@
+"""What becomes of a name when form and network agree, differ, or one of them is silent."""
+
+import pytest
+
+from vla_deploy.perception.classes import BYSTANDERS, OTHER, Form
+from vla_deploy.perception.naming import Name, Source, Word, by_both, by_form, chance_of
+
+POOR, GOOD = 0.55, 0.95
+
+
+def form(name: str, *look_alikes: str, impossible: frozenset[str] = frozenset()) -> Form:
+    fits = frozenset({name, *look_alikes}) - {OTHER}
+    return Form(name=name, fits=fits, impossible=BYSTANDERS | impossible)
+
+
+def said(class_name: str, chance: float) -> Word:
+    return Word(class_name=class_name, chance=chance)
+
+
+@pytest.mark.parametrize("chance", [0.05, POOR, GOOD])
+def test_agreement_makes_a_name_surer_than_either(chance: float) -> None:
+    name = by_both(form("ball"), said("ball", chance))
+    assert (name.class_name, name.source) == ("ball", Source.BOTH)
+    assert name.confidence > max(chance, by_form(form("ball")).confidence)
+
+
+@pytest.mark.parametrize(
+    "impossible", [frozenset(), frozenset({"bottle"})], ids=["possible", "ruled out by its size"]
+)
+def test_a_good_network_that_contradicts_the_form_leaves_no_sure_name(
+    impossible: frozenset[str],
+) -> None:
+    disputed = by_both(form("keys", impossible=impossible), said("bottle", GOOD))
+    assert disputed.confidence < 0.7
+    doubted = by_both(form("keys", impossible=impossible), said("bottle", POOR))
+    assert doubted.class_name == "keys"
+    assert disputed.confidence < doubted.confidence < by_form(form("keys")).confidence
+
+
+@pytest.mark.parametrize("chance", [POOR, GOOD])
+def test_what_the_measures_rule_out_is_never_the_name(chance: float) -> None:
+    for told in ("bottle", "person", "chair"):
+        keys, unknown = (form(one, impossible=frozenset({"bottle"})) for one in ("keys", OTHER))
+        assert by_both(keys, said(told, chance)).class_name in ("keys", OTHER)
+        assert by_both(unknown, said(told, chance)).class_name == OTHER
+
+
+def test_among_look_alikes_a_good_network_decides_and_a_poor_one_does_not() -> None:
+    alike = form("cup", "can")
+    poor, good = by_both(alike, said("can", POOR)), by_both(alike, said("can", GOOD))
+    assert poor.class_name == "cup"
+    assert poor.confidence < 0.6
+    assert (good.class_name, good.source) == ("can", Source.BOTH)
+    assert good.confidence > 0.8
+
+
+def test_what_no_form_names_is_named_by_the_network_as_surely_as_it_is_right() -> None:
+    assert by_both(form(OTHER), said("cup", 0.8)) == Name(
+        class_name="cup", confidence=pytest.approx(0.8), source=Source.NETWORK
+    )
+    assert by_both(form(OTHER), said("cup", 0.45)).class_name == OTHER
+
+
+def test_the_silence_of_a_network_that_finds_most_things_costs_confidence() -> None:
+    sure = by_form(form("cup"))
+    assert sure.confidence == pytest.approx(0.9)
+    assert by_form(form("cup"), silence=0.43).confidence == pytest.approx(0.784, abs=1e-3)
+    assert by_form(form("cup"), silence=0.95).confidence < 0.7
+    assert by_form(form(OTHER), silence=0.95) == by_form(form(OTHER))
+
+
+@pytest.mark.parametrize(
+    ("score", "precision", "chance"),
+    [(0.5, 0.6, 0.6), (0.9, 0.6, 0.6), (0.35, 0.6, 0.42), (1.0, 1.0, 0.97)],
+)
+def test_a_score_counts_for_no_more_than_the_model_was_measured_at(
+    score: float, precision: float, chance: float
+) -> None:
+    assert chance_of(score, precision) == pytest.approx(chance)

@@ -1,0 +1,120 @@
+"""Look at the camera's images: what stands in the way at once, what things are as soon as asked."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.base import RgbdFrame
+from drivers.clock import NS_PER_S
+from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.perception.body_state import Array, BodyState
+from vla_deploy.perception.eyes import Eyes
+from vla_deploy.perception.near_obstacles import NearObstacles
+from vla_deploy.perception.network_view import NetworkView
+from vla_deploy.perception.scene import Scene
+from vla_deploy.perception.whereabouts import Whereabouts
+
+# An image is used only where the camera was nearly still before its exposure.
+STILL_WINDOW_NS: Final = 60_000_000
+MAX_CAMERA_TURN_RAD_S: Final = 0.35
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Moment:
+    """Hold an image and how the robot stood when it was taken."""
+
+    frame: RgbdFrame
+    depth_m: NDArray[np.float32]
+    base_from_camera: Array
+    base: Pose2D
+    body: NDArray[np.bool_]
+
+
+class Looking:
+    """Turn images into obstacles and a scene; one image at a time waits for the network."""
+
+    def __init__(self, body: BodyState, whereabouts: Whereabouts, eyes: Eyes) -> None:
+        self.scene = Scene()
+        self.obstacles = NearObstacles()
+        self._body = body
+        self._whereabouts = whereabouts
+        self._eyes = eyes
+        self._waiting: Moment | None = None
+
+    def see(self, frame: RgbdFrame) -> bool:
+        """Take a new image; return whether the obstacles around are new."""
+        positions = self._body.at(frame.stamp_ns)
+        if positions is None:
+            return False
+        moment = self._moment(frame, positions)
+        grips = [np.array(hand.grip) for hand in self._body.hands(positions) if hand.held]
+        self.obstacles.look(
+            moment.depth_m,
+            frame.intrinsics,
+            moment.base_from_camera,
+            moment.body,
+            moment.base,
+            grips,
+            frame.stamp_ns,
+        )
+        still = self._camera_turn(frame.stamp_ns) <= MAX_CAMERA_TURN_RAD_S
+        if still and self._waiting is None:
+            self._waiting = moment
+            self._eyes.ask(frame.rgb)
+        return True
+
+    def finish(self) -> bool:
+        """Take what the network has answered; return whether the scene is new."""
+        answer = self._eyes.answer() if self._waiting is not None else None
+        if self._waiting is None or answer is None:
+            return False
+        moment, self._waiting = self._waiting, None
+        self._look(moment, answer.view)
+        return True
+
+    def carry(self, positions: Array, now_ns: int) -> None:
+        """Let the things that hands hold, as the executor tells, move along with the hands."""
+        for hand in self._body.hands(positions):
+            if hand.held:
+                pose = self._whereabouts.pose
+                self.scene.carry(hand.name, hand.held, hand.grip, pose, now_ns)
+            else:
+                self.scene.release(hand.name)
+
+    def document(self) -> dict[str, Any]:
+        """Return the scene topic's document, with how things are named."""
+        return {**self.scene.document(), "sight": self._eyes.document()}
+
+    def _look(self, moment: Moment, network: NetworkView | None) -> None:
+        self.scene.look(
+            moment.frame.rgb,
+            moment.depth_m,
+            moment.frame.intrinsics,
+            moment.base_from_camera,
+            moment.base,
+            moment.body,
+            moment.frame.stamp_ns,
+            network,
+        )
+
+    def _moment(self, frame: RgbdFrame, positions: Array) -> Moment:
+        return Moment(
+            frame=frame,
+            depth_m=frame.depth_m(),
+            base_from_camera=self._body.camera_pose(positions),
+            base=self._whereabouts.pose_at(frame.stamp_ns),
+            body=self._body.mask(positions, frame.intrinsics),
+        )
+
+    def _camera_turn(self, stamp_ns: int) -> float:
+        """Return how fast the camera turned, in the map frame, up to a moment."""
+        before, after = (
+            self._body.view_rotation(at_ns, self._whereabouts.pose_at(at_ns))
+            for at_ns in (stamp_ns - STILL_WINDOW_NS, stamp_ns)
+        )
+        cosine = (float(np.trace(before.T @ after)) - 1.0) / 2.0
+        angle_rad = math.acos(min(1.0, max(-1.0, cosine)))
+        return angle_rad * NS_PER_S / STILL_WINDOW_NS

@@ -1,0 +1,93 @@
+"""Hold the sensors open: lidar, IMU and camera, each opened again when its link breaks."""
+
+import math
+
+from drivers import registry
+from drivers.camera.base import Camera, RgbdFrame
+from drivers.clock import Clock
+from drivers.imu.base import Imu, ImuSample
+from drivers.lidar.base import Lidar, Scan
+from drivers.opener import DeviceOpener
+from drivers.reopening import Reopening
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel, full_positions
+
+
+class Sensors:
+    """Give what each sensor has; one that is away gives nothing, and the others go on."""
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        model: RobotModel,
+        devices: DeviceOpener,
+        clock: Clock,
+        camera_rate_hz: float,
+    ) -> None:
+        self._robot = robot
+        self._model = model
+        self._devices = devices
+        self._clock = clock
+        self._camera_rate_hz = camera_rate_hz
+        self._lidar = Reopening("lidar", self._open_lidar, clock)
+        self._imu = Reopening("imu", self._open_imu, clock)
+        self._camera = Reopening("camera", self._open_camera, clock)
+
+    def open(self) -> None:
+        """Open every sensor.
+
+        Raises:
+            DriverError: a sensor is missing or busy.
+        """
+        for slot in (self._lidar, self._imu, self._camera):
+            slot.open()
+
+    def close(self) -> None:
+        """Release every sensor; closing twice is allowed."""
+        for slot in (self._lidar, self._imu, self._camera):
+            slot.close()
+
+    def scan(self) -> Scan | None:
+        """Return a new scan of the lidar, if there is one."""
+        return self._lidar.poll(lambda lidar: lidar.poll(), None)
+
+    def attitude(self) -> ImuSample | None:
+        """Return the newest sample of the IMU, if there is a new one."""
+        none: list[ImuSample] = []
+        samples = self._imu.poll(lambda imu: imu.poll(), none)
+        return samples[-1] if samples else None
+
+    def image(self) -> RgbdFrame | None:
+        """Return a new image of the camera, if there is one."""
+        return self._camera.poll(lambda camera: camera.poll(), None)
+
+    def set_camera_rate(self, rate_hz: float) -> None:
+        """Open the camera anew where it is to send at another rate."""
+        if rate_hz != self._camera_rate_hz:
+            self._camera_rate_hz = rate_hz
+            self._camera.close()
+
+    def away(self) -> dict[str, str]:
+        """Return which sensors are away at present, and why: what they told is stale."""
+        failures = {
+            "lidar": self._lidar.failure,
+            "imu": self._imu.failure,
+            "camera": self._camera.failure,
+        }
+        return {name: failure for name, failure in failures.items() if failure}
+
+    def _open_lidar(self) -> Lidar:
+        robot_lidar = self._robot.lidar
+        pose = self._model.site_pose(robot_lidar.site, full_positions(self._robot))
+        yaw_rad = math.atan2(pose[1, 0], pose[0, 0])
+        line = self._devices.serial(robot_lidar.device)
+        return registry.open_lidar(robot_lidar.model, line, self._clock, mounting_yaw_rad=yaw_rad)
+
+    def _open_imu(self) -> Imu:
+        imu = self._robot.imu
+        return registry.open_imu(imu.model, self._devices.serial(imu.device), self._clock)
+
+    def _open_camera(self) -> Camera[RgbdFrame]:
+        camera = self._robot.camera
+        stream = self._devices.stream(camera.device)
+        return registry.open_camera(camera.model, stream, self._clock, rate_hz=self._camera_rate_hz)

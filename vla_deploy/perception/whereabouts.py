@@ -1,0 +1,81 @@
+"""Follow where the robot is: wheels and IMU from step to step, the lidar against the map."""
+
+from drivers.clock import NS_PER_S
+from drivers.imu.base import ImuSample
+from drivers.lidar.base import Scan
+from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
+from vla_deploy.navigation.grid_map import load_map
+from vla_deploy.navigation.localisation import Localiser, Pose2D
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel, full_positions
+
+# Without a new yaw for this long, the turn is taken from the wheels.
+FRESH_YAW_NS = NS_PER_S // 25
+
+
+class Whereabouts:
+    """Hold the robot's pose in the map."""
+
+    def __init__(self, robot: RobotDescription, model: RobotModel, space: SharedSpace) -> None:
+        """Read the map, and begin where an earlier instance in this run left off.
+
+        Raises:
+            MapInvalid: the robot file's map cannot be used.
+        """
+        # Beams already count from the robot's front, whatever way the lidar is turned.
+        site = model.site_pose(robot.lidar.site, full_positions(robot))
+        lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
+        self._localiser = Localiser(_begin(robot, space), load_map(robot.home.map_path), lidar)
+        self._imu_yaw_rad: float | None = None
+        self._imu_ns = 0
+        self._base_stamp_ns = -1
+
+    def start(self, space: SharedSpace) -> None:
+        """Open the topics."""
+        self._base_state: CellReader = space.cell_reader("base_state")
+        self._writer: CellWriter = space.cell_writer("pose")
+
+    @property
+    def pose(self) -> Pose2D:
+        """Return where the robot is now."""
+        return self._localiser.pose
+
+    def pose_at(self, stamp_ns: int) -> Pose2D:
+        """Return where the robot was at a moment of the last seconds."""
+        return self._localiser.pose_at(stamp_ns)
+
+    def turn(self, newest: ImuSample) -> None:
+        """Take what the IMU says."""
+        self._imu_yaw_rad, self._imu_ns = newest.yaw_rad, newest.stamp_ns
+
+    def move(self, now_ns: int) -> None:
+        """Dead-reckon; without wheel odometry the robot is taken to stand still."""
+        sample = self._base_state.latest()
+        if sample is not None and sample.stamp_ns != self._base_stamp_ns:
+            self._base_stamp_ns = sample.stamp_ns
+            data = sample.data
+            odometry = Pose2D(float(data["x_m"]), float(data["y_m"]), float(data["yaw_rad"]))
+            self._localiser.predict(sample.stamp_ns, odometry, self._fresh_yaw_rad(now_ns))
+        pose = self._localiser.pose
+        self._writer.put(
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            yaw_rad=pose.yaw_rad,
+            match_ratio=self._localiser.match_ratio,
+        )
+
+    def correct(self, scan: Scan) -> None:
+        """Take what the lidar says."""
+        self._localiser.correct(scan.range_m, scan.beam_stamp_ns)
+
+    def _fresh_yaw_rad(self, now_ns: int) -> float | None:
+        """Return the IMU's yaw unless it is out of date: a frozen one would hide every turn."""
+        return self._imu_yaw_rad if now_ns - self._imu_ns <= FRESH_YAW_NS else None
+
+
+def _begin(robot: RobotDescription, space: SharedSpace) -> Pose2D:
+    told = space.cell_reader("pose").latest()
+    if told is not None:
+        return Pose2D(*(float(told.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
+    start = robot.start_pose
+    return Pose2D(start.x_m, start.y_m, start.yaw_rad)
