@@ -1,4 +1,4 @@
-"""Find the folders that outlive a run: logs, models, what was built from models."""
+"""Find the folders that outlive a run: logs, configuration, models, what was built from models."""
 
 import os
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import Final
 
 _ROOT_BASE: Final = Path("/run/vla-deploy")
 _ROOT_STATE: Final = Path("/var/log/vla-deploy")
+_ROOT_CONFIG: Final = Path("/etc/vla-deploy")
 _ROOT_LIBRARY: Final = Path("/var/lib/vla-deploy")
 _MODELS: Final = "models"
 _ENGINES: Final = "engines"
@@ -19,6 +20,16 @@ def state_dir_of(base: Path) -> Path:
         home = os.environ.get("XDG_STATE_HOME")
         return (Path(home) if home else Path.home() / ".local" / "state") / "vla-deploy"
     return base.with_name(f"{base.name}-state")
+
+
+def config_dir_of(base: Path) -> Path:
+    """Return where a person keeps what concerns this robot alone, such as its model servers."""
+    if base == _ROOT_BASE:
+        return _ROOT_CONFIG
+    if base == user_base():
+        home = os.environ.get("XDG_CONFIG_HOME")
+        return (Path(home) if home else Path.home() / ".config") / "vla-deploy"
+    return base.with_name(f"{base.name}-config")
 
 
 def models_dir_of(base: Path) -> Path:

@@ -1,7 +1,15 @@
+import contextlib
 import dataclasses
 import hashlib
 import itertools
-from collections.abc import Callable, Mapping
+import json
+import ssl
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -284,3 +292,106 @@ def lay_out() -> Callable[[Path, Manifest, Mapping[Variant, bytes]], Path]:
         return folder
 
     return write
+
+
+Answer = Callable[[BaseHTTPRequestHandler], None]
+
+
+@dataclass
+class Heard:
+    """One request as the server got it."""
+
+    method: str
+    path: str
+    headers: Mapping[str, str]
+    body: dict[str, Any] | None
+
+
+@dataclass
+class LoopbackServer:
+    """A real HTTP server on loopback that answers by a script, the last answer for ever."""
+
+    server: ThreadingHTTPServer
+    answers: deque[Answer] = field(default_factory=deque)
+    heard: list[Heard] = field(default_factory=list)
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server.server_port}"
+
+    def secure(self, certificate: Path, key: Path) -> None:
+        """Speak TLS from now on."""
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(certificate, key)
+        self.server.socket = context.wrap_socket(self.server.socket, server_side=True)
+
+    def then(self, *answers: Answer) -> None:
+        self.answers.extend(answers)
+
+    @staticmethod
+    def sends(status: int, content: bytes | object, **headers: str) -> Answer:
+        """Answer with bytes, or with JSON; `_` in a header's name stands for `-`."""
+        body = content if isinstance(content, bytes) else json.dumps(content).encode()
+
+        def answer(handler: BaseHTTPRequestHandler) -> None:
+            handler.send_response(status)
+            handler.send_header("Content-Length", str(len(body)))
+            for name, value in headers.items():
+                handler.send_header(name.replace("_", "-"), value)
+            handler.end_headers()
+            handler.wfile.write(body)
+
+        return answer
+
+    @staticmethod
+    def raw(*pieces: bytes, pause_s: float = 0.0) -> Answer:
+        """Answer with bytes that need not be HTTP, piece by piece, then hang up."""
+
+        def answer(handler: BaseHTTPRequestHandler) -> None:
+            for piece in pieces:
+                handler.wfile.write(piece)
+                handler.wfile.flush()
+                time.sleep(pause_s)  # the slowness is what the test is about
+
+        return answer
+
+    @classmethod
+    def says(cls, text: str | None, finish: str = "stop", **message: Any) -> Answer:
+        """Answer as an OpenAI-compatible server whose model says `text`."""
+        said = {"role": "assistant", "content": text, **message}
+        usage = {"prompt_tokens": 11, "completion_tokens": 7}
+        reply = {"choices": [{"message": said, "finish_reason": finish}], "usage": usage}
+        return cls.sends(200, reply)
+
+
+@pytest.fixture
+def loopback() -> Iterator[LoopbackServer]:
+    played: LoopbackServer
+
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_POST(self) -> None:
+            length = int(self.headers.get("Content-Length", 0))
+            body = json.loads(self.rfile.read(length)) if length else None
+            heard = Heard(self.command, self.path, dict(self.headers), body)
+            played.heard.append(heard)
+            answer = played.answers.popleft() if len(played.answers) > 1 else played.answers[0]
+            self.close_connection = True
+            # The client may have seen enough, which is what some tests are about.
+            with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+                answer(self)
+
+        do_GET = do_POST  # noqa: N815 - http.server's name
+
+        def log_message(self, *args: Any) -> None:
+            """Say nothing on the terminal."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    played = LoopbackServer(server)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+    thread.start()
+    yield played
+    server.shutdown()
+    thread.join()
+    server.server_close()

@@ -44,6 +44,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "check": Command("check", "check a robot, a profile or a plan, and report all faults"),
     "schema": Command("check", "print the JSON Schema of a plan"),
     "models": Command("models", "add, list, measure, quantise and verify models"),
+    "servers": Command("servers", "see and try the model servers that the robot may ask"),
     "doctor": Command("doctor", "examine this computer, and say how to mend what is wrong"),
     "probes": Command("doctor", "print load, memory, power, heat and throttling of this computer"),
     "bench": Command("bench", "measure beside a peer or a limit, in the same run"),

@@ -24,6 +24,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.install.errors": "InstallError",
     "vla_deploy.inference.errors": "InferenceError",
     "vla_deploy.ipc.errors": "IpcError",
+    "vla_deploy.model_servers.errors": "ModelServerError",
     "vla_deploy.navigation.errors": "NavigationError",
     "vla_deploy.planning.errors": "PlanningError",
     "platforms.errors": "ProfileError",

@@ -1,0 +1,82 @@
+import socket
+
+import pytest
+
+from vla_deploy.model_servers.addresses import check_address, resolve
+from vla_deploy.model_servers.errors import PrivacyRefused, TimedOut, Unreachable
+
+
+@pytest.mark.parametrize(
+    ("address", "may"),
+    [
+        ("127.0.0.1", True),
+        ("127.8.8.8", True),
+        ("::1", True),
+        ("::ffff:127.0.0.1", True),
+        ("192.168.1.5", False),
+        ("169.254.169.254", False),
+        ("0.0.0.0", False),
+        ("8.8.8.8", False),
+        ("::ffff:8.8.8.8", False),
+        ("fe80::1%eth0", False),
+    ],
+)
+def test_a_local_server_is_on_this_computer(settings, address, may):
+    if may:
+        check_address(settings("http://inference:9"), address)
+        return
+    with pytest.raises(PrivacyRefused, match=r"inference is at .*nothing was sent"):
+        check_address(settings("http://inference:9"), address)
+
+
+@pytest.mark.parametrize(
+    ("url", "address", "may"),
+    [
+        ("https://api.example", "93.184.216.34", True),
+        ("http://api.example", "93.184.216.34", False),
+        ("http://nas.local", "192.168.1.5", True),
+        ("http://nas.local", "fd00::5", True),
+    ],
+)
+def test_a_public_server_is_reached_by_an_encrypted_way_only(settings, url, address, may):
+    declared = settings(url, location="remote", allow_text_off_robot=True)
+    if may:
+        check_address(declared, address)
+        return
+    with pytest.raises(PrivacyRefused, match="in the clear"):
+        check_address(declared, address)
+
+
+def test_a_literal_address_is_not_looked_up(monkeypatch):
+    monkeypatch.setattr(socket, "getaddrinfo", None)
+    assert resolve("127.0.0.1", 9, 1.0) == ("127.0.0.1",)
+    assert resolve("::1", 9, 1.0) == ("::1",)
+
+
+def test_this_computer_s_name_is_on_loopback():
+    assert set(resolve("localhost", 9, 5.0)) <= {"127.0.0.1", "::1"}
+
+
+def test_a_resolver_that_hangs_costs_no_more_than_its_time(monkeypatch):
+    import threading
+
+    released = threading.Event()
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: released.wait(10.0) and [])
+    with pytest.raises(TimedOut, match="name server"):
+        resolve("slow.example", 9, 0.02)
+    released.set()
+
+
+@pytest.mark.parametrize("host", ["no-such-host.invalid", "x" * 70 + ".example"])
+def test_an_unknown_host_is_unreachable(monkeypatch, host):
+    real = socket.getaddrinfo
+
+    def offline(name, *rest, **options):
+        if len(name) > 63:
+            return real(name, *rest, **options)  # refused before anyone is asked
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(socket, "getaddrinfo", offline)
+    with pytest.raises(Unreachable) as found:
+        resolve(host, 9, 2.0)
+    assert not found.value.was_sent

@@ -1,0 +1,108 @@
+"""Ask a model for an answer of a given shape, and take nothing else."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final, Generic, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from vla_deploy.model_servers.chat import Chat, Completion, Message, Role
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.model_servers.errors import (
+    AnswerInvalid,
+    AnswerMalformed,
+    AnswerUnusable,
+    RequestRefused,
+    ServerFailed,
+)
+from vla_deploy.model_servers.json_answer import objects_in
+from vla_deploy.model_servers.server import ModelServer
+
+Shape = TypeVar("Shape", bound=BaseModel)
+# How servers say that they know no schema; one fails with 500 instead.
+_NO_SUCH_RUNG: Final = frozenset({400, 404, 415, 422, 500, 501})
+_MOST_FAULTS: Final = 8
+_REPAIRABLE: Final = (AnswerMalformed, AnswerInvalid)
+
+
+class StructuredAsker(Generic[Shape]):
+    """Ask one server for one shape; it remembers which way of asking the server understands."""
+
+    def __init__(self, server: ModelServer, shape: type[Shape], repairs: int = 1) -> None:
+        self._server = server
+        self._shape = shape
+        self._schema = shape.model_json_schema()
+        self._repairs = repairs
+        self._rung = 0
+        self._is_proven = False
+
+    @property
+    def rung(self) -> str:
+        """Return how the server is asked now."""
+        return self._server.format.rungs[self._rung]
+
+    def ask(self, chat: Chat, deadline: Deadline | None = None) -> Shape:
+        """Return the model's answer; one that has the wrong shape is sent back with its faults.
+
+        Raises:
+            PrivacyRefused: that may not leave the robot.
+            RequestRefused: the server will not answer this.
+            Unavailable: there is no answer now.
+            AnswerUnusable: also after the repair, it has the wrong shape.
+        """
+        ends = deadline or self._server.deadline()
+        asked = replace(chat, schema=self._schema, system=_with_schema(chat.system, self._schema))
+        for repairs_left in range(self._repairs, -1, -1):
+            text = self._descend(asked, ends).text
+            try:
+                return self._read(text)
+            except _REPAIRABLE as error:
+                if repairs_left == 0:
+                    raise
+                asked = _repair(asked, text, error)
+        raise AssertionError("the last round returns or raises")
+
+    def _descend(self, chat: Chat, ends: Deadline) -> Completion:
+        """Ask on the strictest rung that the server takes."""
+        while True:
+            try:
+                completion = self._server.complete(chat, self.rung, ends)
+            except (RequestRefused, ServerFailed) as error:
+                is_last = self._rung == len(self._server.format.rungs) - 1
+                if self._is_proven or is_last or error.status not in _NO_SUCH_RUNG:
+                    raise
+                self._rung += 1
+                continue
+            self._is_proven = True
+            return completion
+
+    def _read(self, text: str) -> Shape:
+        """Take the last object that has the shape: models correct themselves towards the end."""
+        faults: tuple[str, ...] = ()
+        for candidate in reversed(objects_in(text)):
+            try:
+                return self._shape.model_validate(candidate)
+            except ValidationError as error:
+                faults = faults or _faults(error)
+        raise AnswerInvalid(faults)
+
+
+def _faults(error: ValidationError) -> tuple[str, ...]:
+    found = error.errors(include_url=False, include_input=False)[:_MOST_FAULTS]
+    return tuple(f"{'.'.join(map(str, one['loc'])) or 'answer'}: {one['msg']}" for one in found)
+
+
+def _with_schema(system: str, schema: Mapping[str, Any]) -> str:
+    """Say the schema in words too: not every server enforces it, and none its bounds."""
+    text = json.dumps(schema, ensure_ascii=False, separators=(",", ":"))
+    wish = "Answer with one JSON object and nothing else. It must follow this JSON Schema:"
+    return f"{system}\n\n{wish}\n{text}".lstrip()
+
+
+def _repair(chat: Chat, text: str, error: AnswerUnusable) -> Chat:
+    """Return the conversation that sends an answer back, without images: its form is wrong."""
+    before = tuple(replace(message, images=()) for message in chat.messages)
+    said = Message(role=Role.ASSISTANT, text=text)
+    wish = Message(text=f"That cannot be used: {error}. Answer again with the JSON object only.")
+    return replace(chat, messages=(*before, said, wish))

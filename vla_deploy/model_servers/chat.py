@@ -1,0 +1,50 @@
+"""Hold what is asked of a model, and what it answers, whoever serves it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+
+class Role(StrEnum):
+    """Say who speaks in a conversation."""
+
+    USER = "user"
+    ASSISTANT = "assistant"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Message:
+    """Hold one turn; `images` are JPEG files, of the user's turns only."""
+
+    text: str
+    role: Role = Role.USER
+    images: tuple[bytes, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chat:
+    """Hold one question to a model: standing instructions, and turns of which the last asks.
+
+    `schema` is the JSON Schema that the answer should have, `schema_name` what to call it.
+    """
+
+    messages: tuple[Message, ...]
+    system: str = ""
+    schema: Mapping[str, Any] | None = None
+    schema_name: str = "answer"
+    max_tokens: int | None = None
+
+    @property
+    def has_images(self) -> bool:
+        """Tell whether any turn carries an image."""
+        return any(message.images for message in self.messages)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Completion:
+    """Hold a model's answer; counts of tokens are None where the server tells none."""
+
+    text: str
+    tokens_in: int | None
+    tokens_out: int | None

@@ -1,0 +1,1 @@
+"""Speak the languages of model servers."""

@@ -1,0 +1,117 @@
+"""Speak OpenAI's chat completions, as OpenAI does and as llama-server, vLLM and Ollama do."""
+
+import base64
+from collections.abc import Mapping
+from typing import Any, Final
+
+from vla_deploy.model_servers.chat import Chat, Completion, Message
+from vla_deploy.model_servers.credentials import Secret
+from vla_deploy.model_servers.errors import AnswerMalformed, AnswerRefused, AnswerTruncated
+from vla_deploy.model_servers.formats.base import (
+    Json,
+    ModelFacts,
+    WireRequest,
+    count,
+    known_names,
+    part,
+)
+from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.model_servers.wire_schema import is_closed, wire_schema
+
+JSON_SCHEMA: Final = "json_schema"
+# llama-cpp-python's server fails on `json_schema`, and takes the schema here instead.
+JSON_OBJECT: Final = "json_object"
+WORDS: Final = "words"
+
+
+class OpenAiChat:
+    """Speak the language of `/chat/completions`.
+
+    `tokens_key` is how the bound of tokens is called: OpenAI has a new name that not all of the
+    compatible servers know.
+    """
+
+    rungs: tuple[str, ...] = (JSON_SCHEMA, JSON_OBJECT, WORDS)
+
+    def __init__(self, tokens_key: str) -> None:
+        self._tokens_key = tokens_key
+
+    def headers(self, key: Secret | None) -> dict[str, str]:
+        """Return the key's header, none where the server wants no key."""
+        return {} if key is None else {"Authorization": f"Bearer {key.reveal()}"}
+
+    def request(self, settings: ServerSettings, chat: Chat, rung: str) -> WireRequest:
+        """Return the request for a question."""
+        system = [{"role": "system", "content": chat.system}] if chat.system else []
+        body: Json = {
+            "model": settings.model,
+            "messages": [*system, *map(_turn, chat.messages)],
+            self._tokens_key: chat.max_tokens or settings.max_answer_tokens,
+        }
+        if settings.temperature is not None:
+            body["temperature"] = settings.temperature
+        if chat.schema is not None and rung != WORDS:
+            body["response_format"] = _response_format(chat, chat.schema, rung)
+        return WireRequest(path="/chat/completions", body=body)
+
+    def completion(self, reply: Json) -> Completion:
+        """Read a reply."""
+        choice = part(reply, "choices", 0)
+        message = part(choice, "message")
+        refusal = message.get("refusal") if isinstance(message, dict) else None
+        ended = choice.get("finish_reason")
+        if refusal or ended == "content_filter":
+            raise AnswerRefused(f"the model declines: {refusal or 'filtered content'!s:.200}")
+        if ended == "length":
+            raise AnswerTruncated("the model ran out of tokens; raise max_answer_tokens")
+        text = part(message, "content")
+        if text is not None and not isinstance(text, str):
+            raise AnswerMalformed(f"expected a text as content, got {text!r:.120}")
+        return Completion(
+            text=text or "",
+            tokens_in=count(reply, "usage", "prompt_tokens"),
+            tokens_out=count(reply, "usage", "completion_tokens"),
+        )
+
+    def listing(self, settings: ServerSettings) -> tuple[WireRequest, ...]:
+        """Ask for the list of models."""
+        return (WireRequest(path="/models"),)
+
+    def facts(self, settings: ServerSettings, replies: tuple[Json | None, ...]) -> ModelFacts:
+        """Read the list; llama-server also says what a model takes."""
+        reply = replies[0] or {}
+        known = known_names(part(reply, "data"), "id")
+        return ModelFacts(
+            is_present=settings.model in known, known=known, has_vision=_vision(reply, settings)
+        )
+
+
+def _turn(message: Message) -> Json:
+    if not message.images:
+        return {"role": message.role, "content": message.text}
+    images = [
+        {"type": "image_url", "image_url": {"url": f"data:image/jpeg;base64,{_base64(image)}"}}
+        for image in message.images
+    ]
+    return {"role": message.role, "content": [*images, {"type": "text", "text": message.text}]}
+
+
+def _response_format(chat: Chat, schema: Mapping[str, Any], rung: str) -> Json:
+    reduced = wire_schema(schema)
+    if rung == JSON_OBJECT:
+        return {"type": "json_object", "schema": reduced}
+    named = {"name": chat.schema_name, "schema": reduced, "strict": is_closed(reduced)}
+    return {"type": "json_schema", "json_schema": named}
+
+
+def _vision(reply: Json, settings: ServerSettings) -> bool | None:
+    rows = reply.get("models")
+    for row in rows if isinstance(rows, list) else ():
+        if isinstance(row, dict) and settings.model in (row.get("name"), row.get("model")):
+            told = row.get("capabilities")
+            return "multimodal" in told if isinstance(told, list) else None
+    return None
+
+
+def _base64(image: bytes) -> str:
+    return base64.b64encode(image).decode("ascii")

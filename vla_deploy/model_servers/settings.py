@@ -1,0 +1,105 @@
+"""Describe one model server as `servers.toml` declares it."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Final, Self
+from urllib.parse import SplitResult, urlsplit
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]{0,31}$"
+_CREDENTIAL_PATTERN: Final = r"^[a-z][a-z0-9_]{0,63}$"
+
+
+class Api(StrEnum):
+    """Name the languages that servers speak."""
+
+    OPENAI_COMPATIBLE = "openai_compatible"
+    OLLAMA = "ollama"
+    OPENAI = "openai"
+    ANTHROPIC = "anthropic"
+
+
+class Location(StrEnum):
+    """Say where a server runs: on this computer, or anywhere else."""
+
+    LOCAL = "local"
+    REMOTE = "remote"
+
+
+Seconds = Annotated[float, Field(gt=0.0, le=600.0)]
+
+
+class ServerSettings(BaseModel):
+    """Hold what is declared of one server; the defaults suit a model on this computer.
+
+    `total_timeout_s` bounds a call from its beginning to its end, waiting and retries included.
+    `vision` says that the model takes images. `temperature` is sent only where it is given: some
+    models take none.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    api: Annotated[Api, Field(strict=False)]
+    url: str
+    model: Annotated[str, Field(min_length=1, max_length=200)]
+    location: Annotated[Location, Field(strict=False)]
+    vision: bool = False
+    credential: Annotated[str, Field(pattern=_CREDENTIAL_PATTERN)] | None = None
+    ca_file: Annotated[Path, Field(strict=False)] | None = None
+    allow_text_off_robot: bool = False
+    allow_images_off_robot: bool = False
+    temperature: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
+    max_answer_tokens: Annotated[int, Field(ge=1, le=65_536)] = 2048
+    max_answer_bytes: Annotated[int, Field(ge=1024, le=16 * 2**20)] = 2**20
+    connect_timeout_s: Seconds = 2.0
+    read_timeout_s: Seconds = 30.0
+    total_timeout_s: Seconds = 45.0
+    max_calls: Annotated[int, Field(ge=1, le=32)] = 1
+    max_waiting: Annotated[int, Field(ge=0, le=256)] = 4
+    max_attempts: Annotated[int, Field(ge=1, le=10)] = 3
+    backoff_s: Annotated[float, Field(gt=0.0, le=60.0)] = 0.5
+    backoff_max_s: Annotated[float, Field(gt=0.0, le=600.0)] = 8.0
+    breaker_failures: Annotated[int, Field(ge=1, le=100)] = 4
+    breaker_open_s: Seconds = 30.0
+
+    @field_validator("url")
+    @classmethod
+    def _plain_address(cls, url: str) -> str:
+        parts = _split(url)
+        if parts is None or parts.scheme not in ("http", "https") or not parts.hostname:
+            raise ValueError("expected http:// or https:// with a host")
+        if parts.username or parts.password or parts.query or parts.fragment:
+            raise ValueError("expected no user, password, query or fragment; a key is a credential")
+        return url.rstrip("/")
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        allowed = self.allow_text_off_robot or self.allow_images_off_robot
+        if self.location is Location.LOCAL and allowed:
+            raise ValueError(
+                "allow_..._off_robot: expected nothing, a local server is on the robot"
+            )
+        if self.api in (Api.OLLAMA, Api.ANTHROPIC) and self.url.endswith("/v1"):
+            raise ValueError(f"url: expected it without /v1 for {self.api}")
+        if self.allow_images_off_robot and not self.allow_text_off_robot:
+            raise ValueError("allow_images_off_robot: expected allow_text_off_robot too")
+        return self
+
+    @property
+    def is_local(self) -> bool:
+        """Tell whether the server is declared to run on this computer."""
+        return self.location is Location.LOCAL
+
+    @property
+    def host(self) -> str:
+        """Return the name or address to connect to."""
+        return str(urlsplit(self.url).hostname)
+
+
+def _split(url: str) -> SplitResult | None:
+    try:
+        parts = urlsplit(url)
+        return parts if parts.port != 0 else None
+    except ValueError:  # a port that is no number, brackets that do not close
+        return None
