@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import MonotonicClock
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.model_servers.checking import Check, check_server
 from vla_deploy.model_servers.credentials import find_credential
 from vla_deploy.model_servers.errors import CredentialMissing
@@ -23,9 +23,7 @@ EXAMPLES = """  vla-deploy servers list
 
 def register(commands: Any) -> None:
     """Add the command."""
-    servers = add_command(
-        commands, "servers", "see and try the model servers that the robot may ask", EXAMPLES
-    )
+    servers = add_top_command(commands, "servers", EXAMPLES)
     acts = servers.add_subparsers(dest="act", required=True, metavar="ACT")
     listing = add_command(
         acts,
