@@ -10,10 +10,11 @@ from vla_deploy.perception.cloud import Cloud, Floats, Mask
 from vla_deploy.perception.colour import colour_names
 from vla_deploy.perception.supports import Support, inside
 
-MIN_HEIGHT_M = 0.004
+# What is this high is a thing; what adjoins it and is that high belongs to it.
+MIN_HEIGHT_M, EDGE_HEIGHT_M = 0.004, 0.002
 # Rugs and thresholds are floor.
 MIN_HEIGHT_ON_FLOOR_M = 0.012
-NOISE_SIGMAS = 2.5
+NOISE_SIGMAS, EDGE_SIGMAS = 2.5, 1.5
 MAX_HEIGHT_M = 0.42
 OUTLINE_MARGIN_M = 0.02
 HIGHER_MARGIN_M = 0.05
@@ -49,6 +50,11 @@ class Cluster:
     truncated: bool
     occluded: bool
 
+    def upper(self) -> Mask:
+        """Tell which points surely stand up; a low edge may show the support."""
+        upper: Mask = self.heights > MIN_HEIGHT_M
+        return upper if np.count_nonzero(upper) >= MIN_PIXELS else np.ones_like(upper)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Hidden:
@@ -63,17 +69,29 @@ def find_clusters(cloud: Cloud, supports: list[Support]) -> list[Cluster]:
     """Return the things on each support; furniture and walls are none."""
     clusters: list[Cluster] = []
     flat_points = cloud.points.reshape(-1, 3)
-    noise_m = NOISE_SIGMAS * cloud.sigma_m()
+    sigma_m = cloud.sigma_m()
     for index, support in enumerate(supports):
         heights = cv2.medianBlur(support.heights_above(cloud), 3)
-        lowest_m = MIN_HEIGHT_ON_FLOOR_M if support.is_floor else MIN_HEIGHT_M
-        least = np.maximum(lowest_m, noise_m)
-        standing = np.flatnonzero(cloud.valid & (heights > least))
+        standing = np.flatnonzero(cloud.valid & _stands_up(heights, sigma_m, support.is_floor))
         standing = standing[inside(support.outline, flat_points[standing], OUTLINE_MARGIN_M)]
         for higher in supports[:index]:
             standing = standing[~_belongs_to(higher, support, flat_points[standing])]
         clusters += _split(cloud, support, heights, standing)
     return clusters
+
+
+def _stands_up(heights: Floats, sigma_m: Floats, is_floor: bool) -> Mask:
+    """Tell which pixels are higher than their support, with the low edges of what is higher."""
+    lowest_m = MIN_HEIGHT_ON_FLOOR_M if is_floor else MIN_HEIGHT_M
+    surely: Mask = heights > np.maximum(lowest_m, NOISE_SIGMAS * sigma_m)
+    if is_floor:
+        return surely
+    barely = (heights > np.maximum(EDGE_HEIGHT_M, EDGE_SIGMAS * sigma_m)).astype(np.uint8)
+    _, parts = cv2.connectedComponents(barely, connectivity=8)
+    counts = np.bincount(parts[surely], minlength=int(parts.max()) + 1)
+    things = counts >= MIN_PIXELS
+    things[0] = False
+    return surely | things[parts]
 
 
 def _belongs_to(higher: Support, lower: Support, points: Floats) -> Mask:

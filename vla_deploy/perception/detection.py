@@ -136,7 +136,7 @@ def _name(cluster: Cluster, shape: Shape, network: NetworkView | None) -> Name:
 def _detection(cluster: Cluster, look: _Look) -> Detection:
     shape = measure(cluster, look.cloud.camera_position, look.cloud.focal_px)
     name = _name(cluster, shape, look.network)
-    colour, share = dominant_colour(cluster.rgb)
+    colour, share = dominant_colour(cluster.rgb[cluster.upper()])
     placed = place(cluster, shape, name.class_name, look.cloud)
     enough = min(1.0, math.sqrt(len(cluster.points) / FEW_PIXELS))
     whole = 0.6 if cluster.truncated or cluster.occluded else 1.0

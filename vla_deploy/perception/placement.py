@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Cloud
 from vla_deploy.perception.clusters import Cluster
 from vla_deploy.perception.forms import TurnedFit, fit_lying, fit_upright, sight_frame
-from vla_deploy.perception.shapes import Rectangle, Shape
+from vla_deploy.perception.shapes import Rectangle, Shape, half_turn, rectangle_of
 from vla_deploy.perception.uncertainty import (
     UNKNOWN_YAW_SIGMA_RAD,
     Matrix,
@@ -25,8 +25,15 @@ ROUND_AGREEMENT = 0.3
 # Share of a pixel that is left in the middle of, and in the distance between, two edges.
 MIDDLE_PX = 0.3
 EXTENT_PX = 0.6
-# A rectangle's direction is off by this share of a pixel over its length.
+# What fills its rectangle badly has no clear middle and direction; thin parts of it are not seen.
+FULL_RATIO, RAGGED_RATIO, RAGGED_RAD, SKIRT_RATIO = 0.96, 0.3, 1.0, 0.8
+# A disc fills pi / 4 of its square, and has no direction.
+DISC_SQUARENESS, DISC_FILL_RATIO = 0.85, 0.87
+# Thinner than the slice that the class rules look at: that shows more of the near side.
+RIM_M, RIM_SIGMAS, RIM_POINTS = 0.005, 3.0, 12
+# A direction is off by these shares of a pixel over the length: by edges, and by a fitted axis.
 TURN_PX = 0.7
+AXIS_PX = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +54,10 @@ class Placement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Spot:
-    """Hold a form on the floor plan; the sigmas are along and across `direction_rad`."""
+    """Hold a form on the floor plan; the sigmas are along and across `direction_rad`.
+
+    `height_m` is None where the highest points tell it best.
+    """
 
     xy: tuple[float, float]
     length_m: float
@@ -56,6 +66,7 @@ class _Spot:
     sigma_m: tuple[float, float]
     direction_rad: float
     yaw_sigma_rad: float
+    height_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +92,7 @@ def place(cluster: Cluster, shape: Shape, class_name: str, cloud: Cloud) -> Plac
     sight = _Sight(cluster, shape, cloud)
     spot = _lying(sight) if class_name not in NEVER_LIE else None
     spot = spot or FORMS.get(class_name, _block)(sight)
-    height_m = shape.height_m
+    height_m = shape.height_m if spot.height_m is None else spot.height_m
     ground_m = cluster.support.height_m(*spot.xy)
     grain = sight.grain_m
     hidden = hidden_m(cluster, cloud, max(spot.length_m, spot.width_m))
@@ -124,7 +135,7 @@ def _lying(sight: _Sight) -> _Spot | None:
     best = max((fit for fit in tries if fit), key=lambda fit: fit.agreement, default=None)
     if best is None or best.agreement < LYING_AGREEMENT or best.length_m < 2.0 * best.radius_m:
         return None
-    return _spot(best, best.yaw_rad)
+    return _spot(sight, best, best.yaw_rad)
 
 
 def _upright(sight: _Sight) -> _Spot:
@@ -132,10 +143,12 @@ def _upright(sight: _Sight) -> _Spot:
     fit = fit_upright(sight.cluster, sight.cloud.camera_position, sight.grain_m, sigma_m)
     if fit is None or fit.agreement < ROUND_AGREEMENT:
         return _round_top(sight)
-    return _spot(fit, sight.direction_rad, width_m=sight.shape.across_m)
+    return _spot(sight, fit, sight.direction_rad, width_m=sight.shape.across_m)
 
 
-def _spot(fit: TurnedFit, direction_rad: float, width_m: float | None = None) -> _Spot:
+def _spot(
+    sight: _Sight, fit: TurnedFit, direction_rad: float, width_m: float | None = None
+) -> _Spot:
     return _Spot(
         xy=fit.xy,
         length_m=fit.length_m if width_m is None else width_m,
@@ -143,7 +156,7 @@ def _spot(fit: TurnedFit, direction_rad: float, width_m: float | None = None) ->
         yaw_rad=fit.yaw_rad,
         sigma_m=fit.sigma_xy_m,
         direction_rad=direction_rad,
-        yaw_sigma_rad=fit.yaw_sigma_rad,
+        yaw_sigma_rad=math.hypot(fit.yaw_sigma_rad, AXIS_PX * sight.grain_m / fit.length_m),
     )
 
 
@@ -153,9 +166,12 @@ def _round_top(sight: _Sight) -> _Spot:
 
 
 def _rim(sight: _Sight) -> _Spot:
-    """Take the rim: a handle sticks out below it."""
-    top = sight.shape.top
-    return _round(sight, top, 0.5 * (top.length_m + top.width_m))
+    """Take the rim alone: below it a handle sticks out, and only the near side is seen."""
+    heights = sight.cluster.heights
+    thick_m = max(RIM_M, RIM_SIGMAS * DEPTH_SIGMA_PER_M * sight.cluster.depth_m**2)
+    rim = sight.cluster.points[heights > sight.shape.height_m - thick_m]
+    top = rectangle_of(rim[:, :2]) if len(rim) >= RIM_POINTS else sight.shape.top
+    return _round(sight, top, 0.5 * (top.length_m + top.width_m) + 0.5 * sight.grain_m)
 
 
 def _round(sight: _Sight, top: Rectangle, width_m: float) -> _Spot:
@@ -184,6 +200,7 @@ def _ball(sight: _Sight) -> _Spot:
         sigma_m=(sigma_m, sigma_m),
         direction_rad=sight.direction_rad,
         yaw_sigma_rad=UNKNOWN_YAW_SIGMA_RAD,
+        height_m=2.0 * sphere.radius_m,
     )
 
 
@@ -192,11 +209,20 @@ def _box(sight: _Sight) -> _Spot:
 
 
 def _block(sight: _Sight) -> _Spot:
-    return _rectangle(sight, sight.shape.footprint)
+    base = sight.shape.footprint
+    if base.width_m > DISC_SQUARENESS * base.length_m and base.fill_ratio < DISC_FILL_RATIO:
+        return _round(sight, base, 0.5 * (base.length_m + base.width_m))
+    return _rectangle(sight, base)
 
 
 def _rectangle(sight: _Sight, base: Rectangle) -> _Spot:
-    middle_m = MIDDLE_PX * sight.grain_m
+    ragged = max(0.0, FULL_RATIO - base.fill_ratio)
+    whole = sight.shape.whole
+    # Low parts, such as the blades of keys, are not what one grips, but belong to the thing.
+    skirt_m = math.dist(base.centre, whole.centre)
+    skirt_rad = abs(half_turn(whole.yaw_rad - base.yaw_rad)) if skirt_m > sight.grain_m else 0.0
+    middle_m = MIDDLE_PX * sight.grain_m + RAGGED_RATIO * ragged * base.length_m
+    middle_m += SKIRT_RATIO * skirt_m
     return _Spot(
         xy=base.centre,
         length_m=base.length_m,
@@ -204,7 +230,9 @@ def _rectangle(sight: _Sight, base: Rectangle) -> _Spot:
         yaw_rad=base.yaw_rad,
         sigma_m=(middle_m, middle_m),
         direction_rad=base.yaw_rad,
-        yaw_sigma_rad=TURN_PX * sight.grain_m / max(base.length_m, 1e-6),
+        yaw_sigma_rad=TURN_PX * sight.grain_m / max(base.length_m, 1e-6)
+        + RAGGED_RAD * ragged
+        + SKIRT_RATIO * skirt_rad,
     )
 
 

@@ -22,12 +22,16 @@ Point = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rectangle:
-    """Hold the tightest rectangle around points on the floor plan; length >= width."""
+    """Hold the tightest rectangle around points on the floor plan; length >= width.
+
+    `fill_ratio` is the share of it that the points' convex hull covers: 1 for what is rectangular.
+    """
 
     centre: tuple[float, float]
     length_m: float
     width_m: float
     yaw_rad: float
+    fill_ratio: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,12 +49,14 @@ class Shape:
 
     `across_m` is the width as seen from the camera, which no far side can hide. `hole_m` is how far
     the inside lies below the rim, 0 for what has no rim; `rim_share` is how much of the way around
-    the middle the rim is seen. `sphere` is None where none fits.
+    the middle the rim is seen. `sphere` is None where none fits. `whole` is the rectangle around
+    low edges, too, which the other measures leave out: the rings and blades of keys.
     """
 
     height_m: float
     across_m: float
     footprint: Rectangle
+    whole: Rectangle
     top: Rectangle
     hole_m: float
     rim_share: float
@@ -62,14 +68,17 @@ def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
     pixel_m = cluster.depth_m / focal_px
     sigma_m = DEPTH_SIGMA_PER_M * cluster.depth_m**2
     height_m = float(np.percentile(cluster.heights, 98.0))
-    xy = cluster.points[:, :2]
+    every = cluster.points[:, :2]
+    upper = cluster.upper()
+    xy = every[upper]
     slice_m = max(TOP_SLICE_M, TOP_SLICE_RATIO * height_m)
-    rim = xy[cluster.heights > height_m - slice_m]
-    top = rectangle_of(rim, pixel_m)
+    rim = every[cluster.heights > height_m - slice_m]
+    top = rectangle_of(rim)
     return Shape(
         height_m=height_m,
         across_m=_across(xy, camera_position) + pixel_m,
-        footprint=rectangle_of(xy, pixel_m),
+        footprint=rectangle_of(xy),
+        whole=rectangle_of(every),
         top=top,
         hole_m=_hole(cluster, top, height_m, pixel_m),
         rim_share=_share_around(rim, top),
@@ -77,8 +86,11 @@ def measure(cluster: Cluster, camera_position: Point, focal_px: float) -> Shape:
     )
 
 
-def rectangle_of(xy: Floats, pixel_m: float) -> Rectangle:
-    """Return the tightest rectangle around (n, 2) points, half a pixel wider on each side."""
+def rectangle_of(xy: Floats) -> Rectangle:
+    """Return the tightest rectangle around (n, 2) points.
+
+    Each side rests on its outermost pixel of many, so that no half pixel is missing there.
+    """
     # Around their mean and in millimetres: OpenCV computes in single precision.
     mean = xy.mean(axis=0, dtype=np.float64)
     local = ((xy - mean) * 1000.0).astype(np.float32)
@@ -88,9 +100,10 @@ def rectangle_of(xy: Floats, pixel_m: float) -> Rectangle:
     )
     return Rectangle(
         centre=(float(mean[0] + x / 1000.0), float(mean[1] + y / 1000.0)),
-        length_m=length / 1000.0 + pixel_m,
-        width_m=width / 1000.0 + pixel_m,
+        length_m=length / 1000.0,
+        width_m=width / 1000.0,
         yaw_rad=half_turn(math.radians(angle_deg)),
+        fill_ratio=cv2.contourArea(cv2.convexHull(local)) / max(length * width, 1e-6),
     )
 
 
