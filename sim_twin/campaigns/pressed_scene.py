@@ -81,7 +81,6 @@ class Scene:
         with contextlib.ExitStack() as stack:
             name = stack.enter_context(tempfile.TemporaryDirectory(prefix="vla-pressure-"))
             self.folder = Path(name)
-            self.disk = self.folder / "disk"
             self.disk.mkdir()
             if small_disk:
                 stack.enter_context(_mounted(self.disk))
@@ -152,16 +151,24 @@ class Scene:
         return [str(json.loads(report.read_text())["process"]) for report in reports]
 
     @property
+    def disk(self) -> Path:
+        """Return what holds the robot's runs and what outlives them."""
+        return self.folder / "disk"
+
+    @property
     def board(self) -> Path:
         """Return the root of what the robot's probes read."""
         return self.folder / "board"
 
     def lay_out_board(self) -> None:
-        """Write what a cool board with a good supply tells."""
+        """Write what a cool board with a good supply tells; its disk is the robot's."""
         for name, content in _BOARD.items():
             path = self.board / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(content, encoding="utf-8")
+        shown = self.board / self.disk.relative_to("/")
+        shown.parent.mkdir(parents=True)
+        shown.symlink_to(self.disk)
 
     def _rewrite(self, name: str, value: int) -> None:
         fresh = self.board / f"{name}.new"

@@ -57,7 +57,7 @@ class Sample:
 
 
 class CellWriter:
-    """Put values of one cell; a single process owns it."""
+    """Put values of one cell, one process at a time."""
 
     def __init__(self, segment: Segment, topic: Topic, clock: Clock) -> None:
         self._segment = segment

@@ -1,33 +1,34 @@
 """Share the claims on resources between the processes of one run."""
 
-import fcntl
-import json
 import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.claims import Book, Claim, ask, declare, obstacles, release, settle
-from vla_deploy.ipc.errors import SpaceUnavailable
+from vla_deploy.ipc.errors import BadPayload, ClaimRefused
+from vla_deploy.ipc.shared_document import Document
+from vla_deploy.ipc.space import SharedSpace
 
-FILE_NAME: Final = "claims.json"
+TOPIC: Final = "claims"
 _START_TIME_FIELD: Final = 19  # of /proc/<pid>/stat, counted behind the name
 
 
 class ClaimBook:
-    """Keep the claims in a file of the run, under a lock that the kernel gives back.
+    """Keep the claims in shared memory; whoever changes them excludes the others.
 
     A claim belongs to the process that made it and ends with it, however it ends.
-
-    Raises:
-        SpaceUnavailable: the file cannot be opened.
     """
 
-    def __init__(self, directory: Path, clock: Clock) -> None:
-        self._path = directory / FILE_NAME
+    def __init__(self, space: SharedSpace, clock: Clock) -> None:
+        """Open the claims of the run that `space` belongs to.
+
+        Raises:
+            SpaceUnavailable: shared memory cannot be opened.
+        """
+        self._shared = space.shared_document(TOPIC)
         self._clock = clock
         self._pid = os.getpid()
         self._pid_started = _start_time(self._pid) or 0
@@ -42,8 +43,8 @@ class ClaimBook:
         """Ask for all of `wants` at once; return whether it was granted, or waits.
 
         Raises:
-            ClaimRefused: there is no such resource, never that much of it, or the holder has asked
-                already.
+            ClaimRefused: there is no such resource, never that much of it, the holder has asked
+                already, or there are too many claims.
         """
         now_ns = self._clock.now_ns()
         claim = Claim(
@@ -69,43 +70,34 @@ class ClaimBook:
         return obstacles(self.look(), wants)
 
     def _change(self, change: Callable[[Book, int], Book]) -> Book:
-        with self._locked():
-            before = self._read()
-            dead = [one.holder for one in (*before.granted, *before.waiting) if not _is_alive(one)]
+        def turn(before: Document | None) -> Document:
+            book = _book_of(before)
+            dead = [one.holder for one in (*book.granted, *book.waiting) if not _is_alive(one)]
             now_ns = self._clock.now_ns()
-            after = change(release(before, dead, now_ns) if dead else before, now_ns)
-            if after != before:
-                self._write(after)
-        return after
+            return _document_of(change(release(book, dead, now_ns) if dead else book, now_ns))
 
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        lock = self._path.with_suffix(".lock")
         try:
-            fd = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o660)
-        except OSError as error:
-            raise SpaceUnavailable(f"{lock}: cannot open it: {error.strerror}") from error
-        try:
-            fcntl.flock(fd, fcntl.LOCK_EX)
-            yield
-        finally:
-            os.close(fd)
+            return _book_of(self._shared.change(turn))
+        except BadPayload as error:
+            raise ClaimRefused(f"too many claims at once: {error}") from error
 
-    def _read(self) -> Book:
-        try:
-            document = json.loads(self._path.read_bytes())
-        except FileNotFoundError:
-            return Book()
-        return replace(
-            Book(capacities=document["capacities"]),
-            granted=tuple(Claim(**claim) for claim in document["granted"]),
-            waiting=tuple(Claim(**claim) for claim in document["waiting"]),
-        )
 
-    def _write(self, book: Book) -> None:
-        fresh = self._path.with_suffix(f".{self._pid}")
-        fresh.write_text(json.dumps(asdict(book)))
-        fresh.replace(self._path)  # whoever is killed half way leaves the old book whole
+def _book_of(document: Document | None) -> Book:
+    if document is None:
+        return Book()
+    return Book(
+        capacities=document["capacities"],
+        granted=tuple(Claim(**claim) for claim in document["granted"]),
+        waiting=tuple(Claim(**claim) for claim in document["waiting"]),
+    )
+
+
+def _document_of(book: Book) -> Document:
+    return {
+        "capacities": dict(book.capacities),
+        "granted": [asdict(claim) for claim in book.granted],
+        "waiting": [asdict(claim) for claim in book.waiting],
+    }
 
 
 def _is_alive(claim: Claim) -> bool:

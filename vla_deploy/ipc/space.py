@@ -11,6 +11,7 @@ from vla_deploy.ipc.frame_ring import FrameReader, FrameWriter
 from vla_deploy.ipc.record_ring import RecordReader, RecordWriter
 from vla_deploy.ipc.ring import RingReader, RingWriter
 from vla_deploy.ipc.segment import Segment
+from vla_deploy.ipc.shared_document import SharedDocument
 from vla_deploy.ipc.topics import TOPICS, Kind, Topic
 
 
@@ -42,6 +43,11 @@ class SharedSpace:
         """Open a latest-value cell for reading."""
         topic = self._topic(name, Kind.CELL)
         return CellReader(self._segment(topic, writable=False), topic)
+
+    def shared_document(self, name: str) -> SharedDocument:
+        """Open a cell whose document several processes change in turns."""
+        topic = self._topic(name, Kind.CELL)
+        return SharedDocument(self._segment(topic, writable=True), topic, self._clock)
 
     def ring_writer(self, name: str) -> RingWriter:
         """Open an event ring for publishing."""

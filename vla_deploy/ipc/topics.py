@@ -36,7 +36,8 @@ class Field:
 class Topic:
     """Describe one topic.
 
-    `owner` is the only process that writes it; "any" marks a ring with many writers.
+    `owner` is the only process that writes it; "any" marks a ring, or a document
+    changed in turns, with many writers.
     `rate_hz` 0 means "on change"; `deadline_s` is the age above which a reader calls it stale.
     """
 
@@ -304,6 +305,13 @@ TOPICS: tuple[Topic, ...] = (
         deadline_s=3.0,
         summary="what the budgets ask of each process: rate, model, suspension, as JSON",
         fields=(Field("document", "json", 4096),),
+    ),
+    Topic(
+        name="claims",
+        kind=Kind.CELL,
+        owner="any",
+        summary="who holds and who waits for which resource, as JSON; on change",
+        fields=(Field("document", "json", 8192),),
     ),
     Topic(
         name="budget",

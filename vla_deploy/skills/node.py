@@ -31,7 +31,6 @@ class ExecutorNode:
         self.period_s = 1.0 / rate_hz
         self._clock = context.clock
         self._robot = robot
-        self._run_dir = context.run_dir
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._skills: SkillContext
         self._plans: RingReader
@@ -53,7 +52,7 @@ class ExecutorNode:
             ),
             arms={name: ArmKinematics(self._robot, name) for name in self._robot.hands},
             say=self._say,
-            claims=ClaimBook(self._run_dir, self._clock),
+            claims=ClaimBook(self._space, self._clock),
         )
         self._skills.claims.declare(body_of(self._robot))
         self._plans = self._space.ring_reader("plan", from_start=False)

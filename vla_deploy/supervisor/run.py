@@ -81,7 +81,6 @@ class Run:
             profile,
             self.space,
             clock,
-            run_dir=run_dir,
             state_dir=self.runtime.state_dir,
             probe_root=options.probe_root,
         )

@@ -32,11 +32,13 @@ def test_the_profile_is_valid_and_declares_every_step_that_a_trouble_expects(
 
 def test_heat_and_brown_outs_reach_the_probes(tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
-    probes = open_probes(scene.board, disk_folders=[tmp_path])
+    scene.disk.mkdir()
+    probes = open_probes(scene.board, disk_folders=[scene.disk])
     emergencies = Emergencies(critical_trips_c(scene.board))
     try:
         readings = probes.read()
         assert readings["temperature_c"].value == 45.0
+        assert readings["disk_free_bytes"].value
         assert not emergencies.judge(readings)
         scene.heat(91.5)
         assert probes.read()["temperature_c"].value == 91.5

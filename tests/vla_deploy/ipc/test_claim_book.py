@@ -6,14 +6,15 @@ from pathlib import Path
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.ipc import ClaimBook, ClaimRefused, SpaceUnavailable
+from vla_deploy.ipc import ClaimBook, ClaimRefused, SharedSpace
 
 HOLDER = """
 import sys
 from pathlib import Path
 from drivers.clock import MonotonicClock
-from vla_deploy.ipc import ClaimBook
-book = ClaimBook(Path(sys.argv[1]), MonotonicClock())
+from vla_deploy.ipc import ClaimBook, SharedSpace
+clock = MonotonicClock()
+book = ClaimBook(SharedSpace(Path(sys.argv[1]), clock), clock)
 print(book.ask("model", {"ram_mb": 700}), flush=True)
 sys.stdin.read()
 """
@@ -21,8 +22,9 @@ CONTENDER = """
 import sys
 from pathlib import Path
 from drivers.clock import MonotonicClock
-from vla_deploy.ipc import ClaimBook
-book = ClaimBook(Path(sys.argv[1]), MonotonicClock())
+from vla_deploy.ipc import ClaimBook, SharedSpace
+clock = MonotonicClock()
+book = ClaimBook(SharedSpace(Path(sys.argv[1]), clock), clock)
 name = sys.argv[2]
 for _ in range(60):
     granted = book.ask(name, {"ram_mb": 400})
@@ -32,9 +34,14 @@ for _ in range(60):
 """
 
 
+def book_in(folder: Path) -> ClaimBook:
+    clock = MonotonicClock()
+    return ClaimBook(SharedSpace(folder, clock), clock)
+
+
 @pytest.fixture
 def book(tmp_path: Path) -> ClaimBook:
-    book = ClaimBook(tmp_path, MonotonicClock())
+    book = book_in(tmp_path)
     book.declare({"base": 1, "ram_mb": 1000})
     return book
 
@@ -53,7 +60,7 @@ def other(tmp_path: Path, book: ClaimBook) -> Iterator[subprocess.Popen[str]]:
 
 def test_what_one_opens_another_sees(book: ClaimBook, tmp_path: Path):
     assert book.ask("a", {"base": 1})
-    second = ClaimBook(tmp_path, MonotonicClock())
+    second = book_in(tmp_path)
     assert not second.ask("b", {"base": 1})
     assert second.obstacles({"base": 1}) == "base is held by a"
     book.release("a")
@@ -106,7 +113,7 @@ def test_waiting_ends_after_its_time(tmp_path: Path):
             self.ns = deadline_ns
 
     clock = Clock()
-    book = ClaimBook(tmp_path, clock)
+    book = ClaimBook(SharedSpace(tmp_path, clock), clock)
     book.declare({"base": 1})
     book.ask("a", {"base": 1})
     assert not book.ask("b", {"base": 1}, timeout_s=2.0)
@@ -116,6 +123,17 @@ def test_waiting_ends_after_its_time(tmp_path: Path):
     assert not book.look().waits("b")
 
 
-def test_a_folder_that_is_not_there_is_named(tmp_path: Path):
-    with pytest.raises(SpaceUnavailable, match="gone"):
-        ClaimBook(tmp_path / "gone", MonotonicClock()).look()
+def test_more_claims_than_there_is_room_for_are_refused_and_the_others_stay(book: ClaimBook):
+    with pytest.raises(ClaimRefused, match="too many claims"):
+        for number in range(1000):
+            book.ask(f"holder {number}", {"base": 1})
+    assert book.look().holds("holder 0")
+    book.release("holder 0")
+    assert book.look().holds("holder 1")
+
+
+def test_a_look_that_changes_nothing_writes_nothing(book: ClaimBook, tmp_path: Path):
+    cell = SharedSpace(tmp_path, MonotonicClock()).cell_reader("claims")
+    before = cell.latest()
+    book.look()
+    assert cell.latest() is before

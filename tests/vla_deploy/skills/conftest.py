@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.ipc import ClaimBook
+from vla_deploy.ipc import ClaimBook, SharedSpace
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
@@ -61,6 +61,6 @@ def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
         planner=PathPlanner(grid, BODY_RADIUS_M),
         arms={},
         say=lambda _: None,
-        claims=ClaimBook(tmp_path, MonotonicClock()),
+        claims=ClaimBook(SharedSpace(tmp_path, MonotonicClock()), MonotonicClock()),
         hands={"left": None, "right": None},
     )

@@ -90,7 +90,7 @@ def stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
         planner=None,  # type: ignore[arg-type]
         arms={},
         say=lambda _: None,
-        claims=ClaimBook(tmp_path, clock),
+        claims=ClaimBook(space, clock),
     )
     context.claims.declare(body_of(robot))
     stage = Stage(space=space, clock=clock, context=context)
@@ -189,7 +189,8 @@ def test_an_action_that_waits_starts_when_the_holder_lets_go(stage: Stage):
 def test_an_action_is_refused_a_part_that_is_not_there(
     stage: Stage, tmp_path_factory: pytest.TempPathFactory
 ):
-    stage.context.claims = ClaimBook(tmp_path_factory.mktemp("other"), stage.clock)
+    elsewhere = SharedSpace(tmp_path_factory.mktemp("other"), stage.clock)
+    stage.context.claims = ClaimBook(elsewhere, stage.clock)
     execution = stage.plan(a_look_at=())
     stage.step(execution)
     assert "nobody declares" in execution.records[0].error

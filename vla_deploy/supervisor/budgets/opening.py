@@ -19,7 +19,6 @@ def open_keeper(
     space: SharedSpace,
     clock: Clock,
     *,
-    run_dir: Path,
     state_dir: Path,
     probe_root: Path,
 ) -> BudgetKeeper:
@@ -38,7 +37,7 @@ def open_keeper(
         BackgroundSampler(probes, clock),
         Emergencies(critical_trips_c(probe_root)),
         Enforcer(CgroupTree(realtime=profile().realtime_priority > 0)),
-        ClaimBook(run_dir, clock),
+        ClaimBook(space, clock),
     )
 
 

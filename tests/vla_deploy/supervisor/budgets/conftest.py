@@ -67,7 +67,7 @@ class World:
             self.feed,
             Emergencies({"tj-thermal": 104.5}),
             Enforcer(CgroupTree(directory)),
-            ClaimBook(directory, self.clock),
+            ClaimBook(self.space, self.clock),
         )
 
     def go(self, seconds: float, *, measured: bool = True) -> Orders:

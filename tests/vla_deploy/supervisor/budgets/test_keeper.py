@@ -213,7 +213,7 @@ def test_a_full_disk_is_warned_of_and_slows_nobody(world, caplog):
 
 
 def test_memory_may_be_claimed_up_to_the_profiles_total(world, profile, tmp_path):
-    book = ClaimBook(tmp_path, world.clock)
+    book = ClaimBook(world.space, world.clock)
     assert book.look().capacities == {"ram_mb": int(profile.total.memory_mb)}
     world.profile = replace(profile, total=replace(profile.total, gpu_memory_mb=800))
     world.go(0.5)
