@@ -5,8 +5,12 @@ import json
 import math
 from typing import Any
 
+import numpy as np
+
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.ipc import Sample
+from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt, PlaceState
 from vla_deploy.supervisor.profile_change import Outcome
 
 
@@ -36,12 +40,21 @@ def collect(session: Session) -> dict[str, Any]:
         "process_table": session.document("process_table", age_limit_s=3.0),
         "control": session.document("control_status", age_limit_s=1.0),
         "executor": session.document("executor_status", age_limit_s=2.0),
-        "pose": None
-        if pose is None
-        else {name: float(pose.data[name]) for name in ("x_m", "y_m", "yaw_rad", "match_ratio")},
+        "pose": None if pose is None else _pose_document(pose),
         "scene": session.document("scene", age_limit_s=5.0),
         "profile": session.document("profile_status", age_limit_s=3.0),
         "dashboard_url": None,
+    }
+
+
+def _pose_document(sample: Sample) -> dict[str, Any]:
+    numbers = {name: float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad", "match_ratio")}
+    state, doubt = PlaceState(int(sample.data["state"])), Doubt(int(sample.data["doubt"]))
+    return {
+        **numbers,
+        "state": state.name.lower(),
+        "doubt": doubt.name.lower(),
+        "covariance": np.reshape(sample.data["covariance"], (3, 3)).tolist(),
     }
 
 
@@ -114,7 +127,10 @@ def _pose(status: dict[str, Any]) -> str:
     if pose is None:
         return "pose: unknown"
     degrees = math.degrees(pose["yaw_rad"])
-    return f"pose: x {pose['x_m']:.2f} m, y {pose['y_m']:.2f} m, heading {degrees:.0f} degrees"
+    where = f"pose: x {pose['x_m']:.2f} m, y {pose['y_m']:.2f} m, heading {degrees:.0f} degrees"
+    if pose["state"] == "tracking":
+        return where
+    return f"{where}, {pose['state']}: {DOUBT_TEXT[Doubt[pose['doubt'].upper()]]}"
 
 
 def _task(status: dict[str, Any]) -> str:

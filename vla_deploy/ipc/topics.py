@@ -179,6 +179,9 @@ TOPICS: tuple[Topic, ...] = (
             Field("y_m", "f8", unit="m"),
             Field("yaw_rad", "f8", unit="rad"),
             Field("match_ratio", "f8", unit="share of lidar points on the map"),
+            Field("covariance", "f8", 9, "x, y, yaw by rows, m and rad"),
+            Field("state", "u1", unit="0 tracking, 1 unsure, 2 lost"),
+            Field("doubt", "u1", unit="why, see vla_deploy/navigation.place_judge.py"),
         ),
     ),
     Topic(

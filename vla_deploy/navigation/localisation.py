@@ -1,213 +1,172 @@
-"""Know where the robot is: dead reckoning from wheels and IMU, corrected by scans on the map.
+"""Know where the robot is, how surely, and when it does not know.
 
-The dead-reckoned frame drifts smoothly; one rigid transform places it on the map. A scan moves that
-transform by Gauss-Newton on the map's signed distance field, gently and only when it fits.
+Wheels and IMU carry the pose on, scans fitted to the map correct it, by an extended Kalman filter.
+Scans that do not fit make it unsure, then lost; a lost robot searches the whole map for itself.
 """
 
-import math
-from collections import deque
-from dataclasses import dataclass
+from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.follower import wrap_angle
+from vla_deploy.navigation.dead_reckoning import DeadReckoning
+from vla_deploy.navigation.distance_field import DistanceField
 from vla_deploy.navigation.grid_map import GridMap
+from vla_deploy.navigation.hypotheses import Relocaliser
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.navigation.pose_filter import GATE, PoseFilter
+from vla_deploy.navigation.scan_match import MIN_POINTS, Match, ScanPoints, fit
+from vla_deploy.navigation.place_judge import (
+    MATCH_RATIO,
+    THROUGH_RATIO,
+    Doubt,
+    PlaceJudge,
+    PlaceState,
+    ScanVerdict,
+)
 
-Points = NDArray[np.float64]
-
-HISTORY_NS = 2_000_000_000
-ODOMETRY_JUMP_M = 0.3
-MAX_BEAM_M = 8.0
-MIN_BEAM_M = 0.25
-MIN_POINTS = 60
-INLIER_M = 0.30
-MATCH_M = 0.10
-MIN_MATCH_RATIO = 0.6
-ITERATIONS = 6
-GAIN = 0.35
-# A corridor says nothing about the way along it: this holds the estimate there.
-DAMPING = 4.0
-MAX_SHIFT_M = 0.4
-MAX_TURN_RAD = 0.25
-
-
-@dataclass(frozen=True, slots=True)
-class Pose2D:
-    """Place something on the floor."""
-
-    x_m: float
-    y_m: float
-    yaw_rad: float
-
-    def compose(self, other: "Pose2D") -> "Pose2D":
-        """Return `other`, given in this pose's frame, in the frame that this pose is given in."""
-        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return Pose2D(
-            self.x_m + c * other.x_m - s * other.y_m,
-            self.y_m + s * other.x_m + c * other.y_m,
-            wrap_angle(self.yaw_rad + other.yaw_rad),
-        )
-
-    def relative_to(self, frame: "Pose2D") -> "Pose2D":
-        """Return this pose in the frame of another one."""
-        c, s = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
-        dx, dy = self.x_m - frame.x_m, self.y_m - frame.y_m
-        return Pose2D(c * dx + s * dy, c * dy - s * dx, wrap_angle(self.yaw_rad - frame.yaw_rad))
-
-
-class DistanceField:
-    """Tell the signed distance to the nearest wall's surface (negative inside it) and its slope."""
-
-    def __init__(self, grid: GridMap) -> None:
-        self._grid = grid
-        walls = grid.blocked if grid.seen_by_lidar is None else grid.seen_by_lidar
-        occupied = walls.astype(np.uint8)
-        outside = cv2.distanceTransform(1 - occupied, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        inside = cv2.distanceTransform(occupied, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        # Distances run between cell centres; the surface lies half a cell before the next one.
-        cells = np.where(occupied > 0, 0.5 - inside, outside - 0.5)
-        self._field_m = (cells * grid.resolution_m).astype(np.float32)
-
-    def sample(self, points: Points) -> tuple[NDArray[np.float64], Points]:
-        """Return distance and gradient at (n, 2) map points, by bilinear interpolation."""
-        rows, columns = self._field_m.shape
-        at = (points - self._grid.origin_m) / self._grid.resolution_m - 0.5
-        u = np.clip(at[:, 0], 0.0, columns - 1.001)
-        v = np.clip(at[:, 1], 0.0, rows - 1.001)
-        i, j = v.astype(np.intp), u.astype(np.intp)
-        fu, fv = u - j, v - i
-        # Clipped as they are, both have a neighbour: in one flat list it lies a cell or a row on.
-        field_m, cell = self._field_m.ravel(), i * columns + j
-        low, high = field_m.take(cell), field_m.take(cell + 1)
-        low_next, high_next = field_m.take(cell + columns), field_m.take(cell + columns + 1)
-        along_low, along_high = low + fu * (high - low), low_next + fu * (high_next - low_next)
-        gradient_x = (1.0 - fv) * (high - low) + fv * (high_next - low_next)
-        gradient = np.column_stack((gradient_x, along_high - along_low))
-        return along_low + fv * (along_high - along_low), gradient / self._grid.resolution_m
+# However often it is measured, no pose is better known than the map is drawn.
+MAP_COVARIANCE: Final = np.diag((0.01**2, 0.01**2, 0.008**2))
+MAX_BEAM_M: Final = 8.0
+MIN_BEAM_M: Final = 0.25
+# Noise makes two scans differ: one that repeats itself bit for bit is not the present.
+FROZEN_SCANS: Final = 4
+# A match that the filter did not expect is believed when it comes so often, and fits so well.
+STUBBORN_SCANS: Final = 3
+STUBBORN_RATIO: Final = 0.8
+MAX_SHIFT_M: Final = 0.4
+MAX_TURN_RAD: Final = 0.3
 
 
 class Localiser:
-    """Keep the pose of the base on the map; `lidar` is the sensor's place on the base."""
+    """Keep the pose of the base on the map; `lidar` is the sensor's place on the base.
+
+    `match_ratio` is the share of the last scan's points that lie on the map's walls.
+    """
 
     def __init__(self, start: Pose2D, grid: GridMap, lidar: Pose2D | None = None) -> None:
         self.match_ratio = 0.0
-        self._lidar = lidar or Pose2D(0.0, 0.0, 0.0)
-        self._field = DistanceField(grid)
-        self._map_from_track = start
-        self._track = Pose2D(0.0, 0.0, 0.0)
-        self._odometry: Pose2D | None = None
-        self._imu_yaw_rad: float | None = None
-        self._history: deque[tuple[int, Pose2D]] = deque()
+        self._lidar = lidar or ORIGIN
+        self._field = DistanceField.of(grid)
+        self._track = DeadReckoning()
+        self._filter = PoseFilter(start)
+        self._judge = PlaceJudge()
+        self._relocaliser = Relocaliser(self._field)
+        self._last_ranges: NDArray[np.float32] | None = None
+        self._repeats = 0
+        self._unexpected = 0
 
     @property
     def pose(self) -> Pose2D:
         """Return where the base is now, in the map frame."""
-        return self._map_from_track.compose(self._track)
+        return self._filter.pose
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Return the pose's covariance, (3, 3) over x, y (m) and yaw (rad), with the map's own."""
+        return self._filter.covariance + MAP_COVARIANCE
+
+    @property
+    def state(self) -> PlaceState:
+        """Return what the pose is worth."""
+        return self._judge.state
+
+    @property
+    def doubt(self) -> Doubt:
+        """Return why the pose is in doubt."""
+        return self._judge.doubt
+
+    @property
+    def track_pose(self) -> Pose2D:
+        """Return the dead-reckoned pose, which drifts but never jumps."""
+        return self._track.pose
 
     def pose_at(self, stamp_ns: int) -> Pose2D:
         """Return where the base was; the nearest known moment where `stamp_ns` is out of range."""
-        return self._map_from_track.compose(self._track_at(stamp_ns))
+        return self._map_from_track().compose(self._track.at(stamp_ns))
 
     def predict(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> Pose2D:
-        """Move by what wheels (distance) and IMU (turn) say since the last call; return the pose.
+        """Move by what wheels (way) and IMU (turn) say since the last call; return the pose.
 
         Without an IMU the wheels' turn is taken.
         """
-        step = odometry.relative_to(self._odometry or odometry)
-        turn_rad = step.yaw_rad
-        if imu_yaw_rad is not None and self._imu_yaw_rad is not None:
-            turn_rad = wrap_angle(imu_yaw_rad - self._imu_yaw_rad)
-        if math.hypot(step.x_m, step.y_m) > ODOMETRY_JUMP_M:
-            # Odometry begins anew when control restarts: the robot has not moved.
-            step = Pose2D(0.0, 0.0, 0.0)
-        self._odometry, self._imu_yaw_rad = odometry, imu_yaw_rad
-        self._track = self._track.compose(Pose2D(step.x_m, step.y_m, turn_rad))
-        self._remember(stamp_ns)
+        self._filter.predict(self._track.move(stamp_ns, odometry, imu_yaw_rad))
+        self._judge.pass_time(stamp_ns, self._filter.sigma_m, self._filter.sigma_rad)
+        if self.state is PlaceState.LOST:
+            self._relocaliser.work()
         return self.pose
 
     def correct(self, range_m: NDArray[np.float32], beam_stamp_ns: NDArray[np.int64]) -> bool:
         """Pull the pose towards where the scan fits the map; tell whether it was used."""
-        points = self._points(range_m, beam_stamp_ns)
-        if len(points) < MIN_POINTS:
+        stamp_ns = int(beam_stamp_ns.max(initial=0))
+        scan = self._points(range_m, beam_stamp_ns)
+        if len(scan) < MIN_POINTS or self._is_frozen(range_m):
             self.match_ratio = 0.0
+            self._tell(stamp_ns, Doubt.NO_SCAN)
             return False
-        pose = self.pose
-        pivot = np.array([pose.x_m, pose.y_m])
-        on_map = self._on_map(points)
-        delta = self._fit(on_map, pivot)
-        distance_m, _ = self._field.sample(_transformed(on_map, pivot, delta))
-        self.match_ratio = float(np.mean(np.abs(distance_m) < MATCH_M))
-        too_far = math.hypot(delta[0], delta[1]) > MAX_SHIFT_M or abs(delta[2]) > MAX_TURN_RAD
-        if self.match_ratio < MIN_MATCH_RATIO or too_far:
+        if self.state is PlaceState.LOST:
+            self._search(stamp_ns, scan)
             return False
-        track_origin = Pose2D(0.0, 0.0, 0.0).relative_to(self._track)
-        self._map_from_track = _moved(pose, GAIN * delta).compose(track_origin)
-        return True
+        match = fit(self._field, scan.placed(self._map_from_track()), self.pose)
+        self.match_ratio = match.match_ratio
+        doubt = self._doubt_of(match)
+        if doubt is Doubt.NONE:
+            self._filter.correct(match.shift, match.covariance)
+        self._tell(stamp_ns, doubt)
+        return doubt is Doubt.NONE
 
-    def _fit(self, points: Points, pivot: Points) -> NDArray[np.float64]:
-        """Return the shift and turn about `pivot` that bring the points onto the map's walls."""
-        delta = np.zeros(3)
-        for _ in range(ITERATIONS):
-            moved = _transformed(points, pivot, delta)
-            distance_m, gradient = self._field.sample(moved)
-            arm = moved - pivot - delta[:2]
-            turn = gradient[:, 1] * arm[:, 0] - gradient[:, 0] * arm[:, 1]
-            jacobian = np.column_stack((gradient, turn))
-            weight = np.clip(1.0 - np.abs(distance_m) / INLIER_M, 0.0, 1.0)
-            normal = jacobian.T @ (weight[:, None] * jacobian) + DAMPING * np.eye(3)
-            delta -= np.linalg.solve(normal, jacobian.T @ (weight * distance_m))
-        return delta
+    def _doubt_of(self, match: Match) -> Doubt:
+        if match.match_ratio < MATCH_RATIO:
+            return Doubt.POOR_MATCH
+        if match.through_ratio > THROUGH_RATIO:
+            return Doubt.THROUGH_WALLS
+        shift, turn = match.shift, abs(float(match.shift[2]))
+        too_far = float(np.hypot(shift[0], shift[1])) > MAX_SHIFT_M or turn > MAX_TURN_RAD
+        if not too_far and self._filter.surprise(shift, match.covariance) <= GATE:
+            self._unexpected = 0
+            return Doubt.NONE
+        self._unexpected += 1
+        stubborn = self._unexpected >= STUBBORN_SCANS and match.match_ratio >= STUBBORN_RATIO
+        if stubborn and not too_far:
+            self._filter.doubt(shift)
+        return Doubt.INCONSISTENT
 
-    def _points(self, range_m: NDArray[np.float32], stamps: NDArray[np.int64]) -> Points:
+    def _search(self, stamp_ns: int, scan: ScanPoints) -> None:
+        """Look for the place that a lost robot's scans fit."""
+        found = self._relocaliser.take(scan, self._track.pose)
+        self._judge.search_found(self._relocaliser.places)
+        if found is None:
+            return
+        self._filter.start_anew(found.pose, found.covariance)
+        self.match_ratio = found.match_ratio
+        self._judge.found(stamp_ns)
+        self._relocaliser.reset()
+        self._unexpected = 0
+
+    def _tell(self, stamp_ns: int, doubt: Doubt) -> None:
+        sigma_m, sigma_rad = self._filter.sigma_m, self._filter.sigma_rad
+        verdict = ScanVerdict(
+            doubt=doubt, match_ratio=self.match_ratio, sigma_m=sigma_m, sigma_rad=sigma_rad
+        )
+        self._judge.take(stamp_ns, verdict)
+
+    def _map_from_track(self) -> Pose2D:
+        return self.pose.compose(ORIGIN.relative_to(self._track.pose))
+
+    def _is_frozen(self, range_m: NDArray[np.float32]) -> bool:
+        same = self._last_ranges is not None and np.array_equal(self._last_ranges, range_m)
+        self._repeats = self._repeats + 1 if same else 0
+        self._last_ranges = np.array(range_m)
+        return self._repeats >= FROZEN_SCANS
+
+    def _points(self, range_m: NDArray[np.float32], stamps: NDArray[np.int64]) -> ScanPoints:
         """Return the scan's points in the dead-reckoned frame, each by the pose of its moment."""
         beams = np.flatnonzero((range_m > MIN_BEAM_M) & (range_m < MAX_BEAM_M))
-        angles = np.radians(beams) + self._lidar.yaw_rad
+        angles = np.radians(beams * (360.0 / len(range_m))) + self._lidar.yaw_rad
         ranges = range_m[beams].astype(np.float64)
         x = self._lidar.x_m + ranges * np.cos(angles)
         y = self._lidar.y_m + ranges * np.sin(angles)
-        track_x, track_y, yaw = self._tracks_at(stamps[beams])
-        c, s = np.cos(yaw), np.sin(yaw)
-        return np.column_stack((track_x + c * x - s * y, track_y + s * x + c * y))
-
-    def _on_map(self, points: Points) -> Points:
-        frame = self._map_from_track
-        c, s = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
-        on_map: Points = points @ np.array([[c, s], [-s, c]]) + (frame.x_m, frame.y_m)
-        return on_map
-
-    def _remember(self, stamp_ns: int) -> None:
-        self._history.append((stamp_ns, self._track))
-        while self._history[0][0] < stamp_ns - HISTORY_NS:
-            self._history.popleft()
-
-    def _track_at(self, stamp_ns: int) -> Pose2D:
-        x, y, yaw = self._tracks_at(np.array([stamp_ns], dtype=np.int64))
-        return Pose2D(float(x[0]), float(y[0]), wrap_angle(float(yaw[0])))
-
-    def _tracks_at(self, stamps_ns: NDArray[np.int64]) -> tuple[Points, Points, Points]:
-        history = self._history or [(0, self._track)]
-        known_ns = np.array([stamp for stamp, _ in history], dtype=np.int64)
-        since_s = (stamps_ns - known_ns[0]).astype(np.float64)
-        known_s = (known_ns - known_ns[0]).astype(np.float64)
-        yaw = np.unwrap([pose.yaw_rad for _, pose in history])
-        return (
-            np.interp(since_s, known_s, [pose.x_m for _, pose in history]),
-            np.interp(since_s, known_s, [pose.y_m for _, pose in history]),
-            np.interp(since_s, known_s, yaw),
-        )
-
-
-def _transformed(points: Points, pivot: Points, delta: NDArray[np.float64]) -> Points:
-    c, s = math.cos(delta[2]), math.sin(delta[2])
-    turned: Points = (points - pivot) @ np.array([[c, s], [-s, c]])
-    return turned + pivot + delta[:2]
-
-
-def _moved(pose: Pose2D, delta: NDArray[np.float64]) -> Pose2D:
-    return Pose2D(
-        pose.x_m + float(delta[0]),
-        pose.y_m + float(delta[1]),
-        wrap_angle(pose.yaw_rad + float(delta[2])),
-    )
+        at = np.tile((self._lidar.x_m, self._lidar.y_m), (len(beams), 1))
+        moments = stamps[beams]
+        starts = self._track.place(at, moments)
+        return ScanPoints(starts, self._track.place(np.column_stack((x, y)), moments))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellReader, SharedSpace
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body import BodyMask
 from vla_deploy.perception.history import JointHistory
 from vla_deploy.robots import RobotDescription

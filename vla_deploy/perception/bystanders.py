@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.classes import BYSTANDERS, Range
 from vla_deploy.perception.cloud import Cloud, Floats
 from vla_deploy.perception.network_view import NetworkView

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body_state import Array, BodyState
 from vla_deploy.perception.eyes import Eyes
 from vla_deploy.perception.near_obstacles import NearObstacles
@@ -61,7 +61,8 @@ class Looking:
             frame.stamp_ns,
         )
         still = self._camera_turn(frame.stamp_ns) <= MAX_CAMERA_TURN_RAD_S
-        if still and self._waiting is None:
+        # Where things are on the map is not known as long as the robot is lost.
+        if still and self._waiting is None and not self._whereabouts.is_lost:
             self._waiting = moment
             self._eyes.ask(frame.rgb)
         return True

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 
 Array = NDArray[np.float64]
 Cell = tuple[int, int]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.bystanders import Bystander, find_bystanders
 from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect

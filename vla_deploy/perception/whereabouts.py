@@ -5,7 +5,9 @@ from drivers.imu.base import ImuSample
 from drivers.lidar.base import Scan
 from vla_deploy.ipc import CellReader, CellWriter, SharedSpace
 from vla_deploy.navigation.grid_map import load_map
-from vla_deploy.navigation.localisation import Localiser, Pose2D
+from vla_deploy.navigation.localisation import Localiser
+from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel, full_positions
 
@@ -40,6 +42,11 @@ class Whereabouts:
         """Return where the robot is now."""
         return self._localiser.pose
 
+    @property
+    def is_lost(self) -> bool:
+        """Tell whether the pose says nothing about the map; it moves on with the wheels then."""
+        return self._localiser.state is PlaceState.LOST
+
     def pose_at(self, stamp_ns: int) -> Pose2D:
         """Return where the robot was at a moment of the last seconds."""
         return self._localiser.pose_at(stamp_ns)
@@ -62,6 +69,9 @@ class Whereabouts:
             y_m=pose.y_m,
             yaw_rad=pose.yaw_rad,
             match_ratio=self._localiser.match_ratio,
+            covariance=self._localiser.covariance.ravel(),
+            state=self._localiser.state,
+            doubt=self._localiser.doubt,
         )
 
     def correct(self, scan: Scan) -> None:

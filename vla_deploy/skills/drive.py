@@ -17,9 +17,10 @@ from vla_deploy.navigation.follower import (
     Twist,
     wrap_angle,
 )
-from vla_deploy.navigation.localisation import MIN_MATCH_RATIO
 from vla_deploy.navigation.obstacles import is_blocked, scan_points
+from vla_deploy.navigation.place_judge import MATCH_RATIO, PlaceState
 from vla_deploy.robots.description import FloorPose
+from vla_deploy.skills.bearings import find_myself
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.frames import on_floor, to_map
@@ -53,8 +54,9 @@ def drive_to(
 
     Raises:
         NotPossible: no path leads there.
-        TryAgain: something blocks the way for too long.
+        TryAgain: the robot is lost, or something blocks the way for too long.
     """
+    yield from find_myself(context)
     pose = context.link.pose
     try:
         points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
@@ -197,8 +199,10 @@ def _hindrance(
     ranges_m = context.link.ranges_m
     if ranges_m is None:
         return "the lidar tells nothing, and without it the robot does not drive"
-    if context.link.match_ratio < MIN_MATCH_RATIO:
+    if context.link.match_ratio < MATCH_RATIO:
         return "what the lidar sees does not fit the map, so the robot may be elsewhere"
+    if context.link.place_state is not PlaceState.TRACKING:
+        return f"the robot is not sure where it is: {context.link.place_doubt}"
     points = scan_points(ranges_m)
     mapped = context.planner.is_mapped(on_floor(context.link.pose, points))
     blocked = is_blocked(

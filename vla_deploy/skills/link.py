@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.follower import AT_REST, Twist
+from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt, PlaceState
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.safety import Direction
@@ -132,6 +133,19 @@ class RobotLink:
         """Return how much of the newest scan the map explains at this pose; 0 before the first."""
         sample = self._pose.latest()
         return 0.0 if sample is None else float(sample.data["match_ratio"])
+
+    @property
+    def place_state(self) -> PlaceState:
+        """Return what the pose is worth; lost before perception tells it."""
+        sample = self._pose.latest()
+        return PlaceState.LOST if sample is None else PlaceState(int(sample.data["state"]))
+
+    @property
+    def place_doubt(self) -> str:
+        """Say why the pose is in doubt; "" when it is not."""
+        sample = self._pose.latest()
+        doubt = Doubt.STARTING if sample is None else Doubt(int(sample.data["doubt"]))
+        return DOUBT_TEXT[doubt]
 
     @property
     def is_blind(self) -> bool:

@@ -96,7 +96,9 @@ def test_each_part_gets_its_turn_and_tells_what_it_knows(watch: Any, rig: Any) -
     space = SharedSpace(rig.lockstep.context.run_dir / "ipc", rig.lockstep.clock)
     zone = rig.robot.home.zones[0].polygon_m
     x_m, y_m = np.mean(zone, axis=0)
-    space.cell_writer("pose").put(x_m=x_m, y_m=y_m, yaw_rad=0.0, match_ratio=1.0)
+    space.cell_writer("pose").put(
+        x_m=x_m, y_m=y_m, yaw_rad=0.0, match_ratio=1.0, covariance=(0.0,) * 9, state=0, doubt=0
+    )
     ahead = np.zeros(360, dtype=np.float32)
     ahead[:3] = 0.245
     space.cell_writer("scan").put(range_m=ahead)

@@ -12,11 +12,12 @@ import time
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc import Sample, SharedSpace
 
 pytestmark = pytest.mark.stack
 
 PUTS = 3000
+NUMBERS = ("x_m", "y_m", "yaw_rad", "match_ratio")
 OPEN = """
 import sys
 from pathlib import Path
@@ -53,9 +54,15 @@ print("ready", flush=True)
 n = 0
 while True:
     n += 1
-    cell.put(x_m=n, y_m=n, yaw_rad=n, match_ratio=n)
+    cell.put(x_m=n, y_m=n, yaw_rad=n, match_ratio=n, covariance=(n,) * 9, state=0, doubt=0)
 """
 )
+
+
+def _numbers(sample: Sample) -> set[float]:
+    """Return every number that the writer put."""
+    data = sample.data
+    return {*data["covariance"].tolist(), *(float(data[name]) for name in NUMBERS)}
 
 
 @pytest.fixture
@@ -118,7 +125,7 @@ def test_a_reader_never_sees_a_mix_of_a_writer_at_full_speed(space, spawn):
     ):
         sample = reader.latest()
         if sample is not None:
-            assert set(sample.data.item()) == {float(sample.sequence)}
+            assert _numbers(sample) == {float(sample.sequence)}
             seen.add(sample.sequence)
     assert len(seen) > 100
 

@@ -46,14 +46,14 @@ def test_a_creator_killed_before_the_header_leaves_no_harm(tmp_path, clock):
     (tmp_path / "pose.cell").write_bytes(bytes(1000))
     space = SharedSpace(tmp_path, clock)
     writer = space.cell_writer("pose")
-    writer.put(x_m=1, y_m=2, yaw_rad=3, match_ratio=1)
+    writer.put(x_m=1, y_m=2, yaw_rad=3, match_ratio=1, covariance=(0,) * 9, state=0, doubt=0)
     assert space.cell_reader("pose").latest().data["y_m"] == 2
 
 
 def test_a_file_of_an_earlier_boot_begins_anew(tmp_path, clock):
     space = SharedSpace(tmp_path, clock)
     writer = space.cell_writer("pose")
-    writer.put(x_m=1, y_m=2, yaw_rad=3, match_ratio=1)
+    writer.put(x_m=1, y_m=2, yaw_rad=3, match_ratio=1, covariance=(0,) * 9, state=0, doubt=0)
     writer.close()
     path = tmp_path / "pose.cell"
     data = bytearray(path.read_bytes())
@@ -135,7 +135,9 @@ def test_packed_fields_lie_aligned_and_little_endian():
 def test_a_closed_space_holds_no_descriptor_and_its_samples_stay_valid(tmp_path, clock):
     before = len(list(Path("/proc/self/fd").iterdir()))
     space = SharedSpace(tmp_path, clock)
-    space.cell_writer("pose").put(x_m=1, y_m=2, yaw_rad=3, match_ratio=1)
+    space.cell_writer("pose").put(
+        x_m=1, y_m=2, yaw_rad=3, match_ratio=1, covariance=(0,) * 9, state=0, doubt=0
+    )
     sample = space.cell_reader("pose").latest()
     space.ring_reader("operator", from_start=True).drain()
     space.doorbell("operator")

@@ -1,90 +1,60 @@
-"""Localisation in a drawn L-shaped flat; scans are traced on the true outline, not on the map."""
-
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vla_deploy.navigation.grid_map import GridMap
-from vla_deploy.navigation.localisation import DistanceField, Localiser, Pose2D
+from vla_deploy.navigation.localisation import Localiser
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.navigation.place_judge import LOST_SIGMA_M, Doubt, PlaceState
 
-# Axis-parallel solid boxes: x0, y0, x1, y1 in metres.
-SOLIDS = np.array(
-    [
-        (-0.1, -0.1, 6.1, 0.0),
-        (-0.1, 5.0, 6.1, 5.1),
-        (-0.1, 0.0, 0.0, 5.0),
-        (6.0, 0.0, 6.1, 5.0),
-        (3.0, 0.0, 3.1, 2.0),
-        (4.4, 3.6, 5.2, 4.4),
-    ]
-)
-RESOLUTION_M = 0.05
+if TYPE_CHECKING:
+    from conftest import TracedFlat
 
-
-def flat_map() -> GridMap:
-    blocked = np.zeros((110, 130), dtype=np.bool_)
-    origin = (-0.25, -0.25)
-    for box in SOLIDS:
-        x0, y0, x1, y1 = np.rint((box - np.tile(origin, 2)) / RESOLUTION_M).astype(int)
-        blocked[y0:y1, x0:x1] = True
-    return GridMap(resolution_m=RESOLUTION_M, origin_m=origin, blocked=blocked)
-
-
-def trace(pose: Pose2D, solids: NDArray[np.float64] = SOLIDS) -> NDArray[np.float32]:
-    """Cast 360 beams by the slab method."""
-    angles = pose.yaw_rad + np.radians(np.arange(360))
-    direction = np.column_stack((np.cos(angles), np.sin(angles)))
-    direction[np.abs(direction) < 1e-9] = 1e-9
-    start = np.array([pose.x_m, pose.y_m])
-    low = (solids[None, :, :2] - start) / direction[:, None]
-    high = (solids[None, :, 2:] - start) / direction[:, None]
-    enter = np.minimum(low, high).max(axis=2)
-    leave = np.maximum(low, high).min(axis=2)
-    hit = np.where((enter < leave) & (enter > 0), enter, np.inf).min(axis=1)
-    return np.where(np.isfinite(hit), hit, 0.0).astype(np.float32)
-
-
-def still_scan(pose: Pose2D, seed: int = 0) -> NDArray[np.float32]:
-    noise = np.random.default_rng(seed).normal(0.0, 0.005, 360)
-    ranges = trace(pose)
-    return np.where(ranges > 0, ranges + noise, 0.0).astype(np.float32)
+HOME = Pose2D(1.5, 1.2, 0.4)
+SETTLED_SCANS = 8
 
 
 def error_of(localiser: Localiser, truth: Pose2D) -> tuple[float, float]:
-    off = localiser.pose.relative_to(truth)
-    return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
+    return localiser.pose.distance_m(truth), localiser.pose.turn_rad(truth)
 
 
-def test_the_field_is_zero_on_walls_and_negative_inside() -> None:
-    field = DistanceField(flat_map())
-    distance, gradient = field.sample(np.array([[0.0, 2.5], [1.0, 2.5], [3.05, 1.0], [3.3, 1.0]]))
-    assert distance[0] == pytest.approx(0.0, abs=0.01)
-    assert distance[1] == pytest.approx(1.0, abs=0.01)
-    assert distance[2] < -0.02
-    assert distance[3] == pytest.approx(0.2, abs=0.01)
-    assert gradient[1] == pytest.approx([1.0, 0.0], abs=0.05)
+def settled(flat: "TracedFlat", pose: Pose2D = HOME) -> Localiser:
+    localiser = Localiser(pose, flat.map())
+    flat.stand(localiser, pose, SETTLED_SCANS)
+    assert localiser.state is PlaceState.TRACKING
+    return localiser
 
 
-@pytest.mark.parametrize("true", [Pose2D(1.5, 1.2, 0.4), Pose2D(4.6, 1.5, -2.2)])
-def test_a_wrong_start_is_corrected_by_standing_still(true: Pose2D) -> None:
-    start = true.compose(Pose2D(0.12, -0.1, 0.09))
-    localiser = Localiser(start, flat_map())
-    for step in range(20):
-        localiser.predict(step * 100_000_000, Pose2D(0, 0, 0), 0.0)
-        stamps = np.full(360, step * 100_000_000, dtype=np.int64)
-        assert localiser.correct(still_scan(true, step), stamps)
+def feed(localiser: Localiser, flat: "TracedFlat", ranges: NDArray[np.float32]) -> bool:
+    """Give one scan, a turn of the lidar after the last."""
+    flat.now_ns += 100_000_000
+    localiser.predict(flat.now_ns, ORIGIN, 0.0)
+    return localiser.correct(ranges, flat.stamps())
+
+
+@pytest.mark.parametrize("true", [HOME, Pose2D(4.6, 1.5, -2.2)])
+def test_a_wrong_start_is_corrected_by_standing_still(flat: "TracedFlat", true: Pose2D) -> None:
+    localiser = Localiser(true.compose(Pose2D(0.12, -0.1, 0.09)), flat.map())
+    assert (localiser.state, localiser.doubt) == (PlaceState.UNSURE, Doubt.STARTING)
+    assert all(flat.stand(localiser, true, 20))
     position_m, yaw_rad = error_of(localiser, true)
     assert position_m < 0.015
     assert yaw_rad < 0.006
     assert localiser.match_ratio > 0.9
+    assert localiser.state is PlaceState.TRACKING
 
 
-def drive(*, correct: bool, seconds: float = 25.0) -> tuple[float, float]:
-    """Drive a closed curve with wheels 8 % too long and a drifting IMU; return the final error."""
-    localiser = Localiser(Pose2D(1.5, 1.5, 0.0), flat_map())
-    true, odometry, imu_yaw = Pose2D(1.5, 1.5, 0.0), Pose2D(0.0, 0.0, 0.0), 0.0
+def stays(localiser: Localiser, before: Pose2D) -> bool:
+    """Tell whether the pose is the same but for the IMU's drift, which is taken out all along."""
+    return localiser.pose.distance_m(before) < 1e-6 and localiser.pose.turn_rad(before) < 1e-3
+
+
+def drive(flat: "TracedFlat", *, correct: bool, seconds: float = 25.0) -> tuple[Localiser, Pose2D]:
+    """Drive a closed curve with wheels 8 % too long and a drifting IMU; return what came of it."""
+    localiser = Localiser(Pose2D(1.5, 1.5, 0.0), flat.map())
+    true, odometry, imu_yaw = Pose2D(1.5, 1.5, 0.0), ORIGIN, 0.0
     step_s, poses, stamps = 0.02, [], []
     for tick in range(round(seconds / step_s)):
         turn = 0.9 * math.sin(0.5 * tick * step_s) * step_s
@@ -100,38 +70,170 @@ def drive(*, correct: bool, seconds: float = 25.0) -> tuple[float, float]:
             ranges, beam_stamps = np.zeros(360, np.float32), np.zeros(360, np.int64)
             for part in range(5):
                 beams = np.arange(360)[(4 - part) * 72 : (5 - part) * 72]
-                ranges[beams] = trace(poses[part - 5])[beams]
+                ranges[beams] = flat.trace(poses[part - 5])[beams]
                 beam_stamps[beams] = stamps[part - 5]
             localiser.correct(ranges, beam_stamps)
-    return error_of(localiser, true)
+    return localiser, true
 
 
-def test_scans_take_out_the_drift_of_wheels_and_imu() -> None:
-    drifted_m, drifted_rad = drive(correct=False)
+def test_scans_take_out_the_drift_of_wheels_and_imu(flat: "TracedFlat") -> None:
+    drifted_m, drifted_rad = error_of(*drive(flat, correct=False))
     assert drifted_m > 0.1
     assert drifted_rad > 0.04
-    position_m, yaw_rad = drive(correct=True)
-    assert position_m < 0.03
+    position_m, yaw_rad = error_of(*drive(flat, correct=True))
+    assert position_m < 0.02
     assert yaw_rad < 0.01
 
 
-def test_a_scan_that_does_not_fit_moves_nothing() -> None:
-    localiser = Localiser(Pose2D(1.5, 1.5, 0.0), flat_map())
-    localiser.predict(0, Pose2D(0, 0, 0), 0.0)
+def test_the_covariance_covers_the_error_and_grows_without_scans(flat: "TracedFlat") -> None:
+    tracked, true = drive(flat, correct=True)
+    blind, _ = drive(flat, correct=False)
+    off = np.array([tracked.pose.x_m - true.x_m, tracked.pose.y_m - true.y_m])
+    assert off @ np.linalg.solve(tracked.covariance[:2, :2], off) < 12.0
+    assert np.trace(blind.covariance[:2, :2]) > 20 * np.trace(tracked.covariance[:2, :2])
+    assert blind.state is not PlaceState.TRACKING
+
+
+def test_a_corridor_says_nothing_about_the_way_along_it(flat: "TracedFlat") -> None:
+    flat.solids = [(-20.0, -0.1, 20.0, 0.0), (-20.0, 1.2, 20.0, 1.3)]
+    pose = Pose2D(2.0, 0.6, 0.0)
+    localiser = Localiser(pose.compose(Pose2D(0.05, 0.05, 0.02)), flat.map())
+    flat.stand(localiser, pose, 20)
+    along_m2, across_m2 = np.diag(localiser.covariance)[:2]
+    assert abs(localiser.pose.y_m - pose.y_m) < 0.01
+    assert across_m2 < 0.015**2
+    assert along_m2 > 0.05**2
+
+
+def test_a_robot_that_was_carried_off_notices_and_finds_itself(flat: "TracedFlat") -> None:
+    random = np.random.default_rng(4)
+    localiser = settled(flat)
+    for _ in range(6):
+        x_m, y_m = random.choice(((1.5, 3.5), (2.3, 1.0), (4.5, 1.4), (5.5, 2.8), (3.5, 4.4)))
+        true = Pose2D(float(x_m), float(y_m), float(random.uniform(-3.0, 3.0)))
+        flat.stand(localiser, true, 4)
+        assert localiser.state is not PlaceState.TRACKING or error_of(localiser, true)[0] < 0.1
+        flat.stand(localiser, true, 60)
+        assert localiser.state is PlaceState.TRACKING
+        position_m, yaw_rad = error_of(localiser, true)
+        assert position_m < 0.03
+        assert yaw_rad < 0.02
+
+
+def test_a_robot_between_places_that_look_alike_says_that_it_is_lost(flat: "TracedFlat") -> None:
+    # Two rooms alike to the last detail: the same walls, turned by half a turn.
+    flat.solids = [
+        (0.0, 0.0, 6.0, 0.1),
+        (0.0, 3.9, 6.0, 4.0),
+        (0.0, 0.0, 0.1, 4.0),
+        (5.9, 0.0, 6.0, 4.0),
+        (2.9, 0.0, 3.1, 4.0),
+        (1.0, 0.1, 1.5, 0.6),
+        (4.5, 3.4, 5.0, 3.9),
+    ]
+    true = Pose2D(2.0, 2.5, 0.5)
+    localiser = Localiser(Pose2D(4.4, 0.9, -1.0), flat.map())
+    told = set()
+    for _ in range(80):
+        flat.stand(localiser, true, 1)
+        told.add((localiser.state, localiser.doubt))
+    assert (PlaceState.LOST, Doubt.AMBIGUOUS) in told
+    assert PlaceState.TRACKING not in {state for state, _ in told}
+
+
+def test_a_scan_that_does_not_fit_moves_nothing_and_many_make_the_robot_lost(
+    flat: "TracedFlat",
+) -> None:
+    localiser = settled(flat)
+    before = localiser.pose
     crowd = np.full(360, 0.6, dtype=np.float32)
-    assert not localiser.correct(crowd, np.zeros(360, dtype=np.int64))
-    assert localiser.pose == Pose2D(1.5, 1.5, 0.0)
-    assert localiser.match_ratio < 0.2
+    states = []
+    for number in range(20):
+        assert not feed(localiser, flat, crowd + np.float32(0.001 * (number % 2)))
+        states.append(localiser.state)
+    assert stays(localiser, before)
+    assert states[1] is PlaceState.TRACKING
+    assert states[3] is PlaceState.UNSURE
+    assert states[-1] is PlaceState.LOST
+    assert localiser.doubt is Doubt.POOR_MATCH
 
 
-def test_an_empty_scan_moves_nothing() -> None:
-    localiser = Localiser(Pose2D(1.5, 1.5, 0.0), flat_map())
-    assert not localiser.correct(np.zeros(360, np.float32), np.zeros(360, np.int64))
-    assert localiser.pose == Pose2D(1.5, 1.5, 0.0)
+@pytest.mark.parametrize(
+    "ranges",
+    [
+        np.zeros(360, np.float32),
+        np.full(360, np.nan, np.float32),
+        np.full(360, np.inf, np.float32),
+        np.full(360, 65.535, np.float32),
+        np.full(360, -1.0, np.float32),
+        np.where(np.arange(360) < 40, 1.0, 0.0).astype(np.float32),
+    ],
+    ids=["zero", "nan", "inf", "maximum", "negative", "torn"],
+)
+def test_scans_that_tell_nothing_move_nothing_and_make_the_robot_unsure(
+    flat: "TracedFlat", ranges: NDArray[np.float32]
+) -> None:
+    localiser = settled(flat)
+    before = localiser.pose
+    assert not any(feed(localiser, flat, ranges) for _ in range(15))
+    assert stays(localiser, before)
+    assert (localiser.state, localiser.doubt) == (PlaceState.UNSURE, Doubt.NO_SCAN)
+    assert localiser.match_ratio == 0.0
 
 
-def test_odometry_that_starts_anew_does_not_move_the_robot() -> None:
-    localiser = Localiser(Pose2D(1.0, 2.0, 0.5), flat_map())
+def test_a_scan_that_repeats_itself_to_the_bit_is_not_the_present(flat: "TracedFlat") -> None:
+    localiser = settled(flat)
+    scan = flat.scan(HOME)
+    used = [feed(localiser, flat, scan) for _ in range(20)]
+    assert used[0]
+    assert not used[-1]
+    assert localiser.state is PlaceState.UNSURE
+
+
+def test_people_around_the_robot_do_not_unsettle_it(flat: "TracedFlat") -> None:
+    localiser = settled(flat)
+    flat.solids += [(2.3, 1.0, 2.7, 1.4), (1.0, 2.2, 1.4, 2.6)]
+    flat.stand(localiser, HOME, 20)
+    assert localiser.state is PlaceState.TRACKING
+    assert error_of(localiser, HOME)[0] < 0.02
+
+
+def test_without_a_lidar_it_becomes_unsure_at_rest_and_lost_on_the_way(flat: "TracedFlat") -> None:
+    localiser = settled(flat)
+    for tick in range(100):
+        flat.now_ns += 20_000_000
+        localiser.predict(flat.now_ns, ORIGIN, 0.0)
+    assert (localiser.state, localiser.doubt) == (PlaceState.UNSURE, Doubt.NO_SCAN)
+    way_m = 0.0
+    while localiser.state is not PlaceState.LOST:
+        flat.now_ns += 20_000_000
+        way_m += 0.01
+        assert way_m < 2000.0
+        localiser.predict(flat.now_ns, Pose2D(way_m, 0.0, 0.0), 0.0)
+    assert localiser.doubt is Doubt.UNCERTAIN
+    assert math.sqrt(np.linalg.eigvalsh(localiser.covariance[:2, :2])[-1]) > LOST_SIGMA_M
+
+
+def test_a_map_of_wrong_scale_is_never_believed(flat: "TracedFlat") -> None:
+    localiser = Localiser(HOME, flat.map(stretch=1.25))
+    states = set()
+    for _ in range(80):
+        flat.stand(localiser, HOME, 1)
+        states.add(localiser.state)
+    assert PlaceState.TRACKING not in states
+    assert localiser.doubt is Doubt.POOR_MATCH
+
+
+def test_a_push_that_the_wheels_did_not_feel_is_followed(flat: "TracedFlat") -> None:
+    localiser = settled(flat)
+    pushed = HOME.compose(Pose2D(0.1, 0.12, 0.1))
+    flat.stand(localiser, pushed, 30)
+    assert localiser.state is PlaceState.TRACKING
+    assert error_of(localiser, pushed)[0] < 0.02
+
+
+def test_odometry_that_starts_anew_does_not_move_the_robot(flat: "TracedFlat") -> None:
+    localiser = Localiser(Pose2D(1.0, 2.0, 0.5), flat.map())
     localiser.predict(0, Pose2D(3.0, 1.0, 0.2), None)
     localiser.predict(1, Pose2D(3.1, 1.0, 0.2), None)
     moved = localiser.pose
@@ -139,12 +241,12 @@ def test_odometry_that_starts_anew_does_not_move_the_robot() -> None:
     assert localiser.pose == moved
 
 
-def test_past_poses_are_interpolated() -> None:
-    localiser = Localiser(Pose2D(1.0, 1.0, 0.0), flat_map())
+def test_past_poses_are_interpolated(flat: "TracedFlat") -> None:
+    localiser = Localiser(Pose2D(1.0, 1.0, 0.0), flat.map())
     localiser.predict(0, Pose2D(0.0, 0.0, 0.0), 3.1)
     localiser.predict(100, Pose2D(0.1, 0.0, 0.0), -3.1)
     middle = localiser.pose_at(50)
     assert middle.x_m == pytest.approx(1.05)
-    assert middle.yaw_rad == pytest.approx((2 * math.pi - 6.2) / 2)
-    assert localiser.pose_at(-5).x_m == 1.0
+    assert middle.yaw_rad == pytest.approx((2 * math.pi - 6.2) / 2, abs=1e-6)
+    assert localiser.pose_at(-5).x_m == pytest.approx(1.0)
     assert localiser.pose_at(500) == localiser.pose

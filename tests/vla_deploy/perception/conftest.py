@@ -13,7 +13,7 @@ from sim_twin.compose import compose
 from sim_twin.head_camera import HeadCamera
 from sim_twin.probes import RangeProbe
 from sim_twin.worlds.placement import draw_poses, load_world
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import RobotModel
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body import BodyMask
 from vla_deploy.perception.cloud import make_cloud
 from vla_deploy.perception.detection import Detection, detect

@@ -17,7 +17,7 @@ from sim_twin.sensors.camera import CameraDevice
 from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.navigation.localisation import Pose2D
+from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.node import NodeContext
 from vla_deploy.perception.node import PerceptionNode
 

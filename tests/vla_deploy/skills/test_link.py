@@ -5,7 +5,7 @@ from typing import cast
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import ClaimBook, Event, SharedSpace
+from vla_deploy.ipc import CellWriter, ClaimBook, Event, SharedSpace
 from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.planning.readiness import refusal_of
@@ -36,6 +36,20 @@ class SteppedClock:
         self.at_ns += round(seconds * NS_PER_S)
 
 
+def put_pose(
+    poses: CellWriter, x_m: float = 0.0, y_m: float = 0.0, yaw_rad: float = 0.0, state: int = 0
+) -> None:
+    poses.put(
+        x_m=x_m,
+        y_m=y_m,
+        yaw_rad=yaw_rad,
+        match_ratio=1.0,
+        covariance=(0.0,) * 9,
+        state=state,
+        doubt=0,
+    )
+
+
 @pytest.fixture
 def clock() -> SteppedClock:
     return SteppedClock()
@@ -54,7 +68,7 @@ def test_a_pose_that_grows_old_is_waited_for_and_then_given_up(
     link = RobotLink(space, clock, load_robot("butler"))
     before_it_ever_spoke = link.is_blind
     poses = space.cell_writer("pose")
-    poses.put(x_m=1.0, y_m=2.0, yaw_rad=0.5, match_ratio=1.0)
+    put_pose(poses, x_m=1.0, y_m=2.0, yaw_rad=0.5)
     assert (link.pose.x_m, link.is_blind) == (1.0, False)
     clock.step(POSE_AGE_S + 0.1)
     silent = link.is_blind
@@ -159,7 +173,7 @@ def test_a_turn_that_control_holds_back_is_asked_for_until_it_is_given_up(
     skill = turn(context_of(link), {"angle_rad": 1.0})
 
     def step() -> float:
-        poses.put(x_m=0.0, y_m=0.0, yaw_rad=0.0, match_ratio=1.0)
+        put_pose(poses)
         control_says(space, cause="keep_out_zone", blocked=["turn_left"])
         next(skill)
         clock.step(0.1)

@@ -1,0 +1,137 @@
+"""Judge how well the robot knows where it is: tracking, unsure or lost, and why.
+
+The judge is pure: it takes one fact at a time and has no clock of its own.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+from drivers.clock import NS_PER_S
+
+# A scan fits with MATCH_RATIO of its points on the map; a place is sure from SURE_RATIO on.
+MATCH_RATIO: Final = 0.6
+SURE_RATIO: Final = 0.75
+THROUGH_RATIO: Final = 0.15
+UNSURE_AFTER_SCANS: Final = 3
+LOST_AFTER_SCANS: Final = 15
+SURE_AFTER_SCANS: Final = 5
+SILENT_NS: Final = NS_PER_S
+UNSURE_SIGMA_M: Final = 0.15
+UNSURE_SIGMA_RAD: Final = 0.15
+LOST_SIGMA_M: Final = 0.6
+
+
+class PlaceState(IntEnum):
+    """Say what the pose is worth; the numbers are those of topic `pose`."""
+
+    TRACKING = 0
+    UNSURE = 1
+    LOST = 2
+
+
+class Doubt(IntEnum):
+    """Say why the pose is in doubt; the numbers are those of topic `pose`."""
+
+    NONE = 0
+    STARTING = 1
+    NO_SCAN = 2
+    POOR_MATCH = 3
+    THROUGH_WALLS = 4
+    INCONSISTENT = 5
+    UNCERTAIN = 6
+    AMBIGUOUS = 7
+    FOUND_AGAIN = 8
+
+
+DOUBT_TEXT: Final = {
+    Doubt.NONE: "",
+    Doubt.STARTING: "it has just started",
+    Doubt.NO_SCAN: "the lidar tells nothing of use",
+    Doubt.POOR_MATCH: "what the lidar sees does not fit the map",
+    Doubt.THROUGH_WALLS: "the lidar sees through walls of the map",
+    Doubt.INCONSISTENT: "scans contradict wheels and IMU",
+    Doubt.UNCERTAIN: "it has gone too far without a scan that fits",
+    Doubt.AMBIGUOUS: "several places of the map look like this one",
+    Doubt.FOUND_AGAIN: "it was lost and has just found a place that fits",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanVerdict:
+    """Tell what a scan says of the pose: the doubt that it casts, or none, and how well it fits."""
+
+    doubt: Doubt
+    match_ratio: float
+    sigma_m: float
+    sigma_rad: float
+
+
+class PlaceJudge:
+    """Follow the verdicts with hysteresis."""
+
+    def __init__(self) -> None:
+        self.state = PlaceState.UNSURE
+        self.doubt = Doubt.STARTING
+        self._good = 0
+        self._bad = 0
+        self._weak = 0
+        self._good_ns: int | None = None
+
+    def take(self, stamp_ns: int, verdict: ScanVerdict) -> None:
+        """Take in what a scan says."""
+        if verdict.doubt is Doubt.NO_SCAN:
+            self.pass_time(stamp_ns, verdict.sigma_m, verdict.sigma_rad)
+            return
+        if verdict.doubt is not Doubt.NONE:
+            self._good, self._bad = 0, self._bad + 1
+            self._take_bad(verdict.doubt)
+            return
+        fits_well = verdict.match_ratio >= SURE_RATIO
+        self._good, self._bad, self._good_ns = self._good + 1 if fits_well else 0, 0, stamp_ns
+        certain = verdict.sigma_m < UNSURE_SIGMA_M and verdict.sigma_rad < UNSURE_SIGMA_RAD
+        self._weak = 0 if fits_well else self._weak + 1
+        if self.state is not PlaceState.UNSURE:
+            return
+        if self._good >= SURE_AFTER_SCANS and certain:
+            self.state, self.doubt = PlaceState.TRACKING, Doubt.NONE
+        elif self._weak >= LOST_AFTER_SCANS:
+            self.doubt = Doubt.POOR_MATCH
+
+    def pass_time(self, now_ns: int, sigma_m: float, sigma_rad: float) -> None:
+        """Tell what is known when no scan says anything."""
+        if self._good_ns is None:
+            self._good_ns = now_ns
+        if self.state is PlaceState.TRACKING and now_ns - self._good_ns > SILENT_NS:
+            self._fall(PlaceState.UNSURE, Doubt.NO_SCAN)
+        if sigma_m > LOST_SIGMA_M and self.state is not PlaceState.LOST:
+            self._fall(PlaceState.LOST, Doubt.UNCERTAIN)
+        elif self.state is PlaceState.TRACKING and (
+            sigma_m > UNSURE_SIGMA_M or sigma_rad > UNSURE_SIGMA_RAD
+        ):
+            self._fall(PlaceState.UNSURE, Doubt.UNCERTAIN)
+
+    def found(self, stamp_ns: int) -> None:
+        """Take a place that was searched for and found; scans must confirm it."""
+        self._fall(PlaceState.UNSURE, Doubt.FOUND_AGAIN)
+        self._good_ns = stamp_ns
+
+    def search_found(self, places: int) -> None:
+        """Take the number of places that fit, while lost."""
+        if self.state is PlaceState.LOST and places > 1:
+            self.doubt = Doubt.AMBIGUOUS
+
+    def _take_bad(self, doubt: Doubt) -> None:
+        if self.state is PlaceState.LOST:
+            return
+        if self._bad >= LOST_AFTER_SCANS:
+            self._fall(PlaceState.LOST, doubt)
+        elif self._bad >= UNSURE_AFTER_SCANS:
+            keeps = self.state is PlaceState.UNSURE and self.doubt is Doubt.FOUND_AGAIN
+            bad, self._bad = self._bad, 0
+            self._fall(PlaceState.LOST if keeps else PlaceState.UNSURE, doubt)
+            self._bad = bad
+
+    def _fall(self, state: PlaceState, doubt: Doubt) -> None:
+        self.state, self.doubt = state, doubt
+        self._good = self._bad = self._weak = 0
