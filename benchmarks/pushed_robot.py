@@ -24,7 +24,7 @@ from sim_twin.sensors.imu import ImuDevice, ImuTruth
 from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses
 from vla_deploy.control.odometry import DifferentialDrive, Odometry
-from vla_deploy.navigation.follower import DriveLimits, PathFollower, Phase, Twist
+from vla_deploy.navigation.follower import AT_REST, DriveLimits, PathFollower, Phase, Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.robots import RobotDescription
@@ -93,7 +93,7 @@ class PushedRobot:
         self.pose = pose
         self._stand()
 
-    def read(self, twist: Twist = Twist(0.0, 0.0)) -> Reading:
+    def read(self, twist: Twist = AT_REST) -> Reading:
         """Move for as long as perception's period, and return what it gets then."""
         for _ in range(STEPS_PER_READING):
             self._move(twist)

@@ -13,9 +13,6 @@ from vla_deploy.navigation.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.distance_field import DistanceField
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.hypotheses import Relocaliser
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
-from vla_deploy.navigation.pose_filter import GATE, PoseFilter
-from vla_deploy.navigation.scan_match import MIN_POINTS, Match, ScanPoints, fit
 from vla_deploy.navigation.place_judge import (
     MATCH_RATIO,
     THROUGH_RATIO,
@@ -24,6 +21,9 @@ from vla_deploy.navigation.place_judge import (
     PlaceState,
     ScanVerdict,
 )
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.navigation.pose_filter import GATE, PoseFilter
+from vla_deploy.navigation.scan_match import MIN_POINTS, Match, ScanPoints, fit
 
 # However often it is measured, no pose is better known than the map is drawn.
 MAP_COVARIANCE: Final = np.diag((0.01**2, 0.01**2, 0.008**2))

@@ -6,8 +6,8 @@ import pytest
 from numpy.typing import NDArray
 
 from vla_deploy.navigation.localisation import Localiser
-from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.navigation.place_judge import LOST_SIGMA_M, Doubt, PlaceState
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
 
 if TYPE_CHECKING:
     from conftest import TracedFlat
@@ -200,7 +200,7 @@ def test_people_around_the_robot_do_not_unsettle_it(flat: "TracedFlat") -> None:
 
 def test_without_a_lidar_it_becomes_unsure_at_rest_and_lost_on_the_way(flat: "TracedFlat") -> None:
     localiser = settled(flat)
-    for tick in range(100):
+    for _ in range(100):
         flat.now_ns += 20_000_000
         localiser.predict(flat.now_ns, ORIGIN, 0.0)
     assert (localiser.state, localiser.doubt) == (PlaceState.UNSURE, Doubt.NO_SCAN)
