@@ -68,6 +68,7 @@ def as_text(status: dict[str, Any]) -> str:
             _pose(status),
             _task(status),
             _scene(status),
+            *_sight(status),
         ]
     )
 
@@ -151,3 +152,20 @@ def _scene(status: dict[str, Any]) -> str:
         for one in scene["objects"]
     ]
     return f"sees: {'; '.join(seen) or 'nothing'}"
+
+
+def _sight(status: dict[str, Any]) -> list[str]:
+    """Say how things are named, and what is wrong with the camera's images."""
+    scene = status["scene"]
+    if scene is None or "sight" not in scene:
+        return []
+    sight, image = scene["sight"], scene["image"]
+    by_form = sight["mode"] == "form"
+    how = f"form alone ({sight['why']})" if by_form else _model(sight["model"])
+    return [f"names by: {how}", *(f"  image: {fault}" for fault in image["faults"])]
+
+
+def _model(model: dict[str, Any]) -> str:
+    cost = f"{1000 * model['p50_s']:.0f} ms, {model['memory_mb']:.0f} MB"
+    notices = f" ({'; '.join(model['notices'])})" if model["notices"] else ""
+    return f"form and {model['model']} {model['variant']} on {model['provider']}, {cost}{notices}"

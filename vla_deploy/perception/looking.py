@@ -12,6 +12,8 @@ from drivers.clock import NS_PER_S
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body_state import Array, BodyState
 from vla_deploy.perception.eyes import Eyes
+from vla_deploy.perception.frame_check import Use
+from vla_deploy.perception.frame_watch import FrameWatch
 from vla_deploy.perception.near_obstacles import NearObstacles
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.scene import Scene
@@ -42,7 +44,12 @@ class Looking:
         self._body = body
         self._whereabouts = whereabouts
         self._eyes = eyes
+        self._watch = FrameWatch()
         self._waiting: Moment | None = None
+
+    def came(self, now_ns: int) -> None:
+        """Take note that an image has come, whether it is looked at or not."""
+        self._watch.came(now_ns)
 
     def see(self, frame: RgbdFrame) -> bool:
         """Take a new image; return whether the obstacles around are new."""
@@ -50,6 +57,10 @@ class Looking:
         if positions is None:
             return False
         moment = self._moment(frame, positions)
+        rotation = self._body.view_rotation(frame.stamp_ns, moment.base)
+        verdict = self._watch.judge(frame, moment.depth_m, rotation, moment.base)
+        if verdict.use < Use.OBSTACLES:
+            return False
         grips = [np.array(hand.grip) for hand in self._body.hands(positions) if hand.held]
         self.obstacles.look(
             moment.depth_m,
@@ -62,9 +73,11 @@ class Looking:
         )
         still = self._camera_turn(frame.stamp_ns) <= MAX_CAMERA_TURN_RAD_S
         # Where things are on the map is not known as long as the robot is lost.
-        if still and self._waiting is None and not self._whereabouts.is_lost:
+        placed = still and not self._whereabouts.is_lost
+        if placed and verdict.use >= Use.FORM and self._waiting is None:
             self._waiting = moment
-            self._eyes.ask(frame.rgb)
+            if verdict.use >= Use.ALL:
+                self._eyes.ask(frame.rgb)
         return True
 
     def finish(self) -> bool:
@@ -85,9 +98,13 @@ class Looking:
             else:
                 self.scene.release(hand.name)
 
-    def document(self) -> dict[str, Any]:
-        """Return the scene topic's document, with how things are named."""
-        return {**self.scene.document(), "sight": self._eyes.document()}
+    def document(self, now_ns: int) -> dict[str, Any]:
+        """Return the scene topic's document, with how things are named, and how images are."""
+        return {
+            **self.scene.document(),
+            "sight": self._eyes.document(),
+            "image": self._watch.document(now_ns),
+        }
 
     def _look(self, moment: Moment, network: NetworkView | None) -> None:
         self.scene.look(

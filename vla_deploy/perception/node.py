@@ -158,7 +158,10 @@ class PerceptionNode:
 
     def _read_camera(self) -> None:
         frame, now_ns = self._sensors.image(), self._clock.now_ns()
-        if frame is None or now_ns < self._next_look_ns:
+        if frame is None:
+            return
+        self._looking.came(now_ns)
+        if now_ns < self._next_look_ns:
             return
         rate_hz = self._profile.perception_rate_hz * self._rate_ratio
         self._next_look_ns = now_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
@@ -193,7 +196,8 @@ class PerceptionNode:
         )
 
     def _publish_scene(self) -> None:
-        if self._clock.now_ns() >= self._next_scene_ns:
-            self._next_scene_ns = self._clock.now_ns() + SCENE_PERIOD_NS
-            document = {**self._looking.document(), "away": self._sensors.away()}
+        now_ns = self._clock.now_ns()
+        if now_ns >= self._next_scene_ns:
+            self._next_scene_ns = now_ns + SCENE_PERIOD_NS
+            document = {**self._looking.document(now_ns), "away": self._sensors.away()}
             self._writers["scene"].put_document(document)

@@ -1,22 +1,46 @@
-"""The robot standing in the twin's flat, without physics: what its camera and lidar would show."""
+"""The robot standing in the twin's flat, without physics: what its sensors would show.
+
+`StillFlat` is the flat to pose and to look at; `Rig` steps perception's node in it.
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
+import can
 import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.camera.protocol import Intrinsics
+from drivers.camera.protocol import BYTES_PER_PIXEL, CRC, HEADER_BYTES, Intrinsics
+from platforms import Profile, load_profile
 from sim_twin.compose import compose
+from sim_twin.device import WireDevice
+from sim_twin.faults.line_tamper import LineTamper
 from sim_twin.head_camera import HeadCamera
+from sim_twin.lines import MemoryLine
 from sim_twin.probes import RangeProbe
+from sim_twin.sensors.camera import CameraDevice
+from sim_twin.sensors.imu import ImuDevice, ImuTruth
+from sim_twin.sensors.lidar import LidarDevice
 from sim_twin.worlds.placement import draw_poses, load_world
+from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.node import NodeContext
+from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import RobotModel
 
+Rgb = NDArray[np.uint8]
+Depth = NDArray[np.float32]
+
+STEP_NS = 10_000_000
+CAMERA_FRAME_BYTES = HEADER_BYTES + 320 * 240 * BYTES_PER_PIXEL + CRC.size
+NODE_PERIOD_NS = 20_000_000
+VIEW = Pose2D(2.2, 2.05, -math.pi / 2)
 HIDDEN_GROUP = 5
 
 
@@ -108,8 +132,143 @@ class StillFlat:
         self.data.qpos[start : start + 7] = (*position_m, *turn)
 
 
+class Rig:
+    """Step sensors and node; stand in for control by telling the true joints and wheel odometry."""
+
+    def __init__(
+        self, flat: StillFlat, run_dir: Path, believed: Pose2D, profile: Profile | None = None
+    ) -> None:
+        self.now = 1_000_000_000
+        self.flat = flat
+        self.head_tilt: Callable[[float], float] = lambda _: 0.75
+        self.base: Callable[[float], Pose2D] = lambda _: VIEW
+        self.arm: dict[str, float] = {}
+        flat.scatter(1)
+        self.spoil: Callable[[Rgb, Depth], tuple[Rgb, Depth]] = lambda rgb, depth: (rgb, depth)
+        self.devices: dict[str, WireDevice] = {
+            "lidar": LidarDevice(flat.lidar.cast, seed=1),
+            "imu": ImuDevice(self._feel, seed=1),
+            "camera": CameraDevice(self._render, flat.intrinsics, latency_s=0.03, seed=1),
+        }
+        self.camera_wire = LineTamper(
+            self.devices["camera"], self.now_ns, CAMERA_FRAME_BYTES, tells_time=False
+        )
+        wires = {**self.devices, "camera": self.camera_wire}
+        self.lines = {name: MemoryLine(device, self) for name, device in wires.items()}
+        self.space = SharedSpace(run_dir / "ipc", self)
+        self._joint_state = self.space.cell_writer("joint_state")
+        self._base_state = self.space.cell_writer("base_state")
+        context = NodeContext(
+            run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=self
+        )
+        home = flat.robot.home
+        start = replace(
+            home.places[home.start].pose,
+            x_m=believed.x_m,
+            y_m=believed.y_m,
+            yaw_rad=believed.yaw_rad,
+        )
+        places = {**home.places, home.start: replace(home.places[home.start], pose=start)}
+        robot = replace(flat.robot, home=replace(home, places=places))
+        self.profile = load_profile("desktop") if profile is None else profile
+        self.node = PerceptionNode(context, robot, self.profile, self)
+        self.node.start()
+
+    def now_ns(self) -> int:
+        return self.now
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        raise AssertionError("perception never sleeps")
+
+    def serial(self, name: str) -> MemoryLine:
+        return self.lines[name]
+
+    def stream(self, name: str) -> MemoryLine:
+        return self.lines[name]
+
+    def can(self, name: str) -> can.BusABC:
+        raise AssertionError("perception has no business on the CAN bus")
+
+    def run_for(self, seconds: float) -> None:
+        end_ns = self.now + round(seconds * 1e9)
+        while self.now < end_ns:
+            self.now += STEP_NS
+            t = self.now / 1e9
+            self.flat.stand(self.base(t), head_tilt=self.head_tilt(t), **self.arm)
+            for device in self.devices.values():
+                device.step(self.now)
+            if self.now % NODE_PERIOD_NS == 0:
+                self._tell()
+                self.node.step()
+
+    def cell(self, name: str) -> Any:
+        sample = self.space.cell_reader(name).latest()
+        assert sample is not None, f"{name} was never published"
+        return sample.data
+
+    def scene(self) -> dict[str, Any]:
+        sample = self.space.cell_reader("scene").latest()
+        assert sample is not None
+        return sample.document()
+
+    def known(self) -> dict[str, dict[str, Any]]:
+        return {thing["id"]: thing for thing in self.scene()["objects"]}
+
+    def pose_error(self) -> tuple[float, float]:
+        data = self.cell("pose")
+        off = Pose2D(data["x_m"], data["y_m"], data["yaw_rad"]).relative_to(self.flat.base)
+        return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
+
+    def _render(self) -> tuple[Rgb, Depth]:
+        return self.spoil(*self.flat.camera.render())
+
+    def _feel(self) -> ImuTruth:
+        return ImuTruth(
+            yaw_rad=self.flat.base.yaw_rad,
+            pitch_rad=0.0,
+            roll_rad=0.0,
+            acceleration_m_s2=(0.0, 0.0, 9.81),
+        )
+
+    def _tell(self) -> None:
+        count = len(self.flat.joints)
+        zeros = np.zeros(count)
+        self._joint_state.put(
+            joint_count=count,
+            position=self.flat.joints,
+            velocity=zeros,
+            setpoint=self.flat.joints,
+            effort_ratio=zeros,
+            age_s=zeros,
+            error=zeros,
+            torque_enabled=np.ones(count),
+        )
+        moved = self.flat.base.relative_to(VIEW)
+        self._base_state.put(
+            x_m=1.05 * moved.x_m,
+            y_m=1.05 * moved.y_m,
+            yaw_rad=0.95 * moved.yaw_rad,
+            v_m_s=0.0,
+            w_rad_s=0.0,
+            enabled=1,
+        )
+
+
 @pytest.fixture(scope="module")
 def flat() -> Iterator[StillFlat]:
     still = StillFlat()
     yield still
     still.camera.close()
+
+
+@pytest.fixture
+def make_rig(flat: StillFlat, tmp_path: Path) -> Iterator[Callable[..., Rig]]:
+    rigs = []
+
+    def make(believed: Pose2D = VIEW, profile: Profile | None = None) -> Rig:
+        rigs.append(Rig(flat, tmp_path, believed, profile))
+        return rigs[-1]
+
+    yield make
+    for rig in rigs:
+        rig.node.stop()

@@ -1,162 +1,25 @@
 """The perception process on simulated time: real drivers, emulated sensors, rendered images."""
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-import can
 import numpy as np
 import pytest
 
-from platforms import load_profile
-from sim_twin.device import WireDevice
-from sim_twin.lines import MemoryLine
-from sim_twin.sensors.camera import CameraDevice
-from sim_twin.sensors.imu import ImuDevice, ImuTruth
-from sim_twin.sensors.lidar import LidarDevice
-from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.pose import Pose2D
-from vla_deploy.node import NodeContext
-from vla_deploy.perception.node import PerceptionNode
 
 if TYPE_CHECKING:
-    from conftest import StillFlat
+    from conftest import Rig, StillFlat
 
 pytestmark = pytest.mark.gl
 
-STEP_NS = 10_000_000
-NODE_PERIOD_NS = 20_000_000
 VIEW = Pose2D(2.2, 2.05, -math.pi / 2)
-
-
-class Rig:
-    """Step sensors and node; stand in for control by telling the true joints and wheel odometry."""
-
-    def __init__(self, flat: "StillFlat", run_dir: Path, believed: Pose2D) -> None:
-        self.now = 1_000_000_000
-        self.flat = flat
-        self.head_tilt: Callable[[float], float] = lambda _: 0.75
-        self.base: Callable[[float], Pose2D] = lambda _: VIEW
-        self.arm: dict[str, float] = {}
-        flat.scatter(1)
-        self.devices: dict[str, WireDevice] = {
-            "lidar": LidarDevice(flat.lidar.cast, seed=1),
-            "imu": ImuDevice(self._feel, seed=1),
-            "camera": CameraDevice(flat.camera.render, flat.intrinsics, latency_s=0.03, seed=1),
-        }
-        self.lines = {name: MemoryLine(device, self) for name, device in self.devices.items()}
-        self.space = SharedSpace(run_dir / "ipc", self)
-        self._joint_state = self.space.cell_writer("joint_state")
-        self._base_state = self.space.cell_writer("base_state")
-        context = NodeContext(
-            run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=self
-        )
-        home = flat.robot.home
-        start = replace(
-            home.places[home.start].pose,
-            x_m=believed.x_m,
-            y_m=believed.y_m,
-            yaw_rad=believed.yaw_rad,
-        )
-        places = {**home.places, home.start: replace(home.places[home.start], pose=start)}
-        robot = replace(flat.robot, home=replace(home, places=places))
-        self.node = PerceptionNode(context, robot, load_profile("desktop"), self)
-        self.node.start()
-
-    def now_ns(self) -> int:
-        return self.now
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        raise AssertionError("perception never sleeps")
-
-    def serial(self, name: str) -> MemoryLine:
-        return self.lines[name]
-
-    def stream(self, name: str) -> MemoryLine:
-        return self.lines[name]
-
-    def can(self, name: str) -> can.BusABC:
-        raise AssertionError("perception has no business on the CAN bus")
-
-    def run_for(self, seconds: float) -> None:
-        end_ns = self.now + round(seconds * 1e9)
-        while self.now < end_ns:
-            self.now += STEP_NS
-            t = self.now / 1e9
-            self.flat.stand(self.base(t), head_tilt=self.head_tilt(t), **self.arm)
-            for device in self.devices.values():
-                device.step(self.now)
-            if self.now % NODE_PERIOD_NS == 0:
-                self._tell()
-                self.node.step()
-
-    def cell(self, name: str) -> Any:
-        sample = self.space.cell_reader(name).latest()
-        assert sample is not None, f"{name} was never published"
-        return sample.data
-
-    def scene(self) -> dict[str, Any]:
-        sample = self.space.cell_reader("scene").latest()
-        assert sample is not None
-        return sample.document()
-
-    def known(self) -> dict[str, dict[str, Any]]:
-        return {thing["id"]: thing for thing in self.scene()["objects"]}
-
-    def pose_error(self) -> tuple[float, float]:
-        data = self.cell("pose")
-        off = Pose2D(data["x_m"], data["y_m"], data["yaw_rad"]).relative_to(self.flat.base)
-        return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
-
-    def _feel(self) -> ImuTruth:
-        return ImuTruth(
-            yaw_rad=self.flat.base.yaw_rad,
-            pitch_rad=0.0,
-            roll_rad=0.0,
-            acceleration_m_s2=(0.0, 0.0, 9.81),
-        )
-
-    def _tell(self) -> None:
-        count = len(self.flat.joints)
-        zeros = np.zeros(count)
-        self._joint_state.put(
-            joint_count=count,
-            position=self.flat.joints,
-            velocity=zeros,
-            setpoint=self.flat.joints,
-            effort_ratio=zeros,
-            age_s=zeros,
-            error=zeros,
-            torque_enabled=np.ones(count),
-        )
-        moved = self.flat.base.relative_to(VIEW)
-        self._base_state.put(
-            x_m=1.05 * moved.x_m,
-            y_m=1.05 * moved.y_m,
-            yaw_rad=0.95 * moved.yaw_rad,
-            v_m_s=0.0,
-            w_rad_s=0.0,
-            enabled=1,
-        )
-
-
-@pytest.fixture
-def make_rig(flat: "StillFlat", tmp_path: Path) -> Iterator[Callable[..., Rig]]:
-    rigs = []
-
-    def make(believed: Pose2D = VIEW) -> Rig:
-        rigs.append(Rig(flat, tmp_path, believed))
-        return rigs[-1]
-
-    yield make
-    for rig in rigs:
-        rig.node.stop()
+MakeRig = Callable[..., "Rig"]
 
 
 def test_the_scene_is_right_in_the_map_although_the_start_was_wrong(
-    make_rig: Callable[..., Rig],
+    make_rig: MakeRig,
 ) -> None:
     rig = make_rig(VIEW.compose(Pose2D(0.06, -0.05, 0.04)))
     rig.run_for(4.0)
@@ -173,7 +36,7 @@ def test_the_scene_is_right_in_the_map_although_the_start_was_wrong(
 
 
 def test_the_table_is_told_as_a_surface_with_its_height_and_outline(
-    make_rig: Callable[..., Rig],
+    make_rig: MakeRig,
 ) -> None:
     rig = make_rig()
     rig.run_for(1.0)
@@ -186,7 +49,7 @@ def test_the_table_is_told_as_a_surface_with_its_height_and_outline(
     assert all(surface["height_m"] > 0.1 for surface in rig.scene()["surfaces"])
 
 
-def test_every_topic_is_published(make_rig: Callable[..., Rig]) -> None:
+def test_every_topic_is_published(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.run_for(1.0)
     assert np.count_nonzero(rig.cell("scan")["range_m"]) > 300
@@ -199,7 +62,7 @@ def test_every_topic_is_published(make_rig: Callable[..., Rig]) -> None:
     assert frame.payload[: rgb.size] == rgb.tobytes()
 
 
-def test_driving_is_followed_better_than_by_wheels_alone(make_rig: Callable[..., Rig]) -> None:
+def test_driving_is_followed_better_than_by_wheels_alone(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.run_for(0.5)
     began = rig.now / 1e9
@@ -216,7 +79,7 @@ def test_driving_is_followed_better_than_by_wheels_alone(make_rig: Callable[...,
     assert yaw_rad < 0.03
 
 
-def test_a_restarted_process_knows_where_the_robot_is(make_rig: Callable[..., Rig]) -> None:
+def test_a_restarted_process_knows_where_the_robot_is(make_rig: MakeRig) -> None:
     make_rig().run_for(0.5)
     restarted = make_rig(believed=Pose2D(VIEW.x_m + 1.5, VIEW.y_m, VIEW.yaw_rad + 1.0))
     restarted.run_for(1.0)
@@ -226,7 +89,7 @@ def test_a_restarted_process_knows_where_the_robot_is(make_rig: Callable[..., Ri
 
 
 def test_images_taken_while_the_head_turns_are_shown_but_not_believed(
-    make_rig: Callable[..., Rig],
+    make_rig: MakeRig,
 ) -> None:
     rig = make_rig()
     rig.run_for(1.0)
@@ -243,7 +106,7 @@ def test_images_taken_while_the_head_turns_are_shown_but_not_believed(
     assert rig.scene()["stamp_ns"] > before + 1_000_000_000
 
 
-def test_a_lost_camera_is_reopened_and_the_rest_goes_on(make_rig: Callable[..., Rig]) -> None:
+def test_a_lost_camera_is_reopened_and_the_rest_goes_on(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.run_for(0.5)
     rig.lines["camera"].unplug()
@@ -264,7 +127,7 @@ def test_a_lost_camera_is_reopened_and_the_rest_goes_on(make_rig: Callable[..., 
 
 @pytest.mark.parametrize(("sensor", "topic"), [("lidar", "scan"), ("imu", "imu")])
 def test_a_lost_lidar_or_imu_leaves_its_topic_stale_until_it_is_back(
-    make_rig: Callable[..., Rig], sensor: str, topic: str
+    make_rig: MakeRig, sensor: str, topic: str
 ) -> None:
     rig = make_rig()
     rig.run_for(0.5)
@@ -286,7 +149,7 @@ def test_a_lost_lidar_or_imu_leaves_its_topic_stale_until_it_is_back(
 
 
 def test_a_cup_that_is_carried_off_is_forgotten_and_keeps_its_id_elsewhere(
-    make_rig: Callable[..., Rig],
+    make_rig: MakeRig,
 ) -> None:
     rig = make_rig()
     rig.run_for(1.0)
@@ -300,7 +163,7 @@ def test_a_cup_that_is_carried_off_is_forgotten_and_keeps_its_id_elsewhere(
     assert math.dist(rig.known()["cup_1"]["position_m"][:2], (2.2, 1.42)) < 0.03
 
 
-def test_what_moves_while_the_camera_is_away_is_not_noticed(make_rig: Callable[..., Rig]) -> None:
+def test_what_moves_while_the_camera_is_away_is_not_noticed(make_rig: MakeRig) -> None:
     """All that perception knows of things has come over the camera's wire."""
     rig = make_rig()
     rig.run_for(1.0)
@@ -327,7 +190,7 @@ def reach(flat: "StillFlat", target: np.ndarray) -> dict[str, float]:
     return min(tries, key=gap_m)
 
 
-def test_a_cup_in_the_hand_goes_where_the_hand_goes(make_rig: Callable[..., Rig]) -> None:
+def test_a_cup_in_the_hand_goes_where_the_hand_goes(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.flat.put("red_cup", (2.1, 1.62, 0.4975))
     rig.run_for(1.0)

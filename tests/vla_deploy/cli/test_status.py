@@ -1,0 +1,41 @@
+"""What a person is told of how the robot sees."""
+
+from typing import Any
+
+import pytest
+
+from vla_deploy.cli.status import as_text
+
+SILENT = ("process_table", "profile", "control", "pose", "executor")
+MODEL = {
+    "model": "detector",
+    "variant": "int8_u8s8",
+    "provider": "CPUExecutionProvider",
+    "p50_s": 0.0041,
+    "memory_mb": 11.6,
+    "notices": ["CUDAExecutionProvider: this onnxruntime has none"],
+}
+
+
+def told(sight: dict[str, Any], *faults: str) -> str:
+    scene = {"objects": [], "sight": sight, "image": {"use": "all", "faults": list(faults)}}
+    return as_text({**dict.fromkeys(SILENT), "scene": scene})
+
+
+def test_the_network_at_work_is_told_with_its_cost_and_what_is_not_as_asked() -> None:
+    text = told({"mode": "network", "why": "", "model": MODEL})
+    assert "names by: form and detector int8_u8s8 on CPUExecutionProvider, 4 ms, 12 MB" in text
+    assert "CUDAExecutionProvider: this onnxruntime has none" in text
+
+
+@pytest.mark.parametrize("model", [None, MODEL])
+def test_that_the_network_is_done_without_is_told_with_the_reason(
+    model: dict[str, Any] | None,
+) -> None:
+    text = told({"mode": "form", "why": "no answer within 1 s", "model": model})
+    assert text.endswith("names by: form alone (no answer within 1 s)")
+
+
+def test_what_spoils_the_images_is_told() -> None:
+    text = told({"mode": "network", "why": "", "model": MODEL}, "dark: 1, limit 0.9 (...)")
+    assert text.endswith("  image: dark: 1, limit 0.9 (...)")

@@ -1,0 +1,208 @@
+"""Asking a real network beside the steps: in time, late, failing, replaced, not to be opened."""
+
+import dataclasses
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.clock import MonotonicClock
+from platforms import load_profile
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.store import ModelStore
+from vla_deploy.perception.eyes import FAILURES_TO_DISMISS, Answer, Eyes, open_network
+
+
+class HeldBack(Executor):
+    """Run what was handed in when told to, in order."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[Callable[[], None]] = deque()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+
+        def run() -> None:
+            try:
+                future.set_result(fn(*args, **kwargs))
+            except Exception as error:
+                future.set_exception(error)
+
+        self._waiting.append(run)
+        return future
+
+    def catch_up(self) -> None:
+        while self._waiting:
+            self._waiting.popleft()()
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.ns = 0
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        raise AssertionError("eyes never wait")
+
+
+@pytest.fixture
+def rgb():
+    image = np.full((64, 96, 3), 90, dtype=np.uint8)
+    image[16:32, 16:32] = (255, 0, 0)
+    return image
+
+
+@pytest.fixture
+def shelf(tmp_path):
+    return ModelShelf(
+        store=ModelStore(tmp_path / "models", tmp_path / "none"),
+        engines=tmp_path / "engines",
+        clock=MonotonicClock(),
+    )
+
+
+@pytest.fixture
+def model(tmp_path, lay_out, blob_manifest, blobs):
+    content = blobs.raw().SerializeToString()
+    return lay_out(tmp_path / "models", blob_manifest, {Variant.INT8_U8S8: content})
+
+
+def profile(*, required: bool = False):
+    desktop = load_profile("desktop")
+    choice = dataclasses.replace(desktop.models["detector"], tiers=("blobs",), required=required)
+    return dataclasses.replace(desktop, models=MappingProxyType({"detector": choice}))
+
+
+@pytest.fixture
+def executor():
+    return HeldBack()
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def eyes(executor, clock, shelf, model):
+    made = Eyes(executor, clock)
+    made.take(open_network(shelf, profile(), 0))
+    return made
+
+
+def test_an_answer_is_awaited_and_then_taken_once(eyes, executor, rgb):
+    eyes.ask(rgb)
+    assert eyes.answer() is None
+    executor.catch_up()
+    answer = eyes.answer()
+    assert answer.view.classes == ("red", "green", "blue")
+    assert {int(one) for one in answer.view.boxes.classes} == {0}
+    assert eyes.answer() == Answer(view=None)
+    assert eyes.document()["model"]["runs"] == 1
+
+
+def test_a_network_that_takes_too_long_is_done_without_until_it_answers(eyes, executor, clock, rgb):
+    eyes.ask(rgb)
+    clock.ns = 1_100_000_000
+    assert eyes.answer() == Answer(view=None)
+    assert eyes.document()["mode"] == "form"
+    assert eyes.document()["why"] == "no answer within 1 s"
+    eyes.ask(rgb)  # it is still busy with the first
+    assert eyes.answer() == Answer(view=None)
+    executor.catch_up()
+    eyes.ask(rgb)
+    executor.catch_up()
+    assert eyes.answer().view is not None
+    assert (eyes.document()["mode"], eyes.document()["late"]) == ("network", 1)
+
+
+def test_a_network_that_fails_again_and_again_is_asked_no_more(eyes, executor, rgb, caplog):
+    eyes.network.detector.close()
+    for number in range(FAILURES_TO_DISMISS):
+        assert eyes.network.detector is not None
+        eyes.ask(rgb)
+        executor.catch_up()
+        assert eyes.answer() == Answer(view=None)
+        assert eyes.document()["mode"] == "form"
+        assert "session is closed" in eyes.document()["why"]
+        assert ("asked no more" in caplog.text) is (number + 1 == FAILURES_TO_DISMISS)
+    assert eyes.document()["model"] is None
+    eyes.ask(rgb)
+    assert eyes.answer() == Answer(view=None)
+
+
+def test_a_network_that_is_replaced_still_answers_what_it_was_asked(eyes, executor, shelf, rgb):
+    eyes.ask(rgb)
+    eyes.release(eyes.take(open_network(shelf, profile(), 0)))
+    executor.catch_up()
+    assert eyes.answer().view is not None
+    eyes.ask(rgb)
+    executor.catch_up()
+    assert eyes.answer().view is not None
+
+
+def cut_off(folder, blobs):
+    path = folder / "int8_u8s8.onnx"
+    path.write_bytes(path.read_bytes()[:200])
+    return "it was cut off or replaced"
+
+
+def without_manifest(folder, blobs):
+    (folder / "model.toml").unlink()
+    return "no model 'blobs'"
+
+
+def other_classes(folder, blobs):
+    text = (folder / "model.toml").read_text()
+    spoiled = text.replace('"red", "green", "blue"', '"red", "green"')
+    assert spoiled != text
+    (folder / "model.toml").write_text(spoiled)
+    return "is the list of classes right"
+
+
+def other_shape(folder, blobs):
+    text = (folder / "model.toml").read_text()
+    spoiled = text.replace("[1, 7, 96]", "[1, 7, 84]")
+    assert spoiled != text
+    (folder / "model.toml").write_text(spoiled)
+    return "expected shape [1, 7, 84]"
+
+
+SPOILERS = (cut_off, without_manifest, other_classes, other_shape)
+
+
+@pytest.mark.parametrize("spoil", SPOILERS)
+def test_a_model_that_is_no_good_leaves_the_robot_without_one_and_says_why(
+    shelf, model, blobs, spoil
+):
+    told = spoil(model, blobs)
+    network = open_network(shelf, profile(), 0)
+    assert network.detector is None
+    assert told in network.why
+    for changes in ({"required": True}, {}):
+        with pytest.raises(InferenceError):
+            open_network(shelf, profile(**changes), 0, instead_of_one=not changes)
+
+
+def test_weights_that_give_no_numbers_are_refused_when_the_model_is_opened(
+    tmp_path, shelf, lay_out, blob_manifest, blobs
+):
+    content = blobs.raw(red_gain=float("nan")).SerializeToString()
+    lay_out(tmp_path / "models", blob_manifest, {Variant.INT8_U8S8: content})
+    network = open_network(shelf, profile(), 0)
+    assert network.detector is None
+    assert "values are no numbers" in network.why
+
+
+def test_a_profile_that_names_no_detector_goes_by_form(shelf):
+    bare = dataclasses.replace(load_profile("desktop"), models={})
+    network = open_network(shelf, bare, 0)
+    assert (network.detector, network.why) == (None, "profile desktop names no detector")

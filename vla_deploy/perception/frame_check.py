@@ -1,0 +1,141 @@
+"""Judge whether an image can be what the camera sees now: one table of limits, one rule each.
+
+A rule takes what its fault spoils. A grainy image is not shown to the network; without colours
+nothing is named, but depth still tells what stands in the way; without depth, or in an image that
+is not of now, nothing is told. What is not told becomes stale, and whoever relies on it acts by its
+own rule for that.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final
+
+from vla_deploy.perception.frame_statistics import FrameStatistics
+
+
+class Use(IntEnum):
+    """Say what an image is good for: each use includes those below it."""
+
+    NOTHING = 0
+    OBSTACLES = 1
+    FORM = 2
+    ALL = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """Bound one statistic of an image: beyond `most`, it is good for `leaves` and no more."""
+
+    fault: str
+    measure: Callable[[FrameStatistics], float]
+    most: float
+    leaves: Use
+    meaning: str
+
+
+LIMITS: Final[tuple[Limit, ...]] = (
+    Limit(
+        fault="no new image",
+        measure=lambda seen: seen.silent_s,
+        most=1.5,
+        leaves=Use.NOTHING,
+        meaning="s since the last one",
+    ),
+    Limit(
+        fault="frozen",
+        measure=lambda seen: seen.stale_ratio,
+        most=0.95,
+        leaves=Use.NOTHING,
+        meaning="share of rows that are to the bit those of the image before",
+    ),
+    Limit(
+        fault="torn",
+        measure=lambda seen: seen.stale_ratio if seen.stale_ratio <= 0.95 else 0.0,
+        most=0.05,
+        leaves=Use.NOTHING,
+        meaning="share of rows that are to the bit those of the image before",
+    ),
+    Limit(
+        fault="frozen while the camera moved",
+        measure=lambda seen: seen.unmoved_rad,
+        most=0.12,
+        leaves=Use.NOTHING,
+        meaning="change of view in rad, after which it shows the same",
+    ),
+    Limit(
+        fault="cut off",
+        measure=lambda seen: seen.missing_ratio,
+        most=0.05,
+        leaves=Use.NOTHING,
+        meaning="share of rows that are empty in colour and depth, while others are not",
+    ),
+    Limit(
+        fault="depth holes",
+        measure=lambda seen: seen.hole_ratio,
+        most=0.92,
+        leaves=Use.NOTHING,
+        meaning="share of pixels without depth",
+    ),
+    Limit(
+        fault="noisy depth",
+        measure=lambda seen: seen.depth_noise_ratio,
+        most=4.0,
+        leaves=Use.NOTHING,
+        meaning="noise of depth over what a stereo camera has at this distance",
+    ),
+    Limit(
+        fault="dark",
+        measure=lambda seen: seen.dark_ratio,
+        most=0.9,
+        leaves=Use.OBSTACLES,
+        meaning="share of pixels too dark to have a colour",
+    ),
+    Limit(
+        fault="saturated",
+        measure=lambda seen: seen.saturated_ratio,
+        most=0.6,
+        leaves=Use.OBSTACLES,
+        meaning="share of pixels that are white beyond measure",
+    ),
+    Limit(
+        fault="noisy",
+        measure=lambda seen: seen.colour_noise_levels,
+        most=25.0,
+        leaves=Use.OBSTACLES,
+        meaning="noise in levels of 255",
+    ),
+    Limit(
+        fault="grainy",
+        measure=lambda seen: seen.colour_noise_levels,
+        most=15.0,
+        leaves=Use.FORM,
+        meaning="noise in levels of 255",
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """Hold what an image is good for, and why it is not for more."""
+
+    use: Use
+    faults: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return the verdict as the scene topic tells it."""
+        return {"use": self.use.name.lower(), "faults": list(self.faults)}
+
+
+def judge_frame(seen: FrameStatistics) -> Verdict:
+    """Return what an image with these statistics is good for; all that spoils it is told."""
+    beyond = [limit for limit in LIMITS if limit.measure(seen) > limit.most]
+    worst = min((limit.leaves for limit in beyond), default=Use.ALL)
+    return Verdict(
+        use=worst,
+        faults=tuple(
+            f"{limit.fault}: {limit.measure(seen):.3g}, limit {limit.most:g} ({limit.meaning})"
+            for limit in beyond
+            if limit.leaves == worst
+        ),
+    )

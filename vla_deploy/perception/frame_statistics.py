@@ -1,0 +1,124 @@
+"""Measure what tells a sound image from a spoiled one, by itself and beside the one before."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Floats
+
+Image = NDArray[np.uint8]
+
+DARK_LEVEL: Final = 30
+WHITE_LEVEL: Final = 252
+EMPTY_LEVEL: Final = 2
+THUMB_PX: Final = (40, 30)
+PLAIN_LEVELS: Final = 6.0
+"""Contrast of an image in which nothing could be seen to move, such as one of a bare wall."""
+SAME_LEVELS: Final = 0.7
+ROW_STRIDE: Final = 4
+LEAST_SIGMA_M: Final = 0.0005
+_SECOND_DIFFERENCE: Final = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
+_ITS_MEAN_OF_NOISE: Final = 6.0 * math.sqrt(2.0 / math.pi)
+"""Its mean absolute value for noise of deviation 1 (Immerkaer 1996)."""
+_MEDIAN_OF_NOISE: Final = 0.6745 * math.sqrt(6.0)
+"""The median absolute second difference along a row, likewise."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameStatistics:
+    """Hold the measures of one image.
+
+    `unmoved_rad` is by how much the camera has turned since images began to show the same; 0 where
+    they do not, or show too little to tell. Ratios are shares of pixels or rows, from 0 to 1.
+    `silent_s` is for how long none has come.
+    """
+
+    dark_ratio: float = 0.0
+    saturated_ratio: float = 0.0
+    colour_noise_levels: float = 0.0
+    missing_ratio: float = 0.0
+    hole_ratio: float = 0.0
+    depth_noise_ratio: float = 0.0
+    stale_ratio: float = 0.0
+    unmoved_rad: float = 0.0
+    silent_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Glance:
+    """Hold what is kept of an image to compare the next one with."""
+
+    rgb: Image
+    depth: NDArray[np.uint16]
+    thumb: Floats
+
+    @classmethod
+    def of(cls, rgb: Image, depth: NDArray[np.uint16]) -> "Glance":
+        """Return what is to be kept of an image."""
+        grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+        small = cv2.resize(grey, THUMB_PX, interpolation=cv2.INTER_AREA)
+        return cls(rgb=rgb, depth=depth, thumb=small.astype(np.float32))
+
+    def shows_the_same(self, other: "Glance") -> bool:
+        """Tell whether two images show the same view of something that has contrast."""
+        plain = min(float(self.thumb.std()), float(other.thumb.std())) < PLAIN_LEVELS
+        change = float(np.abs(self.thumb - other.thumb).mean())
+        return not plain and change < SAME_LEVELS
+
+    def stale_ratio(self, other: "Glance") -> float:
+        """Return the share of rows in which not one bit differs; no sensor is as still as that."""
+        if self.rgb.shape != other.rgb.shape:
+            return 0.0
+        rows = (self.depth == other.depth).all(axis=1) & self.depth.any(axis=1)
+        same = (self.rgb[rows] == other.rgb[rows]).all(axis=(1, 2))
+        return float(np.count_nonzero(same)) / len(rows)
+
+
+def measure_frame(rgb: Image, depth_m: Floats) -> FrameStatistics:
+    """Measure an image by itself; `depth_m` is 0 where there is no depth."""
+    return FrameStatistics(
+        dark_ratio=_share_between(rgb, 0, DARK_LEVEL),
+        saturated_ratio=_share_between(rgb, WHITE_LEVEL, 255),
+        colour_noise_levels=_colour_noise(rgb),
+        missing_ratio=_missing_rows(rgb, depth_m),
+        hole_ratio=1.0 - int(np.count_nonzero(depth_m)) / depth_m.size,
+        depth_noise_ratio=_depth_noise(depth_m[::ROW_STRIDE]),
+    )
+
+
+def _share_between(rgb: Image, low: int, high: int) -> float:
+    """Return the share of pixels of which every channel is within bounds."""
+    within = cv2.inRange(rgb, (low,) * 3, (high,) * 3)
+    return cv2.countNonZero(within) / int(within.size)
+
+
+def _colour_noise(rgb: Image) -> float:
+    """Return the deviation of noise in the middle one of small tiles.
+
+    Edges and patterns fill some tiles; noise fills all of them.
+    """
+    rough = np.abs(cv2.filter2D(cv2.extractChannel(rgb, 1), cv2.CV_32F, _SECOND_DIFFERENCE))
+    tiles = cv2.resize(rough, THUMB_PX, interpolation=cv2.INTER_AREA)
+    return float(np.median(tiles)) / _ITS_MEAN_OF_NOISE
+
+
+def _missing_rows(rgb: Image, depth_m: Floats) -> float:
+    """Return the share of rows that are empty in colour and depth, unless all are."""
+    without_depth = ~depth_m.any(axis=1)
+    missing = int(np.count_nonzero(rgb[without_depth].max(axis=(1, 2), initial=0) <= EMPTY_LEVEL))
+    return 0.0 if missing == len(rgb) else missing / len(rgb)
+
+
+def _depth_noise(rows_m: Floats) -> float:
+    """Return how strong the noise along rows is, over what is usual; edges are the rarer half."""
+    left, middle, right = rows_m[:, :-2], rows_m[:, 1:-1], rows_m[:, 2:]
+    known = (left > 0.0) & (middle > 0.0) & (right > 0.0)
+    if not known.any():
+        return 0.0
+    usual = np.maximum(np.float32(DEPTH_SIGMA_PER_M) * middle[known] ** 2, LEAST_SIGMA_M)
+    bend = np.abs(left[known] - 2.0 * middle[known] + right[known])
+    return float(np.median(bend / usual)) / _MEDIAN_OF_NOISE

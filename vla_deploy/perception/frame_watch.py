@@ -1,0 +1,66 @@
+"""Watch the images that come, and whether any do: each by itself and beside those before."""
+
+import math
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.base import RgbdFrame
+from drivers.clock import NS_PER_S
+from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.cloud import Floats
+from vla_deploy.perception.frame_check import Use, Verdict, judge_frame
+from vla_deploy.perception.frame_statistics import FrameStatistics, Glance, measure_frame
+
+VIEW_DISTANCE_M: Final = 3.0
+"""Driving by one metre changes the view as turning by one over this does."""
+
+
+class FrameWatch:
+    """Hold the last image, the one since when nothing has moved in them, and the last verdict."""
+
+    def __init__(self) -> None:
+        self._last: Glance | None = None
+        self._still: tuple[Glance, NDArray[np.float64], Pose2D] | None = None
+        self._came_ns: int | None = None
+        self._verdict = Verdict(use=Use.ALL, faults=())
+        self._refused = 0
+
+    def came(self, now_ns: int) -> None:
+        """Take note that an image has come."""
+        self._came_ns = now_ns
+
+    def judge(
+        self, frame: RgbdFrame, depth_m: Floats, rotation: NDArray[np.float64], base: Pose2D
+    ) -> Verdict:
+        """Return what an image is good for; `rotation` is the camera's in the map, 3 x 3."""
+        glance = Glance.of(frame.rgb, frame.depth)
+        seen = replace(
+            measure_frame(frame.rgb, depth_m),
+            stale_ratio=0.0 if self._last is None else glance.stale_ratio(self._last),
+            unmoved_rad=self._unmoved_rad(glance, rotation, base),
+        )
+        self._last = glance
+        self._verdict = judge_frame(seen)
+        self._refused += self._verdict.use is Use.NOTHING
+        return self._verdict
+
+    def document(self, now_ns: int) -> dict[str, Any]:
+        """Return the verdict on the last image, or that none comes, as the scene topic tells it."""
+        if self._came_ns is None:
+            self._came_ns = now_ns
+        silence = judge_frame(FrameStatistics(silent_s=(now_ns - self._came_ns) / NS_PER_S))
+        verdict = silence if silence.faults else self._verdict
+        return {**verdict.document(), "refused": self._refused}
+
+    def _unmoved_rad(self, glance: Glance, rotation: NDArray[np.float64], base: Pose2D) -> float:
+        if self._still is None or not glance.shows_the_same(self._still[0]):
+            self._still = (glance, rotation, base)
+            return 0.0
+        _, before, stood = self._still
+        cosine = (float(np.trace(before.T @ rotation)) - 1.0) / 2.0
+        turned_rad = math.acos(min(1.0, max(-1.0, cosine)))
+        driven_m = math.hypot(base.x_m - stood.x_m, base.y_m - stood.y_m)
+        return turned_rad + driven_m / VIEW_DISTANCE_M
