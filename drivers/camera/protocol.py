@@ -49,7 +49,11 @@ class Command(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Intrinsics:
-    """Hold a pinhole camera's calibration in pixels."""
+    """Hold a camera's calibration in pixels.
+
+    `distortion` has the lens' coefficients in the order k1 k2 p1 p2 k3 k4 k5 k6, the last ones left
+    out or all of them: a pinhole. The wire tells a pinhole only; a calibration file the lens.
+    """
 
     width: int
     height: int
@@ -57,6 +61,7 @@ class Intrinsics:
     fy: float
     cx: float
     cy: float
+    distortion: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

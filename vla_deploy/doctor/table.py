@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from platforms.tree import Missing
 from vla_deploy.doctor import (
+    camera,
     clocks,
     computer,
     devices,
@@ -36,6 +37,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Computer", "memory", computer.memory),
     Check("Computer", "user", computer.user, live=True),
     Check("Devices", "device files", devices.device_files),
+    Check("Devices", "camera calibration", camera.camera_calibration),
     Check("Devices", "latency timers", devices.latency_timers),
     Check("Devices", "CAN link", devices.can_link),
     Check("Devices", "sound", devices.sound),

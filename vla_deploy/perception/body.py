@@ -8,6 +8,7 @@ import pinocchio
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.perception.lens import project
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.mjcf import read_mjcf_names
 
@@ -37,6 +38,7 @@ class BodyMask:
         self._neutral = pinocchio.neutral(self._model)
         camera = self._model.getFrameId(robot.camera.site)
         self._camera_frame = camera
+        self._camera_from_site = pinocchio.SE3(robot.camera.site_from_camera).inverse()
         head = self._model.frames[camera].parentJoint
         mimics = read_mjcf_names(robot.mjcf_path).mimics
         leaders = {**{name: name for name in robot.joint_names}, **mimics}
@@ -55,7 +57,7 @@ class BodyMask:
         for place, joint in self._places:
             q[place] = positions[joint]
         pinocchio.framesForwardKinematics(self._model, self._data, q)
-        camera_from_world = self._data.oMf[self._camera_frame].inverse()
+        camera_from_world = self._camera_from_site * self._data.oMf[self._camera_frame].inverse()
         image = np.zeros((camera.height, camera.width), dtype=np.uint8)
         for balls in self._balls:
             pose = camera_from_world * self._data.oMi[balls.joint]
@@ -95,8 +97,7 @@ def _fill(shape: pinocchio.GeometryObject) -> _Balls:
 
 
 def _paint(image: NDArray[np.uint8], centres: Array, radius_m: float, camera: Intrinsics) -> None:
-    for x, y, z in centres:
-        if z < NEAR_M:
-            continue
-        at = (round(camera.fx * x / z + camera.cx), round(camera.fy * y / z + camera.cy))
-        cv2.circle(image, at, max(1, round(camera.fx * radius_m / z)), 1, cv2.FILLED)
+    ahead = centres[centres[:, 2] >= NEAR_M]
+    for (u, v), z in zip(project(camera, ahead), ahead[:, 2], strict=True):
+        radius_px = max(1, round(camera.fx * radius_m / z))
+        cv2.circle(image, (round(u), round(v)), radius_px, 1, cv2.FILLED)

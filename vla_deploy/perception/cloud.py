@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.perception.lens import ray_table
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -74,18 +75,17 @@ def make_cloud(
 def _back_project(
     depth_m: Floats, camera: Intrinsics, base_from_camera: NDArray[np.float64]
 ) -> Floats:
-    """Return each pixel's point; a ray is the sum of what its column and its row give to it."""
-    height, width = depth_m.shape
-    across = (np.arange(width) - camera.cx) / camera.fx
-    down = (np.arange(height) - camera.cy) / camera.fy
-    points: Floats = np.empty((height, width, 3), np.float32)
+    """Return each pixel's point; only the pose is new from image to image, the rays are not."""
+    rays = ray_table(camera)
+    across, down = rays[..., 0], rays[..., 1]
+    points: Floats = np.empty((*depth_m.shape, 3), np.float32)
     for axis in range(3):
-        right, below, ahead, origin = base_from_camera[axis]
-        by_column = (right * across).astype(np.float32)
-        by_row = (below * down + ahead).astype(np.float32)
-        ray = by_row[:, None] + by_column
+        right, below, ahead, origin = base_from_camera[axis].astype(np.float32)
+        ray = right * across
+        ray += below * down
+        ray += ahead
         ray *= depth_m
-        np.add(ray, np.float32(origin), out=points[..., axis])
+        np.add(ray, origin, out=points[..., axis])
     return points
 
 

@@ -16,6 +16,7 @@ from vla_deploy.perception.frame_check import Use
 from vla_deploy.perception.frame_watch import FrameWatch
 from vla_deploy.perception.near_obstacles import NearObstacles
 from vla_deploy.perception.network_view import NetworkView
+from vla_deploy.perception.pinhole_view import as_pinhole, in_image
 from vla_deploy.perception.scene import Scene
 from vla_deploy.perception.whereabouts import Whereabouts
 
@@ -77,7 +78,7 @@ class Looking:
         if placed and verdict.use >= Use.FORM and self._waiting is None:
             self._waiting = moment
             if verdict.use >= Use.ALL:
-                self._eyes.ask(frame.rgb)
+                self._eyes.ask(as_pinhole(frame))
         return True
 
     def finish(self) -> bool:
@@ -86,7 +87,7 @@ class Looking:
         if self._waiting is None or answer is None:
             return False
         moment, self._waiting = self._waiting, None
-        self._look(moment, answer.view)
+        self._look(moment, in_image(answer.view, moment.frame.intrinsics))
         return True
 
     def carry(self, positions: Array, now_ns: int) -> None:

@@ -14,6 +14,7 @@ from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc.topics import OBSTACLE_POINTS
 from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.lens import project, ray_table
 
 Array = NDArray[np.float64]
 Cell = tuple[int, int]
@@ -93,10 +94,10 @@ class NearObstacles:
         if not self._cells:
             return
         points = _to_base(self._points(), pose) - base_from_camera[:3, 3]
-        right, down, ahead = (points @ base_from_camera[:3, :3]).T
-        depth = np.maximum(ahead, MIN_DEPTH_M)
-        column = np.rint(camera.fx * right / depth + camera.cx).astype(np.int64)
-        row = np.rint(camera.fy * down / depth + camera.cy).astype(np.int64)
+        local = points @ base_from_camera[:3, :3]
+        ahead = local[:, 2].copy()
+        local[:, 2] = np.maximum(ahead, MIN_DEPTH_M)
+        column, row = np.rint(project(camera, local)).astype(np.int64).T
         seen = (ahead > MIN_DEPTH_M) & (column >= 0) & (column < camera.width)
         seen &= (row >= 0) & (row < camera.height)
         at = (row[seen], column[seen])
@@ -129,8 +130,7 @@ def _standing(
     depth = depth_m[some].astype(np.float64)
     rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < SEEN_WITHIN_M) & ~body[some])
     z = depth[rows, columns]
-    x = (STRIDE_PX * columns - camera.cx) / camera.fx * z
-    y = (STRIDE_PX * rows - camera.cy) / camera.fy * z
+    x, y = ray_table(camera)[some][rows, columns].T * z
     rotation, origin = base_from_camera[:3, :3], base_from_camera[:3, 3]
     points: Array = np.column_stack((x, y, z)) @ rotation.T + origin
     return points[(points[:, 2] > LOWEST_M) & (points[:, 2] < HIGHEST_M)]

@@ -13,6 +13,7 @@ from vla_deploy.perception.bystanders import Bystander, find_bystanders
 from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
 from vla_deploy.perception.filtering import Estimate
+from vla_deploy.perception.lens import project
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.noise import covariance_of
 from vla_deploy.perception.shapes import half_turn
@@ -129,7 +130,7 @@ def _view(
         return View.HIDDEN
     half = math.ceil(0.5 * camera.fx * max(track.size_m) / z)
     border = BORDER_PX + half
-    u, v = round(camera.fx * x / z + camera.cx), round(camera.fy * y / z + camera.cy)
+    u, v = (round(value) for value in project(camera, np.array([[x, y, z]]))[0])
     if not (border <= u < camera.width - border and border <= v < camera.height - border):
         return View.HIDDEN
     around = np.s_[v - half : v + half + 1, u - half : u + half + 1]

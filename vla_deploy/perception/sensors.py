@@ -1,9 +1,12 @@
 """Hold the sensors open: lidar, IMU and camera, each opened again when its link breaks."""
 
+import logging
 import math
+from dataclasses import replace
 
 from drivers import registry
 from drivers.camera.base import Camera, RgbdFrame
+from drivers.camera.protocol import Intrinsics
 from drivers.clock import Clock
 from drivers.imu.base import Imu, ImuSample
 from drivers.lidar.base import Lidar, Scan
@@ -11,6 +14,8 @@ from drivers.opener import DeviceOpener
 from drivers.reopening import Reopening
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel, full_positions
+
+_log = logging.getLogger(__name__)
 
 
 class Sensors:
@@ -29,6 +34,7 @@ class Sensors:
         self._devices = devices
         self._clock = clock
         self._camera_rate_hz = camera_rate_hz
+        self._told_of_size = False
         self._lidar = Reopening("lidar", self._open_lidar, clock)
         self._imu = Reopening("imu", self._open_imu, clock)
         self._camera = Reopening("camera", self._open_camera, clock)
@@ -58,8 +64,16 @@ class Sensors:
         return samples[-1] if samples else None
 
     def image(self) -> RgbdFrame | None:
-        """Return a new image of the camera, if there is one."""
-        return self._camera.poll(lambda camera: camera.poll(), None)
+        """Return a new image of the camera, if there is one, with its calibrated lens."""
+        frame = self._camera.poll(lambda camera: camera.poll(), None)
+        lens = self._robot.camera.lens
+        if frame is None or lens is None:
+            return frame
+        told, known = frame.intrinsics, lens.intrinsics
+        if (told.width, told.height) == (known.width, known.height):
+            return replace(frame, intrinsics=known)
+        self._tell_of_other_size(told, known)
+        return frame
 
     def set_camera_rate(self, rate_hz: float) -> None:
         """Open the camera anew where it is to send at another rate."""
@@ -75,6 +89,19 @@ class Sensors:
             "camera": self._camera.failure,
         }
         return {name: failure for name, failure in failures.items() if failure}
+
+    def _tell_of_other_size(self, told: Intrinsics, known: Intrinsics) -> None:
+        """Say once that the calibration is of no use: the camera's own intrinsics count then."""
+        if not self._told_of_size:
+            self._told_of_size = True
+            _log.error(
+                "degraded: the camera sends %dx%d, its lens was calibrated at %dx%d; its own "
+                "intrinsics are taken; calibrate it anew: vla-deploy camera calibrate",
+                told.width,
+                told.height,
+                known.width,
+                known.height,
+            )
 
     def _open_lidar(self) -> Lidar:
         robot_lidar = self._robot.lidar

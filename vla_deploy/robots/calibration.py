@@ -5,8 +5,6 @@ It names the servo too: when another one is mounted, the old measurement is refu
 """
 
 import json
-import os
-import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -15,6 +13,7 @@ from typing import Any
 
 from vla_deploy.robots.consistency import rows, subtables, table, unknown_name
 from vla_deploy.robots.errors import RobotFileError
+from vla_deploy.robots.replacing import replace_text
 from vla_deploy.robots.schema import SERVO, TABLE, TEXT, Fault, Shape, check_record
 
 CALIBRATION_FILE = "calibration.toml"
@@ -62,20 +61,7 @@ def write_calibration(file: Path, calibrations: Mapping[str, JointCalibration]) 
     Raises:
         RobotFileError: it cannot be written; the old file stays.
     """
-    fresh = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        with fresh.open("w", encoding="utf-8") as stream:
-            stream.write(_as_toml(calibrations))
-            stream.flush()
-            os.fsync(stream.fileno())
-        if file.exists():
-            shutil.copy2(file, file.with_name(file.name + ".bak"))
-        fresh.replace(file)
-    except OSError as error:
-        fresh.unlink(missing_ok=True)
-        expected = "a file that can be written; choose one with --output"
-        fault = Fault(key="(file)", got=error.strerror or str(error), expected=expected)
-        raise RobotFileError(file, (fault,)) from error
+    replace_text(file, _as_toml(calibrations))
 
 
 def calibrated(document: Document, directory: Path) -> tuple[Document, tuple[Fault, ...]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.camera.protocol import Intrinsics
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 
 
@@ -113,8 +114,52 @@ class SerialSensor:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LensCalibration:
+    """Hold what was measured of a lens; what a file of another tool does not tell is None or ""."""
+
+    intrinsics: Intrinsics
+    distortion_model: str
+    reprojection_error_px: float | None
+    views: int | None
+    made_at: str
+    tool: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mounting:
+    """Hold by how much the camera sits otherwise than its site, measured with a lens `focal_px`.
+
+    `residual_m` is how far apart the measurements put the board; `made_at` is a date for people.
+    """
+
+    site: str
+    model: str
+    focal_px: float
+    translation_m: tuple[float, float, float]
+    quaternion_xyzw: tuple[float, float, float, float]
+    residual_m: float
+    made_at: str
+
+    def matrix(self) -> NDArray[np.float64]:
+        """Return the camera's optical frame in the frame of its site, 4 x 4."""
+        x, y, z, w = np.array(self.quaternion_xyzw) / np.linalg.norm(self.quaternion_xyzw)
+        pose: NDArray[np.float64] = np.eye(4)
+        pose[:3, :3] = (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        )
+        pose[:3, 3] = self.translation_m
+        return pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
-    """Describe the RGB-D camera; `site` is its optical frame: x right, y down, z forward."""
+    """Describe the RGB-D camera; `site` is its optical frame: x right, y down, z forward.
+
+    `lens` and `mounting` are what calibration measured; None means as told by the camera, and as
+    drawn in the MJCF.
+    """
 
     device: str
     path: str
@@ -123,6 +168,27 @@ class Camera:
     width: int
     height: int
     fovy_rad: float
+    lens: LensCalibration | None = None
+    mounting: Mounting | None = None
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Return the calibrated lens, or the pinhole of the robot file's opening angle."""
+        if self.lens is not None:
+            return self.lens.intrinsics
+        return Intrinsics(
+            width=self.width,
+            height=self.height,
+            fx=self.focal_px,
+            fy=self.focal_px,
+            cx=(self.width - 1) / 2,
+            cy=(self.height - 1) / 2,
+        )
+
+    @property
+    def site_from_camera(self) -> NDArray[np.float64]:
+        """Return where the camera sits in the frame of its site, 4 x 4."""
+        return np.eye(4) if self.mounting is None else self.mounting.matrix()
 
     @property
     def focal_px(self) -> float:

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 from vla_deploy.robots import protection_schema, schema
 from vla_deploy.robots.calibration import calibrated
+from vla_deploy.robots.camera_calibration import with_calibration
 from vla_deploy.robots.consistency import CHECKS, missing_files, rows, subtables, table
 from vla_deploy.robots.description import (
     Audio,
@@ -71,7 +72,8 @@ LISTED: Mapping[tuple[str, str], Shape] = {
 def load_robot(name_or_path: str | Path) -> RobotDescription:
     """Return the robot of that name under `vla_deploy/robots`, or of that file or folder.
 
-    What `calibration.toml` in the same folder has measured replaces signs and offsets.
+    What `calibration.toml` in the same folder has measured replaces signs and offsets; the camera
+    gets the lens of `camera.yaml` and the place of `camera_mounting.toml`, if they are there.
 
     Raises:
         RobotFileError: the file is missing, is not TOML, or has faults; all of them are listed.
@@ -81,7 +83,10 @@ def load_robot(name_or_path: str | Path) -> RobotDescription:
     faults = (*calibration_faults, *_faults(document, file.parent))
     if faults:
         raise RobotFileError(file, faults)
-    return _build(document, file.parent)
+    camera, faults = with_calibration(Camera(**document["camera"]), file.parent)
+    if faults:
+        raise RobotFileError(file, faults)
+    return _build(document, file.parent, camera)
 
 
 def robot_names() -> tuple[str, ...]:
@@ -149,7 +154,7 @@ def _as_table(value: Any) -> Document:
     return value if isinstance(value, dict) else {}
 
 
-def _build(document: Document, directory: Path) -> RobotDescription:
+def _build(document: Document, directory: Path, camera: Camera) -> RobotDescription:
     servo_bus = document["servo_bus"]
     return RobotDescription(
         name=document["name"],
@@ -162,7 +167,7 @@ def _build(document: Document, directory: Path) -> RobotDescription:
         base=BaseGeometry(**document["base"]),
         lidar=SerialSensor(**document["lidar"]),
         imu=SerialSensor(**document["imu"]),
-        camera=Camera(**document["camera"]),
+        camera=camera,
         estop=EstopButton(**document["estop"]) if "estop" in document else None,
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,

@@ -36,6 +36,7 @@ class RobotModel:
         self.joint_names = robot.joint_names
         self.total_mass_kg = float(pinocchio.computeTotalMass(whole))
         self._camera_site = robot.camera.site
+        self._site_from_camera = robot.camera.site_from_camera
         self._coupling = self._couple(mimics)
 
     def gravity(self, positions: Array) -> Array:
@@ -81,8 +82,12 @@ class RobotModel:
         return np.asarray(local @ self._coupling, dtype=np.float64)
 
     def camera_pose(self, positions: Array) -> Array:
-        """Return the camera's optical frame (x right, y down, z forward) in the base frame."""
-        return self.site_pose(self._camera_site, positions)
+        """Return the camera's optical frame (x right, y down, z forward) in the base frame.
+
+        It is where the calibration of its mounting puts it, else its site.
+        """
+        pose: Array = self.site_pose(self._camera_site, positions) @ self._site_from_camera
+        return pose
 
     def _frame(self, site: str) -> int:
         if not self._model.existFrame(site):
