@@ -21,6 +21,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "demo": Command("demo", "do the main job on the twin"),
     "say": Command("say", "give the robot a command and follow it"),
     "status": Command("status", "tell what runs and how the robot is"),
+    "scene": Command("scene", "tell what the robot knows of the things around it"),
     "budget": Command(
         "budget", "tell what the robot uses of its budgets, and what is done about an excess"
     ),

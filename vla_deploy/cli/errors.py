@@ -31,6 +31,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.robots.errors": "RobotFileError",
     "vla_deploy.supervisor.errors": "SupervisorError",
     "vla_deploy.telemetry.errors": "TelemetryError",
+    "vla_deploy.world.errors": "WorldError",
 }
 
 

@@ -22,6 +22,11 @@ class Belief:
             scale = MOST_EVIDENCE / total
             self._evidence = {known: scale * value for known, value in self._evidence.items()}
 
+    def recall(self, shares: Mapping[str, float], looks: float) -> None:
+        """Take over what was believed before, as from so many looks."""
+        evidence = min(looks, MOST_EVIDENCE)
+        self._evidence = {name: evidence * share for name, share in shares.items()}
+
     @property
     def best(self) -> str:
         """Return the likeliest name, the first seen of equals."""

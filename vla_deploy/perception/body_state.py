@@ -11,6 +11,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.ipc import CellReader, SharedSpace
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body import BodyMask
+from vla_deploy.perception.hands import Hands, Hold
 from vla_deploy.perception.history import JointHistory
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
@@ -22,10 +23,10 @@ STALE_JOINTS_NS = NS_PER_S // 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hand:
-    """Hold what a hand holds, "" for nothing, and where its grip is in the base frame."""
+    """Hold what a hand holds, and where its grip is in the base frame."""
 
     name: str
-    held: str
+    hold: Hold
     grip: Point
 
 
@@ -42,6 +43,7 @@ class BodyState:
         self._model = model
         self._mask = BodyMask(robot)
         self._joints = JointHistory()
+        self._hands = Hands(robot)
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics."""
@@ -55,6 +57,7 @@ class BodyState:
             count = len(self._robot.joint_names)
             positions = np.array(sample.data["position"][:count], dtype=np.float64)
             self._joints.add(sample.stamp_ns, positions)
+            self._hands.feel(sample)
 
     def at(self, stamp_ns: int) -> Array | None:
         """Return the joints' positions at a moment; None where nothing near it is known."""
@@ -69,18 +72,13 @@ class BodyState:
         """Return an image that is true where the robot itself is seen."""
         return self._mask.mask(positions, camera)
 
-    def hands(self, positions: Array) -> list[Hand]:
-        """Return the hands, once the executor tells what they hold."""
+    def hands(self, positions: Array, now_ns: int) -> list[Hand]:
+        """Return the hands with what they hold, by the executor's word and by touch."""
         sample = self._executor_status.latest()
-        if sample is None:
-            return []
-        holding = sample.document().get("holding", {})
+        told = {} if sample is None else sample.document().get("holding", {})
+        holds = self._hands.judge(told, now_ns)
         return [
-            Hand(
-                name=name,
-                held=holding.get(name) or "",
-                grip=self._grip(hand.grip_site, positions),
-            )
+            Hand(name=name, hold=holds[name], grip=self._grip(hand.grip_site, positions))
             for name, hand in self._robot.hands.items()
         ]
 

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 DRIFT_M2_S = 0.003**2
 MOST_SIGMA_M = 0.15
 CARRIED_SIGMA_M = 0.03
+# What falls from a hand rolls away, and ends somewhere between the hand and the floor.
+DROPPED_SIGMA_M = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,3 +82,11 @@ def carried(position_m: tuple[float, float, float], stamp_ns: int) -> Estimate:
     """Return what is known of a thing that a hand holds: where the hand is."""
     covariance = CARRIED_SIGMA_M**2 * np.eye(3)
     return Estimate(position_m=np.array(position_m), covariance_m2=covariance, stamp_ns=stamp_ns)
+
+
+def dropped(estimate: Estimate) -> Estimate:
+    """Return what is known of a thing that has fallen from where it was."""
+    covariance = DROPPED_SIGMA_M**2 * np.eye(3)
+    return Estimate(
+        position_m=estimate.position_m, covariance_m2=covariance, stamp_ns=estimate.stamp_ns
+    )

@@ -1,6 +1,7 @@
 """Look at the camera's images: what stands in the way at once, what things are as soon as asked."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,6 +20,7 @@ from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.pinhole_view import as_pinhole, in_image
 from vla_deploy.perception.scene import Scene
 from vla_deploy.perception.whereabouts import Whereabouts
+from vla_deploy.world.surfaces import Point
 
 # An image is used only where the camera was nearly still before its exposure.
 STILL_WINDOW_NS: Final = 60_000_000
@@ -39,8 +41,14 @@ class Moment:
 class Looking:
     """Turn images into obstacles and a scene; one image at a time waits for the network."""
 
-    def __init__(self, body: BodyState, whereabouts: Whereabouts, eyes: Eyes) -> None:
-        self.scene = Scene()
+    def __init__(
+        self,
+        body: BodyState,
+        whereabouts: Whereabouts,
+        eyes: Eyes,
+        furniture: Mapping[str, Point],
+    ) -> None:
+        self.scene = Scene(furniture)
         self.obstacles = NearObstacles()
         self._body = body
         self._whereabouts = whereabouts
@@ -62,7 +70,8 @@ class Looking:
         verdict = self._watch.judge(frame, moment.depth_m, rotation, moment.base)
         if verdict.use < Use.OBSTACLES:
             return False
-        grips = [np.array(hand.grip) for hand in self._body.hands(positions) if hand.held]
+        hands = self._body.hands(positions, frame.stamp_ns)
+        grips = [np.array(hand.grip) for hand in hands if hand.hold.kind]
         self.obstacles.look(
             moment.depth_m,
             frame.intrinsics,
@@ -91,18 +100,21 @@ class Looking:
         return True
 
     def carry(self, positions: Array, now_ns: int) -> None:
-        """Let the things that hands hold, as the executor tells, move along with the hands."""
-        for hand in self._body.hands(positions):
-            if hand.held:
-                pose = self._whereabouts.pose
-                self.scene.carry(hand.name, hand.held, hand.grip, pose, now_ns)
-            else:
-                self.scene.release(hand.name)
+        """Let the things that hands hold, as told and felt, move along with the hands."""
+        pose = self._whereabouts.pose
+        for hand in self._body.hands(positions, now_ns):
+            self.scene.hold(hand.name, hand.hold, hand.grip, pose, now_ns)
 
     def document(self, now_ns: int) -> dict[str, Any]:
-        """Return the scene topic's document, with how things are named, and how images are."""
+        """Return the scene topic's document, with how things are named, and how images are.
+
+        The robot's own place is in it as long as it is not lost.
+        """
+        pose = self._whereabouts.pose
+        robot = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
         return {
             **self.scene.document(),
+            "robot": None if self._whereabouts.is_lost else robot,
             "sight": self._eyes.document(),
             "image": self._watch.document(now_ns),
         }

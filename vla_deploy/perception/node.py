@@ -22,6 +22,7 @@ from vla_deploy.perception.sensors import Sensors
 from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
+from vla_deploy.world.surfaces import furniture_points
 
 STALE_SCAN_NS = round(BY_NAME["scan"].deadline_s * NS_PER_S)
 SCENE_PERIOD_NS = NS_PER_S // 2
@@ -70,7 +71,9 @@ class PerceptionNode:
         self._body = BodyState(robot, model)
         self._whereabouts = Whereabouts(robot, model, self._space)
         self._eyes = Eyes(AtOnce() if executor is None else executor, context.clock)
-        self._looking = Looking(self._body, self._whereabouts, self._eyes)
+        furniture = furniture_points(robot.places)
+        self._looking = Looking(self._body, self._whereabouts, self._eyes, furniture)
+        self._recall_scene()
         self._rate_ratio = 1.0
         self._next_look_ns = 0
         self._next_scene_ns = 0
@@ -177,6 +180,12 @@ class PerceptionNode:
         padded[:, : len(points)] = points.T
         x_m, y_m, z_m = padded
         self._writers["near_obstacles"].put(count=len(points), x_m=x_m, y_m=y_m, z_m=z_m)
+
+    def _recall_scene(self) -> None:
+        """Remember what an earlier instance in this run knew of things."""
+        told = self._space.cell_reader("scene").latest()
+        if told is not None:
+            self._looking.scene.recall(told.document())
 
     def _carry_held(self) -> None:
         now_ns = self._clock.now_ns()

@@ -1,6 +1,9 @@
 """Keep the scene: detections of each image, moved to the map frame, tracked over time."""
 
+import itertools
+import json
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +16,7 @@ from vla_deploy.perception.bystanders import Bystander, find_bystanders
 from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
 from vla_deploy.perception.filtering import Estimate
+from vla_deploy.perception.hands import Hold
 from vla_deploy.perception.lens import project
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.noise import covariance_of
@@ -21,23 +25,41 @@ from vla_deploy.perception.supports import Support, find_supports
 from vla_deploy.perception.track import Sighting, Track
 from vla_deploy.perception.tracking import Tracker, View
 from vla_deploy.perception.uncertainty import turned
+from vla_deploy.world.document import read_snapshot
+from vla_deploy.world.resting import BEGIN, LET_GO, Bounds, rest_of
+from vla_deploy.world.surfaces import Point, SurfaceBook
+from vla_deploy.world.thing import Rest
 
 # A missing thing is missed only where its kind would surely be found.
 CLEAR_RANGE_M = 1.6
 BORDER_PX = 12
 PATCH_PX = 2
 IN_FRONT_M = 0.05
+# The scene's cell is bounded: so much of it is for things, the most recently seen first.
+TOLD_BYTES = 25_000
+LOST_TOLD = 12
 
 
 class Scene:
-    """Hold the known things around the robot."""
+    """Hold the known things around the robot; `furniture` names points of the home's surfaces."""
 
-    def __init__(self) -> None:
+    def __init__(self, furniture: Mapping[str, Point] | None = None) -> None:
         self._tracker = Tracker()
+        self._book = SurfaceBook(furniture)
         self.stamp_ns = 0
         self.detections: list[Detection] = []
         self._surfaces: list[dict[str, Any]] = []
         self._bystanders: list[Bystander] = []
+        self._hands: dict[str, dict[str, Any]] = {}
+
+    def recall(self, document: Mapping[str, Any]) -> None:
+        """Take over what an earlier instance in this run knew; it is no longer in view.
+
+        Raises:
+            SceneUnreadable: the document is no scene.
+        """
+        read_snapshot(document)
+        self._tracker.recall(document["objects"])
 
     def look(
         self,
@@ -56,7 +78,7 @@ class Scene:
         """
         cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body)
         supports = find_supports(cloud)
-        self._surfaces = [_surface(s, base) for s in supports if not s.is_floor]
+        self._surfaces = [self._surface(one, base) for one in supports if not one.is_floor]
         found = detect(cloud, supports, network)
         sightings = [_sighting(detection, base, stamp_ns) for detection in found]
         self.detections = [sighting.detection for sighting in sightings]
@@ -67,35 +89,66 @@ class Scene:
         }
         self._tracker.update(sightings, views, stamp_ns)
         self.stamp_ns = stamp_ns
+        for track in self._tracker.objects:
+            if track.last_seen_ns == stamp_ns and not track.held_by:
+                track.rests = self._rest_of(track, BEGIN)
 
-    def carry(self, hand: str, class_name: str, grip: Vector, base: Pose2D, stamp_ns: int) -> None:
-        """Take note that a hand holds a thing; `grip` is where, in the base frame."""
+    def hold(self, hand: str, hold: Hold, grip: Vector, base: Pose2D, stamp_ns: int) -> None:
+        """Take note of what a hand holds; `grip` is where the hand is, in the base frame.
+
+        What it has put down rests below it; what it has lost may be anywhere near.
+        """
         placed = base.compose(Pose2D(grip[0], grip[1], 0.0))
-        self._tracker.carry(hand, class_name, (placed.x_m, placed.y_m, grip[2]), stamp_ns)
-
-    def release(self, hand: str) -> None:
-        """Take note that a hand holds nothing."""
-        self._tracker.release(hand)
+        before = held = self._tracker.held_by(hand)
+        if hold.kind:
+            grip_m = (placed.x_m, placed.y_m, grip[2])
+            held = self._tracker.carry(hand, hold.kind, grip_m, stamp_ns)
+        elif before is not None and hold.is_lost:
+            self._tracker.lose(hand, f"the {hand} hand lost it: {hold.cause}")
+        elif before is not None:
+            self._tracker.release(hand)
+            before.rests = self._rest_of(before, LET_GO)
+        name = held.object_id if held is not None and hold.kind else None
+        self._hands[hand] = {"holding": name, **hold.document()}
 
     def document(self) -> dict[str, Any]:
         """Return the scene topic's document."""
-        objects = [track.document() for track in self._tracker.objects]
+        lost = [track.document() for track in self._tracker.vanished[-LOST_TOLD:]]
+        known = [track.document() for track in self._tracker.objects]
         return {
             "stamp_ns": self.stamp_ns,
-            "objects": objects,
+            "objects": _within(TOLD_BYTES - _size(lost), known),
             "surfaces": self._surfaces,
             "bystanders": [bystander.document() for bystander in self._bystanders],
+            "lost": lost,
+            "hands": self._hands,
+        }
+
+    def _rest_of(self, track: Track, begin: Bounds) -> Rest | None:
+        things = [one.thing for one in self._tracker.objects]
+        return rest_of(track.thing, things, self._book.surfaces, begin)
+
+    def _surface(self, support: Support, base: Pose2D) -> dict[str, Any]:
+        """Return a surface as the scene topic tells it: the part in view, in the map frame."""
+        x, y = (float(v) for v in support.outline.mean(axis=0))
+        corners = [base.compose(Pose2D(float(u), float(v), 0.0)) for u, v in support.outline]
+        polygon_m = [(corner.x_m, corner.y_m) for corner in corners]
+        height_m = support.height_m(x, y)
+        return {
+            "name": self._book.look(height_m, polygon_m),
+            "height_m": round(height_m, 4),
+            "polygon_m": [[round(x_m, 3), round(y_m, 3)] for x_m, y_m in polygon_m],
         }
 
 
-def _surface(support: Support, base: Pose2D) -> dict[str, Any]:
-    """Return a surface as the scene topic tells it: the part in view, in the map frame."""
-    x, y = (float(v) for v in support.outline.mean(axis=0))
-    corners = [base.compose(Pose2D(float(u), float(v), 0.0)) for u, v in support.outline]
-    return {
-        "height_m": round(support.height_m(x, y), 4),
-        "polygon_m": [[round(corner.x_m, 3), round(corner.y_m, 3)] for corner in corners],
-    }
+def _within(room_bytes: int, told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return as many of the first documents as there is room for."""
+    sums = itertools.accumulate(_size([one]) for one in told)
+    return [one for one, total in zip(told, sums, strict=True) if total <= room_bytes]
+
+
+def _size(told: list[dict[str, Any]]) -> int:
+    return len(json.dumps(told, separators=(",", ":")))
 
 
 def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
@@ -108,7 +161,7 @@ def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
         yaw_rad=half_turn(detection.yaw_rad + base.yaw_rad),
         covariance_m2=turned(detection.covariance_m2, base.yaw_rad),
     )
-    covariance = covariance_of(detection, math.hypot(x, y))
+    covariance = covariance_of(on_map, math.hypot(x, y))
     seen = Estimate(
         position_m=np.array(on_map.position_m), covariance_m2=covariance, stamp_ns=stamp_ns
     )

@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from vla_deploy.perception.belief import Belief
 from vla_deploy.perception.classes import OTHER
 from vla_deploy.perception.detection import Detection, Vector
-from vla_deploy.perception.filtering import Estimate, carried, corrected
+from vla_deploy.perception.filtering import Estimate, carried, corrected, dropped
 from vla_deploy.perception.shapes import half_turn
+from vla_deploy.world.thing import Rest, Thing
 
 LEAST_GAIN = 0.2
 DOUBTFUL_GAIN = 0.05
@@ -18,7 +21,7 @@ DOUBTFUL_GAIN = 0.05
 DOUBTFUL_LOOKS = 9.0
 # Not to recognise a thing says little against one that knew it.
 CLASS_WEIGHTS: Mapping[str, float] = MappingProxyType({OTHER: 0.25})
-TOLD_CLASSES = 3
+TOLD_NAMES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,8 @@ def _no_colour() -> Belief:
 class Track:
     """Hold one thing; `object_id` is empty until it is confirmed, `held_by` names a hand.
 
-    `aliases` are ids under which the same thing was known before it was found to be the same.
+    `aliases` are ids under which the same thing was known before it was found to be the same;
+    `cause` tells why it is no longer where it was.
     """
 
     estimate: Estimate
@@ -60,6 +64,8 @@ class Track:
     object_id: str = ""
     aliases: tuple[str, ...] = ()
     held_by: str = ""
+    rests: Rest | None = None
+    cause: str = ""
     classes: Belief = field(default_factory=_no_class)
     colours: Belief = field(default_factory=_no_colour)
 
@@ -79,6 +85,25 @@ class Track:
         """Return the likeliest colour."""
         return self.colours.best
 
+    @property
+    def thing(self) -> Thing:
+        """Return the thing as the world model takes it."""
+        x_m, y_m, z_m = (float(value) for value in self.estimate.sigma_m)
+        return Thing(
+            thing_id=self.object_id,
+            kind=self.class_name,
+            colour=self.colour,
+            position_m=self.position_m,
+            size_m=self.size_m,
+            yaw_rad=self.yaw_rad,
+            last_seen_ns=self.last_seen_ns,
+            confidence=self.confidence,
+            sigma_m=(x_m, y_m, z_m),
+            rests=self.rests,
+            held_by=self.held_by,
+            aliases=self.aliases,
+        )
+
     def document(self) -> dict[str, Any]:
         """Return the thing as the scene topic tells it."""
         told: dict[str, Any] = {
@@ -92,13 +117,17 @@ class Track:
             "seen_count": self.seen_count,
             "confidence": round(self.confidence * self.classes.share(self.class_name), 3),
             "sigma_m": [round(float(v), 4) for v in self.estimate.sigma_m],
-            "classes": _rounded(self.classes.shares(TOLD_CLASSES)),
-            "colours": _rounded(self.colours.shares(TOLD_CLASSES)),
+            "classes": _rounded(self.classes.shares(TOLD_NAMES)),
+            "colours": _rounded(self.colours.shares(TOLD_NAMES)),
         }
         if self.aliases:
-            told["aliases"] = list(self.aliases)
+            told["aliases"] = list(self.aliases[:TOLD_NAMES])
         if self.held_by:
             told["held_by"] = self.held_by
+        if self.rests is not None:
+            told["rests"] = {"relation": self.rests.relation, "of": self.rests.of}
+        if self.cause:
+            told["cause"] = self.cause
         return told
 
 
@@ -121,7 +150,7 @@ def new_track(sighting: Sighting, stamp_ns: int) -> Track:
 def absorb(track: Track, sighting: Sighting, stamp_ns: int, *, was_moved: bool) -> None:
     """Take in a sight; of what `was_moved` the old place says nothing."""
     detection = sighting.detection
-    track.misses = 0
+    track.misses, track.cause = 0, ""
     track.last_seen_ns = stamp_ns
     track.seen_count += 1
     gain = DOUBTFUL_GAIN if sighting.is_doubtful else max(LEAST_GAIN, 1.0 / track.seen_count)
@@ -142,6 +171,39 @@ def take_in_hand(track: Track, hand: str, grip_m: Vector, stamp_ns: int) -> None
     """Seat a thing where the hand is that holds it."""
     track.estimate = carried(grip_m, stamp_ns)
     track.held_by, track.last_seen_ns, track.misses = hand, stamp_ns, 0
+    track.rests, track.cause = None, ""
+
+
+def let_fall(track: Track, cause: str) -> None:
+    """Seat a thing that a hand has lost: somewhere near and below it."""
+    track.estimate = dropped(track.estimate)
+    track.held_by, track.rests, track.cause = "", None, cause
+
+
+def recalled(told: Mapping[str, Any]) -> Track:
+    """Return the track that the scene topic's object tells of."""
+    x_m, y_m, z_m = (float(value) for value in told["size_m"])
+    stamp_ns, looks = int(told["last_seen_ns"]), int(told["seen_count"])
+    track = Track(
+        estimate=Estimate(
+            position_m=np.array(told["position_m"], dtype=np.float64),
+            covariance_m2=np.diag(np.square(np.array(told["sigma_m"], dtype=np.float64))),
+            stamp_ns=stamp_ns,
+        ),
+        size_m=(x_m, y_m, z_m),
+        yaw_rad=float(told["yaw_rad"]),
+        # What is told is the confidence in the sights times that in the class.
+        confidence=float(told["confidence"]) / max(told["classes"].values()),
+        first_seen_ns=stamp_ns,
+        last_seen_ns=stamp_ns,
+        seen_count=looks,
+        object_id=str(told["id"]),
+        aliases=tuple(told.get("aliases", ())),
+        rests=Rest(**told["rests"]) if "rests" in told else None,
+    )
+    track.classes.recall(told["classes"], looks)
+    track.colours.recall(told["colours"], looks)
+    return track
 
 
 def gap_m(one: Track, other: Track) -> float:

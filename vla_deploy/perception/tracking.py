@@ -2,22 +2,35 @@
 
 import math
 from collections import Counter
+from collections.abc import Iterable, Mapping
 from enum import Enum
+from typing import Any
 
 from vla_deploy.perception.classes import OTHER
 from vla_deploy.perception.detection import Vector
 from vla_deploy.perception.identity import is_missing, likeliest, may_be, take_over
 from vla_deploy.perception.matching import match
-from vla_deploy.perception.track import Sighting, Track, absorb, gap_m, new_track, take_in_hand
+from vla_deploy.perception.track import (
+    Sighting,
+    Track,
+    absorb,
+    gap_m,
+    let_fall,
+    new_track,
+    recalled,
+    take_in_hand,
+)
 
 CONFIRM_HITS = 2
 CONFIRM_SHARE = 0.5
 CARRY_GATE_M = 0.2
+FELT_GATE_M = 0.06
 MISSES_TO_FORGET = 5
 UNCONFIRMED_MISSES = 2
 MAX_OBJECTS = 64
 MAX_TRACKS = 128
 VANISHED_KEPT = 32
+GONE = "its place was seen without it"
 
 
 class View(Enum):
@@ -95,14 +108,31 @@ class Tracker:
         if held is not None:
             held.held_by = ""
 
+    def lose(self, hand: str, cause: str) -> None:
+        """Take note that a hand has lost what it carried: the thing is somewhere near."""
+        held = self.held_by(hand)
+        if held is not None:
+            let_fall(held, cause)
+
+    def recall(self, told: Iterable[Mapping[str, Any]]) -> None:
+        """Take over the things of a scene that was told before, as not in view now."""
+        for one in told:
+            track = recalled(one)
+            self._tracks.append(track)
+            for name in (track.object_id, *track.aliases):
+                kind, _, number = name.rpartition("_")
+                self._used[kind] = max(self._used[kind], int(number))
+
     def _nearest(self, class_name: str, grip_m: Vector) -> Track | None:
+        # What is felt and not told of may be anything: only what is right there is meant.
+        gate_m = CARRY_GATE_M if class_name != OTHER else FELT_GATE_M
         near = [
             (distance_m, track.object_id, track)
             for track in self._tracks
             if track.object_id
             and not track.held_by
-            and track.class_name == class_name
-            and (distance_m := math.dist(track.position_m, grip_m)) < CARRY_GATE_M
+            and class_name in (track.class_name, OTHER)
+            and (distance_m := math.dist(track.position_m, grip_m)) < gate_m
         ]
         return min(near)[2] if near else None
 
@@ -126,6 +156,7 @@ class Tracker:
             self._tracks.remove(track)
         for track in gone:
             if track.object_id and not self._live_on(track):
+                track.cause = track.cause or GONE
                 self._vanished.append(track)
         del self._vanished[:-VANISHED_KEPT]
         while len(self._tracks) > MAX_TRACKS:

@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
+from vla_deploy.world.vocabulary import OBJECT_CLASSES
+
 ARMS = ("left", "right")
-OBJECT_CLASSES = ("cup", "ball", "book", "bottle", "phone", "keys", "box", "object")
 GRASPABLE_CLASSES = tuple(name for name in OBJECT_CLASSES if name != "box")
-COLOURS = (
-    "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "white", "grey", "black",
-)  # fmt: skip
 RELATIONS = ("in", "on")
 NAVIGATION_TIMEOUT_S = 300.0
 MANIPULATION_TIMEOUT_S = 120.0

@@ -4,6 +4,7 @@ PlanningError
 ├── NotUnderstood     say it in other words
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
+│   └── DependsOnView say what it stands on, in or next to
 ├── NotReady          reset and arm the robot first
 └── PlanInvalid       mend the plan; carries every fault
 """
@@ -38,6 +39,17 @@ class UnknownObject(PlanningError):
     def __init__(self, name: str, known: Iterable[str]) -> None:
         super().__init__(
             f'I do not know the object "{name}"; I can handle: {", ".join(sorted(known))}'
+        )
+
+
+class DependsOnView(UnknownObject):
+    """Say that where an object is depends on who looks, and changes while the robot drives."""
+
+    def __init__(self, name: str, known: Iterable[str]) -> None:
+        super().__init__(name, known)
+        self.args = (
+            f'"{name}": left, right, in front and behind change while I drive; say what it is '
+            "on, in or next to",
         )
 
 

@@ -3,44 +3,31 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from vla_deploy.planning.catalogue import COLOURS, OBJECT_CLASSES
-from vla_deploy.planning.errors import UnknownObject
-
-ARTICLES = frozenset({"the", "a", "an", "my", "your", "that", "this", "some", "our"})
-SYNONYMS: Mapping[str, str] = {
-    "mug": "cup", "glass": "cup", "beaker": "cup", "tumbler": "cup",
-    "sphere": "ball",
-    "novel": "book", "notebook": "book",
-    "flask": "bottle",
-    "smartphone": "phone", "mobile": "phone", "telephone": "phone",
-    "key": "keys", "keyring": "keys",
-    "crate": "box", "bin": "box", "container": "box", "basket": "box",
-    "thing": "object", "something": "object",
-    "gray": "grey", "violet": "purple",
-}  # fmt: skip
-FILLERS = frozenset({"small", "big", "large", "little", "old", "new", "one", "storage"})
-_TRACK_ID = re.compile(r"^(?P<kind>[a-z]+)_\d+$")
+from vla_deploy.planning.errors import DependsOnView, UnknownObject
+from vla_deploy.world import Query, Snapshot, Thing, UnknownWord, Viewpoint, find, parse_query
+from vla_deploy.world.query import FROM_A_VIEW
+from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectQuery:
-    """Say which objects are meant; an empty colour means any."""
+    """Say which objects are meant; an empty colour means any.
+
+    `asked` is the whole question, with sizes and what they stand next to.
+    """
 
     kind: str
     colour: str = ""
     track_id: str = ""
+    asked: Query
 
-    def matches(self, candidate: Mapping[str, Any]) -> bool:
-        """Tell whether an object of the scene document is one of those meant."""
-        if self.track_id:
-            return bool(candidate["id"] == self.track_id)
-        right_kind = self.kind in ("object", candidate["class"])
-        return right_kind and self.colour in ("", candidate["colour"])
+    def among(self, snapshot: Snapshot, view: Viewpoint | None = None) -> list[Thing]:
+        """Return the things meant, the nearest to who looks first."""
+        return find(self.asked, snapshot, view)
 
     def __str__(self) -> str:
-        return self.track_id or f"{self.colour} {self.kind}".strip()
+        return str(self.asked)
 
 
 def words_of(text: str) -> list[str]:
@@ -50,21 +37,22 @@ def words_of(text: str) -> list[str]:
 
 
 def parse_object(text: str) -> ObjectQuery:
-    """Read "the red cup", "mug" or a track id such as "cup_1".
+    """Read "the red cup", "mug", "the small cup next to the book", or an id such as "cup_1".
 
     Raises:
         UnknownObject: no word of it, or one word too many, is a kind or colour the robot knows.
+        DependsOnView: it says left, right, in front or behind.
     """
-    track = _TRACK_ID.match(text.strip().lower())
-    if track and track["kind"] in OBJECT_CLASSES:
-        return ObjectQuery(kind=track["kind"], track_id=text.strip().lower())
-    words = [SYNONYMS.get(word, word) for word in words_of(text) if word not in FILLERS]
-    colours = [word for word in words if word in COLOURS]
-    kinds = [word for word in words if word in OBJECT_CLASSES]
-    understood = len(colours) + len(kinds) == len(words)
-    if len(kinds) != 1 or len(colours) > 1 or not understood:
+    try:
+        asked = parse_query(text)
+    except UnknownWord as error:
+        raise UnknownObject(text.strip(), OBJECT_CLASSES) from error
+    if asked.relation in FROM_A_VIEW:
+        raise DependsOnView(text.strip(), OBJECT_CLASSES)
+    kind = asked.thing_id.rpartition("_")[0] or asked.kind
+    if kind not in OBJECT_CLASSES or not asked.is_named:
         raise UnknownObject(text.strip(), OBJECT_CLASSES)
-    return ObjectQuery(kind=kinds[0], colour=colours[0] if colours else "")
+    return ObjectQuery(kind=kind, colour=asked.colour, track_id=asked.thing_id, asked=asked)
 
 
 def match_place(text: str, places: Mapping[str, str]) -> str | None:

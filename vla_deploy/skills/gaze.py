@@ -11,6 +11,7 @@ from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.motion import move_joints, settle, wait_until
+from vla_deploy.world import Viewpoint, read_snapshot
 
 PAN, TILT = "head_pan", "head_tilt"
 HEAD_JOINTS = (PAN, TILT)
@@ -65,19 +66,17 @@ def gaze_at(context: SkillContext, position_m: Any) -> Skill:
 
 def remembered(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any] | None:
     """Return the nearest object meant that was seen surely and within MEMORY_S, or None."""
-    oldest_ns = context.link.clock.now_ns() - round(MEMORY_S * NS_PER_S)
-    meant = [
-        candidate
-        for candidate in context.link.objects
-        if query.matches(candidate)
-        and int(candidate["last_seen_ns"]) >= oldest_ns
-        and float(candidate["confidence"]) >= SURE_CONFIDENCE
-    ]
-    if not meant:
+    now_ns = context.link.clock.now_ns()
+    objects = context.link.objects
+    if not objects:
         return None
+    snapshot = read_snapshot({"stamp_ns": now_ns, "objects": objects})
     pose = context.link.pose
-    here = (pose.x_m, pose.y_m)
-    return min(meant, key=lambda one: math.dist(one["position_m"][:2], here))
+    here = Viewpoint(x_m=pose.x_m, y_m=pose.y_m, yaw_rad=pose.yaw_rad)
+    for thing in query.among(snapshot, here):
+        if thing.confidence >= SURE_CONFIDENCE and snapshot.unseen_s(thing) <= MEMORY_S:
+            return next(one for one in objects if one["id"] == thing.thing_id)
+    return None
 
 
 def see(context: SkillContext, query: ObjectQuery) -> Skill:

@@ -7,10 +7,8 @@ from vla_deploy.navigation.follower import wrap_angle
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.frames import to_base
+from vla_deploy.world.reach import REACH_M, Stand, is_in_reach, stands_around
 
-# Distance from the base's centre to the object: best first, all within the arms' reach.
-REACH_M = (0.42, 0.46, 0.50, 0.54)
-DIRECTIONS = 36
 # The object goes before one shoulder rather than between them.
 SIDE_M = 0.12
 
@@ -23,35 +21,19 @@ def standing_poses(
     The present pose alone, where it will do, unless they are wanted `anew`.
     """
     pose = context.link.pose
-    here = to_base(pose, position_m)
-    if (
-        not anew
-        and math.hypot(here[0], here[1]) <= REACH_M[-1]
-        and abs(here[1]) <= 0.2
-        and here[0] > 0.3
-    ):
+    if not anew and is_in_reach(to_base(pose, position_m)):
         return [pose]
     candidates = []
-    for step in range(DIRECTIONS):
-        bearing_rad = 2 * math.pi * step / DIRECTIONS
-        found = _nearest_free(context, position_m, bearing_rad)
-        if found is not None:
-            reach_m, goal = found
-            candidates.append((_effort(pose, goal) + 2.0 * (reach_m - REACH_M[0]), step, goal))
-    return [goal for _, _, goal in sorted(candidates, key=lambda one: one[:2])][:6]
+    for stand in stands_around(position_m, context.planner.is_free):
+        goal = _facing(context, stand)
+        candidates.append((_effort(pose, goal) + 2.0 * (stand.reach_m - REACH_M[0]), stand, goal))
+    return [goal for _, _, goal in sorted(candidates, key=lambda one: (one[0], one[1].step))][:6]
 
 
-def _nearest_free(
-    context: SkillContext, position_m: Sequence[float], bearing_rad: float
-) -> tuple[float, FloorPose] | None:
-    for reach_m in REACH_M:
-        x_m = position_m[0] - reach_m * math.cos(bearing_rad)
-        y_m = position_m[1] - reach_m * math.sin(bearing_rad)
-        if context.planner.is_free(x_m, y_m):
-            side_rad = math.asin(min(1.0, _side_m(context) / reach_m))
-            yaw_rad = wrap_angle(bearing_rad - side_rad)
-            return reach_m, FloorPose(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
-    return None
+def _facing(context: SkillContext, stand: Stand) -> FloorPose:
+    """Turn a stand so that the object comes before the shoulder of the hand that takes it."""
+    side_rad = math.asin(min(1.0, _side_m(context) / stand.reach_m))
+    return FloorPose(x_m=stand.x_m, y_m=stand.y_m, yaw_rad=wrap_angle(stand.bearing_rad - side_rad))
 
 
 def _side_m(context: SkillContext) -> float:

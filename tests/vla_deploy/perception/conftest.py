@@ -143,6 +143,7 @@ class Rig:
         self.head_tilt: Callable[[float], float] = lambda _: 0.75
         self.base: Callable[[float], Pose2D] = lambda _: VIEW
         self.arm: dict[str, float] = {}
+        self.pressing = ""
         flat.scatter(1)
         self.spoil: Callable[[Rgb, Depth], tuple[Rgb, Depth]] = lambda rgb, depth: (rgb, depth)
         self.devices: dict[str, WireDevice] = {
@@ -233,12 +234,13 @@ class Rig:
     def _tell(self) -> None:
         count = len(self.flat.joints)
         zeros = np.zeros(count)
+        presses = np.array([name == self.pressing for name in self.flat.robot.joint_names])
         self._joint_state.put(
             joint_count=count,
             position=self.flat.joints,
             velocity=zeros,
-            setpoint=self.flat.joints,
-            effort_ratio=zeros,
+            setpoint=self.flat.joints - 0.01 * presses,
+            effort_ratio=-0.25 * presses,
             age_s=zeros,
             error=zeros,
             torque_enabled=np.ones(count),

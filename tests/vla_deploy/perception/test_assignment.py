@@ -15,14 +15,14 @@ costs = shapes.flatmap(lambda shape: arrays(np.float64, shape, elements=st.float
 def total(cost: np.ndarray, pairs: list[tuple[int, int]]) -> float:
     """Count what stays alone as the limit that a pair of it would cost."""
     alone = min(cost.shape) - len(pairs)
-    return sum(float(cost[pair]) for pair in pairs) + alone * LIMIT
+    return float(sum(cost[pair] for pair in pairs)) + alone * LIMIT
 
 
 def least(cost: np.ndarray) -> float:
     """Try everything."""
     wide = np.minimum(cost if cost.shape[0] <= cost.shape[1] else cost.T, LIMIT)
     orders = itertools.permutations(range(wide.shape[1]), wide.shape[0])
-    return min(sum(wide[row, column] for row, column in enumerate(order)) for order in orders)
+    return min(float(sum(wide[pair] for pair in enumerate(order))) for order in orders)
 
 
 @given(costs)

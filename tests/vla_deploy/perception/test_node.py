@@ -197,6 +197,7 @@ def test_a_cup_in_the_hand_goes_where_the_hand_goes(make_rig: MakeRig) -> None:
     cup = rig.known()["cup_1"]["position_m"]
     local = Pose2D(cup[0], cup[1], 0.0).relative_to(VIEW)
     rig.arm = reach(rig.flat, np.array([local.x_m, local.y_m, cup[2]]))
+    rig.pressing = "right_gripper"
     rig.run_for(0.1)
     status = rig.space.cell_writer("executor_status")
     status.put_document({"holding": {"left": None, "right": "cup"}})

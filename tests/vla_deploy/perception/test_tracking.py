@@ -28,6 +28,7 @@ def seen(
         "truncated": False,
         "occluded": False,
         "box_px": (0, 0, 10, 10),
+        "covariance_m2": ((9e-6, 0.0, 0.0), (0.0, 9e-6, 0.0), (0.0, 0.0, 9e-6)),
     }
     return Detection(**(fields | changes))
 

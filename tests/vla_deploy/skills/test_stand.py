@@ -3,7 +3,8 @@ from typing import TYPE_CHECKING
 
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.frames import to_base
-from vla_deploy.skills.stand import REACH_M, SIDE_M, standing_poses
+from vla_deploy.skills.stand import SIDE_M, standing_poses
+from vla_deploy.world.reach import REACH_M
 
 if TYPE_CHECKING:
     from conftest import StandingLink

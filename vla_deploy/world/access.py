@@ -1,0 +1,213 @@
+"""Tell whether a thing can be taken, from where, and what is in the way, each with its reason."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+from vla_deploy.manipulation.errors import TooWide
+from vla_deploy.manipulation.grasps import Grasp, grasps_from_above
+from vla_deploy.world.footprint import depth_inside_m
+from vla_deploy.world.reach import GRIP_HEIGHTS_M, IsFree, is_in_reach, stands_around
+from vla_deploy.world.resting import IN, ON
+from vla_deploy.world.thing import Snapshot, Thing, Viewpoint
+
+# What of a hand goes down beside a thing: two fingers from below the grip, the palm from above it.
+FINGER_RADIUS_M: Final = 0.018
+TIP_BELOW_GRIP_M: Final = 0.012
+PALM_RADIUS_M: Final = 0.045
+PALM_ABOVE_GRIP_M: Final = 0.07
+WALL_M: Final = 0.008
+UNSURE_M: Final = 0.06
+
+
+class Way(StrEnum):
+    """Say from where a thing is within the arms' reach."""
+
+    HERE = "here"
+    AFTER_DRIVING = "after driving"
+    NONE = "no"
+
+
+class Bar(StrEnum):
+    """Name what may be in the way of taking a thing."""
+
+    HELD = "held"
+    ON_TOP = "on top"
+    TOO_WIDE = "too wide"
+    TOO_HIGH = "too high"
+    TOO_LOW = "too low"
+    CLOSED_IN = "closed in"
+    BESIDE = "beside"
+    NO_STAND = "no stand"
+    UNSURE = "place unsure"
+    HANDS_FULL = "hands full"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Obstacle:
+    """Say what is in the way; `by` is the id of a thing, "" where none is."""
+
+    bar: Bar
+    by: str
+    why: str
+
+    def document(self) -> dict[str, str]:
+        """Return it as the scene query tells it."""
+        return {"bar": self.bar.value, "by": self.by, "why": self.why}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """Say what the robot takes things with; `is_free` None means that no map is at hand."""
+
+    opening_max_m: float
+    hands: tuple[str, ...]
+    is_free: IsFree | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Access:
+    """Say whether and from where a thing can be taken."""
+
+    way: Way
+    is_graspable: bool
+    obstacles: tuple[Obstacle, ...]
+
+    @property
+    def is_accessible(self) -> bool:
+        """Tell whether nothing is in the way."""
+        return not self.obstacles
+
+    def document(self) -> dict[str, Any]:
+        """Return it as the scene query tells it."""
+        return {
+            "reachable": self.way.value,
+            "graspable": self.is_graspable,
+            "accessible": self.is_accessible,
+            "obstacles": [one.document() for one in self.obstacles],
+        }
+
+
+def access_to(thing: Thing, snapshot: Snapshot, body: Body) -> Access:
+    """Judge one thing; the obstacles are in the order in which one would clear them."""
+    grasps, too_wide = _grasps(thing, body)
+    way = _way(thing, snapshot.robot, body)
+    found = [*_general(thing, snapshot, body), *too_wide, *_height(grasps)]
+    found += _in_corridor(thing, grasps, snapshot) if grasps else []
+    if way is Way.NONE:
+        found.append(_bar(Bar.NO_STAND, "", "no free floor from which the arms reach it"))
+    return Access(way=way, is_graspable=bool(grasps), obstacles=tuple(found))
+
+
+def _general(thing: Thing, snapshot: Snapshot, body: Body) -> Iterator[Obstacle]:
+    if thing.held_by:
+        yield _bar(Bar.HELD, "", f"the {thing.held_by} hand holds it")
+    full = {one.held_by for one in snapshot.things if one.held_by}
+    if not thing.held_by and body.hands and full.issuperset(body.hands):
+        yield _bar(Bar.HANDS_FULL, "", "no hand is free")
+    for other in snapshot.things:
+        rests = other.rests
+        if rests is not None and rests.relation == ON and rests.of == thing.thing_id:
+            yield _bar(Bar.ON_TOP, other.thing_id, f"the {other} is on it")
+    if max(thing.sigma_m[:2]) > UNSURE_M:
+        yield _bar(
+            Bar.UNSURE, "", f"its place is known to {max(thing.sigma_m[:2]):.2f} m only; look first"
+        )
+
+
+def _grasps(thing: Thing, body: Body) -> tuple[list[Grasp], list[Obstacle]]:
+    try:
+        return grasps_from_above(
+            thing.kind, thing.position_m, thing.size_m, thing.yaw_rad, body.opening_max_m
+        ), []
+    except TooWide as error:
+        return [], [_bar(Bar.TOO_WIDE, "", str(error))]
+
+
+def _height(grasps: list[Grasp]) -> Iterator[Obstacle]:
+    low_m, high_m = GRIP_HEIGHTS_M
+    for grasp in grasps[:1]:
+        height_m = grasp.point_m[2]
+        bar = Bar.TOO_LOW if height_m < low_m else Bar.TOO_HIGH
+        if not low_m <= height_m <= high_m:
+            yield _bar(bar, "", f"the grip would be {height_m:.2f} m high; "
+                       f"hands that point down reach {low_m:g} to {high_m:g} m")  # fmt: skip
+
+
+def _way(thing: Thing, robot: Viewpoint | None, body: Body) -> Way:
+    if robot is not None and is_in_reach(_from(robot, thing)):
+        return Way.HERE
+    if body.is_free is None:
+        return Way.AFTER_DRIVING
+    has_stand = next(stands_around(thing.position_m, body.is_free), None) is not None
+    return Way.AFTER_DRIVING if has_stand else Way.NONE
+
+
+def _from(robot: Viewpoint, thing: Thing) -> tuple[float, float]:
+    dx, dy = thing.position_m[0] - robot.x_m, thing.position_m[1] - robot.y_m
+    c, s = math.cos(robot.yaw_rad), math.sin(robot.yaw_rad)
+    return c * dx + s * dy, c * dy - s * dx
+
+
+def _in_corridor(thing: Thing, grasps: list[Grasp], snapshot: Snapshot) -> list[Obstacle]:
+    """Return what bars the grasp that least bars; nothing where one is free."""
+    best: dict[str, Obstacle] | None = None
+    for grasp in grasps:
+        bars = {one.by: one for one in _bars_of(grasp, thing, snapshot)}
+        if best is None or len(bars) < len(best):
+            best = bars
+    return list((best or {}).values())
+
+
+def _bars_of(grasp: Grasp, thing: Thing, snapshot: Snapshot) -> Iterator[Obstacle]:
+    for other in snapshot.things:
+        if other is thing or other.held_by or _carries(thing, other):
+            continue
+        holds = thing.rests is not None and (thing.rests.relation, thing.rests.of) == (
+            IN, other.thing_id,
+        )  # fmt: skip
+        for point_m, radius_m, from_m in _discs(grasp):
+            depth_m = depth_inside_m(point_m, other)
+            if other.top_m <= from_m:
+                continue
+            if holds and depth_m < radius_m + WALL_M:
+                yield _bar(
+                    Bar.CLOSED_IN, other.thing_id, f"too deep, or too near a wall, in the {other}"
+                )
+            elif not holds and depth_m > -radius_m:
+                yield _bar(Bar.BESIDE, other.thing_id, f"the {other} is where a finger would go")
+
+
+def _discs(grasp: Grasp) -> Iterator[tuple[tuple[float, float], float, float]]:
+    """Yield centre, radius and lowest height of what of a hand goes down to a grasp."""
+    x_m, y_m, z_m = grasp.point_m
+    aside_m = 0.5 * grasp.opening_m + 0.5 * FINGER_RADIUS_M
+    across = (math.sin(grasp.yaw_rad), -math.cos(grasp.yaw_rad))
+    for side in (-aside_m, aside_m):
+        at = (x_m + side * across[0], y_m + side * across[1])
+        yield at, FINGER_RADIUS_M, z_m - TIP_BELOW_GRIP_M
+    yield (x_m, y_m), PALM_RADIUS_M, z_m + PALM_ABOVE_GRIP_M
+
+
+def _carries(thing: Thing, other: Thing) -> bool:
+    """Tell whether `other` is what a thing stands on, or stands on it: neither is beside it."""
+    below = thing.rests is not None and (thing.rests.relation, thing.rests.of) == (
+        ON, other.thing_id,
+    )  # fmt: skip
+    above = other.rests is not None and other.rests.of == thing.thing_id
+    return below or above
+
+
+def _bar(bar: Bar, by: str, why: str) -> Obstacle:
+    return Obstacle(bar=bar, by=by, why=why)
+
+
+def bodies_of(openings_m: Mapping[str, float], is_free: IsFree | None = None) -> Body:
+    """Return the body with these hands; `openings_m` is how wide each opens."""
+    return Body(
+        opening_max_m=max(openings_m.values(), default=0.0),
+        hands=tuple(openings_m),
+        is_free=is_free,
+    )

@@ -1,0 +1,26 @@
+"""List the words for things: kinds, colours, sizes, and what else people call them."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+OBJECT_CLASSES: Final = ("cup", "ball", "book", "bottle", "phone", "keys", "box", "object")
+ANY_CLASS: Final = "object"
+COLOURS: Final = (
+    "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "white", "grey", "black",
+)  # fmt: skip
+# What may have other things in it.
+CONTAINERS: Final = frozenset({"box", "bowl"})
+ARTICLES: Final = frozenset({"the", "a", "an", "my", "your", "that", "this", "some", "our"})
+SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
+    "mug": "cup", "glass": "cup", "beaker": "cup", "tumbler": "cup",
+    "sphere": "ball",
+    "novel": "book", "notebook": "book",
+    "flask": "bottle",
+    "smartphone": "phone", "mobile": "phone", "telephone": "phone",
+    "key": "keys", "keyring": "keys",
+    "crate": "box", "bin": "box", "container": "box", "basket": "box",
+    "thing": "object", "something": "object",
+    "gray": "grey", "violet": "purple",
+})  # fmt: skip
+FILLERS: Final = frozenset({"old", "new", "one", "storage"})
