@@ -2,10 +2,12 @@
 
 import argparse
 import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from platforms import load_profile
+from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import read_plan
 from vla_deploy.planning.dialects import parse_plan
@@ -13,6 +15,11 @@ from vla_deploy.planning.node import world_of
 from vla_deploy.planning.plan import plan_schema
 from vla_deploy.planning.validator import check_plan
 from vla_deploy.robots import load_robot
+
+SCHEMAS: Final[Mapping[str, Callable[[], dict[str, Any]]]] = {
+    "plan": plan_schema,
+    "analysis": analysis_schema,
+}
 
 
 def register(commands: Any) -> None:
@@ -26,7 +33,10 @@ def register(commands: Any) -> None:
     check.add_argument("--profile", default="desktop", help="name or file of a profile")
     check.add_argument("--plan", type=Path, help="a plan to check against the robot")
     check.set_defaults(run=run)
-    schema = add_top_command(commands, "schema", "  vla-deploy schema\n")
+    schema = add_top_command(
+        commands, "schema", "  vla-deploy schema\n  vla-deploy schema analysis\n"
+    )
+    schema.add_argument("what", nargs="?", choices=tuple(SCHEMAS), default="plan", help="of what")
     schema.set_defaults(run=run_schema)
 
 
@@ -45,6 +55,5 @@ def run(arguments: argparse.Namespace) -> int:
 
 def run_schema(arguments: argparse.Namespace) -> int:
     """Print the schema."""
-    del arguments
-    print(json.dumps(plan_schema(), indent=2))
+    print(json.dumps(SCHEMAS[arguments.what](), indent=2))
     return 0

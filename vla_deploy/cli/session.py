@@ -8,7 +8,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.ipc import CellReader, Sample, SharedSpace
+from vla_deploy.ipc import CellReader, Frame, Sample, SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP, StopButton
 from vla_deploy.supervisor.runtime import default_base, running
 
@@ -38,6 +38,14 @@ class Session:
         """Return the newest JSON document of a cell, or None when there is none that young."""
         sample = self.fresh(topic, age_limit_s)
         return None if sample is None else sample.document()
+
+    def frame(self, topic: str, age_limit_s: float) -> Frame | None:
+        """Return the newest image of a frame ring, or None when there is none that young."""
+        frame = self._space.frame_reader(topic).latest()
+        if frame is None:
+            return None
+        age_s = (self.clock.now_ns() - frame.stamp_ns) / NS_PER_S
+        return frame if age_s <= age_limit_s else None
 
     def pause(self, duration_s: float = POLL_NS / NS_PER_S) -> None:
         """Wait a moment; a poll's worth unless told otherwise."""

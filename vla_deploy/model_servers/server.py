@@ -23,6 +23,7 @@ from vla_deploy.model_servers.formats.base import Format, Json, ModelFacts, Wire
 from vla_deploy.model_servers.formats.table import FORMATS
 from vla_deploy.model_servers.metrics import CallMetrics
 from vla_deploy.model_servers.privacy import check_privacy
+from vla_deploy.model_servers.rate import CallRate
 from vla_deploy.model_servers.replies import document_of
 from vla_deploy.model_servers.settings import ServerSettings
 
@@ -49,6 +50,7 @@ class ModelServer:
         self._key = key
         self._exchange = exchange
         self._admission = Admission(settings.max_calls, settings.max_waiting)
+        self._rate = CallRate(settings.max_calls_per_minute, clock)
         self._breaker = CircuitBreaker(settings.breaker_failures, settings.breaker_open_s, clock)
         self._backoff = Backoff(
             first_s=settings.backoff_s, longest_s=settings.backoff_max_s, draw=draw
@@ -80,6 +82,7 @@ class ModelServer:
             if chat.has_images and not self.settings.vision:
                 raise RequestRefused(f"server {self.name} takes no images; it has no vision = true")
             request = self.format.request(self.settings, chat, rung or self.format.rungs[0])
+            self._rate.take()
             with self._admission.place(ends):
                 reply = self._send_patiently(request, ends)
             completion = self.format.completion(reply)

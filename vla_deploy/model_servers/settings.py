@@ -57,6 +57,7 @@ class ServerSettings(BaseModel):
     total_timeout_s: Seconds = 45.0
     max_calls: Annotated[int, Field(ge=1, le=32)] = 1
     max_waiting: Annotated[int, Field(ge=0, le=256)] = 4
+    max_calls_per_minute: Annotated[int, Field(ge=1, le=6000)] = 30
     max_attempts: Annotated[int, Field(ge=1, le=10)] = 3
     backoff_s: Annotated[float, Field(gt=0.0, le=60.0)] = 0.5
     backoff_max_s: Annotated[float, Field(gt=0.0, le=600.0)] = 8.0

@@ -21,6 +21,7 @@ from vla_deploy.model_servers.errors import (
 )
 from vla_deploy.model_servers.metrics import CallMetrics
 from vla_deploy.model_servers.privacy import check_privacy
+from vla_deploy.model_servers.rate import CallRate
 
 TEXT = Chat(messages=(Message(text="hello"),))
 IMAGE = Chat(messages=(Message(text="what is it?", images=(b"jpeg",)),))
@@ -169,3 +170,16 @@ def test_metrics_count_calls_tokens_and_times():
     assert told["failures"] == {"TimedOut": 1}
     assert told["latency_p50_s"] == pytest.approx(0.5, abs=0.01)
     assert told["latency_p95_s"] == pytest.approx(0.95, abs=0.01)
+
+
+def test_calls_are_counted_over_the_last_minute(clock):
+    rate = CallRate(2, clock)
+    rate.take()
+    clock.time_ns += 30 * NS_PER_S
+    rate.take()
+    with pytest.raises(Busy, match=r"2 calls in the last minute.*the next one in 30 s"):
+        rate.take()
+    clock.time_ns += 30 * NS_PER_S
+    rate.take()
+    with pytest.raises(Busy):
+        rate.take()

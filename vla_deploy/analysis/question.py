@@ -1,0 +1,81 @@
+"""Hold what an analyser is asked, and say what an analyser is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.analysis.document import SceneAnalysis
+from vla_deploy.world import Snapshot, Viewpoint, read_snapshot
+from vla_deploy.world.resting import rest_of
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bystander:
+    """Place a person or a chair on the floor plan; `width_m` is what is seen of it."""
+
+    kind: str
+    x_m: float
+    y_m: float
+    width_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Question:
+    """Hold the world as it is known, an image (rows, columns, RGB) or none, and a goal or none.
+
+    `holding` tells which kind of thing each hand holds.
+    """
+
+    world: Snapshot
+    bystanders: tuple[Bystander, ...] = ()
+    holding: Mapping[str, str | None] = field(default_factory=dict)
+    image: Image | None = None
+    goal: str = ""
+
+
+class Analyser(Protocol):
+    """Make an analysis of a question; it always gives one, and notes what it lacked."""
+
+    def analyse(self, question: Question) -> SceneAnalysis:
+        """Return the analysis."""
+        ...
+
+
+def question_of(
+    scene: Mapping[str, Any],
+    *,
+    now_ns: int,
+    robot: Viewpoint | None = None,
+    holding: Mapping[str, str | None] | None = None,
+    image: Image | None = None,
+    goal: str = "",
+) -> Question:
+    """Return the question about a scene topic's document; `robot` is where it stands.
+
+    Raises:
+        SceneUnreadable: the document is no scene.
+    """
+    read = read_snapshot(scene, now_ns)
+    world = replace(read, robot=robot or read.robot)
+    rested = [
+        thing if thing.rests is not None or thing.held_by
+        else replace(thing, rests=rest_of(thing, world.things, world.surfaces))
+        for thing in world.things
+    ]  # fmt: skip
+    return Question(
+        world=replace(world, things=tuple(rested)),
+        bystanders=tuple(_bystander(one) for one in scene.get("bystanders", ())),
+        holding=holding or {},
+        image=image,
+        goal=goal.strip(),
+    )
+
+
+def _bystander(told: Mapping[str, Any]) -> Bystander:
+    x_m, y_m = (float(value) for value in told["position_m"][:2])
+    return Bystander(kind=str(told["class"]), x_m=x_m, y_m=y_m, width_m=float(told["width_m"]))

@@ -1,0 +1,139 @@
+"""`vla-deploy analyse`: what the scene holds, how things lie, whether a goal can be reached."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from vla_deploy.analysis.abilities import Abilities
+from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis, Task
+from vla_deploy.analysis.geometric import GeometricAnalyser
+from vla_deploy.analysis.question import Analyser, Image, Question, question_of
+from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
+from vla_deploy.cli.errors import UsageError
+from vla_deploy.cli.example import add_top_command
+from vla_deploy.cli.session import Session, attach
+from vla_deploy.ipc import Frame
+from vla_deploy.model_servers.shelf import ServerShelf
+from vla_deploy.robots import load_robot
+from vla_deploy.supervisor.runtime import default_base
+from vla_deploy.world import Viewpoint
+
+EXAMPLES: Final = """  vla-deploy analyse
+  vla-deploy analyse --goal "pick up the red cup and put it in the box"
+  vla-deploy analyse --server bench --json      ask a model too: vla-deploy servers list
+"""
+FRESH_S: Final = 5.0
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    analyse = add_top_command(commands, "analyse", EXAMPLES)
+    analyse.add_argument(
+        "--goal", default="", metavar="WORDS", help="judge whether this can be done"
+    )
+    analyse.add_argument("--server", metavar="NAME", help="ask this model server for names too")
+    analyse.add_argument(
+        "--within",
+        type=float,
+        default=WITHIN_S,
+        metavar="S",
+        help=f"how long the server may take, in seconds (default: {WITHIN_S:g})",
+    )
+    analyse.add_argument("--json", action="store_true", help="print the analysis as JSON")
+    analyse.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the analysis of what the running robot sees."""
+    session = attach(arguments.runtime_base)
+    analysis = analyser_for(session, arguments).analyse(ask(session, arguments.goal))
+    text = analysis.model_dump_json(indent=2) if arguments.json else as_text(analysis)
+    sys.stdout.write(text + "\n")
+    return 0
+
+
+def ask(session: Session, goal: str) -> Question:
+    """Return the question about what the robot tells of itself now.
+
+    Raises:
+        UsageError: perception is silent.
+    """
+    scene = session.document("scene", age_limit_s=FRESH_S)
+    if scene is None:
+        raise UsageError("perception tells no scene; see: vla-deploy status")
+    executor = session.document("executor_status", age_limit_s=FRESH_S) or {}
+    return question_of(
+        scene,
+        now_ns=session.clock.now_ns(),
+        robot=_pose(session),
+        holding=executor.get("holding", {}),
+        image=_image(session.frame("rgbd", age_limit_s=FRESH_S)),
+        goal=goal,
+    )
+
+
+def analyser_for(session: Session, arguments: argparse.Namespace) -> Analyser:
+    """Return the analyser that was asked for, of the robot that runs.
+
+    Raises:
+        UsageError: the supervisor is silent.
+        ModelServerError: the server is not declared, or its key is missing.
+    """
+    table = session.document("process_table", age_limit_s=FRESH_S)
+    if table is None:
+        raise UsageError("the supervisor does not tell which robot this is; see: vla-deploy status")
+    measuring = GeometricAnalyser(Abilities.of(load_robot(table["robot"])))
+    if arguments.server is None:
+        return measuring
+    base: Path = arguments.runtime_base or default_base()
+    server = ServerShelf.of_base(base, session.clock).open(arguments.server)
+    return ServedAnalyser(server, measuring, arguments.within)
+
+
+def _pose(session: Session) -> Viewpoint | None:
+    sample = session.fresh("pose", age_limit_s=1.0)
+    if sample is None:
+        return None
+    x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
+    return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+
+
+def _image(frame: Frame | None) -> Image | None:
+    if frame is None:
+        return None
+    pixels = np.frombuffer(frame.payload, np.uint8, 3 * frame.width * frame.height)
+    return pixels.reshape(frame.height, frame.width, 3)
+
+
+def as_text(analysis: SceneAnalysis) -> str:
+    """Return an analysis as lines for a person."""
+    lines = [_object_line(one) for one in analysis.objects] or ["nothing is known around"]
+    lines += [f"  {one.subject} {one.relation} {one.other}" for one in analysis.relations]
+    lines += _task_lines(analysis.task) if analysis.task else []
+    lines += [f"note: {note}" for note in analysis.notes]
+    return "\n".join(lines)
+
+
+def _object_line(one: AnalysedObject) -> str:
+    where = " ".join(word for word in (one.side, one.distance) if word) or "somewhere"
+    hand = "can be taken" if one.graspable and one.accessible else "cannot be taken"
+    known = one.id or "not measured"
+    return (
+        f"{known:<14} {one.size or ''} {one.colour} {one.name}, {where}, {hand}, "
+        f"{100 * one.confidence:.0f} % sure ({one.source})"
+    )
+
+
+def _task_lines(task: Task) -> Iterator[str]:
+    verdict = task.feasible.replace("_", " ")
+    yield f'"{task.goal}": {verdict}, {100 * task.confidence:.0f} % sure: {task.reason}'
+    for head, rows in (
+        ("before", task.prerequisites),
+        ("in the way", task.obstacles),
+        ("instead", task.alternatives),
+    ):
+        yield from (f"  {head}: {row}" for row in rows)
