@@ -18,6 +18,7 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.ipc import Frame
 from vla_deploy.model_servers.shelf import ServerShelf
+from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.runtime import default_base
 from vla_deploy.world import Viewpoint
@@ -95,8 +96,9 @@ def analyser_for(session: Session, arguments: argparse.Namespace) -> Analyser:
 
 
 def _pose(session: Session) -> Viewpoint | None:
+    """Return where the robot is; one that is lost is nowhere."""
     sample = session.fresh("pose", age_limit_s=1.0)
-    if sample is None:
+    if sample is None or PlaceState(int(sample.data["state"])) is PlaceState.LOST:
         return None
     x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
     return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)

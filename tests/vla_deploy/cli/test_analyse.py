@@ -6,6 +6,7 @@ import pytest
 
 from vla_deploy.cli.analyse import analyser_for, as_text, ask
 from vla_deploy.cli.errors import UsageError
+from vla_deploy.navigation.place_judge import PlaceState
 
 CUP = {
     "id": "cup_1",
@@ -24,8 +25,7 @@ def seen(robot, clock):
     scene = {"stamp_ns": clock.now_ns(), "objects": [CUP | {"last_seen_ns": clock.now_ns()}]}
     robot.space.cell_writer("scene").put_document(scene)
     robot.space.cell_writer("process_table").put_document({"robot": "butler", "processes": []})
-    pose = {"x_m": 2.2, "y_m": 2.05, "yaw_rad": -1.5708, "match_ratio": 1.0}
-    robot.space.cell_writer("pose").put(**dict.fromkeys(_fields(robot), 0.0) | pose)
+    robot.space.cell_writer("pose").put(**pose())
     robot.executes(None)
     image = np.zeros((4, 6, 3), np.uint8)
     image[0, 0] = (250, 1, 2)
@@ -33,11 +33,10 @@ def seen(robot, clock):
     robot.space.frame_writer("rgbd").put(payload, width=6, height=4, stamp_ns=clock.now_ns())
 
 
-def _fields(robot) -> list[str]:
-    """Return the numbers that a pose has, however many there are by now."""
-    from vla_deploy.ipc import BY_NAME
-
-    return [field.name for field in BY_NAME["pose"].fields if field.shape == 1]
+def pose(state: PlaceState = PlaceState.TRACKING) -> dict:
+    covariance = np.zeros(9)
+    place = {"x_m": 2.2, "y_m": 2.05, "yaw_rad": -1.5708, "match_ratio": 1.0}
+    return place | {"covariance": covariance, "state": state, "doubt": 0}
 
 
 def arguments(**changes) -> argparse.Namespace:
@@ -66,6 +65,13 @@ def test_a_server_that_is_not_there_leaves_the_measured_analysis(session, seen, 
     analysis = analyser_for(session, chosen).analyse(ask(session, ""))
     assert json.loads(analysis.model_dump_json())["analyser"] == "geometric"
     assert "note: measured only, server gone gave nothing" in as_text(analysis)
+
+
+def test_a_robot_that_is_lost_tells_no_sides(session, seen, robot):
+    robot.space.cell_writer("pose").put(**pose(PlaceState.LOST))
+    analysis = analyser_for(session, arguments()).analyse(ask(session, "go to the kitchen"))
+    assert analysis.objects[0].side is None
+    assert analysis.task.prerequisites == ("find out where the robot is",)
 
 
 def test_a_robot_that_is_silent_is_told(session, robot):
