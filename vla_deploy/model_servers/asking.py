@@ -64,18 +64,21 @@ class StructuredAsker(Generic[Shape]):
         raise AssertionError("the last round returns or raises")
 
     def _descend(self, chat: Chat, ends: Deadline) -> Completion:
-        """Ask on the strictest rung that the server takes."""
-        while True:
+        """Ask on the strictest rung that the server takes; where it takes none, begin anew."""
+        if self._is_proven:
+            return self._server.complete(chat, self.rung, ends)
+        rungs = self._server.format.rungs
+        for number, rung in enumerate(rungs):
+            final = frozenset[int]() if rung == rungs[-1] else _NO_SUCH_RUNG
             try:
-                completion = self._server.complete(chat, self.rung, ends)
+                completion = self._server.complete(chat, rung, ends, final)
             except (RequestRefused, ServerFailed) as error:
-                is_last = self._rung == len(self._server.format.rungs) - 1
-                if self._is_proven or is_last or error.status not in _NO_SUCH_RUNG:
+                if error.status not in final:
                     raise
-                self._rung += 1
                 continue
-            self._is_proven = True
+            self._rung, self._is_proven = number, True
             return completion
+        raise AssertionError("the last rung returns or raises")
 
     def _read(self, text: str) -> Shape:
         """Take the last object that has the shape: models correct themselves towards the end."""

@@ -5,6 +5,7 @@ import ssl
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 from vla_deploy.model_servers.addresses import Resolve, resolve
 from vla_deploy.model_servers.deadline import Deadline
@@ -71,7 +72,7 @@ class Exchange:
             pool.stream(
                 "GET" if content is None else "POST",
                 settings.url + request.path,
-                headers=_headers(content, {**request.headers, **headers}),
+                headers=_headers(settings, content, {**request.headers, **headers}),
                 content=content,
                 extensions={"timeout": timeouts},
             ) as response,
@@ -116,7 +117,15 @@ def _open_tls(settings: ServerSettings) -> ssl.SSLContext:
         raise RequestRefused(f"ca_file: {settings.ca_file}: {error}") from error
 
 
-def _headers(content: bytes | None, others: Mapping[str, str]) -> list[tuple[str, str]]:
-    plain = {"Accept": "application/json", "Accept-Encoding": "identity", "Connection": "close"}
+def _headers(
+    settings: ServerSettings, content: bytes | None, others: Mapping[str, str]
+) -> list[tuple[str, str]]:
+    plain = {
+        # The client would leave out the brackets of an IPv6 address.
+        "Host": urlsplit(settings.url).netloc,
+        "Accept": "application/json",
+        "Accept-Encoding": "identity",
+        "Connection": "close",
+    }
     kind = {} if content is None else {"Content-Type": "application/json"}
     return [*plain.items(), *kind.items(), *others.items()]

@@ -15,6 +15,7 @@ from vla_deploy.model_servers.errors import (
     AnswerUnusable,
     ModelServerError,
     RequestRefused,
+    ServerFailed,
     TimedOut,
     Unavailable,
 )
@@ -63,11 +64,16 @@ class ModelServer:
         return Deadline.within(self.clock, min(within_s or longest_s, longest_s))
 
     def complete(
-        self, chat: Chat, rung: str | None = None, deadline: Deadline | None = None
+        self,
+        chat: Chat,
+        rung: str | None = None,
+        deadline: Deadline | None = None,
+        final: frozenset[int] = frozenset(),
     ) -> Completion:
         """Ask the model once, and again while that may help and time is left.
 
-        `rung` is one of `format.rungs`, the strictest by default.
+        `rung` is one of `format.rungs`, the strictest by default. `final` are statuses of HTTP that
+        are taken for an answer to this rung, and not tried again.
 
         Raises:
             PrivacyRefused: that may not leave the robot, or the server is not where it should be.
@@ -84,7 +90,7 @@ class ModelServer:
             request = self.format.request(self.settings, chat, rung or self.format.rungs[0])
             self._rate.take()
             with self._admission.place(ends):
-                reply = self._send_patiently(request, ends)
+                reply = self._send_patiently(request, ends, final)
             completion = self.format.completion(reply)
         except ModelServerError as error:
             self._metrics.failed(error)
@@ -127,13 +133,15 @@ class ModelServer:
                 return None
             raise
 
-    def _send_patiently(self, request: WireRequest, ends: Deadline) -> Json:
+    def _send_patiently(self, request: WireRequest, ends: Deadline, final: frozenset[int]) -> Json:
         for failures in itertools.count(1):
             try:
                 return self._send_if_admitted(request, ends)
             except ModelServerError as error:
                 wait_s = self._backoff.wait_s(failures, error)
-                if not self._is_worth_a_retry(error, failures) or wait_s >= ends.left_s:
+                is_final = isinstance(error, ServerFailed) and error.status in final
+                worth = self._is_worth_a_retry(error, failures) and not is_final
+                if not worth or wait_s >= ends.left_s:
                     raise
             self.clock.sleep_until(self.clock.now_ns() + round(wait_s * NS_PER_S))
             self._metrics.retried()

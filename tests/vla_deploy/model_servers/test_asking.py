@@ -54,6 +54,7 @@ def test_a_server_that_knows_no_schema_is_asked_otherwise_from_then_on(
     asked = len(loopback.heard)
     assert asker.ask(CHAT).colour == "red"
     assert (asker.rung, len(loopback.heard) - asked) == ("json_object", 1)
+    assert clock.waits_s == []
 
 
 def test_the_last_way_is_to_ask_in_words(loopback, asker):
@@ -68,7 +69,7 @@ def test_a_server_that_refuses_every_way_is_told(loopback, asker):
     loopback.then(loopback.sends(400, {"error": "no"}))
     with pytest.raises(RequestRefused, match="no"):
         asker.ask(CHAT)
-    assert len(loopback.heard) == 3
+    assert (len(loopback.heard), asker.rung) == (3, "json_schema")
 
 
 def test_a_failure_after_a_way_has_proven_right_changes_nothing(loopback, asker):

@@ -346,3 +346,17 @@ def test_an_authority_s_file_that_is_none_is_told(open_server, tmp_path):
     (tmp_path / "ca.pem").write_text("nothing")
     with pytest.raises(RequestRefused, match=r"ca\.pem"):
         open_server("https://127.0.0.1:9", ca_file=str(tmp_path / "ca.pem")).complete(CHAT)
+
+
+def test_an_ipv6_address_is_named_with_its_brackets(open_server, loopback):
+    heard = []
+
+    def remember(host, port, timeout_s):
+        heard.append((host, port))
+        return ("127.0.0.1",)
+
+    loopback.then(loopback.says("hi"))
+    url = loopback.url.replace("127.0.0.1", "[::1]")
+    assert open_server(url, resolve=remember).complete(CHAT).text == "hi"
+    assert heard == [("::1", loopback.server.server_port)]
+    assert loopback.heard[0].headers["Host"] == f"[::1]:{loopback.server.server_port}"
