@@ -32,14 +32,14 @@ class Arms:
     def __init__(self, robot: RobotDescription) -> None:
         self._arms = {name: ArmKinematics(robot, name) for name in robot.hands}
         self._seed = 0.5 * (robot.position_min + robot.position_max)
-        self.reaches = cache(self._reaches)
-
-    def _reaches(self, hand: str, step: int) -> bool:
-        return any(self._solves(hand, reach_m, step * _HEIGHT_STEP_M) for reach_m in REACH_M)
+        self._answered = cache(self._reaches)
 
     def reach_height(self, hand: str, height_m: float) -> bool:
         """Tell whether the hand gets to that height above the floor, to the centimetre."""
-        return self.reaches(hand, round(height_m / _HEIGHT_STEP_M))
+        return self._answered(hand, round(height_m / _HEIGHT_STEP_M))
+
+    def _reaches(self, hand: str, step: int) -> bool:
+        return any(self._solves(hand, reach_m, step * _HEIGHT_STEP_M) for reach_m in REACH_M)
 
     def _solves(self, hand: str, reach_m: float, height_m: float) -> bool:
         aside_m = _SIGNS.get(hand, 0.0) * SIDE_M
