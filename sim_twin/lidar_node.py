@@ -1,6 +1,7 @@
 """Tell control what the lidar sees where perception, which needs a camera, does not run."""
 
 from drivers import registry
+from drivers.clock import NS_PER_S
 from drivers.lidar.base import Lidar
 from drivers.opener import DeviceOpener
 from vla_deploy.ipc import SharedSpace
@@ -23,6 +24,7 @@ class LidarNode:
         """
         line = devices.serial(robot.lidar.device)
         self._lidar: Lidar = registry.open_lidar(robot.lidar.model, line, context.clock)
+        self._clock = context.clock
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._scan = self._space.cell_writer("scan")
 
@@ -37,7 +39,8 @@ class LidarNode:
         """
         scan = self._lidar.poll()
         if scan is not None:
-            self._scan.put(range_m=scan.range_m)
+            ages_s = (self._clock.now_ns() - scan.beam_stamp_ns) / NS_PER_S
+            self._scan.put(range_m=scan.range_m, beam_age_s=ages_s)
 
     def stop(self) -> None:
         """Release the lidar."""

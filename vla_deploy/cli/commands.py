@@ -44,6 +44,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "flight": Command("flight", "look into what the flight recorder saved"),
     "check": Command("check", "check a robot, a profile or a plan, and report all faults"),
     "schema": Command("check", "print the JSON Schema of a plan or of an analysis"),
+    "map": Command("map", "record, look at, check and convert maps in the ROS format"),
     "models": Command("models", "add, list, measure, quantise and verify models"),
     "analyse": Command("analyse", "tell what the scene holds, and whether a goal can be reached"),
     "servers": Command("servers", "see and try the model servers that the robot may ask"),

@@ -191,7 +191,10 @@ TOPICS: tuple[Topic, ...] = (
         rate_hz=10,
         deadline_s=0.5,
         summary="planar lidar; beam i at angle i degrees counter-clockwise from the robot's front",
-        fields=(Field("range_m", "f4", SCAN_BEAMS, "m, 0 is no return"),),
+        fields=(
+            Field("range_m", "f4", SCAN_BEAMS, "m, 0 is no return"),
+            Field("beam_age_s", "f4", SCAN_BEAMS, "s, from the beam's moment to the stamp"),
+        ),
     ),
     Topic(
         name="near_obstacles",

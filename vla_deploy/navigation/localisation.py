@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.navigation.beams import placed_beams
 from vla_deploy.navigation.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.distance_field import DistanceField
 from vla_deploy.navigation.grid_map import GridMap
@@ -27,8 +28,6 @@ from vla_deploy.navigation.scan_match import MIN_POINTS, Match, ScanPoints, fit
 
 # However often it is measured, no pose is better known than the map is drawn.
 MAP_COVARIANCE: Final = np.diag((0.01**2, 0.01**2, 0.008**2))
-MAX_BEAM_M: Final = 8.0
-MIN_BEAM_M: Final = 0.25
 # Noise makes two scans differ: one that repeats itself bit for bit is not the present.
 FROZEN_SCANS: Final = 4
 # A match that the filter did not expect is believed when it comes so often, and fits so well.
@@ -99,7 +98,7 @@ class Localiser:
     def correct(self, range_m: NDArray[np.float32], beam_stamp_ns: NDArray[np.int64]) -> bool:
         """Pull the pose towards where the scan fits the map; tell whether it was used."""
         stamp_ns = int(beam_stamp_ns.max(initial=0))
-        scan = self._points(range_m, beam_stamp_ns)
+        scan = placed_beams(self._track, self._lidar, range_m, beam_stamp_ns)
         if len(scan) < MIN_POINTS or self._is_frozen(range_m):
             self.match_ratio = 0.0
             self._tell(stamp_ns, Doubt.NO_SCAN)
@@ -158,15 +157,3 @@ class Localiser:
         self._repeats = self._repeats + 1 if same else 0
         self._last_ranges = np.array(range_m)
         return self._repeats >= FROZEN_SCANS
-
-    def _points(self, range_m: NDArray[np.float32], stamps: NDArray[np.int64]) -> ScanPoints:
-        """Return the scan's points in the dead-reckoned frame, each by the pose of its moment."""
-        beams = np.flatnonzero((range_m > MIN_BEAM_M) & (range_m < MAX_BEAM_M))
-        angles = np.radians(beams * (360.0 / len(range_m))) + self._lidar.yaw_rad
-        ranges = range_m[beams].astype(np.float64)
-        x = self._lidar.x_m + ranges * np.cos(angles)
-        y = self._lidar.y_m + ranges * np.sin(angles)
-        at = np.tile((self._lidar.x_m, self._lidar.y_m), (len(beams), 1))
-        moments = stamps[beams]
-        starts = self._track.place(at, moments)
-        return ScanPoints(starts, self._track.place(np.column_stack((x, y)), moments))

@@ -156,7 +156,8 @@ class PerceptionNode:
         """Publish a scan unless it is out of date already: its reader takes it for the present."""
         scan = self._sensors.scan()
         if scan is not None and self._clock.now_ns() - scan.stamp_ns <= STALE_SCAN_NS:
-            self._writers["scan"].put(range_m=scan.range_m)
+            ages_s = (self._clock.now_ns() - scan.beam_stamp_ns) / NS_PER_S
+            self._writers["scan"].put(range_m=scan.range_m, beam_age_s=ages_s)
             self._whereabouts.correct(scan)
 
     def _read_camera(self) -> None:

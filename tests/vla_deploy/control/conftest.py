@@ -48,7 +48,7 @@ class EmptyFloor:
     def step(self) -> None:
         """Put one scan."""
         if self.sees:
-            self._scan.put(range_m=self.ranges_m)
+            self._scan.put(range_m=self.ranges_m, beam_age_s=())
 
     def stop(self) -> None:
         """Have nothing to close."""

@@ -101,7 +101,7 @@ def test_each_part_gets_its_turn_and_tells_what_it_knows(watch: Any, rig: Any) -
     )
     ahead = np.zeros(360, dtype=np.float32)
     ahead[:3] = 0.245
-    space.cell_writer("scan").put(range_m=ahead)
+    space.cell_writer("scan").put(range_m=ahead, beam_age_s=())
     level = (0.0, 0.0, 9.81)
     space.cell_writer("imu").put(yaw_rad=0.0, pitch_rad=0.0, roll_rad=0.0, acceleration_m_s2=level)
     tuck = full_positions(rig.robot, list(rig.robot.poses["tuck"].items()))
@@ -140,7 +140,7 @@ def test_a_beam_on_the_own_arm_is_no_obstacle(rig: Any) -> None:
     bearing = round(np.degrees(np.arctan2(low[1], low[0]))) % 360
     scan = np.zeros(360, dtype=np.float32)
     scan[bearing - 1 : bearing + 2] = float(np.hypot(low[0], low[1]))
-    space.cell_writer("scan").put(range_m=scan)
+    space.cell_writer("scan").put(range_m=scan, beam_age_s=())
     assert refreshed(watch, rig, hanging).zones == ()
     assert abs(low[2] - 0.19) < 0.05
     watch.close()

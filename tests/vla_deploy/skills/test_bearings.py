@@ -60,7 +60,7 @@ class Told:
             state=self.state,
             doubt=self.doubt,
         )
-        self._scan.put(range_m=np.full(360, 5.0, dtype=np.float32))
+        self._scan.put(range_m=np.full(360, 5.0, dtype=np.float32), beam_age_s=())
 
     def asked(self) -> tuple[float, float]:
         sample = self._asked.latest()

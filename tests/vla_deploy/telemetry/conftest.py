@@ -55,7 +55,7 @@ class Rig(LockstepControl):
     def drive(self, seconds: float) -> None:
         for _ in range(round(seconds / 0.02)):
             self.base_command.put(v_m_s=0.2, w_rad_s=0.1)
-            self._scan.put(range_m=np.full(360, 8.0, dtype=np.float32))
+            self._scan.put(range_m=np.full(360, 8.0, dtype=np.float32), beam_age_s=())
             self.run(0.02)
 
     def flights(self) -> list[Flight]:

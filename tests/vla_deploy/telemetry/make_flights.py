@@ -27,7 +27,7 @@ def drive(stack: LockstepControl, seconds: float) -> None:
     command, scan = (stack.space.cell_writer(name) for name in ("base_command", "scan"))
     for _ in range(round(seconds / 0.02)):
         command.put(v_m_s=0.3, w_rad_s=0.2)
-        scan.put(range_m=np.full(360, 8.0, dtype=np.float32))
+        scan.put(range_m=np.full(360, 8.0, dtype=np.float32), beam_age_s=())
         stack.lockstep.run_for(0.02)
 
 

@@ -1,0 +1,115 @@
+"""Draw a map from what a running robot tells of its sensors, while somebody drives it around."""
+
+from typing import Final
+
+import numpy as np
+
+from drivers.camera.protocol import Intrinsics
+from drivers.clock import NS_PER_S
+from vla_deploy.ipc import Sample, SharedSpace
+from vla_deploy.navigation.depth_band import depth_band
+from vla_deploy.navigation.mapping import Mapper
+from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
+from vla_deploy.perception.body_state import BodyState
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel, full_positions
+
+MILLIMETRE_M: Final = 0.001
+FRESH_YAW_NS: Final = NS_PER_S // 10
+RGB_BYTES: Final = 3
+
+
+class MapRecorder:
+    """Read the topics and feed a mapper.
+
+    A robot that knows where it is gives the new map the frame of its old one; otherwise the frame
+    begins where the robot stands.
+    """
+
+    def __init__(
+        self, robot: RobotDescription, space: SharedSpace, resolution_m: float = 0.05
+    ) -> None:
+        """Open the topics.
+
+        Raises:
+            RobotFileError: the MJCF does not fit the robot file.
+        """
+        model = RobotModel(robot)
+        site = model.site_pose(robot.lidar.site, full_positions(robot))
+        self._scan, self._imu = space.cell_reader("scan"), space.cell_reader("imu")
+        self._base_state = space.cell_reader("base_state")
+        self._images = space.frame_reader("rgbd")
+        self._body = BodyState(robot, model)
+        self._body.start(space)
+        self._camera = robot.camera
+        start = _known_place(space.cell_reader("pose").latest())
+        self.on_old_frame = start is not None
+        lidar = Pose2D(float(site[0, 3]), float(site[1, 3]), 0.0)
+        self.mapper = Mapper(start or ORIGIN, lidar, resolution_m)
+        self._last = {"base_state": -1, "scan": -1, "rgbd": -1}
+
+    def step(self) -> None:
+        """Take what is new; to be called some fifty times a second.
+
+        Raises:
+            MapInvalid: the map has grown beyond every flat.
+        """
+        self._body.read()
+        moved = self._base_state.latest()
+        if moved is None or not self._is_new("base_state", moved.stamp_ns):
+            return
+        x_m, y_m, yaw_rad = (float(moved.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
+        yaw = self._imu_yaw_rad(moved.stamp_ns)
+        self.mapper.predict(moved.stamp_ns, Pose2D(x_m, y_m, yaw_rad), yaw)
+        scan = self._scan.latest()
+        if scan is not None and self._is_new("scan", scan.stamp_ns):
+            ages_ns = np.rint(scan.data["beam_age_s"] * NS_PER_S).astype(np.int64)
+            self.mapper.add_scan(np.array(scan.data["range_m"]), scan.stamp_ns - ages_ns)
+        self._look()
+
+    def _look(self) -> None:
+        """Add what the camera sees between floor and head, where scans have begun the map."""
+        frame = self._images.latest()
+        if frame is None or not self.mapper.scans or not self._is_new("rgbd", frame.stamp_ns):
+            return
+        positions = self._body.at(frame.stamp_ns)
+        if positions is None:
+            return
+        camera = self._intrinsics(frame.width, frame.height)
+        pixels = frame.width * frame.height
+        depth = np.frombuffer(frame.payload, "<u2", pixels, RGB_BYTES * pixels)
+        standing, floor = depth_band(
+            (depth.reshape(frame.height, frame.width) * MILLIMETRE_M).astype(np.float32),
+            camera,
+            self._body.camera_pose(positions),
+            self._body.mask(positions, camera),
+        )
+        self.mapper.add_depth(standing, floor, frame.stamp_ns)
+
+    def _imu_yaw_rad(self, now_ns: int) -> float | None:
+        sample = self._imu.latest()
+        if sample is None or now_ns - sample.stamp_ns > FRESH_YAW_NS:
+            return None
+        return float(sample.data["yaw_rad"])
+
+    def _is_new(self, topic: str, stamp_ns: int) -> bool:
+        before, self._last[topic] = self._last[topic], stamp_ns
+        return stamp_ns != before
+
+    def _intrinsics(self, width: int, height: int) -> Intrinsics:
+        return Intrinsics(
+            width=width,
+            height=height,
+            fx=self._camera.focal_px,
+            fy=self._camera.focal_px,
+            cx=(width - 1) / 2,
+            cy=(height - 1) / 2,
+        )
+
+
+def _known_place(sample: Sample | None) -> Pose2D | None:
+    """Return the robot's pose on its present map, None where it does not know it."""
+    if sample is None or int(sample.data["state"]) != PlaceState.TRACKING:
+        return None
+    return Pose2D(*(float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad")))
