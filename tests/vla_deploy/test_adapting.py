@@ -114,6 +114,17 @@ def test_a_slowed_process_steps_less_often_and_then_as_before(adapted, direct):
     assert node.period_s == 0.1
 
 
+def test_a_node_that_can_do_its_costly_work_more_seldom_is_told_so(adapted, direct):
+    inner = Plain()
+    told: list[float] = []
+    inner.slow = told.append
+    node = adapted(inner)
+    for ratio in (0.5, 1.0):
+        direct({"planner": ratio}, {})
+        node.step()
+    assert told == [0.5, 1.0]
+
+
 def test_control_is_never_slowed(adapted, direct):
     node = adapted(Plain(), "control")
     direct({"control": 0.5}, {"control": 1})

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from onnx import TensorProto, helper, numpy_helper
 
 from drivers.clock import MonotonicClock
 from platforms import load_profile
@@ -206,3 +207,37 @@ def test_a_profile_that_names_no_detector_goes_by_form(shelf):
     bare = dataclasses.replace(load_profile("desktop"), models={})
     network = open_network(shelf, bare, 0)
     assert (network.detector, network.why) == (None, "profile desktop names no detector")
+
+
+def fails_on_bright_images() -> bytes:
+    """Return a model whose logarithm has a number for black and none for anything bright."""
+    image = helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, 64, 96])
+    output = helper.make_tensor_value_info("output", TensorProto.FLOAT, [1, 7, 96])
+    constants = {
+        "axes": np.array([1, 2, 3]),
+        "little": np.array([0.1], np.float32),
+        "table": np.zeros((1, 7, 96), np.float32),
+    }
+    nodes = [
+        helper.make_node("ReduceMean", ["images", "axes"], ["mean"], keepdims=0),
+        helper.make_node("Sub", ["little", "mean"], ["room"]),
+        helper.make_node("Log", ["room"], ["shift"]),
+        helper.make_node("Add", ["table", "shift"], ["output"]),
+    ]
+    tensors = [numpy_helper.from_array(value, name) for name, value in constants.items()]
+    graph = helper.make_graph(nodes, "bright", [image], [output], tensors)
+    opset = [helper.make_opsetid("", 18)]
+    content: bytes = helper.make_model(graph, opset_imports=opset, ir_version=8).SerializeToString()
+    return content
+
+
+def test_weights_that_give_no_numbers_for_an_image_fail_that_image(
+    tmp_path, shelf, lay_out, blob_manifest, executor, clock, rgb
+):
+    lay_out(tmp_path / "models", blob_manifest, {Variant.INT8_U8S8: fails_on_bright_images()})
+    eyes = Eyes(executor, clock)
+    eyes.take(open_network(shelf, profile(), 0))
+    eyes.ask(rgb)
+    executor.catch_up()
+    assert eyes.answer() == Answer(view=None)
+    assert "blobs: output 'output': 672 of its 672 values are no numbers" in eyes.document()["why"]
