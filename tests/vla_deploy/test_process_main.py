@@ -11,6 +11,7 @@ NODE = """
 import sys
 from pathlib import Path
 from drivers.errors import DeviceMissing
+from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.process_main import main
 
 class Node:
@@ -18,6 +19,8 @@ class Node:
     def __init__(self, context):
         self.context, self.steps = context, 0
     def start(self):
+        if self.context.robot == "blind":
+            raise ModelFileSpoiled("detector.onnx: it was cut off; add it again")
         if self.context.robot == "unwired":
             raise DeviceMissing("servos: /dev/ttyUSB0 does not exist; plug it in")
         print("start", self.context.devices_dir, Path("/proc/self/comm").read_text().strip())
@@ -63,6 +66,12 @@ def test_a_missing_device_is_one_line_and_exit_code_2(tmp_path):
     assert done.returncode == 2
     assert done.stderr == ("planner: ERROR: servos: /dev/ttyUSB0 does not exist; plug it in\n")
     assert not (tmp_path / "ready" / "planner").exists()
+
+
+def test_a_model_that_is_required_and_spoiled_is_one_line_and_exit_code_2(tmp_path):
+    done = run(tmp_path, "blind")
+    assert done.returncode == 2
+    assert done.stderr == "planner: ERROR: detector.onnx: it was cut off; add it again\n"
 
 
 def test_an_unknown_profile_is_one_line_and_exit_code_2(tmp_path):

@@ -34,6 +34,9 @@ GRASP_RULES: Mapping[str, GraspRule] = MappingProxyType(
         "book": GraspRule(depth_ratio=0.6, depth_max_m=0.03, effort_ratio=0.35, round=False),
         "phone": GraspRule(depth_ratio=0.7, depth_max_m=0.03, effort_ratio=0.3, round=False),
         "keys": GraspRule(depth_ratio=0.7, depth_max_m=0.03, effort_ratio=0.3, round=False),
+        "can": GraspRule(depth_ratio=0.4, depth_max_m=0.045, effort_ratio=0.3, round=True),
+        "bowl": GraspRule(depth_ratio=0.45, depth_max_m=0.04, effort_ratio=0.25, round=True),
+        "remote": GraspRule(depth_ratio=0.7, depth_max_m=0.03, effort_ratio=0.3, round=False),
         "object": GraspRule(depth_ratio=0.5, depth_max_m=0.04, effort_ratio=0.25, round=False),
     }
 )

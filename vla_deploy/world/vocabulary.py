@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-OBJECT_CLASSES: Final = ("cup", "ball", "book", "bottle", "phone", "keys", "box", "object")
+OBJECT_CLASSES: Final = (
+    "cup", "ball", "book", "bottle", "phone", "keys", "box", "bowl", "can", "remote", "object",
+)  # fmt: skip
 ANY_CLASS: Final = "object"
 COLOURS: Final = (
     "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "white", "grey", "black",
@@ -21,6 +23,7 @@ SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
     "key": "keys", "keyring": "keys",
     "crate": "box", "bin": "box", "container": "box", "basket": "box",
     "thing": "object", "something": "object",
+    "tin": "can", "dish": "bowl",
     "gray": "grey", "violet": "purple",
 })  # fmt: skip
 FILLERS: Final = frozenset({"old", "new", "one", "storage"})
