@@ -18,6 +18,7 @@ PARTS: Final[Mapping[str, str]] = {
     "network": "accuracy of the shipped files, int8 beside fp32, names by form and by both",
     "live": "from the camera's image to the scene, CPU and memory, in the real processes",
     "geometry": "where things are told to be, against the truth",
+    "map": "pose after a tour, finding itself again, the map that it draws",
 }
 
 
@@ -46,6 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "network": {"images": given.images, "scenes": given.scenes, "seed": given.seed},
         "live": {"seconds": given.seconds},
         "geometry": {"seed": given.seed},
+        "map": {"seed": given.seed},
     }
     show(measure(given.part or list(PARTS), options), as_json=given.json)
     return 0
