@@ -47,7 +47,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         "network": {"images": given.images, "scenes": given.scenes, "seed": given.seed},
         "live": {"seconds": given.seconds},
         "geometry": {"seed": given.seed},
-        "map": {"seed": given.seed},
     }
     show(measure(given.part or list(PARTS), options), as_json=given.json)
     return 0
