@@ -39,6 +39,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     ),
     "profile": Command("profile", "choose how the stack uses this computer"),
     "servo": Command("servo", "find, look at, set up and calibrate servos"),
+    "camera": Command("camera", "calibrate the camera: its lens, and how it sits on the head"),
     "can": Command("can", "find CAN nodes and watch the traffic"),
     "fault": Command("fault", "make the twin's devices fail"),
     "flight": Command("flight", "look into what the flight recorder saved"),

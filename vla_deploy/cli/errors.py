@@ -26,6 +26,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.ipc.errors": "IpcError",
     "vla_deploy.model_servers.errors": "ModelServerError",
     "vla_deploy.navigation.errors": "NavigationError",
+    "vla_deploy.perception.camera_tools.errors": "CalibrationError",
     "vla_deploy.planning.errors": "PlanningError",
     "platforms.errors": "ProfileError",
     "vla_deploy.robots.errors": "RobotFileError",

@@ -8,7 +8,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.ipc import CellReader, Frame, Sample, SharedSpace
+from vla_deploy.ipc import CellReader, Frame, FrameReader, Sample, SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP, StopButton
 from vla_deploy.supervisor.runtime import default_base, running
 
@@ -23,6 +23,7 @@ class Session:
         self.clock: Clock = clock or MonotonicClock()
         self._space = SharedSpace(run_dir / "ipc", self.clock)
         self._cells: dict[str, CellReader] = {}
+        self._frames: dict[str, FrameReader] = {}
         self._numbers = itertools.count(1)
 
     def fresh(self, topic: str, age_limit_s: float | None = None) -> Sample | None:
@@ -41,7 +42,9 @@ class Session:
 
     def frame(self, topic: str, age_limit_s: float) -> Frame | None:
         """Return the newest image of a frame ring, or None when there is none that young."""
-        frame = self._space.frame_reader(topic).latest()
+        if topic not in self._frames:
+            self._frames[topic] = self._space.frame_reader(topic)
+        frame = self._frames[topic].latest()
         if frame is None:
             return None
         age_s = (self.clock.now_ns() - frame.stamp_ns) / NS_PER_S

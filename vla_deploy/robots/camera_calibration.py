@@ -141,6 +141,17 @@ def read_mounting(file: Path, camera: Camera) -> Mounting | None:
     return Mounting(**{**document, **lists})
 
 
+def require_plausible(file: Path, mounting: Mounting, camera: Camera) -> None:
+    """Check a mounting before it is written, as it will be checked when it is read.
+
+    Raises:
+        RobotFileError: it moves or turns the camera further than any mounting does.
+    """
+    faults = tuple(_wrong(asdict(mounting), camera))
+    if faults:
+        raise RobotFileError(file, faults)
+
+
 def write_mounting(file: Path, mounting: Mounting) -> None:
     """Replace the file in one act; the one before stays as `<file>.bak`.
 
