@@ -19,6 +19,7 @@ PARTS: Final[Mapping[str, str]] = {
     "live": "from the camera's image to the scene, CPU and memory, in the real processes",
     "geometry": "where things are told to be, against the truth",
     "map": "pose after a tour, finding itself again, the map that it draws",
+    "tracks": "ids kept and found again, relations against the truth, CPU of the tracker",
 }
 
 
@@ -47,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "network": {"images": given.images, "scenes": given.scenes, "seed": given.seed},
         "live": {"seconds": given.seconds},
         "geometry": {"seed": given.seed},
+        "tracks": {"seed": given.seed},
     }
     show(measure(given.part or list(PARTS), options), as_json=given.json)
     return 0

@@ -5,36 +5,13 @@ from collections.abc import Callable
 
 import pytest
 
-from benchmarks.perception_tracks import IdentityWatch
+from benchmarks.perception_tracks import SceneWatcher
 from sim_twin.stack import LockstepStack
 
 COMMAND = "pick up the red cup and put it in the box"
 MakeStack = Callable[[int], LockstepStack]
 
 pytestmark = pytest.mark.gl
-
-
-class SceneWatcher:
-    """Compare what perception tells with the truth, ten times a second."""
-
-    period_s = 0.1
-
-    def __init__(self, stack: LockstepStack) -> None:
-        self.identities = IdentityWatch()
-        self._stack = stack
-        self._scene = stack.space.cell_reader("scene")
-
-    def start(self) -> None:
-        pass
-
-    def step(self) -> None:
-        sample = self._scene.latest()
-        if sample is not None:
-            real = self._stack.lockstep.truth()["objects"]
-            self.identities.look(sample.document()["objects"], real)
-
-    def stop(self) -> None:
-        self._scene.close()
 
 
 @pytest.mark.timeout(240)
