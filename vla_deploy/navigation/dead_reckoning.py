@@ -19,6 +19,7 @@ from vla_deploy.navigation.pose import ORIGIN, Points, Pose2D
 Floats = NDArray[np.float64]
 
 HISTORY_NS = 2 * NS_PER_S
+SPEED_WINDOW_NS = NS_PER_S // 10
 # Odometry that leaps begins anew, as when control restarts: the robot has not moved that far.
 JUMP_M = 0.3
 JUMP_RAD = 0.6
@@ -112,6 +113,15 @@ class DeadReckoning:
             np.interp(since_s, known_s, [pose.y_m for _, pose in history]),
             np.interp(since_s, known_s, yaw),
         )
+
+    def speed(self) -> tuple[float, float]:
+        """Return how fast the base has moved (m/s) and turned (rad/s) of late, without signs."""
+        if not self._history:
+            return 0.0, 0.0
+        now_ns = self._history[-1][0]
+        before = self.at(now_ns - SPEED_WINDOW_NS)
+        window_s = SPEED_WINDOW_NS / NS_PER_S
+        return self.pose.distance_m(before) / window_s, self.pose.turn_rad(before) / window_s
 
     def place(self, local: Points, stamps_ns: NDArray[np.int64]) -> Points:
         """Return (n, 2) points of the base's frame in the track, each by the pose of its moment."""

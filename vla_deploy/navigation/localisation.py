@@ -28,6 +28,8 @@ from vla_deploy.navigation.scan_match import MIN_POINTS, Match, ScanPoints, fit
 
 # However often it is measured, no pose is better known than the map is drawn.
 MAP_COVARIANCE: Final = np.diag((0.01**2, 0.01**2, 0.008**2))
+# How well it is known when a beam was measured: serial lines and lidars hold packets back.
+BEAM_TIMING_S: Final = 0.02
 # Noise makes two scans differ: one that repeats itself bit for bit is not the present.
 FROZEN_SCANS: Final = 4
 # A match that the filter did not expect is believed when it comes so often, and fits so well.
@@ -108,20 +110,27 @@ class Localiser:
             return False
         match = fit(self._field, scan.placed(self._map_from_track()), self.pose)
         self.match_ratio = match.match_ratio
-        doubt = self._doubt_of(match)
+        noise = match.covariance + self._timing_covariance()
+        doubt = self._doubt_of(match, noise)
         if doubt is Doubt.NONE:
-            self._filter.correct(match.shift, match.covariance)
+            self._filter.correct(match.shift, noise)
         self._tell(stamp_ns, doubt)
         return doubt is Doubt.NONE
 
-    def _doubt_of(self, match: Match) -> Doubt:
+    def _timing_covariance(self) -> NDArray[np.float64]:
+        """Return what uncertain stamps of the beams make of a scan that is taken in motion."""
+        speed_m_s, rate_rad_s = self._track.speed()
+        way_m, turn_rad = BEAM_TIMING_S * speed_m_s, BEAM_TIMING_S * rate_rad_s
+        return np.diag((way_m**2, way_m**2, turn_rad**2))
+
+    def _doubt_of(self, match: Match, noise: NDArray[np.float64]) -> Doubt:
         if match.match_ratio < MATCH_RATIO:
             return Doubt.POOR_MATCH
         if match.through_ratio > THROUGH_RATIO:
             return Doubt.THROUGH_WALLS
         shift, turn = match.shift, abs(float(match.shift[2]))
         too_far = float(np.hypot(shift[0], shift[1])) > MAX_SHIFT_M or turn > MAX_TURN_RAD
-        if not too_far and self._filter.surprise(shift, match.covariance) <= GATE:
+        if not too_far and self._filter.surprise(shift, noise) <= GATE:
             self._unexpected = 0
             return Doubt.NONE
         self._unexpected += 1
