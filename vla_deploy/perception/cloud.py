@@ -1,5 +1,6 @@
 """Turn an RGB-D image into points in the base frame, pixel by pixel."""
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -18,6 +19,8 @@ MAX_DEPTH_M = 3.0
 DEPTH_SIGMA_PER_M = 0.0012
 # Encoders and mounting of a head that stands still.
 AIM_SIGMA_RAD = 0.0005
+# How well stamps of images and joints agree: a camera that turns meanwhile looks elsewhere.
+STAMP_SIGMA_S = 0.004
 SMOOTHING_PX = 3
 UPRIGHT = 0.9
 EDGE_RATIO = 0.15
@@ -43,6 +46,11 @@ class Cloud:
         """Return the depth noise to expect at each pixel."""
         sigma: Floats = np.float32(DEPTH_SIGMA_PER_M) * self.depth_m**2
         return sigma
+
+
+def aim_sigma_rad(turn_rad_s: float) -> float:
+    """Return how well the direction of a camera is known that turns at a rate."""
+    return math.hypot(AIM_SIGMA_RAD, STAMP_SIGMA_S * turn_rad_s)
 
 
 def make_cloud(

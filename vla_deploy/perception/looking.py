@@ -12,6 +12,7 @@ from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.body_state import Array, BodyState
+from vla_deploy.perception.cloud import aim_sigma_rad
 from vla_deploy.perception.eyes import Eyes
 from vla_deploy.perception.frame_check import Use
 from vla_deploy.perception.frame_watch import FrameWatch
@@ -36,6 +37,7 @@ class Moment:
     base_from_camera: Array
     base: Pose2D
     body: NDArray[np.bool_]
+    turn_rad_s: float
 
 
 class Looking:
@@ -81,7 +83,7 @@ class Looking:
             grips,
             frame.stamp_ns,
         )
-        still = self._camera_turn(frame.stamp_ns) <= MAX_CAMERA_TURN_RAD_S
+        still = moment.turn_rad_s <= MAX_CAMERA_TURN_RAD_S
         # Where things are on the map is not known as long as the robot is lost.
         placed = still and not self._whereabouts.is_lost
         if placed and verdict.use >= Use.FORM and self._waiting is None:
@@ -129,6 +131,7 @@ class Looking:
             moment.body,
             moment.frame.stamp_ns,
             network,
+            aim_sigma_rad(moment.turn_rad_s),
         )
 
     def _moment(self, frame: RgbdFrame, positions: Array) -> Moment:
@@ -138,6 +141,7 @@ class Looking:
             base_from_camera=self._body.camera_pose(positions),
             base=self._whereabouts.pose_at(frame.stamp_ns),
             body=self._body.mask(positions, frame.intrinsics),
+            turn_rad_s=self._camera_turn(frame.stamp_ns),
         )
 
     def _camera_turn(self, stamp_ns: int) -> float:

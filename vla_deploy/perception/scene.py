@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.bystanders import Bystander, find_bystanders
-from vla_deploy.perception.cloud import Cloud, make_cloud
+from vla_deploy.perception.cloud import AIM_SIGMA_RAD, Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
 from vla_deploy.perception.filtering import Estimate
 from vla_deploy.perception.hands import Hold
@@ -71,12 +71,14 @@ class Scene:
         body: NDArray[np.bool_],
         stamp_ns: int,
         network: NetworkView | None = None,
+        aim_sigma_rad: float = AIM_SIGMA_RAD,
     ) -> None:
         """Take one image; `base` is the robot's map pose, `body` masks the robot itself.
 
-        `network` is what a network saw in it, if one is at work.
+        `network` is what a network saw in it, if one is at work; `aim_sigma_rad` is how well the
+        camera's direction is known.
         """
-        cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body)
+        cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body, aim_sigma_rad)
         supports = find_supports(cloud)
         self._surfaces = [self._surface(one, base) for one in supports if not one.is_floor]
         found = detect(cloud, supports, network)

@@ -19,9 +19,14 @@ def test_positions_are_interpolated(stamp: int, expected: float) -> None:
     assert got == pytest.approx([expected, -expected])
 
 
-@pytest.mark.parametrize("stamp", [20, 250, 460])
+@pytest.mark.parametrize("stamp", [20, 150, 250, 460])
 def test_a_moment_too_far_from_any_sample_is_unknown(stamp: int) -> None:
     assert filled().at(stamp, TOLERANCE_NS) is None
+
+
+def test_a_sample_after_a_gap_is_not_blended_with_the_one_before() -> None:
+    assert filled().at(399, TOLERANCE_NS) is None
+    assert filled().at(400, TOLERANCE_NS) == pytest.approx([400, -400])
 
 
 def test_an_empty_history_knows_nothing() -> None:
