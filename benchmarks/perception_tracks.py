@@ -155,7 +155,8 @@ def _moves(count: int, seed: int) -> dict[str, Any]:
             after = _near_truth(stack, "red_cup")
             found += after is not None
             kept += after is not None and before is not None and before["id"] == after["id"]
-    return {"count": count, "found_ratio": found / count, "same_id_ratio": kept / count}
+    tries = max(1, count)
+    return {"count": count, "found_ratio": found / tries, "same_id_ratio": kept / tries}
 
 
 def _relations(count: int, seed: int) -> dict[str, Any]:

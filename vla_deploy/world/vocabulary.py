@@ -21,7 +21,7 @@ SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
     "flask": "bottle",
     "smartphone": "phone", "mobile": "phone", "telephone": "phone",
     "key": "keys", "keyring": "keys",
-    "dish": "bowl", "tin": "can", "controller": "remote", "zapper": "remote",
+    "controller": "remote", "zapper": "remote",
     "crate": "box", "bin": "box", "container": "box", "basket": "box",
     "thing": "object", "something": "object",
     "tin": "can", "dish": "bowl",
