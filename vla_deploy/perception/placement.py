@@ -128,11 +128,13 @@ def _lying(sight: _Sight) -> _Spot | None:
     if not low < sight.shape.height_m / max(base.width_m, 1e-6) < high:
         return None
     sigma_m = DEPTH_SIGMA_PER_M * sight.cluster.depth_m**2
-    tries = (
-        fit_lying(sight.cluster, base.yaw_rad + turn, sight.grain_m, sigma_m)
-        for turn in (0.0, math.pi / 2)
-    )
-    best = max((fit for fit in tries if fit), key=lambda fit: fit.agreement, default=None)
+    best: TurnedFit | None = None
+    for turn in (0.0, math.pi / 2):
+        fit = fit_lying(sight.cluster, base.yaw_rad + turn, sight.grain_m, sigma_m)
+        if fit is not None and (best is None or fit.agreement > best.agreement):
+            best = fit
+        if best is not None and best.agreement >= LYING_AGREEMENT:
+            break
     if best is None or best.agreement < LYING_AGREEMENT or best.length_m < 2.0 * best.radius_m:
         return None
     return _spot(sight, best, best.yaw_rad)

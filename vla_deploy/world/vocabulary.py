@@ -24,7 +24,6 @@ SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
     "controller": "remote", "zapper": "remote",
     "crate": "box", "bin": "box", "container": "box", "basket": "box",
     "thing": "object", "something": "object",
-    "tin": "can", "dish": "bowl",
     "gray": "grey", "violet": "purple",
 })  # fmt: skip
 FILLERS: Final = frozenset({"old", "new", "one", "storage"})
