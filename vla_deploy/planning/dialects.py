@@ -8,8 +8,9 @@ terse      action, params, description
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -17,6 +18,11 @@ from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.plan import Plan
 
 Json = dict[str, Any]
+
+_DECODER: Final = json.JSONDecoder()
+_BEGINNING: Final = re.compile(r"[{[]")
+# Each may cost the parser a look at the whole text.
+_MOST_BEGINNINGS: Final = 64
 
 PLAN_LISTS = ("actions", "action_sequence", "plan", "steps", "primitives")
 PLAN_GOALS = ("goal", "task", "command", "objective")
@@ -138,12 +144,18 @@ def parse_plan(document: str | Json | list[Any]) -> Plan:
 
 
 def _extract_json(text: str) -> Any:
-    decoder = json.JSONDecoder()
-    for start in (index for index, sign in enumerate(text) if sign in "{["):
+    """Return the first JSON object or list in a text; what is broken is skipped whole."""
+    start = 0
+    for _ in range(_MOST_BEGINNINGS):
+        beginning = _BEGINNING.search(text, start)
+        if beginning is None:
+            break
         try:
-            return decoder.raw_decode(text, start)[0]
-        except json.JSONDecodeError:
-            continue
+            return _DECODER.raw_decode(text, beginning.start())[0]
+        except json.JSONDecodeError as error:
+            start = max(error.pos, beginning.end())
+        except RecursionError:
+            raise PlanInvalid(["the JSON is nested too deeply"]) from None
     raise PlanInvalid(["no JSON object found in the text"])
 
 

@@ -50,6 +50,20 @@ def test_json_wrapped_in_prose_is_found() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[" * 60_000, "nested too deeply"),
+        ("{" * 60_000, "no JSON"),
+        ('{"a": [' * 9_000, "nested too deeply|no JSON"),
+    ],
+    ids=["lists", "braces", "objects"],
+)
+def test_text_made_to_cost_time_or_stack_is_refused(text: str, fault: str) -> None:
+    with pytest.raises(PlanInvalid, match=fault):
+        parse_plan(text)
+
+
+@pytest.mark.parametrize(
     ("action", "skill", "parameters"),
     [
         ({"action": "turn_right", "params": {"degrees": 90}}, "turn", {"angle_rad": -math.pi / 2}),
