@@ -9,16 +9,14 @@ from typing import Final
 from vla_deploy.manipulation.errors import Unreachable
 from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.manipulation.kinematics import ArmKinematics
-from vla_deploy.navigation.grid_map import load_map
+from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.zones import with_zones
 from vla_deploy.planning.validator import spoken_places
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import Place
 from vla_deploy.world import Body
 from vla_deploy.world.reach import REACH_M
 
-CLEARANCE_MARGIN_M: Final = 0.03
 # A thing is taken before the shoulder of the hand that takes it.
 SIDE_M: Final = 0.12
 _HEIGHT_STEP_M: Final = 0.01
@@ -53,6 +51,18 @@ class Arms:
         return False
 
 
+def body_of(robot: RobotDescription, planner: PathPlanner) -> Body:
+    """Return what the robot takes things with, and where its base fits."""
+    openings_m = [
+        robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
+    ]
+    return Body(
+        opening_max_m=max(openings_m, default=0.0),
+        hands=tuple(robot.hands),
+        is_free=planner.is_free,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abilities:
     """Hold a robot's body for judging goals; `spoken` maps every name of a place to the place."""
@@ -71,19 +81,9 @@ class Abilities:
         Raises:
             MapInvalid: its map cannot be used.
         """
-        radius_m = robot.base.footprint_radius_m + CLEARANCE_MARGIN_M
-        grid = with_zones(load_map(robot.home.map_path), robot.home.zones)
-        planner = PathPlanner(grid, radius_m)
-        openings_m = [
-            robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
-        ]
-        body = Body(
-            opening_max_m=max(openings_m, default=0.0),
-            hands=tuple(robot.hands),
-            is_free=planner.is_free,
-        )
+        planner = base_planner(robot)
         return cls(
-            body=body,
+            body=body_of(robot, planner),
             arms=Arms(robot),
             planner=planner,
             places=robot.places,

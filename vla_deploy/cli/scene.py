@@ -5,21 +5,19 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from vla_deploy.analysis.abilities import body_of
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.session import Session, attach
-from vla_deploy.navigation.grid_map import load_map
-from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.zones import with_zones
+from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.validator import spoken_places
 from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.world import Body, Query, Viewpoint, parse_query, read_snapshot
+from vla_deploy.world import Query, Viewpoint, parse_query, read_snapshot
 from vla_deploy.world.report import report
 from vla_deploy.world.surfaces import furniture_points
 
 FRESH_S = 5.0
-CLEARANCE_MARGIN_M = 0.03
 
 
 def register(commands: Any) -> None:
@@ -71,17 +69,8 @@ def collect(session: Session, arguments: argparse.Namespace) -> dict[str, Any]:
     snapshot = read_snapshot(document, session.clock.now_ns())
     view = _view(arguments.view, robot)
     query = _query(arguments, robot)
-    return report(snapshot, query, body_of(robot), furniture_points(robot.places), view)
-
-
-def body_of(robot: RobotDescription) -> Body:
-    """Return what the robot takes things with, and where its base fits."""
-    radius_m = robot.base.footprint_radius_m + CLEARANCE_MARGIN_M
-    planner = PathPlanner(with_zones(load_map(robot.home.map_path), robot.home.zones), radius_m)
-    openings = [
-        robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
-    ]
-    return Body(opening_max_m=max(openings), hands=tuple(robot.hands), is_free=planner.is_free)
+    body = body_of(robot, base_planner(robot))
+    return report(snapshot, query, body, furniture_points(robot.places), view)
 
 
 def _query(arguments: argparse.Namespace, robot: RobotDescription) -> Query:

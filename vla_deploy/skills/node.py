@@ -7,9 +7,7 @@ from drivers.clock import NS_PER_S
 from platforms import Profile
 from vla_deploy.ipc import CellWriter, ClaimBook, RingReader, RingWriter, SharedSpace
 from vla_deploy.manipulation.kinematics import ArmKinematics
-from vla_deploy.navigation.grid_map import load_map
-from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.zones import with_zones
+from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.readiness import refusal_of
@@ -20,7 +18,6 @@ from vla_deploy.skills.executor import ActionRecord, PlanExecution
 from vla_deploy.skills.link import RobotLink
 from vla_deploy.skills.resources import body_of
 
-CLEARANCE_MARGIN_M = 0.03
 STATUS_PERIOD_NS = NS_PER_S // 10
 
 
@@ -43,13 +40,10 @@ class ExecutorNode:
 
     def start(self) -> None:
         """Load the map, build the kinematics, open the topics."""
-        radius_m = self._robot.base.footprint_radius_m + CLEARANCE_MARGIN_M
         self._skills = SkillContext(
             robot=self._robot,
             link=RobotLink(self._space, self._clock, self._robot),
-            planner=PathPlanner(
-                with_zones(load_map(self._robot.home.map_path), self._robot.home.zones), radius_m
-            ),
+            planner=base_planner(self._robot),
             arms={name: ArmKinematics(self._robot, name) for name in self._robot.hands},
             say=self._say,
             claims=ClaimBook(self._space, self._clock),

@@ -38,7 +38,7 @@ CLAIMS = {
 def analyser(loopback, geometric):
     """Return an analyser that asks the loopback server."""
 
-    def analyser(within_s: float = 2.0, **changes) -> ServedAnalyser:
+    def analyser(within_s: float = 20.0, **changes) -> ServedAnalyser:
         declared = {
             "api": "openai_compatible",
             "url": loopback.url,
@@ -91,20 +91,26 @@ def test_a_model_names_what_was_measured(loopback, analyser, question):
         (lambda server: server.sends(500, b""), "HTTP 500"),
         (lambda server: server.sends(200, b" " * 2_000_000), "at most 1024 KB"),
         (lambda server: server.raw(b""), "no whole HTTP answer"),
-        (lambda server: server.raw(b"HTTP/1.1 200 OK\r\n", pause_s=0.3), "within|silent"),
     ],
 )
 def test_measuring_goes_on_alone_with_the_reason(
     loopback, geometric, analyser, question, answer, told
 ):
     loopback.then(answer(loopback))
-    analysis = analyser(within_s=0.25).analyse(question)
+    analysis = analyser().analyse(question)
     alone = geometric.analyse(question)
     assert analysis.model_copy(update={"notes": ()}) == alone
     assert alone.task.feasible is Feasible.YES
     note = analysis.notes[-1]
     assert note.startswith("measured only, server bench gave nothing: ")
-    assert any(part in note for part in told.split("|"))
+    assert told in note
+
+
+def test_measuring_goes_on_alone_when_the_server_is_slow(loopback, geometric, analyser, question):
+    loopback.then(loopback.raw(b"HTTP/1.1 200 OK\r\n", pause_s=0.3))
+    analysis = analyser(within_s=0.25).analyse(question)
+    assert analysis.model_copy(update={"notes": ()}) == geometric.analyse(question)
+    assert any(word in analysis.notes[-1] for word in ("within", "silent"))
 
 
 def test_calls_are_bounded_by_the_minute(loopback, analyser, question):

@@ -40,9 +40,9 @@ def settings() -> Callable[..., ServerSettings]:
             "url": url,
             "model": "tiny",
             "location": "local",
-            "connect_timeout_s": 1.0,
-            "read_timeout_s": 1.0,
-            "total_timeout_s": 2.0,
+            "connect_timeout_s": 10.0,
+            "read_timeout_s": 10.0,
+            "total_timeout_s": 20.0,
         }
         return ServerSettings.model_validate(declared | changes)
 
