@@ -113,9 +113,9 @@ class ControlNode:
     def stop(self) -> None:
         """Ramp to rest, release what may be released, and close the buses.
 
-        All power goes only when the robot is switched off. Whatever else ends this process, such as
-        a crash or the supervisor's death, leaves groups of stop category 2, and hands that hold
-        something, to their Bus Watchdog and to the next control.
+        Power goes only when the robot is switched off, but for hands that hold something. Whatever
+        else ends this process, such as a crash or the supervisor's death, leaves groups of stop
+        category 2 too to their Bus Watchdog and to the next control.
         """
         self._telemetry.tell_results(self._motions.stop("control is shut down"))
         deadline_ns = self._clock.now_ns() + _SHUTDOWN_NS
@@ -125,7 +125,7 @@ class ControlNode:
             self._base.brake(self.period_s)
             self._clock.sleep_until(self._clock.now_ns() + round(self.period_s * NS_PER_S))
         if power_off_asked(self._run_dir):
-            self._stopping.remove_power()
+            self._stopping.switch_off()
         else:
             self._stopping.release()
         self._wheels.cycle(0.0, 0.0)

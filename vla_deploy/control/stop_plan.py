@@ -45,6 +45,16 @@ class StopPlan:
         """Return the joints that a disarmed robot leaves without power: all but category 2."""
         return np.flatnonzero(self._categories(holding) != StopCategory.STOP_KEEP_POWER)
 
+    def switched_off(self, holding: Collection[str]) -> Axes:
+        """Return the joints that lose power when a person switches the robot off.
+
+        That is all, but what a hand holds is not dropped: it keeps its power, and its arm.
+        """
+        off = np.ones(len(self._joints), np.bool_)
+        for hand in holding:
+            off[self._carrying[hand]] = False
+        return np.flatnonzero(off)
+
     def base_category(self, reaction: Reaction) -> StopCategory:
         """Return how the base stops."""
         if reaction is Reaction.BASE_OFF:

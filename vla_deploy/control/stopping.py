@@ -15,8 +15,8 @@ from vla_deploy.safety import Reaction, Verdict
 class Stopping:
     """Follow one stop from its beginning to standstill, and take power where it has to go.
 
-    Joint groups of category 2, and hands that hold something, keep theirs; only `remove_power`
-    takes it all.
+    Joint groups of category 2, and hands that hold something, keep theirs; `switch_off` leaves it
+    to those hands alone, and only `remove_power` takes it all.
     """
 
     def __init__(
@@ -76,6 +76,11 @@ class Stopping:
         self._servos.remove_power(self._plan.released(self._holding()))
         if self._plan.base is not StopCategory.STOP_KEEP_POWER:
             self._wheels.disable()
+
+    def switch_off(self) -> None:
+        """Take all power, but from hands that hold something: it would drop."""
+        self._servos.remove_power(self._plan.switched_off(self._holding()))
+        self._wheels.disable()
 
     def remove_power(self) -> str:
         """Take all power; return why a servo did not confirm it, or nothing."""

@@ -11,6 +11,7 @@ from drivers.drive_bus import PowerState
 from drivers.errors import DeviceMissing
 from platforms import load_profile
 from vla_deploy.control.servos import ServoLine
+from vla_deploy.ipc import SharedSpace
 from vla_deploy.power_off import ask_power_off
 from vla_deploy.robots.description import StopCategory
 
@@ -385,6 +386,17 @@ def test_a_robot_that_is_switched_off_ramps_and_then_takes_all_power(armed: Rig)
     armed.lockstep.remove(armed.control)
     assert [r["status"] for r in armed.results()] == ["stopped"]
     assert set(torque_enabled(armed).values()) == {0}
+
+
+def test_what_a_hand_holds_is_not_dropped_when_the_robot_is_switched_off(armed: Rig) -> None:
+    space = SharedSpace(armed.lockstep.context.run_dir / "ipc", armed.lockstep.clock)
+    space.cell_writer("executor_status").put_document({"holding": {"left": "cup", "right": None}})
+    armed.run(0.1)
+    ask_power_off(armed.lockstep.context.run_dir)
+    armed.lockstep.remove(armed.control)
+    powered = {joint for joint, torque in torque_enabled(armed).items() if torque}
+    groups = armed.robot.groups
+    assert powered == {*groups["left_arm"].joints, *groups["left_gripper"].joints}
 
 
 def test_a_control_that_is_ended_otherwise_holds_the_arms_for_the_next_one(armed: Rig) -> None:

@@ -120,9 +120,19 @@ def test_an_arm_that_holds_something_keeps_its_power(
     assert len(plan.released({"left"})) == 0
 
 
+def test_a_robot_that_is_switched_off_keeps_only_what_would_drop_something(
+    robot: RobotDescription,
+) -> None:
+    plan = StopPlan(robot)
+    every = set(robot.joint_names)
+    assert names(robot, plan.switched_off(())) == every
+    assert names(robot, plan.switched_off({"left"})) == every - left_side(robot)
+
+
 def test_an_arm_that_may_drop_its_payload_loses_power_all_the_same(robot: RobotDescription) -> None:
     changed = with_arm(robot, StopCategory.POWER_REMOVED, drop_payload=True)
     plan = StopPlan(changed)
+    assert len(plan.switched_off({"left"})) == len(robot.joint_names)
     assert names(changed, plan.unpowered_at_once(Reaction.GROUP_STOP, {"left"})) == left_side(
         changed
     )
