@@ -5,6 +5,7 @@ import logging
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from training.detector.card import describe
@@ -24,19 +25,21 @@ def main() -> None:
     parser.add_argument("step", choices=[*STEPS, "ship", "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for data and models")
     parser.add_argument("--size", choices=SIZES, default="full")
+    parser.add_argument("--threads", type=int, default=1, help="of the training (default: 1)")
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     if arguments.step == "all":
-        _run_all(arguments.out, arguments.size)
-    else:
-        {**STEPS, "ship": _ship}[arguments.step](arguments.out, SIZES[arguments.size])
+        _run_all(arguments.out, arguments.size, arguments.threads)
+        return
+    settings = replace(SIZES[arguments.size], threads=arguments.threads)
+    {**STEPS, "ship": _ship}[arguments.step](arguments.out, settings)
 
 
-def _run_all(out: Path, size: str) -> None:
+def _run_all(out: Path, size: str, threads: int) -> None:
     """Run each step in a process of its own: Mesa's LLVM and torch crash each other in one."""
+    options = ["--out", str(out), "--size", size, "--threads", str(threads)]
     for step in STEPS:
-        command = [sys.executable, "-m", "training.detector", step]
-        subprocess.run([*command, "--out", str(out), "--size", size], check=True)
+        subprocess.run([sys.executable, "-m", "training.detector", step, *options], check=True)
 
 
 def _data(out: Path, settings: Settings) -> None:

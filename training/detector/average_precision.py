@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from training.detector.classes import CLASSES
 from vla_deploy.perception.detectors.boxes import Boxes, iou
+from vla_deploy.perception.model_tools.accuracy import average_precision
 
 MATCH_IOU, TIGHT_IOU = 0.5, 0.75
 SURE_SCORE = 0.35
@@ -49,8 +50,8 @@ def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> 
     scores, right = _joined(at50)
     sure = scores >= SURE_SCORE
     return Judgement(
-        ap50=_average_precision(scores, right, count),
-        ap75=_average_precision(*_joined(at75), count),
+        ap50=average_precision(scores, right, count) if count else 0.0,
+        ap75=average_precision(*_joined(at75), count) if count else 0.0,
         recall=hits / max(count, 1),
         precision=float(right[sure].mean()) if sure.any() else 0.0,
         labels=count,
@@ -106,14 +107,3 @@ def _centres_hit(index: int, boxes: Boxes, rows: Rows) -> int:
         around = (near[:, 0] <= x) & (x <= near[:, 2]) & (near[:, 1] <= y) & (y <= near[:, 3])
         hits += bool((around & (iou(label, near) >= 0.3)).any())
     return hits
-
-
-def _average_precision(scores: NDArray[np.float32], right: NDArray[np.bool_], count: int) -> float:
-    """Return the area under precision over recall, precision made to fall from right to left."""
-    if not count or not len(scores):
-        return 0.0
-    ranked = right[np.argsort(-scores, kind="stable")]
-    hits = np.cumsum(ranked)
-    precision = hits / np.arange(1, len(ranked) + 1)
-    envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    return float(envelope[ranked].sum() / count)

@@ -1,5 +1,6 @@
 """Make batches: vary the images, cut pieces out of them, and draw their targets."""
 
+import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ Rows = NDArray[np.float32]
 MIN_LEFT_RATIO = 0.6
 """A thing of which a cut leaves less is passed over."""
 AT_THING_CHANCE = 0.85
+AS_DRAWN_CHANCE = 0.4
+SCALES = (0.8, 1.25)
+"""How much pieces are grown or shrunk."""
 
 
 def make_batch(
@@ -31,7 +35,7 @@ def make_batch(
         image, rows = _vary(image, rows, random)
         images.append(image)
         made = make_targets(rows, *image.shape[:2])
-        targets.append((made.heat, made.ignored, made.edges, made.share))
+        targets.append((made.names, made.ignored, made.edges, made.share))
     stacked = [torch.from_numpy(np.stack(maps)) for maps in zip(*targets, strict=True)]
     return torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2), stacked
 
@@ -39,8 +43,9 @@ def make_batch(
 def _cut(
     image: Image, rows: Rows, random: np.random.Generator, piece_px: tuple[int, int]
 ) -> tuple[Image, Rows]:
-    """Cut out a piece, mostly one that has a thing near its middle."""
-    high, wide = piece_px
+    """Cut out a piece, mostly one that has a thing near its middle, and mostly scale it a bit."""
+    scale = 1.0 if random.random() < AS_DRAWN_CHANCE else float(random.uniform(*SCALES))
+    high, wide = (round(side / scale) for side in piece_px)
     room = np.array([image.shape[1] - wide, image.shape[0] - high])
     corner = random.integers(0, room + 1)
     judged = rows[rows[:, 6] > 0]
@@ -50,7 +55,9 @@ def _cut(
         off = random.uniform(-0.3, 0.3, 2) * (wide, high)
         corner = (middle - np.array([wide, high]) / 2 + off).clip(0, room).astype(int)
     x, y = (int(value) for value in corner)
-    return image[y : y + high, x : x + wide], _cut_rows(rows, x, y, wide, high)
+    piece, rows = image[y : y + high, x : x + wide], _cut_rows(rows, x, y, wide, high)
+    rows[:, 2:6] *= np.array([piece_px[1] / wide, piece_px[0] / high] * 2)
+    return np.asarray(cv2.resize(piece, piece_px[::-1]), np.uint8), rows
 
 
 def _cut_rows(rows: Rows, x: int, y: int, wide: int, high: int) -> Rows:

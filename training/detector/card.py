@@ -12,7 +12,7 @@ from training.detector.dataset import FLAT_SHARE, IMAGES_PER_SHARD
 from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import SAME_CLASS_IOU
 from training.detector.files import CARD, FILES, MANIFEST, METRICS
-from training.detector.labels import MIN_LONG_PX, MIN_PIXELS, MIN_SEEN_RATIO
+from training.detector.labels import LARGE_LEAST, MIN_SEEN_RATIO, SMALL_LEAST
 from training.detector.settings import Settings
 from training.detector.targets import STRIDE_PX
 
@@ -92,8 +92,10 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
         "images": images,
         "flat_share": f"{FLAT_SHARE:.0%}",
         "per_shard": IMAGES_PER_SHARD,
-        "min_pixels": MIN_PIXELS,
-        "min_long_px": f"{MIN_LONG_PX:.0f}",
+        "small_pixels": SMALL_LEAST.pixels,
+        "small_long_px": f"{SMALL_LEAST.long_px:.0f}",
+        "large_pixels": LARGE_LEAST.pixels,
+        "large_long_px": f"{LARGE_LEAST.long_px:.0f}",
         "min_seen": f"{MIN_SEEN_RATIO:.0%}",
         "sure_score": metrics["sure_score"],
         "tables": tables(metrics),

@@ -115,7 +115,7 @@ def _put_large(stage: Stage, layout: Layout, random: Random) -> None:
 def _put_small(stage: Stage, layout: Layout, random: Random) -> None:
     pool = [prop for prop in stage.props if prop.thing.class_name in SMALL]
     order = [pool[int(k)] for k in random.permutation(len(pool))]
-    wanted = int(random.integers(2, 10))
+    wanted = int(random.integers(3, 13))
     noise = [prop for prop in stage.props if prop.thing.class_name == CLUTTER]
     picks = random.permutation(len(noise))[: int(random.integers(0, 5))]
     for prop in [*order[:wanted], *(noise[int(k)] for k in picks)]:

@@ -4,34 +4,49 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from training.detector.network import BOX_LOG_RANGE
-from training.detector.targets import STRIDE_PX
+THING_WEIGHT, NAME_WEIGHT, BOX_WEIGHT = 2.0, 1.0, 2.0
+LEAST_QUALITY = 0.5
+"""What to say of a core's cell whose box is wrong; the rest is for how well the box fits."""
+Maps = tuple[Tensor, Tensor, Tensor]
 
-HEAT_WEIGHT, BOX_WEIGHT = 10.0, 5.0
-SEEN_HEAT = 0.1
 
+def losses(maps: Maps, targets: tuple[Tensor, Tensor, Tensor, Tensor]) -> Maps:
+    """Return the losses of things, names and boxes, for each core of average size.
 
-def heat_loss(logits: Tensor, heat: Tensor, ignored: Tensor) -> Tensor:
-    """Return the quality focal loss of the heat, per thing.
-
-    Each cell has a value to reach, however near to a centre it is: a loss with one right cell per
-    thing would ask for a centre more exactly than an image of this size shows it.
+    `maps` are the network's, raw; targets are as `Targets` holds them, one image after another.
     """
-    entropy = functional.binary_cross_entropy_with_logits(logits, heat, reduction="none")
-    counts = 1 - ignored * (heat < SEEN_HEAT)
-    loss = entropy * (logits.sigmoid() - heat) ** 2 * counts
-    return HEAT_WEIGHT * loss.sum() / heat.sum().clamp(min=1.0)
+    things, names, told = maps
+    wanted, ignored, edges, share = targets
+    overlap, generalised = _overlaps(told, edges)
+    whole = share.sum().clamp(min=1.0)
+    in_core = wanted >= 0
+    unnamed = functional.cross_entropy(names, wanted.clamp(min=0), reduction="none")
+    return (
+        THING_WEIGHT * _thing_loss(things[:, 0], in_core, ignored, share, overlap.detach()) / whole,
+        NAME_WEIGHT * (unnamed * share).sum() / whole,
+        BOX_WEIGHT * ((1 - generalised) * share).sum() / whole,
+    )
 
 
-def box_loss(logs: Tensor, edges: Tensor, share: Tensor) -> Tensor:
-    """Return the generalised IoU loss, weighted by each cell's share."""
-    told = STRIDE_PX * torch.exp(logs.clamp(*BOX_LOG_RANGE))
-    smaller, larger = torch.minimum(told, edges), torch.maximum(told, edges)
-    inner = (smaller[:, 0] + smaller[:, 2]) * (smaller[:, 1] + smaller[:, 3])
-    hull = (larger[:, 0] + larger[:, 2]) * (larger[:, 1] + larger[:, 3])
+def _thing_loss(
+    logits: Tensor, in_core: Tensor, ignored: Tensor, share: Tensor, overlap: Tensor
+) -> Tensor:
+    """Return the quality focal loss: the surest cell of a thing should tell the best box."""
+    quality = LEAST_QUALITY + (1 - LEAST_QUALITY) * overlap.clamp(0, 1)
+    aim = torch.where(in_core, quality, torch.zeros_like(quality))
+    entropy = functional.binary_cross_entropy_with_logits(logits, aim, reduction="none")
+    weight = torch.where(in_core, share, 1 - ignored)
+    return (entropy * (logits.sigmoid() - aim) ** 2 * weight).sum()
+
+
+def _overlaps(told: Tensor, edges: Tensor) -> tuple[Tensor, Tensor]:
+    """Return intersection over union of the boxes of each cell, and the generalised one."""
+    low, high = torch.minimum(told, edges), torch.maximum(told, edges)
+    inner = (low[:, 0] + low[:, 2]).clamp(min=0) * (low[:, 1] + low[:, 3]).clamp(min=0)
+    hull = (high[:, 0] + high[:, 2]) * (high[:, 1] + high[:, 3])
     union = _area(told) + _area(edges) - inner
-    generalised = inner / union - (hull - union) / hull
-    return BOX_WEIGHT * ((1 - generalised) * share).sum() / share.sum().clamp(min=1e-3)
+    overlap = inner / union
+    return overlap, overlap - (hull - union) / hull
 
 
 def _area(edges: Tensor) -> Tensor:

@@ -1,64 +1,79 @@
-"""Define the network: plain 3x3 convolutions with ReLU, heat and boxes at a quarter of the size."""
+"""Define the network: plain 3x3 convolutions with ReLU, heat and boxes at an eighth of the size."""
 
 import torch
 from torch import Tensor, nn
 
 from training.detector.targets import STRIDE_PX
 
-HEAT_PRIOR = -4.0
-BOX_LOG_RANGE = (-2.0, 4.6)
-"""Bounds of ln(distance to an edge / stride)."""
+THING_PRIOR = -4.0
+SIZE_LOG_RANGE = (-2.0, 4.6)
+"""Bounds of ln(side of a box / stride)."""
+FIRST_SIZE_LOG = 1.3
+QUARTER, EIGHTH, SIXTEENTH, JOINED = 32, 64, 112, 80
+"""Channels at each size."""
 
 
 def _block(inputs: int, outputs: int, stride: int = 1, spread: int = 1) -> nn.Sequential:
+    return _activated(nn.Conv2d(inputs, outputs, 3, stride, spread, spread, bias=False))
+
+
+def _activated(convolution: nn.Conv2d) -> nn.Sequential:
     return nn.Sequential(
-        nn.Conv2d(inputs, outputs, 3, stride, spread, spread, bias=False),
-        nn.BatchNorm2d(outputs),
-        nn.ReLU(inplace=True),
+        convolution, nn.BatchNorm2d(convolution.out_channels), nn.ReLU(inplace=True)
     )
 
 
 class CentreNet(nn.Module):
-    """Tell for each cell of 4 x 4 pixels how likely a thing's centre is there, and its box.
+    """Tell for each cell of 8 x 8 pixels how likely a thing's middle is there, and its box.
 
     `image` is N x 3 x H x W, RGB from 0 to 1, H and W multiples of 16. The outputs are `heat`,
-    N x classes x H/4 x W/4 from 0 to 1, and `edges`, N x 4 x H/4 x W/4: distances in pixels from
+    N x classes x H/8 x W/8 from 0 to 1, and `edges`, N x 4 x H/8 x W/8: distances in pixels from
     the cell's centre to the left, top, right and bottom edge.
     """
 
     def __init__(self, classes: int) -> None:
         super().__init__()
-        self.stem = _block(3, 16, 2)
-        self.quarter = nn.Sequential(_block(16, 32, 2), _block(32, 32))
-        self.eighth = nn.Sequential(_block(32, 64, 2), _block(64, 64), _block(64, 64))
+        # One step to a quarter: maps of half the size would take a third of all time, and tell no
+        # more of things of 16 px and up.
+        self.stem = _activated(nn.Conv2d(3, QUARTER, 6, 4, 1, bias=False))
+        self.quarter = _block(QUARTER, QUARTER)
+        self.eighth = nn.Sequential(
+            _block(QUARTER, EIGHTH, 2), _block(EIGHTH, EIGHTH), _block(EIGHTH, EIGHTH)
+        )
         # Spread kernels see a whole person without a level at 1/32, which does not divide 240 rows.
         self.sixteenth = nn.Sequential(
-            _block(64, 96, 2), _block(96, 96, spread=2), _block(96, 96, spread=3), _block(96, 96)
+            _block(EIGHTH, SIXTEENTH, 2),
+            _block(SIXTEENTH, SIXTEENTH, spread=2),
+            _block(SIXTEENTH, SIXTEENTH, spread=3),
+            _block(SIXTEENTH, SIXTEENTH),
         )
-        self.to_eighth = nn.Conv2d(96, 64, 1)
-        self.to_quarter = nn.Conv2d(64, 40, 1)
-        self.from_quarter = nn.Conv2d(32, 40, 1)
-        self.join_eighth = _block(64, 64)
-        self.join_quarter = _block(40, 40)
+        self.from_eighth = nn.Conv2d(EIGHTH, JOINED, 1)
+        self.to_eighth = nn.Conv2d(SIXTEENTH, JOINED, 1)
         self.grow = nn.Upsample(scale_factor=2, mode="nearest")
-        self.last = nn.Conv2d(40, classes + 4, 1)
+        self.join = nn.Sequential(_block(JOINED, JOINED), _block(JOINED, JOINED))
+        self.last = nn.Conv2d(JOINED, 1 + classes + 4, 1)
         with torch.no_grad():
             assert self.last.bias is not None
-            self.last.bias.copy_(torch.tensor([HEAT_PRIOR] * classes + [1.0] * 4))
-        self.classes = classes
+            first = [THING_PRIOR] + [0.0] * classes + [0.0, 0.0, FIRST_SIZE_LOG, FIRST_SIZE_LOG]
+            self.last.bias.copy_(torch.tensor(first))
 
-    def raw(self, image: Tensor) -> tuple[Tensor, Tensor]:
-        """Return logits of the heat and logarithms of the edges in strides."""
-        quarter = self.quarter(self.stem(image))
-        eighth = self.eighth(quarter)
-        sixteenth = self.sixteenth(eighth)
-        eighth = self.join_eighth(eighth + self.grow(self.to_eighth(sixteenth)))
-        fine = self.join_quarter(self.from_quarter(quarter) + self.grow(self.to_quarter(eighth)))
-        with torch.autocast(fine.device.type, enabled=False):
-            last = self.last(fine.float())
-        return last[:, : self.classes], last[:, self.classes :]
+    def raw(self, image: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return logits of whether something is there and of its name, and edges in pixels."""
+        eighth = self.eighth(self.quarter(self.stem(image)))
+        wide = self.to_eighth(self.sixteenth(eighth))
+        joined = self.join(self.from_eighth(eighth) + self.grow(wide))
+        with torch.autocast(joined.device.type, enabled=False):
+            last = self.last(joined.float())
+        return last[:, :1], last[:, 1:-4], _edges(last[:, -4:])
 
     def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
         """Return heat and edges."""
-        heat, edges = self.raw(image)
-        return torch.sigmoid(heat), STRIDE_PX * torch.exp(edges.clamp(*BOX_LOG_RANGE))
+        things, names, edges = self.raw(image)
+        return torch.sigmoid(things) * torch.softmax(names, dim=1), edges
+
+
+def _edges(boxes: Tensor) -> Tensor:
+    """Return distances to the edges from the way to the box's middle and its sides' logarithms."""
+    middle = boxes[:, :2] * STRIDE_PX
+    half = 0.5 * STRIDE_PX * torch.exp(boxes[:, 2:].clamp(*SIZE_LOG_RANGE))
+    return torch.cat([half - middle, half + middle], dim=1)

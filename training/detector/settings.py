@@ -8,19 +8,19 @@ class Settings:
     """Hold what decides the result besides the code; shards per split hold 20 images each.
 
     First come `epochs` on pieces of the images, which show most of the things for half the work,
-    then `settling_epochs` on whole images. After `steady_epochs` the learning rate falls.
+    then `settling_epochs` on whole images, through which the learning rate falls.
     """
 
     name: str
     seed: int = 0
     shards: tuple[tuple[str, int], ...]
-    steady_epochs: int
     epochs: int
     settling_epochs: int
     piece_px: tuple[int, int] = (160, 208)
     batch: int = 8
     learning_rate: float = 2e-3
     calibration_images: int = 200
+    threads: int = 1
 
     def shard_count(self, split: str) -> int:
         """Return how many shards a split has."""
@@ -29,8 +29,7 @@ class Settings:
 
 FULL = Settings(
     name="full",
-    shards=(("heldout", 50), ("flat", 20), ("train", 800)),
-    steady_epochs=2,
+    shards=(("heldout", 50), ("flat", 20), ("train", 540)),
     epochs=30,
     settling_epochs=2,
 )
@@ -38,7 +37,6 @@ FULL = Settings(
 SHORT = Settings(
     name="short",
     shards=(("heldout", 50), ("flat", 20), ("train", 400)),
-    steady_epochs=4,
     epochs=8,
     settling_epochs=1,
 )
@@ -46,7 +44,6 @@ SHORT = Settings(
 TINY = Settings(
     name="tiny",
     shards=(("heldout", 1), ("flat", 1), ("train", 2)),
-    steady_epochs=1,
     epochs=1,
     settling_epochs=1,
     batch=4,

@@ -1,28 +1,27 @@
 """Turn labelled boxes into what the network's maps should say."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from training.detector.classes import CLASSES
-
-STRIDE_PX = 4
-SPREAD_RATIO, MIN_SPREAD_CELLS = 0.12, 0.8
-"""Standard deviation of the heat around a centre, as a share of the box, and at least."""
-LEAST_HEAT, LEAST_SHARE = 0.02, 0.1
-"""Heat below the first is none; cells above the second learn the box's edges."""
+STRIDE_PX = 8
+CORE_RATIO = 0.25
+MIN_CORE_PX, MAX_CORE_PX = 6.0, 14.0
+"""Half size of the core of a box, whose cells learn it: a share of the box's, within bounds."""
 Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Targets:
-    """Hold targets of one image: heat (classes x h x w, 1 at centres), where it does not count
-    (`ignored`, 0 or 1), edges in pixels (4 x h x w) and each cell's share in its box (h x w).
+    """Hold targets of one image for each of its h x w cells.
+
+    `names` is the class of the thing in whose core the cell lies, or -1; `ignored` is 1 where
+    nothing is to be learnt but cores; `edges` (4 x h x w) are distances in pixels from the cell's
+    centre to the left, top, right and bottom edge; `share` is the cell's weight in its core.
     """
 
-    heat: Floats
+    names: NDArray[np.int64]
     ignored: Floats
     edges: Floats
     share: Floats
@@ -32,8 +31,8 @@ def make_targets(rows: NDArray[np.float32], height: int, width: int) -> Targets:
     """Return the targets of an image of that size in pixels for the data set's rows of it."""
     h, w = height // STRIDE_PX, width // STRIDE_PX
     targets = Targets(
-        heat=np.zeros((len(CLASSES), h, w), np.float32),
-        ignored=np.zeros((len(CLASSES), h, w), np.float32),
+        names=np.full((h, w), -1, np.int64),
+        ignored=np.zeros((h, w), np.float32),
         edges=np.ones((4, h, w), np.float32),
         share=np.zeros((h, w), np.float32),
     )
@@ -42,39 +41,34 @@ def make_targets(rows: NDArray[np.float32], height: int, width: int) -> Targets:
         if row[6]:
             _learn(targets, int(row[1]), row[2:6])
         else:
-            _pass_over(targets, int(row[1]), row[2:6])
+            _pass_over(targets, row[2:6])
     return targets
 
 
-def _pass_over(targets: Targets, class_index: int, box: Floats) -> None:
-    left, top = (math.floor(value / STRIDE_PX) for value in box[:2])
-    right, bottom = (math.ceil(value / STRIDE_PX) for value in box[2:])
-    channels = slice(None) if class_index < 0 else class_index
-    targets.ignored[channels, top:bottom, left:right] = 1.0
+def _pass_over(targets: Targets, box: Floats) -> None:
+    left, top = np.floor(box[:2] / STRIDE_PX).astype(int)
+    right, bottom = np.ceil(box[2:] / STRIDE_PX).astype(int)
+    targets.ignored[top:bottom, left:right] = 1.0
 
 
 def _learn(targets: Targets, class_index: int, box: Floats) -> None:
-    """Write one box over what larger ones wrote before."""
+    """Write one box over what larger ones wrote before: a cell can tell of one box alone."""
     h, w = targets.share.shape
-    rows, columns = np.arange(h), np.arange(w)
-    bell = np.outer(_bell(rows, box[1::2]), _bell(columns, box[::2]))
-    targets.heat[class_index] = np.maximum(targets.heat[class_index], bell)
-    x, y = (columns + 0.5) * STRIDE_PX, (rows + 0.5)[:, None] * STRIDE_PX
-    distances = np.stack(
-        np.broadcast_arrays(x - box[0], y - box[1], box[2] - x, box[3] - y)
-    ).astype(np.float32)
-    area = (bell >= LEAST_SHARE) & (distances.min(axis=0) > 0)
-    if not area.any():
-        return
-    targets.edges[:, area] = distances[:, area].clip(0.5)
-    size = max(float((box[2] - box[0]) * (box[3] - box[1])), 1.0)
-    targets.share[area] = bell[area] * (math.log(size) / bell[area].sum())
+    top, bottom = _core(box[1], box[3], h)
+    left, right = _core(box[0], box[2], w)
+    core = np.s_[top:bottom, left:right]
+    x = (np.arange(left, right) + 0.5) * STRIDE_PX
+    y = (np.arange(top, bottom) + 0.5)[:, None] * STRIDE_PX
+    edges = np.broadcast_arrays(x - box[0], y - box[1], box[2] - x, box[3] - y)
+    targets.names[core] = class_index
+    targets.edges[:, *core] = np.stack(edges)
+    targets.share[core] = ((bottom - top) * (right - left)) ** -0.5
 
 
-def _bell(cells: NDArray[np.int_], span: Floats) -> Floats:
-    """Return how near each row or column of cells is to the middle: 1 at the nearest one."""
-    middle, size = float(span[0] + span[1]) / 2 / STRIDE_PX, float(span[1] - span[0]) / STRIDE_PX
-    nearest = min(int(middle), len(cells) - 1)
-    sigma = max(SPREAD_RATIO * size, MIN_SPREAD_CELLS)
-    bell = np.exp(-((cells - nearest) ** 2) / (2 * sigma**2))
-    return np.where(bell > LEAST_HEAT, bell, 0.0).astype(np.float32)
+def _core(low: float, high: float, cells: int) -> tuple[int, int]:
+    """Return the first cell in the core of a span in pixels, and that after the last."""
+    middle, reach = (low + high) / 2, CORE_RATIO * (high - low)
+    reach = min(max(reach, MIN_CORE_PX), MAX_CORE_PX)
+    first = round((middle - reach) / STRIDE_PX)
+    after = round((middle + reach) / STRIDE_PX)
+    return max(0, first), min(cells, max(after, first + 1))

@@ -26,7 +26,7 @@ def cup(random: Random) -> Thing:
     """Return a mug or tumbler, turned or made of staves as the flat's own."""
     height, rim = between(random, 0.07, 0.125), between(random, 0.03, 0.048)
     foot = rim * between(random, 0.7, 1.0)
-    handle = random.random() < 0.75
+    handle = random.random() < 0.85
     wall = _staves if random.random() < 0.4 else _turned
     parts = wall(height, rim, foot)
     if random.random() < 0.3:
@@ -37,7 +37,7 @@ def cup(random: Random) -> Thing:
     rests = (
         Rest(quat=UPRIGHT, height_m=height / 2, weight=6),
         Rest(quat=ON_SIDE, height_m=rim),
-        Rest(quat=UPSIDE_DOWN, height_m=height / 2),
+        Rest(quat=UPSIDE_DOWN, height_m=height / 2, weight=0.5),
     )
     return Thing(class_name="cup", parts=tuple(parts), rests=rests, radius_m=rim + 0.02 * handle)
 
@@ -268,9 +268,9 @@ def can(random: Random) -> Thing:
         _disc(radius * 0.94, half, 0.0, "metal"),
         _disc(radius * 0.82, 0.0006, half, "accent" if random.random() < 0.3 else "metal"),
     ]
-    if random.random() < 0.5:
-        z = between(random, -0.3, 0.3) * half
-        parts.append(_disc(radius * 1.006, half * between(random, 0.15, 0.5), z, "label"))
+    if random.random() < 0.85:
+        z = between(random, -0.2, 0.2) * half
+        parts.append(_disc(radius * 1.006, half * between(random, 0.25, 0.6), z, "label"))
     if random.random() < 0.5:
         tab = (0.009, 0.005, 0.001)
         parts.append(Part(kind="box", size=tab, at=(0.006, 0, half + 0.001), role="metal"))

@@ -12,19 +12,19 @@ from torch import Tensor
 from training.detector.batches import make_batch
 from training.detector.classes import CLASSES
 from training.detector.dataset import load
-from training.detector.losses import box_loss, heat_loss
+from training.detector.losses import losses
 from training.detector.network import CentreNet
 from training.detector.settings import Settings
 
 WEIGHTS = "centre_net.pt"
 STATE = "training_state.pt"
-AVERAGE_DECAY = 0.998
-WEIGHT_DECAY = 1e-4
+AVERAGE_DECAY = 0.999
+WEIGHT_DECAY = 0.02
 MAX_GRADIENT = 10.0
 WARM_STEPS = 300
 LAST_RATE_RATIO = 0.01
-"""Learning rate at the end over that in the beginning."""
-TELL_EVERY_STEPS = 50
+"""Learning rate at the end over the highest."""
+TELL_EVERY_STEPS = 100
 _LOG = logging.getLogger(__name__)
 
 
@@ -37,7 +37,7 @@ def train(out: Path, settings: Settings) -> None:
         FileNotFoundError: the data are not there.
     """
     torch.manual_seed(settings.seed)
-    torch.set_num_threads(1)
+    torch.set_num_threads(settings.threads)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     shard = load(out / "data", "train", settings.shard_count("train"))
     run = _Run(settings, device, len(shard.images) // settings.batch)
@@ -45,11 +45,11 @@ def train(out: Path, settings: Settings) -> None:
         random = np.random.default_rng([settings.seed, 100, epoch])
         piece_px = settings.piece_px if epoch < settings.epochs else None
         order = random.permutation(len(shard.images))
-        losses = [
+        told = [
             run.step(*make_batch(shard, order[k : k + settings.batch], random, piece_px))
             for k in range(0, len(order) - settings.batch + 1, settings.batch)
         ]
-        _LOG.info("epoch %d: heat %.3f, box %.3f", epoch, *np.mean(losses, axis=0))
+        _LOG.info("epoch %d: things %.3f, names %.3f, boxes %.3f", epoch, *np.mean(told, axis=0))
         run.save(out / STATE, epoch + 1)
         _write(run.average.state_dict(), out / WEIGHTS)
 
@@ -94,33 +94,33 @@ class _Run:
         }
         _write(state, path)
 
-    def step(self, images: Tensor, targets: list[Tensor]) -> tuple[float, float]:
-        """Learn from one batch; return the losses of heat and boxes."""
-        images = images.to(self._device).float().contiguous(memory_format=torch.channels_last) / 255
-        heat, ignored, edges, share = (target.to(self._device) for target in targets)
+    def step(self, images: Tensor, targets: list[Tensor]) -> list[float]:
+        """Learn from one batch; return the losses of things, names and boxes."""
+        images = images.to(self._device).contiguous(memory_format=torch.channels_last)
+        images = images.to(torch.bfloat16).mul_(1 / 255)
+        names, ignored, edges, share = (target.to(self._device) for target in targets)
         with torch.autocast(self._device.type, torch.bfloat16):
-            logits, logs = self.model.raw(images)
-        of_heat = heat_loss(logits.float(), heat, ignored)
-        of_boxes = box_loss(logs.float(), edges, share)
+            maps = self.model.raw(images)
+        parts = losses(maps, (names, ignored, edges, share))
         for group in self._optimiser.param_groups:
             group["lr"] = self._learning_rate()
         self._optimiser.zero_grad()
-        (of_heat + of_boxes).backward()  # type: ignore[no-untyped-call]
+        sum(parts).backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), MAX_GRADIENT)
         self._optimiser.step()
         self._follow()
-        losses = (of_heat.item(), of_boxes.item())
+        values = [part.item() for part in parts]
         if self._steps % TELL_EVERY_STEPS == 0:
-            _LOG.info("step %d: heat %.3f, box %.3f", self._steps, *losses)
-        return losses
+            _LOG.info("step %d: things %.3f, names %.3f, boxes %.3f", self._steps, *values)
+        return values
 
     def _learning_rate(self) -> float:
-        """Rise, stay, then fall by the same share in each epoch."""
-        settings, epoch = self._settings, self._steps / self._per_epoch
-        last = settings.epochs + settings.settling_epochs
-        fallen = max(0.0, (epoch - settings.steady_epochs) / (last - settings.steady_epochs))
+        """Rise, stay, and fall while the training settles."""
+        settings = self._settings
         rise = min(1.0, (self._steps + 1) / WARM_STEPS)
-        return settings.learning_rate * rise * float(LAST_RATE_RATIO**fallen)
+        settled = (self._steps / self._per_epoch - settings.epochs) / settings.settling_epochs
+        fallen = min(1.0, max(0.0, settled))
+        return settings.learning_rate * rise * (1 - (1 - LAST_RATE_RATIO) * fallen)
 
     @torch.no_grad()
     def _follow(self) -> None:

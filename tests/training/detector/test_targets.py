@@ -16,7 +16,7 @@ def rows(*labels: tuple[int, int, int, int, int, int]) -> np.ndarray:
 
 def surest(made: Targets) -> Boxes:
     return decode(
-        made.heat, made.edges, stride_px=STRIDE_PX, score_threshold=0.99, iou_threshold=0.5
+        made.cores, made.edges, stride_px=STRIDE_PX, score_threshold=0.99, iou_threshold=0.5
     )
 
 
@@ -40,19 +40,33 @@ def test_a_thing_in_a_box_is_learnt_where_it_covers_the_box() -> None:
 def test_what_is_hardly_seen_is_neither_right_nor_wrong() -> None:
     made = make_targets(rows((CUP, 40, 60, 64, 90, 0)), 240, 320)
 
-    assert made.heat.max() == 0.0
-    assert made.ignored[CUP, 15:22, 10:16].all()
-    assert made.ignored.sum() == made.ignored[CUP].sum() == 8 * 6
+    assert made.cores.max() == 0.0
+    assert made.ignored[CUP, 7:12, 5:8].all()
+    assert made.ignored.sum() == made.ignored[CUP].sum() == 5 * 3
 
 
 def test_what_nobody_can_name_counts_for_no_class() -> None:
     made = make_targets(rows((-1, 40, 60, 64, 90, 0)), 240, 320)
 
-    assert made.ignored[:, 15, 10].all()
+    assert made.ignored[:, 8, 6].all()
 
 
-def test_large_and_small_things_weigh_alike_but_for_the_logarithm() -> None:
-    small = make_targets(rows((CUP, 40, 60, 50, 70, 1)), 240, 320).share.sum()
-    large = make_targets(rows((CUP, 40, 60, 140, 160, 1)), 240, 320).share.sum()
+def test_a_cell_tells_of_one_thing_alone() -> None:
+    made = make_targets(rows((CUP, 130, 50, 160, 80, 1), (BOX, 100, 20, 190, 110, 1)), 240, 320)
 
-    assert large / small == pytest.approx(2.0)
+    assert made.cores.sum(axis=0).max() == 1.0
+
+
+def test_a_thing_between_the_middles_of_cells_is_learnt_all_the_same() -> None:
+    made = make_targets(rows((CUP, 41, 65, 59, 71, 1)), 240, 320)
+
+    assert surest(made).corners_px.tolist() == [[41, 65, 59, 71]]
+
+
+def test_large_things_weigh_more_by_the_root_of_their_cells() -> None:
+    small = make_targets(rows((CUP, 40, 64, 56, 80, 1)), 240, 320)
+    large = make_targets(rows((CUP, 40, 60, 160, 200, 1)), 240, 320)
+
+    cells = large.cores.sum() / small.cores.sum()
+    assert cells > 1
+    assert large.share.sum() / small.share.sum() == pytest.approx(cells**0.5)
