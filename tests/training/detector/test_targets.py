@@ -14,9 +14,14 @@ def rows(*labels: tuple[int, int, int, int, int, int]) -> np.ndarray:
     return np.array([(0, *label) for label in labels], np.float32)
 
 
+def heat(made: Targets) -> np.ndarray:
+    """Return the heat of a network that knows the targets."""
+    return np.stack([made.names == index for index in range(len(CLASSES))]).astype(np.float32)
+
+
 def surest(made: Targets) -> Boxes:
     return decode(
-        made.cores, made.edges, stride_px=STRIDE_PX, score_threshold=0.99, iou_threshold=0.5
+        heat(made), made.edges, stride_px=STRIDE_PX, score_threshold=0.99, iou_threshold=0.5
     )
 
 
@@ -37,24 +42,13 @@ def test_a_thing_in_a_box_is_learnt_where_it_covers_the_box() -> None:
     assert boxes.corners_px[boxes.classes == CUP].tolist() == [[130, 50, 160, 80]]
 
 
-def test_what_is_hardly_seen_is_neither_right_nor_wrong() -> None:
-    made = make_targets(rows((CUP, 40, 60, 64, 90, 0)), 240, 320)
+@pytest.mark.parametrize("index", [CUP, -1])
+def test_what_is_hardly_seen_is_neither_right_nor_wrong(index: int) -> None:
+    made = make_targets(rows((index, 40, 60, 64, 90, 0)), 240, 320)
 
-    assert made.cores.max() == 0.0
-    assert made.ignored[CUP, 7:12, 5:8].all()
-    assert made.ignored.sum() == made.ignored[CUP].sum() == 5 * 3
-
-
-def test_what_nobody_can_name_counts_for_no_class() -> None:
-    made = make_targets(rows((-1, 40, 60, 64, 90, 0)), 240, 320)
-
-    assert made.ignored[:, 8, 6].all()
-
-
-def test_a_cell_tells_of_one_thing_alone() -> None:
-    made = make_targets(rows((CUP, 130, 50, 160, 80, 1), (BOX, 100, 20, 190, 110, 1)), 240, 320)
-
-    assert made.cores.sum(axis=0).max() == 1.0
+    assert made.names.max() == -1
+    assert made.ignored[7:12, 5:8].all()
+    assert made.ignored.sum() == 5 * 3
 
 
 def test_a_thing_between_the_middles_of_cells_is_learnt_all_the_same() -> None:
@@ -67,6 +61,6 @@ def test_large_things_weigh_more_by_the_root_of_their_cells() -> None:
     small = make_targets(rows((CUP, 40, 64, 56, 80, 1)), 240, 320)
     large = make_targets(rows((CUP, 40, 60, 160, 200, 1)), 240, 320)
 
-    cells = large.cores.sum() / small.cores.sum()
+    cells = (large.names == CUP).sum() / (small.names == CUP).sum()
     assert cells > 1
     assert large.share.sum() / small.share.sum() == pytest.approx(cells**0.5)
