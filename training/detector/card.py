@@ -12,7 +12,7 @@ from training.detector.dataset import FLAT_SHARE, IMAGES_PER_SHARD
 from training.detector.drawing import HEIGHT_PX, WIDTH_PX
 from training.detector.evaluation import SAME_CLASS_IOU
 from training.detector.files import CARD, FILES, MANIFEST, METRICS
-from training.detector.labels import LARGE_LEAST, MIN_SEEN_RATIO, SMALL_LEAST
+from training.detector.labels import LARGE_LEAST, MIN_SEEN_RATIO, NEAR_LONG_PX, SMALL_LEAST
 from training.detector.settings import Settings
 from training.detector.targets import STRIDE_PX
 
@@ -71,7 +71,7 @@ def verdict(metrics: dict[str, Any]) -> str:
         return f"It reaches its aim ({AIM_MAP50:.2f}, {AIM_RECALL:.2f}): {figures}."
     return (
         f"**It does not reach its aim of mAP50 {AIM_MAP50:.2f} and recall {AIM_RECALL:.2f}: it has "
-        f"{figures}.** Do not let the robot act on it alone; train it longer."
+        f"{figures}.** Do not let the robot act on it alone; train it longer, on more images."
     )
 
 
@@ -94,6 +94,9 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
         "per_shard": IMAGES_PER_SHARD,
         "small_pixels": SMALL_LEAST.pixels,
         "small_long_px": f"{SMALL_LEAST.long_px:.0f}",
+        "small_inside": f"{SMALL_LEAST.in_image:.0%}",
+        "large_inside": f"{LARGE_LEAST.in_image:.0%}",
+        "near_px": f"{NEAR_LONG_PX:.0f}",
         "large_pixels": LARGE_LEAST.pixels,
         "large_long_px": f"{LARGE_LEAST.long_px:.0f}",
         "min_seen": f"{MIN_SEEN_RATIO:.0%}",
