@@ -67,7 +67,7 @@ class _Run:
         self._device = device
         self._settings = settings
         self._per_epoch = steps_per_epoch
-        self.model = CentreNet(len(CLASSES)).to(device).to(memory_format=torch.channels_last)
+        self.model = CentreNet(len(CLASSES)).to(device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.model).eval()
         self._steps = 0
         self._optimiser = torch.optim.AdamW(self.model.parameters(), weight_decay=WEIGHT_DECAY)
@@ -105,7 +105,7 @@ class _Run:
         for group in self._optimiser.param_groups:
             group["lr"] = self._learning_rate()
         self._optimiser.zero_grad()
-        sum(parts).backward()  # type: ignore[no-untyped-call]
+        torch.stack(parts).sum().backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), MAX_GRADIENT)
         self._optimiser.step()
         self._follow()
