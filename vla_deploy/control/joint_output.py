@@ -6,6 +6,7 @@ from vla_deploy.control.axes import Flags, Floats, any_of
 from vla_deploy.control.gravity import GravityOffset
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionResult, MotionSet
+from vla_deploy.control.payload import Payload
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
@@ -14,9 +15,12 @@ from vla_deploy.robots.model import RobotModel
 class JointOutput:
     """Hold the motions of all joints, and send what the gate lets through."""
 
-    def __init__(self, robot: RobotDescription, motions: MotionSet, servos: ServoLine) -> None:
+    def __init__(
+        self, robot: RobotDescription, motions: MotionSet, servos: ServoLine, payload: Payload
+    ) -> None:
         self.motions = motions
         self._servos = servos
+        self._payload = payload
         self._gate = SetpointGate(robot.position_min, robot.position_max, robot.velocity_max)
         self._gravity = GravityOffset(robot, RobotModel(robot).gravity)
 
@@ -38,10 +42,16 @@ class JointOutput:
         return ended
 
     def place(self, joints: Flags) -> None:
-        """Let the setpoints of joints that hold nothing follow them, so that arming is bumpless."""
-        measured = self._servos.state.position_rad
-        self.motions.place(measured, joints)
-        self._gate.place(measured, joints)
+        """Let setpoints of joints that take no goals follow them, so that arming is bumpless.
+
+        A hand whose servo still presses on what it holds goes on pressing.
+        """
+        state = self._servos.state
+        begin = state.position_rad
+        if any_of(joints & state.torque_on):
+            begin = np.where(state.torque_on, self._payload.pressed(begin), begin)
+        self.motions.place(begin, joints)
+        self._gate.place(begin, joints)
 
     def place_all(self) -> None:
         """Let every setpoint begin where its joint is."""

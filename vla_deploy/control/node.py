@@ -57,23 +57,23 @@ class ControlNode:
         self._ticks = TickClock(self.period_s)
         self._act: Act | None = None
 
+        space = SharedSpace(context.run_dir / "ipc", clock)
+        self._payload = Payload(robot, space.cell_reader("executor_status"))
         servos = self._servos = ServoLine(robot, profile, devices, clock)
         wheels = self._wheels = Wheels(robot, profile, devices, clock)
         self._motions = MotionSet(axis_limits(robot))
-        self._joints = JointOutput(robot, self._motions, servos)
+        self._joints = JointOutput(robot, self._motions, servos, self._payload)
         self._base = BaseOutput(robot, wheels)
         self._dispatcher = Dispatcher(robot, self._motions, servos)
         self._rest = Rest()
         self._resetting = Resetting(servos, wheels)
 
-        space = SharedSpace(context.run_dir / "ipc", clock)
         self._button = EstopButton(robot, devices, clock)
         with closing(space.cell_reader("control_status")) as before:
             self._desk = OperatorDesk(
                 space.ring_reader("operator", from_start=True), self._button.source, before.latest()
             )
         self._judging = Judging(space, robot, servos, wheels, clock)
-        self._payload = Payload(robot, space.cell_reader("executor_status"))
         self._stopping = Stopping(robot, servos, wheels, self._joints, self._base, self._payload)
         self._modes = Modes(Arming(servos, wheels, clock), self._stopping, self._motions)
         self._commands = space.ring_reader("motion_command", from_start=False)

@@ -2,6 +2,8 @@
 
 from typing import Final
 
+import numpy as np
+
 from vla_deploy.control.axes import Flags, Floats
 from vla_deploy.ipc import CellReader
 from vla_deploy.robots import RobotDescription
@@ -9,6 +11,8 @@ from vla_deploy.robots import RobotDescription
 # An empty gripper closes to where it was sent; fingers on an object stop short of it, pressing.
 SHORT_OF_GOAL_M: Final = 0.002
 PRESSING_RATIO: Final = 0.05
+PRESS_M: Final = 0.004
+"""How far behind a thing's surface a hand that holds it is sent; its Goal PWM bounds the force."""
 
 
 class Payload:
@@ -19,6 +23,7 @@ class Payload:
             name: [robot.joint_index[joint] for joint in robot.group(hand.gripper).joints]
             for name, hand in robot.hands.items()
         }
+        self._low = robot.position_min
         self._status = executor_status
 
     def holding(
@@ -29,6 +34,16 @@ class Payload:
         pressing = short & (abs(effort_ratio) > PRESSING_RATIO) & torque_on
         felt = {name for name, joints in self._grippers.items() if pressing[joints].any()}
         return frozenset(felt | self._told())
+
+    def pressed(self, position: Floats) -> Floats:
+        """Return where setpoints may begin anew: at the joints, but fingers that hold something
+        are sent further, for a hand that is sent to where it is presses no more.
+        """
+        begin = position.copy()
+        for name in self._told():
+            joints = self._grippers[name]
+            begin[joints] = np.maximum(position[joints] - PRESS_M, self._low[joints])
+        return begin
 
     def close(self) -> None:
         """Unmap the topic."""

@@ -10,6 +10,7 @@ import pytest
 from drivers.drive_bus import PowerState
 from drivers.errors import DeviceMissing
 from platforms import load_profile
+from vla_deploy.control.payload import PRESS_M
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.power_off import ask_power_off
@@ -418,6 +419,24 @@ def test_a_control_that_is_ended_otherwise_holds_the_arms_for_the_next_one(armed
     armed.ask("arm")
     assert armed.state == "armed", armed.status
     assert true_elbow(armed) == pytest.approx(rest, abs=0.02)
+
+
+def test_a_hand_goes_on_pressing_after_a_crash_of_control(armed: Rig) -> None:
+    gripper = armed.robot.joint_index["left_gripper"]
+    space = SharedSpace(armed.lockstep.context.run_dir / "ipc", armed.lockstep.clock)
+    space.cell_writer("executor_status").put_document({"holding": {"left": "cup", "right": None}})
+    armed.run(0.1)
+    held_at_m = armed.lockstep.truth()["joints"]["left_gripper"]["position"]
+    armed.lockstep.kill(armed.control)
+    armed.run(1.0)  # longer than the servos' watchdog
+    armed.control = armed.new_control()
+    armed.lockstep.add(armed.control)
+    armed.run(0.5)
+    armed.ask("arm")
+    assert armed.state == "armed", armed.status
+    told = space.cell_reader("joint_state").latest()
+    assert told is not None
+    assert told.data["setpoint"][gripper] == pytest.approx(held_at_m - PRESS_M, abs=1e-3)
 
 
 def test_a_control_that_finds_no_wheels_drops_no_arm_that_holds(

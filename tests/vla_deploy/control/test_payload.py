@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.control.payload import PRESSING_RATIO, SHORT_OF_GOAL_M, Payload
+from vla_deploy.control.payload import PRESS_M, PRESSING_RATIO, SHORT_OF_GOAL_M, Payload
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import load_robot
 
@@ -49,6 +49,19 @@ def test_an_idle_robot_of_which_nothing_is_told_holds_nothing(payload: Payload) 
 def test_what_the_executor_told_last_stays_held(space: SharedSpace, payload: Payload) -> None:
     told(space, left="cup", right=None)
     assert felt(payload) == {"left"}
+
+
+def test_a_hand_that_begins_anew_goes_on_pressing_on_what_it_holds(
+    space: SharedSpace, payload: Payload
+) -> None:
+    position = np.full(len(ROBOT.joint_names), 0.02)
+    assert payload.pressed(position).tolist() == position.tolist()
+    told(space, left="cup", right=None)
+    begin = payload.pressed(position)
+    assert begin[GRIPPER] == pytest.approx(0.02 - PRESS_M)
+    assert np.delete(begin, GRIPPER).tolist() == np.delete(position, GRIPPER).tolist()
+    nearly_closed = np.full_like(position, ROBOT.position_min[GRIPPER] + 0.5 * PRESS_M)
+    assert payload.pressed(nearly_closed)[GRIPPER] == ROBOT.position_min[GRIPPER]
 
 
 def test_a_hand_that_the_robot_does_not_have_is_not_held(
