@@ -11,7 +11,7 @@ from sim_twin.errors import ModelMismatch
 def test_the_composed_model_has_what_grasps_need(room: mujoco.MjModel) -> None:
     assert room.opt.timestep == 0.002
     assert room.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
-    assert room.opt.impratio == 10.0
+    assert room.opt.impratio == 100.0
 
 
 def test_only_the_robots_geoms_are_in_the_robots_groups(room: mujoco.MjModel) -> None:
