@@ -29,6 +29,7 @@ from vla_deploy.inference.runtime import (
     SessionOptions,
 )
 from vla_deploy.inference.store import Model
+from vla_deploy.one_line import one_line
 
 _FATAL_ONLY: Final = 4  # what goes wrong is raised, and told once
 _HASH_DIGITS: Final = 12
@@ -163,9 +164,9 @@ def _create(
         return InferenceSession(str(path), options, providers=asked, enable_fallback=0)
     except SESSION_ERRORS as error:
         if provider != CPU:
-            raise _Refused(_one_line(error)) from error
+            raise _Refused(one_line(error)) from error
         raise ModelFileSpoiled(
-            f"{path}: onnxruntime {VERSION} cannot load it: {_one_line(error)}; "
+            f"{path}: onnxruntime {VERSION} cannot load it: {one_line(error)}; "
             "expected one whole ONNX file; export it again, weights included"
         ) from error
 
@@ -213,7 +214,3 @@ def _no_provider(model: Model, choice: ModelChoice, refusals: list[str]) -> str:
         else "install an onnxruntime that has one of them, or set cpu_fallback in the profile"
     )
     return f"{model.manifest.name}: no provider runs it: {'; '.join(refusals)}; {hint}"
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())

@@ -13,6 +13,7 @@ from vla_deploy.model_servers.exchange import Reply
 from vla_deploy.model_servers.formats.base import Json
 from vla_deploy.model_servers.json_answer import strict_json
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.one_line import one_line
 
 _PASSING: Final = frozenset({408, 425, 429})
 # Servers repeat a wrong key, or the half of it, in what they say about it.
@@ -80,7 +81,7 @@ def _said(reply: Reply, key: Secret | None) -> str:
         return ""
     error = _error(reply)
     text = error.get("message", error.get("error", error.get("detail", "")))
-    told = " ".join(str(text).split())
+    told = one_line(text)
     told = told if key is None else key.hidden_in(told)
     return f": {told[:_REASON_CHARACTERS]}" if told else ""
 

@@ -14,6 +14,7 @@ from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
 from vla_deploy.inference.errors import InferenceError, RunFailed
 from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.one_line import one_line
 from vla_deploy.perception.detectors.detector import ROLE, Detector, open_detector
 from vla_deploy.perception.detectors.image_input import Image
 from vla_deploy.perception.network_view import NetworkView
@@ -63,7 +64,7 @@ def open_network(
         if choice.required or instead_of_one:
             raise
         _log.error("degraded: things are named by their form alone: %s", error)
-        return Network(detector=None, why=" ".join(str(error).split()))
+        return Network(detector=None, why=one_line(error))
 
 
 class Eyes:

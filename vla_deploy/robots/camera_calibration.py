@@ -18,6 +18,7 @@ import numpy as np
 import yaml
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.one_line import one_line
 from vla_deploy.robots.description import Camera, LensCalibration, Mounting
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.lens_schema import lens_faults
@@ -85,7 +86,7 @@ def read_lens(file: Path, camera: Camera) -> LensCalibration | None:
     try:
         document = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise _unreadable(file, " ".join(str(error).split()), "a YAML document") from error
+        raise _unreadable(file, one_line(error), "a YAML document") from error
     if not isinstance(document, dict):
         raise _unreadable(file, type(document).__name__, "the tables of ROS' camera_info")
     faults = tuple(lens_faults(document, camera, MODELS))

@@ -6,6 +6,7 @@ from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.one_line import one_line
 
 NS_PER_US = 1000
 VARIABLES = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID")
@@ -54,7 +55,7 @@ class NotifySocket:
         """Send one message; return whether it was taken."""
         if self._socket is None:
             return False
-        text = "\n".join(f"{name}={_one_line(value)}" for name, value in assignments.items())
+        text = "\n".join(f"{name}={one_line(value)}" for name, value in assignments.items())
         try:
             self._socket.sendto(text.encode(), self._address)
         except OSError:
@@ -131,10 +132,6 @@ class Notifier:
 
 def _is_due(last_ns: int | None, every_ns: int, now_ns: int) -> bool:
     return last_ns is None or now_ns - last_ns >= every_ns
-
-
-def _one_line(value: str) -> str:
-    return " ".join(value.split())
 
 
 def own_target() -> NotifyTarget:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.one_line import one_line
 from vla_deploy.perception.camera_tools.board import Array, View
 from vla_deploy.perception.camera_tools.errors import BadImages, ImplausibleResult
 from vla_deploy.perception.camera_tools.selecting import MIN_VIEWS, require_variety
@@ -83,7 +84,7 @@ def _solve(views: Sequence[View], size_px: tuple[int, int], model: str) -> _Solv
         )
     except cv2.error as failure:
         raise ImplausibleResult(
-            f"no lens explains these views ({' '.join(str(failure).split())}); check that the "
+            f"no lens explains these views ({one_line(failure)}); check that the "
             "board lies flat and is described as it is printed"
         ) from failure
     return _Solved(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vla_deploy.inference.errors import ModelFileSpoiled, ToolMissing
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.runtime import SESSION_ERRORS
+from vla_deploy.one_line import one_line
 
 # Activation and weight types, as onnxruntime names them.
 TYPES: Final[Mapping[Variant, tuple[str, str]]] = {
@@ -47,7 +48,7 @@ def write_int8(
             for variant, path in paths.items():
                 _quantise_file(tools, prepared, path, variant, _Reader(inputs()), heads)
         except _TOOL_ERRORS as error:
-            told = " ".join(str(error).split())
+            told = one_line(error)
             raise ModelFileSpoiled(f"{source}: it cannot be quantised: {told}") from error
 
 
