@@ -5,6 +5,8 @@ PlanningError
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
+├── Declined          ask the next rung of the ladder: this one has no plan
+├── Ambiguous         answer its question; carries what may be answered
 ├── NotReady          reset and arm the robot first
 └── PlanInvalid       mend the plan; carries every fault
 """
@@ -51,6 +53,19 @@ class DependsOnView(UnknownObject):
             f'"{name}": left, right, in front and behind change while I drive; say what it is '
             "on, in or next to",
         )
+
+
+class Declined(PlanningError):
+    """Say why one rung of the ladder has no plan for a command; the next one is asked."""
+
+
+class Ambiguous(PlanningError):
+    """Ask the person who gave the command what is meant; `choices` are answers that settle it."""
+
+    def __init__(self, question: str, choices: Sequence[str] = ()) -> None:
+        self.question = question
+        self.choices = tuple(choices)
+        super().__init__(question)
 
 
 class NotReady(PlanningError):
