@@ -6,12 +6,16 @@ PlanningError
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
 ├── Declined          ask the next rung of the ladder: this one has no plan
-├── Ambiguous         answer its question; carries what may be answered
+├── Ambiguous         answer its question; carries the candidates
 ├── NotReady          reset and arm the robot first
 └── PlanInvalid       mend the plan; carries every fault
 """
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from vla_deploy.planning.understanding.conversation import Candidate
 
 
 class PlanningError(Exception):
@@ -60,11 +64,18 @@ class Declined(PlanningError):
 
 
 class Ambiguous(PlanningError):
-    """Ask the person who gave the command what is meant; `choices` are answers that settle it."""
+    """Ask the person who gave the command what is meant; the message is the question.
 
-    def __init__(self, question: str, choices: Sequence[str] = ()) -> None:
+    `expression` is the part of the command that is unclear. Without candidates the answer is yes
+    or no.
+    """
+
+    def __init__(
+        self, question: str, candidates: "Sequence[Candidate]" = (), expression: str = ""
+    ) -> None:
         self.question = question
-        self.choices = tuple(choices)
+        self.candidates = tuple(candidates)
+        self.expression = expression
         super().__init__(question)
 
 

@@ -1,1 +1,25 @@
-"""Find out what a command means: who and what it speaks of, and what was said before."""
+"""Understand what a command refers to: by the conversation, the scene and the robot's places."""
+
+from vla_deploy.planning.understanding.answers import Reply, Verdict, reply
+from vla_deploy.planning.understanding.conversation import (
+    Candidate,
+    Conversation,
+    Mention,
+    Outcome,
+    Question,
+    Role,
+    Turn,
+)
+
+__all__ = [
+    "Candidate",
+    "Conversation",
+    "Mention",
+    "Outcome",
+    "Question",
+    "Reply",
+    "Role",
+    "Turn",
+    "Verdict",
+    "reply",
+]
