@@ -8,9 +8,9 @@ from vla_deploy.analysis.outlook import MOST_ALTERNATIVES, CannotBe, Outlook
 from vla_deploy.analysis.question import Question
 from vla_deploy.analysis.steps import judge_step
 from vla_deploy.planning.errors import NotUnderstood, PlanningError
+from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.rules import plan_command
-from vla_deploy.planning.validator import World
 
 _DIGITS: Final = 3
 

@@ -11,7 +11,7 @@ from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import read_plan
 from vla_deploy.planning.dialects import parse_plan
-from vla_deploy.planning.node import world_of
+from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import plan_schema
 from vla_deploy.planning.validator import check_plan
 from vla_deploy.robots import load_robot

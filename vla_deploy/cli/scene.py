@@ -10,8 +10,8 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.validator import spoken_places
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.world import Query, Viewpoint, parse_query, read_snapshot
 from vla_deploy.world.report import report

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding.conversation import Conversation
-from vla_deploy.planning.validator import World
 from vla_deploy.world import Snapshot
 
 

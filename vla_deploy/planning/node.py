@@ -9,10 +9,11 @@ from vla_deploy.ipc import CellReader, CellWriter, Event, RingReader, RingWriter
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.errors import NotReady, PlanningError
+from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.planning.rules import is_stop, plan_command
-from vla_deploy.planning.validator import World, check_plan, spoken_places
+from vla_deploy.planning.validator import check_plan
 from vla_deploy.robots import RobotDescription
 
 STATUS_AGE_S = 2.0
@@ -125,10 +126,3 @@ class PlannerNode:
         if sample is None or self._clock.now_ns() - sample.stamp_ns > NS_PER_S:
             return None
         return tuple(float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))  # type: ignore[return-value]
-
-
-def world_of(robot: RobotDescription, holding: Mapping[str, str | None]) -> World:
-    """Return what plans for this robot may refer to."""
-    return World(
-        places=spoken_places(robot.places), poses=frozenset(robot.poses), holding=dict(holding)
-    )

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject, UnknownPlace
+from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.references import ObjectQuery, match_place, parse_object, words_of
-from vla_deploy.planning.validator import World
 
 Step = tuple[str, dict[str, object]]
 STOP_WORDS = frozenset(

@@ -1,38 +1,16 @@
 """Decide whether a plan may run: schema, skills, parameters, dependencies, world."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, SKILLS, Parameter, SkillSpec, Type
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
 from vla_deploy.planning.graph import dependency_faults
+from vla_deploy.planning.knowledge import World, spoken_places
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.references import match_place, parse_object, words_of
-from vla_deploy.robots.description import Place
+from vla_deploy.planning.references import match_place, parse_object
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class World:
-    """Say what a plan may refer to.
-
-    `places` maps every spoken name to its place; `poses` are the robot file's named poses;
-    `holding` tells which kind of object each hand holds.
-    """
-
-    places: Mapping[str, str]
-    poses: frozenset[str]
-    holding: Mapping[str, str | None]
-
-
-def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:
-    """Map every name by which a place may be called, in lower case, to the place."""
-    return {
-        " ".join(words_of(spoken.replace("_", " "))): place.name
-        for place in places.values()
-        for spoken in (place.name, *place.aliases)
-    }
+__all__ = ["World", "check_plan", "plan_faults", "spoken_places"]
 
 
 def check_plan(plan: Plan, world: World) -> None:

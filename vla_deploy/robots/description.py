@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.protocol import Intrinsics
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
 
 
@@ -311,6 +312,7 @@ class RobotDescription:
     microphone: Audio | None = None
     speaker: Audio | None = None
     protection: Protection = NOTHING_DECLARED
+    planning: PlanBounds = NOT_BOUNDED
 
     @property
     def gripper_joints(self) -> frozenset[str]:

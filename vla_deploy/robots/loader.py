@@ -33,6 +33,7 @@ from vla_deploy.robots.description import (
 )
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.mjcf import mjcf_faults, read_mjcf_names
+from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
 from vla_deploy.robots.schema import Fault, Shape, check_record
 
 ROBOTS_DIR = Path(__file__).parent
@@ -50,6 +51,7 @@ SINGLE: Mapping[str, Shape] = {
     "microphone": schema.AUDIO,
     "speaker": schema.AUDIO,
     "home": schema.HOME,
+    "planning": schema.PLANNING,
     "clearance": protection_schema.CLEARANCE,
     "tip_over": protection_schema.TIP_OVER,
     "contact": protection_schema.CONTACT,
@@ -177,6 +179,7 @@ def _build(document: Document, directory: Path, camera: Camera) -> RobotDescript
         poses=subtables(document, "poses"),
         home=_home(document["home"], directory),
         protection=protection_schema.build_protection(document),
+        planning=_plan_bounds(document.get("planning", {})),
     )
 
 
@@ -220,6 +223,12 @@ def _place(name: str, row: Document) -> Place:
         aliases=tuple(row["aliases"]),
         viewpoints=tuple(FloorPose(**view) for view in row["viewpoints"]),
     )
+
+
+def _plan_bounds(row: Document) -> PlanBounds:
+    if "require_confirmation" in row:
+        row = {**row, "require_confirmation": Confirm(row["require_confirmation"])}
+    return PlanBounds(**row)
 
 
 def _zone(row: Document) -> KeepOutZone:

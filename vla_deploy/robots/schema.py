@@ -1,7 +1,7 @@
 """Declare which keys a robot file has and what each may hold; collect every fault, stop at none."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, TypeGuard
 
@@ -95,6 +95,7 @@ ROBOT: Shape = {
     "hands": TABLE,
     "poses": TABLE,
     "home": TABLE,
+    "planning": OPTIONAL_TABLE,
     "zones": OPTIONAL_TABLE,
     "workspace": OPTIONAL_TABLE,
     "clearance": OPTIONAL_TABLE,
@@ -201,6 +202,12 @@ HOME: Shape = {"map": TEXT, "start": TEXT, "places": TABLE, "zones": TABLES}
 FLOOR_POSE: Shape = {"x_m": NUMBER, "y_m": NUMBER, "yaw_rad": NUMBER}
 PLACE: Shape = {**FLOOR_POSE, "aliases": TEXTS, "viewpoints": TABLES}
 ZONE: Shape = {"name": TEXT, "reason": TEXT, "polygon_m": POLYGON}
+PLANNING: Shape = {
+    "payload_kg": OPTIONAL_POSITIVE,
+    "max_actions": replace(_integer(1, 100), is_optional=True),
+    "max_duration_s": OPTIONAL_POSITIVE,
+    "require_confirmation": one_of("never", "risky", "always", is_optional=True),
+}
 
 
 def check_record(record: Mapping[str, Any], key: str, shape: Shape) -> tuple[Fault, ...]:

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Generator, Mapping
 from typing import Any, TypeVar
 
+from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
-from vla_deploy.planning.validator import spoken_places
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.arms import carry
 from vla_deploy.skills.context import Skill, SkillContext

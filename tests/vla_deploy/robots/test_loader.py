@@ -117,6 +117,10 @@ def test_each_fault_alone_is_reported_too(
         ((r'^gripper = "left_gripper"', 'gripper = "left_arm"'), "hands.left.gripper", "one joint"),
         ((r'"charger", ', '"dock", '), "home.places.charging_station.aliases", "not used by"),
         ((r"^\[can_bus\]", "[can_bus_2]"), "can_bus", "a table"),
+        ((r"^payload_kg = 0.6", "payload_kg = 0"), "planning.payload_kg", "above 0"),
+        ((r"^max_actions = 60", "max_actions = 500"), "planning.max_actions", "in 1..100"),
+        ((r'^require_confirmation = "risky"', 'require_confirmation = "no"'),
+         "planning.require_confirmation", "never, risky, always"),
     ],
 )  # fmt: skip
 def test_contradictions_inside_the_file_are_found(

@@ -1,0 +1,65 @@
+"""Know the robot as plans see it: its places, poses, hands, limits, and where it must not go."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from vla_deploy.planning.references import words_of
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import KeepOutZone, Place
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
+from vla_deploy.world.reach import IsFree
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """Say what a plan may refer to, and what bounds it.
+
+    `places` maps every spoken name to its place, `sites` each place to where one stands for it, and
+    `furniture` names the places that have something to put things on. `poses` are the robot file's
+    named poses; `holding` tells which kind of object each hand holds, and is empty where nobody
+    knows. `is_free` tells whether the base fits on a point of the map; None means that no map is
+    at hand. A gripper opens `opening_max_m` wide, None where that is not known.
+    """
+
+    places: Mapping[str, str]
+    poses: frozenset[str]
+    holding: Mapping[str, str | None]
+    sites: Mapping[str, Place] = field(default_factory=dict)
+    furniture: frozenset[str] = frozenset()
+    zones: tuple[KeepOutZone, ...] = ()
+    footprint_radius_m: float = 0.0
+    max_speed_m_s: float | None = None
+    opening_max_m: float | None = None
+    bounds: PlanBounds = NOT_BOUNDED
+    is_free: IsFree | None = None
+
+
+def spoken_places(places: Mapping[str, Place]) -> dict[str, str]:
+    """Map every name by which a place may be called, in lower case, to the place."""
+    return {
+        " ".join(words_of(spoken.replace("_", " "))): place.name
+        for place in places.values()
+        for spoken in (place.name, *place.aliases)
+    }
+
+
+def world_of(
+    robot: RobotDescription, holding: Mapping[str, str | None], is_free: IsFree | None = None
+) -> World:
+    """Return what plans for this robot may refer to; `is_free` is its map, where one is at hand."""
+    openings_m = [
+        robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
+    ]
+    return World(
+        places=spoken_places(robot.places),
+        poses=frozenset(robot.poses),
+        holding=dict(holding),
+        sites=robot.places,
+        furniture=frozenset(name for name, one in robot.places.items() if one.viewpoints),
+        zones=robot.home.zones,
+        footprint_radius_m=robot.base.footprint_radius_m,
+        max_speed_m_s=robot.base.max_speed_m_s,
+        opening_max_m=max(openings_m, default=None),
+        bounds=robot.planning,
+        is_free=is_free,
+    )
