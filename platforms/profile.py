@@ -22,6 +22,7 @@ __all__ = [
     "ModelChoice",
     "ProcessSettings",
     "Profile",
+    "SpeechSettings",
     "load_profile",
     "profile_from",
     "profile_names",
@@ -67,6 +68,24 @@ class ModelChoice:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SpeechSettings:
+    """Declare what a spoken phrase is, and how surely it must be understood.
+
+    A phrase ends after `end_silence_s`, after `unfinished_silence_s` where its words so far cannot
+    be all. `pre_roll_s` before its first sound belongs to it. `beam` is how many readings the
+    recogniser follows at once; what it understands below `least_confidence` is asked again.
+    """
+
+    shortest_phrase_s: float
+    longest_phrase_s: float
+    end_silence_s: float
+    unfinished_silence_s: float
+    pre_roll_s: float
+    beam: int
+    least_confidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
     """Declare how the stack runs on one kind of computer.
 
@@ -89,6 +108,7 @@ class Profile:
     power_mode: str
     board: BoardLimits
     processes: Mapping[str, ProcessSettings]
+    speech: SpeechSettings
     models: Mapping[str, ModelChoice]
     budgets: Mapping[str, ProcessBudget]
     total: TotalBudget
@@ -130,6 +150,7 @@ def _build(name: str, values: Table) -> Profile:
             process: ProcessSettings(**{**table, "affinity": tuple(table["affinity"])})
             for process, table in values["processes"].items()
         },
+        "speech": SpeechSettings(**values["speech"]),
         "models": {role: _model(table) for role, table in values.get("models", {}).items()},
         "total": TotalBudget(**budgets.pop("total")),
         "budgets": {process: ProcessBudget(**table) for process, table in budgets.items()},

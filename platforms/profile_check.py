@@ -40,6 +40,17 @@ def _perception(values: Table) -> Iterator[Fault]:
         yield Fault(key="perception_rate_hz", text=text)
 
 
+def _speech(values: Table) -> Iterator[Fault]:
+    speech = values["speech"]
+    for key, least in (
+        ("unfinished_silence_s", "end_silence_s"),
+        ("longest_phrase_s", "shortest_phrase_s"),
+    ):
+        if speech[key] < speech[least]:
+            text = f"expected at least {least} ({speech[least]:g} s), got {speech[key]!r}"
+            yield Fault(key=f"speech.{key}", text=text)
+
+
 def _affinities(values: Table) -> Iterator[Fault]:
     count = values["board"]["cpu_count"]
     for process, settings in values["processes"].items():
@@ -108,6 +119,7 @@ def _step_faults(step: Table, processes: tuple[str, ...]) -> Iterator[tuple[str,
 _CHECKS: Final[tuple[Callable[[Table], Iterator[Fault]], ...]] = (
     _watchdogs,
     _perception,
+    _speech,
     _affinities,
     _budget_sums,
     _board_limits,

@@ -11,13 +11,28 @@ PROCESSES: Final[tuple[str, ...]] = (
     "supervisor",
     "control",
     "perception",
+    "speech",
     "planner",
     "executor",
     "recorder",
     "twin",
 )
-NODES: Final[tuple[str, ...]] = ("control", "perception", "planner", "executor", "recorder")
-ROLES: Final = ("detector", "planner", "key_words", "speech_to_text", "text_to_speech")
+NODES: Final[tuple[str, ...]] = (
+    "control",
+    "perception",
+    "speech",
+    "planner",
+    "executor",
+    "recorder",
+)
+ROLES: Final = (
+    "detector",
+    "planner",
+    "key_words",
+    "voice_activity",
+    "speech_to_text",
+    "text_to_speech",
+)
 PROVIDERS: Final = (
     "TensorrtExecutionProvider",
     "CUDAExecutionProvider",
@@ -121,6 +136,15 @@ _TOP: Keys = {
     "memory_lock": _Flag(),
     "power_mode": _Text(),
 }
+_SPEECH: Keys = {
+    "shortest_phrase_s": _Range(0.05, 2, "s"),
+    "longest_phrase_s": _Range(1, 29, "s"),  # Whisper hears 30 s at once
+    "end_silence_s": _Range(0.1, 3, "s"),
+    "unfinished_silence_s": _Range(0.1, 5, "s"),
+    "pre_roll_s": _Range(0, 1, "s"),
+    "beam": _Range(1, 10, "", integer=True),
+    "least_confidence": _Range(0, 1, ""),
+}
 _BOARD: Keys = {"cpu_count": _Range(1, 256, "", integer=True), "memory_mb": _MEMORY_MB}
 _SETTINGS: Keys = {
     "affinity": _ListOf(_Range(0, 255, "", integer=True), empty=True),
@@ -150,7 +174,7 @@ _TIMING: Keys = {
     "fall_s": _Range(0.1, 3600, "s"),
     "release_ratio": _Range(0.1, 1.0, ""),
 }
-_TABLES: Final = ("board", "processes", "models", "budgets", "ladder", "ladder_timing")
+_TABLES: Final = ("board", "processes", "speech", "models", "budgets", "ladder", "ladder_timing")
 
 
 def schema_faults(values: Table) -> Iterator[Fault]:
@@ -159,6 +183,7 @@ def schema_faults(values: Table) -> Iterator[Fault]:
     yield from _table_faults("", plain, _TOP)
     yield from _table_faults("board", values.get("board"), _BOARD)
     yield from _group_faults("processes", values.get("processes"), NODES, _SETTINGS)
+    yield from _table_faults("speech", values.get("speech"), _SPEECH)
     yield from _model_faults(values.get("models", {}))
     yield from _budget_faults(values.get("budgets"))
     yield from _ladder_faults(values.get("ladder"))

@@ -286,6 +286,23 @@ TOPICS: tuple[Topic, ...] = (
         fields=(Field("document", "json", 1024),),
     ),
     Topic(
+        name="heard",
+        kind=Kind.RING,
+        owner="speech",
+        summary="what was understood of each phrase: text, confidence, verdict and its reason",
+        slots=64,
+        slot_bytes=8192,
+    ),
+    Topic(
+        name="speech_status",
+        kind=Kind.CELL,
+        owner="speech",
+        rate_hz=5,
+        deadline_s=2.0,
+        summary="whether the robot hears and speaks, why not, how well and how fast, as JSON",
+        fields=(Field("document", "json", 8192),),
+    ),
+    Topic(
         name="twin_status",
         kind=Kind.CELL,
         owner="twin",

@@ -122,6 +122,17 @@ TABLE: tuple[ProcessSpec, ...] = (
         watched=(Watched(topic="scene", silence_limit_s=10.0),),
     ),
     ProcessSpec(
+        name="speech",
+        command=("-m", "vla_deploy.speech", *_NODE),
+        devices_command=_DEVICES,
+        when=all_of(budgeted("speech"), not_suspended("speech")),
+        with_previous=True,
+        ready_topic="speech_status",
+        ready_files=("ready/speech",),
+        watched=(Watched(topic="speech_status", silence_limit_s=10.0),),
+        giving_up=GivingUp.CARRY_ON,  # typed commands go on
+    ),
+    ProcessSpec(
         name="planner",
         command=("-m", "vla_deploy.planning", *_NODE),
         devices_command=_DEVICES,

@@ -68,11 +68,11 @@ def test_a_model_is_added_listed_shown_and_removed(vla, files, base):
 
 def test_list_tells_which_profiles_use_a_model_and_which_are_missing(vla):
     rows = {row["name"]: row for row in json.loads(vla("list", "--json")[1])}
-    whisper = rows["whisper_tiny"]
+    whisper = rows["whisper-tiny.en"]
     assert "jetson_orin_nano_4gb speech_to_text tier 0" in whisper["used_by"]
     assert whisper["from"] == "missing"
     _, out, _ = vla("list")
-    (line,) = (line for line in out.splitlines() if line.startswith("whisper_tiny "))
+    (line,) = (line for line in out.splitlines() if line.startswith("whisper-tiny.en "))
     assert "named by profiles only" in line
 
 

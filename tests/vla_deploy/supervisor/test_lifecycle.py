@@ -234,6 +234,7 @@ def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_
         "twin",
         "control",
         "perception",
+        "speech",
         "planner",
         "executor",
         "recorder",
@@ -241,7 +242,7 @@ def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_
     assert [row.name for row in TABLE if row.when is twin_only] == ["twin"]
     assert all(row.ready_files or row.ready_topic for row in TABLE)
     together = [row.name for row in TABLE if row.with_previous]
-    assert together == ["planner", "executor", "recorder"]
+    assert together == ["speech", "planner", "executor", "recorder"]
 
 
 def test_a_ready_process_that_falls_silent_is_aborted_and_started_again_with_that_reason():

@@ -1,0 +1,75 @@
+"""Declare what else lives in the speech process: listeners to the raw stream, and the voice."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.speech.sound import SoundBlock
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Playing:
+    """Describe what sounds from the speaker at a moment.
+
+    The robot knows its own words by `text` when it hears them; `level_db` is how loud the speaker
+    is: RMS of what it plays against full scale.
+    """
+
+    say_id: str
+    text: str
+    level_db: float
+
+
+class StreamListener(Protocol):
+    """Hear every block as it comes, before anything is cut or judged, also while the robot speaks.
+
+    `feed` runs within the node's step and takes a small part of it: what takes longer goes beside.
+    """
+
+    name: str
+
+    def start(self, space: SharedSpace) -> None:
+        """Open topics and models."""
+        ...
+
+    def feed(self, block: SoundBlock) -> None:
+        """Take the next block; one that does not follow the last one begins anew."""
+        ...
+
+    def document(self) -> Mapping[str, Any]:
+        """Return what `speech_status` tells under the listener's name; small, as JSON takes it."""
+        ...
+
+    def close(self) -> None:
+        """Release everything; closing twice is allowed."""
+        ...
+
+
+class Voice(Protocol):
+    """Speak, a little in each step of the node."""
+
+    @property
+    def playing(self) -> Playing | None:
+        """Return what sounds from the speaker at this moment; None while it is silent."""
+        ...
+
+    def start(self, space: SharedSpace) -> None:
+        """Open topics; a speaker that is not there is a status, no error."""
+        ...
+
+    def step(self) -> None:
+        """Take what is to be said, and hand the speaker what it has room for."""
+        ...
+
+    def barge_in(self, stamp_ns: int) -> None:
+        """Fall silent: a person has spoken into what the robot says, from `stamp_ns` on."""
+        ...
+
+    def document(self) -> Mapping[str, Any]:
+        """Return what `speech_status` tells under "voice"; small, as JSON takes it."""
+        ...
+
+    def close(self) -> None:
+        """Release everything; closing twice is allowed."""
+        ...

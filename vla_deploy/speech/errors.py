@@ -1,0 +1,18 @@
+"""Group the errors of hearing by what the caller can do about them.
+
+SpeechError
+├── SpeechMissing    the `speech` extra is not installed: install it
+└── NoRecogniser     no model can be opened: the robot is deaf to words, typed commands go on
+"""
+
+
+class SpeechError(Exception):
+    """Base of everything that hearing raises."""
+
+
+class SpeechMissing(SpeechError):
+    """Say that a package is missing, and how to install it."""
+
+
+class NoRecogniser(SpeechError):
+    """Say why no model turns speech into text."""
