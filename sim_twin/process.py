@@ -26,6 +26,7 @@ from sim_twin.priority import claim_priority
 from sim_twin.pty_line import PtyLine
 from sim_twin.referee import REFEREE_SOCKET
 from sim_twin.servos import WireTiming
+from sim_twin.sound.desk import SoundDesk
 from sim_twin.stream_line import StreamLine
 from sim_twin.twin import Twin
 from sim_twin.twin_status import TwinStatus
@@ -98,6 +99,7 @@ class TwinProcess:
             "inside": self._inside,
             "hazards": self._hazards,
             **FaultDesk(self._twin.faults, robot).operations,
+            **SoundDesk(self._twin, devices, options.seed, self._wall_ns).operations,
         }
         gc.collect()
         gc.freeze()  # a full collection of the model and libraries takes longer than a step
@@ -154,6 +156,10 @@ class TwinProcess:
     def _now_ns(self) -> int:
         """Return simulated time, which passes between two steps too."""
         return self._twin.now_ns + self._pacer.since_step_ns(self._clock.now_ns())
+
+    def _wall_ns(self, sim_ns: int) -> int:
+        """Return the host's time of a simulated one, as time passes now."""
+        return self._clock.now_ns() + sim_ns - self._now_ns()
 
     def _wait_ns(self) -> int:
         """Return how long nothing is due: no step, and nothing under way to a host."""

@@ -11,9 +11,11 @@ from typing import Any, Final
 
 import psutil
 
+from drivers.audio.base import Samples
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.faults.remote import RemoteFaults
 from sim_twin.referee import ask
+from sim_twin.sound.talk import said, talk
 from sim_twin.truth import fastest_joint
 from vla_deploy.cli.session import Session
 from vla_deploy.supervisor.orphans import run_id_of
@@ -118,6 +120,19 @@ class ProcessStack:
         if self._session is None:
             self._session = Session(self.run_dir, self._clock)
         return self._session.document(topic, age_limit_s) or {}
+
+    def speak(self, text: str, voice: str = "en-gb", snr_db: float | None = None) -> dict[str, Any]:
+        """Let somebody in the room say a text; return when the words begin and end, host's time.
+
+        Raises:
+            TwinError: the twin does not answer, or the robot has no microphone.
+            VoiceError: the words do not become sound.
+        """
+        return talk(self.run_dir, text, voice, snr_db=snr_db)
+
+    def said(self) -> Samples:
+        """Return what the robot's speaker has played since the last call, (n, channels)."""
+        return said(self.run_dir)
 
     # --- as an adversary ----------------------------------------------------------------------
 

@@ -25,13 +25,16 @@ _SOCKET_AND_ARGUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "truth": (REFEREE_SOCKET, ()),
     "inside": (REFEREE_SOCKET, ("object", "container")),
     "hazards": (REFEREE_SOCKET, ("begin",)),
+    "sound_ear": (REFEREE_SOCKET, ()),
+    "sound_play": (REFEREE_SOCKET, ("name",)),
+    "sound_said": (REFEREE_SOCKET, ("name",)),
     "film_start": (FILM_SOCKET, ("path",)),
     "film_stop": (FILM_SOCKET, ()),
     "caption": (FILM_SOCKET, ("text",)),
 }
 
 
-def ask(run_dir: Path, op: str, **arguments: str) -> dict[str, Any]:
+def ask(run_dir: Path, op: str, **arguments: Any) -> dict[str, Any]:
     """Ask the twin under `run_dir` and return its answer.
 
     Raises:
@@ -93,7 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--run-dir", type=Path, required=True)
     parser.add_argument("op", choices=tuple(_SOCKET_AND_ARGUMENTS))
     parser.add_argument("--path", type=_absolute, help="film to write: .webm, .mp4 or .avi")
-    for name in ("object", "container", "text", "begin"):
+    for name in ("object", "container", "text", "begin", "name"):
         parser.add_argument(f"--{name}")
     return parser
 

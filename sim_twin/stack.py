@@ -4,10 +4,13 @@ import itertools
 from pathlib import Path
 from typing import Any
 
+from drivers.audio.base import Samples
 from platforms import load_profile
 from sim_twin.faults import FaultInjector
 from sim_twin.lidar_node import LidarNode
 from sim_twin.lockstep import Lockstep
+from sim_twin.sound.hearing import Spoken, let_arrive
+from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import Node
@@ -84,6 +87,20 @@ class LockstepControl:
         self.operate("arm")
         if not clock.run_until(lambda: self.status()["state"] == "armed", READY_TIMEOUT_S):
             raise NotReady(f"control does not arm: {self.status()}")
+
+    def speak(self, text: str, talker: Talker | None = None, snr_db: float | None = None) -> Spoken:
+        """Let somebody in the room say a text; return when the words begin and end.
+
+        Raises:
+            VoiceError: the talker's words do not become sound.
+        """
+        room = self.lockstep.twin.microphone.room
+        heard = arrival(text, talker or Talker(), room.rate_hz, room.acoustics, snr_db=snr_db)
+        return let_arrive(self.lockstep.twin, heard)
+
+    def said(self) -> Samples:
+        """Return what the robot's speaker has played since the last call, (n, channels)."""
+        return self.lockstep.twin.speaker.said()
 
     def close(self) -> None:
         """Stop every node and release the twin."""

@@ -1,43 +1,38 @@
 """Emulate a microphone and a speaker in a room: a test plays to the one and hears the other."""
 
-from collections import deque
+from typing import Final
 
 import numpy as np
 
-from drivers.audio.base import AudioFormat, Samples, check_samples
+from drivers.audio.base import FULL_SCALE, AudioFormat, Samples, check_samples
 from drivers.audio.pcm_protocol import PcmBlock, PcmParser, encode_block
-from drivers.clock import NS_PER_S
+from sim_twin.sound.room import Room
+from vla_deploy.speech.voice.sound import Sound, Wave
 
-NOISE_SIGMA = 12.0
-MAX_BACKLOG_S = 1.0
-MAX_HEARD_S = 60.0
+MAX_BACKLOG_S: Final = 1.0
+MAX_HEARD_S: Final = 60.0
 
 
 class MicrophoneDevice:
-    """Send what is played in the room, over a little noise, as fast as time passes.
+    """Send what arrives from the room, over a little noise, as fast as time passes."""
 
-    Samples are made when somebody reads them; a room that nobody listens to costs nothing.
-    """
-
-    def __init__(self, format_: AudioFormat, *, seed: int = 0) -> None:
+    def __init__(self, format_: AudioFormat, *, seed: int = 0, room: Room | None = None) -> None:
         self.format = format_
-        self._random = np.random.default_rng(seed)
-        self._now_ns = 0
+        self.room = room or Room(format_.rate_hz, seed)
+        self.now_ns = 0
         self._sent_rows = 0
-        self._playing: deque[tuple[int, Samples]] = deque()
+        self._played_rows = 0
 
     def play(self, samples: Samples) -> None:
-        """Play sound in the room, after what is being played.
+        """Play sound straight to the microphone, after what was played so before.
 
         Raises:
             ValueError: the samples do not have the microphone's channels.
         """
         check_samples(samples, self.format)
-        starts = self._row_now()
-        if self._playing:
-            last_start, last = self._playing[-1]
-            starts = max(starts, last_start + len(last))
-        self._playing.append((starts, samples))
+        starts = max(self._row_now(), self._played_rows)
+        self._played_rows = starts + len(samples)
+        self.room.lay(_wave(samples), starts)
 
     def announce(self) -> None:
         """Begin with the present for the next host."""
@@ -53,38 +48,29 @@ class MicrophoneDevice:
         self._sent_rows = now
         if now <= first:
             return b""
-        stamp_ns = self.format.duration_ns(first)
         block = PcmBlock(
             format=self.format,
             first_row=first,
-            stamp_ns=stamp_ns,
-            samples=self._heard(first, now),
+            stamp_ns=self.format.duration_ns(first),
+            samples=self.room.heard(first, now, self.format.channels),
         )
         return encode_block(block)
 
     def step(self, now_ns: int) -> None:
         """Let time pass."""
-        self._now_ns = now_ns
+        self.now_ns = now_ns
 
     def _row_now(self) -> int:
-        return self._now_ns * self.format.rate_hz // NS_PER_S
-
-    def _heard(self, first: int, end: int) -> Samples:
-        sound = NOISE_SIGMA * self._random.standard_normal((end - first, self.format.channels))
-        for starts, samples in self._playing:
-            low, high = max(first, starts), min(end, starts + len(samples))
-            if low < high:
-                sound[low - first : high - first] += samples[low - starts : high - starts]
-        while self._playing and self._playing[0][0] + len(self._playing[0][1]) <= end:
-            self._playing.popleft()
-        return np.rint(sound).clip(-32_768, 32_767).astype(np.int16)
+        return self.room.row_at(self.now_ns)
 
 
 class SpeakerDevice:
-    """Keep what the robot says, the last minute of it."""
+    """Sound in the room, if there is one, and keep what the robot says, the last minute of it."""
 
-    def __init__(self, format_: AudioFormat) -> None:
+    def __init__(self, format_: AudioFormat, room: Room | None = None) -> None:
         self.format = format_
+        self._room = room
+        self._now_ns = 0
         self._parser = PcmParser()
         self._said: Samples = np.zeros((0, format_.channels), np.int16)
 
@@ -100,6 +86,8 @@ class SpeakerDevice:
     def receive(self, data: bytes) -> None:
         """Take sound; blocks of another format make a noise that nobody understands."""
         blocks = [b.samples for b in self._parser.feed(data) if b.format == self.format]
+        for samples in blocks:
+            self._sound(samples)
         kept = round(MAX_HEARD_S * self.format.rate_hz)
         self._said = np.concatenate([self._said, *blocks])[-kept:]
 
@@ -109,3 +97,17 @@ class SpeakerDevice:
 
     def step(self, now_ns: int) -> None:
         """Let time pass; a speaker plays as it is told."""
+        self._now_ns = now_ns
+
+    def _sound(self, samples: Samples) -> None:
+        if self._room is None:
+            return
+        sound = Sound(rate_hz=self.format.rate_hz, wave=_wave(samples))
+        wave = sound.at_rate(self._room.rate_hz).wave
+        self._room.sound_from_speaker(wave, self.format.duration_ns(len(samples)), self._now_ns)
+
+
+def _wave(samples: Samples) -> Wave:
+    """Return the mean of the channels as a share of full scale."""
+    wave: Wave = (samples.mean(axis=1) / FULL_SCALE).astype(np.float32)
+    return wave

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import can
+import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
-from drivers.audio.pcm_stream import PcmInput
+from drivers.audio.pcm_stream import PcmInput, PcmOutput
 from drivers.camera.rgbd_stream import RgbdCamera
 from drivers.clock import MonotonicClock
 from drivers.dynamixel.codec import Instruction, encode_instruction
@@ -20,6 +21,7 @@ from drivers.estop.open_estop import open_estop
 from drivers.opener import PathOpener
 from sim_twin.errors import RefereeRefusal, Unreachable
 from sim_twin.referee import ask
+from sim_twin.sound.talk import said, talk
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 
@@ -258,3 +260,29 @@ def test_a_path_too_long_for_sockets_is_refused_with_a_remedy(tmp_path: Path) ->
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "choose a shorter one" in done.stderr
+
+
+def test_somebody_speaks_into_the_room_and_the_robot_is_heard(run_dir: Path) -> None:
+    clock = MonotonicClock()
+    opener = PathOpener(device_links(load_robot("butler"), run_dir / "dev"), clock)
+    format_ = AudioFormat(rate_hz=16_000)
+    ear = PcmInput(opener.stream("microphone"), clock, format_)
+    mouth = PcmOutput(opener.stream("speaker"), clock, format_)
+    spoken = talk(run_dir, "stop", "en-us", snr_db=20.0)
+    assert 0 < spoken["ended_ns"] - spoken["began_ns"] < 2_000_000_000
+    words = np.arange(1_000, dtype=np.int16)[:, None]
+    assert mouth.write(words) == 1_000
+    loudest: dict[bool, int] = {False: 0, True: 0}
+    while clock.now_ns() < spoken["ended_ns"] + 100_000_000:
+        clock.sleep_until(clock.now_ns() + 20_000_000)
+        if (block := ear.poll()) is not None:
+            inside = spoken["began_ns"] <= block.stamp_ns <= spoken["ended_ns"]
+            loudest[inside] = max(loudest[inside], int(np.abs(block.samples).max()))
+    assert loudest[True] > 3 * loudest[False] > 0
+    ear.close()
+    mouth.close()
+    assert np.array_equal(said(run_dir), words)
+    with pytest.raises(RefereeRefusal, match="beside the devices"):
+        ask(run_dir, "sound_play", name="../robot.wav")
+    with pytest.raises(RefereeRefusal, match="no such file"):
+        ask(run_dir, "sound_play", name="none.wav")

@@ -1,0 +1,104 @@
+"""The room joins speaker, microphone and people."""
+
+import numpy as np
+import pytest
+
+from drivers.audio.base import AudioFormat
+from drivers.audio.pcm_stream import PcmInput, PcmOutput
+from sim_twin.lockstep import Lockstep
+from sim_twin.sound.hearing import let_arrive
+from sim_twin.sound.room import NOISE_SIGMA, SPEAKER_LATENCY_S, Room
+from sim_twin.sound.talker import Talker, arrival, loudness
+from vla_deploy.speech.voice.sound import Sound
+
+RATE_HZ = 16_000
+FORMAT = AudioFormat(rate_hz=RATE_HZ)
+
+
+def burst(seconds: float = 0.1) -> np.ndarray:
+    return np.full((round(seconds * RATE_HZ), 1), 12_000, np.int16)
+
+
+def test_what_the_speaker_plays_reaches_the_microphone_late_and_rings_out(
+    lockstep: Lockstep,
+) -> None:
+    ear = PcmInput(lockstep.devices.stream("microphone"), lockstep.clock, FORMAT)
+    mouth = PcmOutput(lockstep.devices.stream("speaker"), lockstep.clock, FORMAT)
+    assert mouth.write(burst()) == len(burst())
+    lockstep.run_for(0.6)
+    block = ear.poll()
+    assert block is not None
+    level = np.abs(block.samples[:, 0].astype(float))
+    first = int(np.flatnonzero(level > 20 * NOISE_SIGMA)[0])
+    distance_m = lockstep.twin.microphone.room.acoustics.speaker_distance_m
+    assert first / RATE_HZ == pytest.approx(SPEAKER_LATENCY_S + distance_m / 343, abs=0.003)
+    ends = first + len(burst())
+    assert level[first:ends].mean() > 2_000
+    ringing, silence = (level[ends + at : ends + at + 800].mean() for at in (100, 5_000))
+    assert ringing > 5 * silence
+    assert silence < 2 * NOISE_SIGMA
+
+
+def test_blocks_of_the_speaker_follow_each_other_without_a_gap() -> None:
+    room = Room(RATE_HZ)
+    wave = np.full(320, 0.5, np.float32)
+    ends = [room.sound_from_speaker(wave, FORMAT.duration_ns(320), 10**9) for _ in range(3)]
+    assert np.diff(ends).tolist() == [FORMAT.duration_ns(320)] * 2
+    later_ns = ends[-1] + 10**9
+    assert room.sound_from_speaker(wave, FORMAT.duration_ns(320), later_ns) > later_ns
+
+
+def test_sound_that_nobody_listens_to_is_forgotten() -> None:
+    room = Room(RATE_HZ)
+    for second in range(0, 400, 10):
+        room.lay(np.ones(RATE_HZ, np.float32), second * RATE_HZ)
+    assert len(room._sounding) <= 14
+
+
+def test_a_person_is_heard_where_the_words_are_said_to_be(lockstep: Lockstep) -> None:
+    ear = PcmInput(lockstep.devices.stream("microphone"), lockstep.clock, FORMAT)
+    lockstep.run_for(0.2)
+    room = lockstep.twin.microphone.room
+    heard = arrival("pick up the red cup", Talker(), RATE_HZ, room.acoustics)
+    began_ns = lockstep.twin.now_ns
+    spoken = let_arrive(lockstep.twin, heard)
+    ear.poll()
+    samples = []
+    while lockstep.twin.now_ns < spoken.ends_ns + 500_000_000:
+        lockstep.run_for(0.1)
+        block = ear.poll()
+        assert block is not None
+        samples.append(block.samples[:, 0])
+    sound = np.concatenate(samples).astype(float)
+    start, end = ((at - began_ns) * RATE_HZ // 10**9 for at in (spoken.begins_ns, spoken.ends_ns))
+    assert np.std(sound[: start - 10]) < 2 * NOISE_SIGMA
+    assert np.std(sound[start:end]) > 20 * NOISE_SIGMA
+    assert np.std(sound[end + 4_800 :]) < 3 * NOISE_SIGMA
+
+
+def test_twice_as_far_is_weaker_and_the_words_are_as_loud_as_declared() -> None:
+    room = Room(RATE_HZ)
+    near, far = (
+        arrival("go to the kitchen", Talker(distance_m=d), RATE_HZ, room.acoustics) for d in (1, 4)
+    )
+    assert loudness(near.sound) > 1.3 * loudness(far.sound)
+    assert 0.03 < loudness(near.sound) < 0.15
+
+
+@pytest.mark.parametrize("snr_db", [0.0, 10.0, 20.0])
+def test_a_stated_noise_lies_under_the_words_and_around_them(snr_db: float) -> None:
+    room = Room(RATE_HZ)
+    plain = arrival("go to the kitchen", Talker(), RATE_HZ, room.acoustics)
+    noisy = arrival("go to the kitchen", Talker(), RATE_HZ, room.acoustics, snr_db=snr_db)
+    begins, ends = noisy.words
+    assert begins > RATE_HZ // 4
+    assert ends - begins == plain.words[1] - plain.words[0]
+    noise = np.std(noisy.sound.wave[: RATE_HZ // 2])
+    assert 20 * np.log10(loudness(plain.sound) / noise) == pytest.approx(snr_db, abs=1.5)
+
+
+def test_loudness_leaves_silence_out() -> None:
+    wave = np.zeros(RATE_HZ, np.float32)
+    wave[:1_600] = 0.2
+    assert loudness(Sound(rate_hz=RATE_HZ, wave=wave)) == pytest.approx(0.2)
+    assert loudness(Sound(rate_hz=RATE_HZ, wave=np.zeros(1_600, np.float32))) == 0.0

@@ -1,0 +1,142 @@
+"""The programs that speak: what they give, and every way in which they give nothing."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.audio.base import AudioFormat
+from vla_deploy.speech.voice.errors import EngineMissing, SynthesisFailed
+from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.voice.piper import PiperEngine
+from vla_deploy.speech.voice.sound import Sound
+from vla_deploy.speech.voice.wav_stream import read_wav_stream
+
+
+def wav(rows: bytes, *, channels: int = 1, bits: int = 16, told_bytes: int = 0x7FFFF000) -> bytes:
+    form = struct.pack("<HHIIHH", 1, channels, 8_000, 16_000 * channels, 2 * channels, bits)
+    chunks = b"".join(
+        (b"LIST", struct.pack("<I", 3), b"abc\0", b"fmt ", struct.pack("<I", 16), form)
+    )
+    return (
+        b"".join(
+            (
+                b"RIFF",
+                struct.pack("<I", 36),
+                b"WAVE",
+                chunks,
+                b"data",
+                struct.pack("<I", told_bytes),
+            )
+        )
+        + rows
+    )
+
+
+def program(folder: Path, script: str) -> str:
+    path = folder / "engine"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+def test_espeak_speaks_and_faster_is_shorter() -> None:
+    slow = EspeakEngine(words_per_minute=120).synthesise("put it in the box")
+    fast = EspeakEngine(words_per_minute=220).synthesise("put it in the box")
+    assert 0.4 < fast.duration_s < slow.duration_s < 4.0
+    assert np.abs(slow.wave).max() > 0.1
+
+
+def test_text_is_never_taken_for_an_option_or_for_phonemes() -> None:
+    plain = EspeakEngine().synthesise("-v nothing")
+    assert plain.duration_s > 0.5
+    spelt = EspeakEngine().synthesise("[[h@l'oU]] robot")
+    assert spelt.duration_s > EspeakEngine().synthesise("robot").duration_s
+
+
+def test_a_missing_program_says_how_to_get_it(tmp_path: Path) -> None:
+    with pytest.raises(EngineMissing, match="apt install espeak-ng"):
+        EspeakEngine(program=str(tmp_path / "none")).synthesise("hello")
+    (tmp_path / "plain").write_text("text")
+    with pytest.raises(EngineMissing, match="Permission denied"):
+        EspeakEngine(program=str(tmp_path / "plain")).synthesise("hello")
+
+
+def test_an_unknown_voice_is_told_in_the_programs_words() -> None:
+    with pytest.raises(SynthesisFailed, match="voice does not exist"):
+        EspeakEngine(voice="klingon-orc").synthesise("hello")
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (b"", "expected a WAV"),
+        (b"<html>not found</html>", "expected a WAV"),
+        (wav(b""), "no sample"),
+        (wav(b"\0" * 8, bits=24), "24 bits"),
+        (wav(b"\0" * 8)[:30], "with a format and samples"),
+    ],
+)
+def test_what_is_no_sound_is_refused(data: bytes, told: str) -> None:
+    with pytest.raises(SynthesisFailed, match=told):
+        read_wav_stream(data)
+
+
+def test_lengths_in_the_header_are_not_believed() -> None:
+    rows = struct.pack("<4h", 0, 16_384, -16_384, 8_192)
+    assert read_wav_stream(wav(rows)).wave.tolist() == [0.0, 0.5, -0.5, 0.25]
+    assert read_wav_stream(wav(rows, channels=2)).wave.tolist() == [0.25, -0.125]
+    assert read_wav_stream(wav(rows + b"\1")).wave.tolist() == [0.0, 0.5, -0.5, 0.25]
+
+
+def test_piper_is_a_process_with_its_voice_beside_it(tmp_path: Path) -> None:
+    voice = tmp_path / "amy.onnx"
+    voice.write_bytes(b"")
+    engine = PiperEngine(
+        voice=str(voice),
+        words_per_minute=320,
+        program=program(
+            tmp_path,
+            """
+        [ "$*" = "--model $(dirname "$0")/amy.onnx --output_raw --length_scale 0.500" ] || exit 3
+        [ "$(cat)" = "hello there" ] || exit 4
+        printf '\\000\\100\\000\\300'
+    """,
+        ),
+    )
+    with pytest.raises(EngineMissing, match=r"audio\.sample_rate"):
+        engine.synthesise("hello")
+    Path(f"{voice}.json").write_text('{"audio": {"sample_rate": 22050}}')
+    sound = engine.synthesise("hello\nthere")
+    assert (sound.rate_hz, sound.wave.tolist()) == (22_050, [0.5, -0.5])
+
+
+def test_a_missing_piper_or_voice_says_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(EngineMissing, match="expected the path of a piper"):
+        PiperEngine(voice=str(tmp_path / "none.onnx")).synthesise("hello")
+    voice = tmp_path / "amy.onnx"
+    voice.write_bytes(b"")
+    Path(f"{voice}.json").write_text('{"audio": {"sample_rate": 22050}}')
+    with pytest.raises(EngineMissing, match=r"pipx install piper-tts"):
+        PiperEngine(voice=str(voice), program="no-such-piper").synthesise("hello")
+    broken = PiperEngine(voice=str(voice), program=program(tmp_path, "echo no >&2; exit 7"))
+    with pytest.raises(SynthesisFailed, match="ended with 7: no"):
+        broken.synthesise("hello")
+
+
+@pytest.mark.parametrize(("rate_hz", "new_rate_hz"), [(22_050, 16_000), (8_000, 48_000)])
+def test_another_rate_keeps_a_tone_and_the_time(rate_hz: int, new_rate_hz: int) -> None:
+    def tone(rate: int) -> np.ndarray:
+        times_s = np.arange(rate) / rate
+        return (np.sin(2 * np.pi * 440 * times_s) * np.sin(np.pi * times_s)).astype(np.float32)
+
+    changed = Sound(rate_hz=rate_hz, wave=tone(rate_hz)).at_rate(new_rate_hz)
+    assert changed.duration_s == pytest.approx(1.0)
+    assert changed.wave == pytest.approx(tone(new_rate_hz), abs=0.01)
+
+
+def test_a_speaker_gets_every_channel_at_its_volume_and_never_wraps() -> None:
+    sound = Sound(rate_hz=8_000, wave=np.array([0.5, -1.0, 2.0], np.float32))
+    samples = sound.samples(AudioFormat(rate_hz=8_000, channels=2), 0.5)
+    assert samples.tolist() == [[8_192, 8_192], [-16_384, -16_384], [32_767, 32_767]]

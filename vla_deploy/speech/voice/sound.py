@@ -1,0 +1,57 @@
+"""Hold one voice's sound, and bring it to another rate: that of a speaker, or of a room."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
+
+Wave = NDArray[np.float32]
+"""Samples of one channel as a share of full scale, -1 to 1."""
+# Silence behind the sound: the transform is a circle, and the end must not ring into the beginning.
+_APART_ROWS: Final = 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sound:
+    """Hold a sound of one channel."""
+
+    rate_hz: int
+    wave: Wave
+
+    @property
+    def duration_s(self) -> float:
+        """Return how long it lasts."""
+        return len(self.wave) / self.rate_hz
+
+    def at_rate(self, rate_hz: int) -> "Sound":
+        """Return the same sound at another rate, without what the lower of both cannot carry."""
+        if rate_hz == self.rate_hz:
+            return self
+        shared = math.gcd(rate_hz, self.rate_hz)
+        step, new_step = self.rate_hz // shared, rate_hz // shared
+        blocks = math.ceil((len(self.wave) + _APART_ROWS) / step)
+        padded = np.zeros(blocks * step, np.float32)
+        padded[: len(self.wave)] = self.wave
+        rows = blocks * new_step
+        resampled = np.fft.irfft(_cut(np.fft.rfft(padded), rows), rows) * (new_step / step)
+        kept = math.ceil(len(self.wave) * new_step / step)
+        return Sound(rate_hz=rate_hz, wave=resampled[:kept].astype(np.float32))
+
+    def samples(self, format_: AudioFormat, volume_ratio: float) -> Samples:
+        """Return it as a device of this format plays it, the same on every channel."""
+        wave = self.at_rate(format_.rate_hz).wave * np.float32(volume_ratio * FULL_SCALE)
+        mono = np.rint(wave).clip(-FULL_SCALE, FULL_SCALE - 1).astype(np.int16)
+        return np.repeat(mono[:, None], format_.channels, axis=1)
+
+
+def _cut(spectrum: NDArray[np.complex128], rows: int) -> NDArray[np.complex128]:
+    """Return a spectrum as long as that of `rows` samples: shortened, or filled with nothing."""
+    wanted = rows // 2 + 1
+    fitted = np.zeros(wanted, np.complex128)
+    kept = min(wanted, len(spectrum))
+    fitted[:kept] = spectrum[:kept]
+    return fitted
