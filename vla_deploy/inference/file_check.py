@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 
 from vla_deploy.inference.errors import ModelFileSpoiled
-from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.manifest import ModelFile, Variant
 from vla_deploy.inference.store import Model
 
 
@@ -14,8 +14,21 @@ def checked_file(model: Model, variant: Variant) -> Path:
     Raises:
         ModelFileSpoiled: it is missing, cannot be read, or its SHA-256 is another one.
     """
-    entry = model.manifest.files[variant]
-    path = model.folder / entry.path
+    return _checked(model.folder, model.manifest.files[variant])
+
+
+def check_parts(model: Model) -> None:
+    """Check every part of a model that has several files.
+
+    Raises:
+        ModelFileSpoiled: one is missing, cannot be read, or its SHA-256 is another one.
+    """
+    for part in model.manifest.parts:
+        _checked(model.folder, part)
+
+
+def _checked(folder: Path, entry: ModelFile) -> Path:
+    path = folder / entry.path
     got = sha256_of(path)
     if got != entry.sha256:
         raise ModelFileSpoiled(

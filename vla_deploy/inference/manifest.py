@@ -1,7 +1,7 @@
 """Declare what a model is: its files, its tensors, and how its outputs are to be read."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 # A dimension is a size, or a name for one that is free.
@@ -96,16 +96,61 @@ class Detection:
     measured: Measured | None = None
 
 
+class Context(StrEnum):
+    """Say how much sound a Whisper's encoder takes.
+
+    Stock weights know only windows of 30 s, `padded` with silence; `trimmed` ones were trained on
+    what is there and a little silence, which costs a hundredth for a short command.
+    """
+
+    PADDED = "padded"
+    TRIMMED = "trimmed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibration:
+    """Declare how sure a model's words are: the weights of a logistic function.
+
+    Of the mean log-probability of a token, of the probability that nobody spoke, and of by how much
+    the text's compression ratio exceeds 2: such a text repeats itself.
+    """
+
+    bias: float
+    log_probability: float
+    no_speech: float
+    compression: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Whisper:
+    """Declare a model of the Whisper family in CTranslate2's form.
+
+    `languages` are those that may be understood; `hot_words` tells whether it heeds words that it
+    is given. `calibration` is None where nobody has measured it.
+    """
+
+    languages: tuple[str, ...]
+    context: Context
+    hot_words: bool
+    calibration: Calibration | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
-    """Declare one model; `detection` is there for detectors, `card` where there is one."""
+    """Declare one model; `card` where there is one.
+
+    A graph has tensors and `files`, one for each variant, detectors a `detection` too; a Whisper
+    has `parts`, which are all needed, and `whisper`.
+    """
 
     name: str
     role: str
     summary: str
     licence: str
     card: str
-    inputs: tuple[Tensor, ...]
-    outputs: tuple[Tensor, ...]
-    files: Mapping[Variant, ModelFile]
-    detection: Detection | None
+    inputs: tuple[Tensor, ...] = ()
+    outputs: tuple[Tensor, ...] = ()
+    files: Mapping[Variant, ModelFile] = field(default_factory=dict)
+    detection: Detection | None = None
+    parts: tuple[ModelFile, ...] = ()
+    whisper: Whisper | None = None

@@ -9,6 +9,8 @@ from typing import Any, Final
 
 from vla_deploy.inference.errors import ManifestInvalid
 from vla_deploy.inference.manifest import (
+    Calibration,
+    Context,
     Detection,
     Fit,
     ImageInput,
@@ -18,6 +20,7 @@ from vla_deploy.inference.manifest import (
     ModelFile,
     Tensor,
     Variant,
+    Whisper,
 )
 from vla_deploy.inference.manifest_schema import manifest_faults
 
@@ -55,17 +58,21 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 
 
 def _build(document: Document) -> Manifest:
-    detection = document.get("detection")
+    detection, whisper = document.get("detection"), document.get("whisper")
     return Manifest(
         name=document["name"],
         role=document["role"],
         summary=document["summary"],
         licence=document["licence"],
         card=document.get("card", ""),
-        inputs=_tensors(document["inputs"]),
-        outputs=_tensors(document["outputs"]),
-        files={Variant(name): ModelFile(**file) for name, file in document["files"].items()},
+        inputs=_tensors(document.get("inputs", [])),
+        outputs=_tensors(document.get("outputs", [])),
+        files={
+            Variant(name): ModelFile(**file) for name, file in document.get("files", {}).items()
+        },
         detection=None if detection is None else _detection(detection),
+        parts=tuple(ModelFile(**part) for part in document.get("parts", [])),
+        whisper=None if whisper is None else _whisper(whisper),
     )
 
 
@@ -93,9 +100,20 @@ def _detection(table: Document) -> Detection:
     )
 
 
+def _whisper(table: Document) -> Whisper:
+    calibration = table.get("calibration")
+    return Whisper(
+        languages=tuple(table["languages"]),
+        context=Context(table["context"]),
+        hot_words=table["hot_words"],
+        calibration=None if calibration is None else Calibration(**calibration),
+    )
+
+
 def document_of(manifest: Manifest) -> dict[str, Any]:
     """Return the manifest as tables; what is empty or absent is left out."""
-    return asdict(manifest, dict_factory=_present)
+    document = asdict(manifest, dict_factory=_present)
+    return {key: value for key, value in document.items() if value not in ((), {})}
 
 
 def _present(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

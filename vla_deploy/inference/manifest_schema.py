@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from platforms.profile_schema import ROLES
 from vla_deploy.inference.manifest import Fit, Layout, Variant
+from vla_deploy.inference.whisper_schema import whisper_cross_faults, whisper_faults
 from vla_deploy.robots.schema import (
     OPTIONAL_TABLE,
     OPTIONAL_TEXT,
@@ -73,17 +74,21 @@ RATIO: Final = Check(
 COUNT: Final = Check(expected="an integer above 0", holds=_is_count)
 THREE: Final = Check(expected="three numbers", holds=_is_three)
 
-_TOP: Shape = {
+_HEAD: Shape = {
     "name": NAME,
     "role": one_of(*ROLES),
     "summary": TEXT,
     "licence": TEXT,
     "card": OPTIONAL_TEXT,
+}
+_GRAPH: Shape = {
+    **_HEAD,
     "inputs": TABLES,
     "outputs": TABLES,
     "files": TABLE,
     "detection": OPTIONAL_TABLE,
 }
+_WHISPER: Shape = {**_HEAD, "parts": TABLES, "whisper": TABLE}
 _TENSOR: Shape = {
     "name": TEXT,
     "shape": Check(
@@ -133,7 +138,17 @@ def manifest_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[F
 
 
 def _key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
-    yield from check_record(document, "", _TOP)
+    if "whisper" not in document:
+        yield from _graph_key_faults(document)
+        return
+    yield from check_record(document, "", _WHISPER)
+    for number, record in enumerate(_rows(document.get("parts"))):
+        yield from check_record(record, f"parts[{number}]", _FILE)
+    yield from whisper_faults(_table(document["whisper"]))
+
+
+def _graph_key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
+    yield from check_record(document, "", _GRAPH)
     for group in ("inputs", "outputs"):
         for number, record in enumerate(_rows(document.get(group))):
             yield from check_record(record, f"{group}[{number}]", _TENSOR)
@@ -156,6 +171,9 @@ def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fau
     if document["name"] != folder_name:
         expected = f"{folder_name!r}, as its folder"
         yield Fault(key="name", got=repr(document["name"]), expected=expected)
+    if "whisper" in document:
+        yield from whisper_cross_faults(document)
+        return
     for group in ("inputs", "outputs", "files"):
         if not document[group]:
             yield Fault(key=group, got="none", expected="one at least")
