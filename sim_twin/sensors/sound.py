@@ -7,7 +7,7 @@ import numpy as np
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples, check_samples
 from drivers.audio.pcm_protocol import PcmBlock, PcmParser, encode_block
 from sim_twin.sound.room import Room
-from vla_deploy.speech.voice.sound import Sound, Wave
+from vla_deploy.speech.voice.clip import Clip, Wave
 
 MAX_BACKLOG_S: Final = 1.0
 MAX_HEARD_S: Final = 60.0
@@ -102,7 +102,7 @@ class SpeakerDevice:
     def _sound(self, samples: Samples) -> None:
         if self._room is None:
             return
-        sound = Sound(rate_hz=self.format.rate_hz, wave=_wave(samples))
+        sound = Clip(rate_hz=self.format.rate_hz, wave=_wave(samples))
         wave = sound.at_rate(self._room.rate_hz).wave
         self._room.sound_from_speaker(wave, self.format.duration_ns(len(samples)), self._now_ns)
 

@@ -17,7 +17,7 @@ from sim_twin.errors import RefereeRefusal
 from sim_twin.sound.hearing import ear_position_m, let_arrive
 from sim_twin.sound.talker import Arrival
 from sim_twin.twin import Twin
-from vla_deploy.speech.voice.sound import Sound
+from vla_deploy.speech.voice.clip import Clip
 
 Answer = dict[str, Any]
 
@@ -54,7 +54,7 @@ class SoundDesk:
             raise RefereeRefusal(f"sound_play: expected {rate_hz} Hz, got {format_}")
         wave = (samples.mean(axis=1) / FULL_SCALE).astype(np.float32)
         words = _rows(request.get("words"), len(wave))
-        sound = Sound(rate_hz=rate_hz, wave=wave)
+        sound = Clip(rate_hz=rate_hz, wave=wave)
         spoken = let_arrive(self._twin, Arrival(sound=sound, words=words))
         return {
             "began_ns": self._wall_ns(spoken.begins_ns),

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from sim_twin.sound.acoustics import Acoustics, path, through
+from vla_deploy.speech.voice.clip import Clip, Wave
 from vla_deploy.speech.voice.engine import Engine
 from vla_deploy.speech.voice.espeak import EspeakEngine
-from vla_deploy.speech.voice.sound import Sound, Wave
 
 USUAL_DISTANCE_M: Final = 1.5
 NOISE_AROUND_S: Final = 0.5
@@ -29,7 +29,7 @@ class Talker:
 class Arrival:
     """Hold what arrives at the microphone; `words` are the rows in which words sound."""
 
-    sound: Sound
+    sound: Clip
     words: tuple[int, int]
 
 
@@ -57,31 +57,31 @@ def arrival(
     delay = int(np.flatnonzero(response)[0])
     words = (delay, delay + len(dry.wave))
     if snr_db is None:
-        return Arrival(sound=Sound(rate_hz=rate_hz, wave=wet), words=words)
+        return Arrival(sound=Clip(rate_hz=rate_hz, wave=wet), words=words)
     around = round(NOISE_AROUND_S * rate_hz)
     wave = _room_noise(len(wet) + 2 * around, seed + 1)
-    wave *= loudness(Sound(rate_hz=rate_hz, wave=wet)) * 10.0 ** (-snr_db / 20.0)
+    wave *= loudness(Clip(rate_hz=rate_hz, wave=wet)) * 10.0 ** (-snr_db / 20.0)
     wave[around : around + len(wet)] += wet
     return Arrival(
-        sound=Sound(rate_hz=rate_hz, wave=wave), words=(words[0] + around, words[1] + around)
+        sound=Clip(rate_hz=rate_hz, wave=wave), words=(words[0] + around, words[1] + around)
     )
 
 
-def loudness(sound: Sound) -> float:
+def loudness(sound: Clip) -> float:
     """Return the effective value of a sound where it is no silence, as a share of full scale."""
     powers = _frame_powers(sound)
     loud = powers[powers > _SILENCE_RATIO**2 * powers.max(initial=0.0)]
     return float(np.sqrt(loud.mean())) if len(loud) else 0.0
 
 
-def _frame_powers(sound: Sound) -> Wave:
+def _frame_powers(sound: Clip) -> Wave:
     rows = round(_FRAME_S * sound.rate_hz)
     whole = len(sound.wave) - len(sound.wave) % rows
     powers: Wave = (sound.wave[:whole].reshape(-1, rows) ** 2).mean(axis=1)
     return powers
 
 
-def _trimmed(sound: Sound) -> Sound:
+def _trimmed(sound: Clip) -> Clip:
     """Return the words alone: programs put silence around them."""
     powers = _frame_powers(sound)
     loud = np.flatnonzero(powers > _SILENCE_RATIO**2 * powers.max(initial=0.0))
@@ -89,13 +89,13 @@ def _trimmed(sound: Sound) -> Sound:
         return sound
     rows = round(_FRAME_S * sound.rate_hz)
     kept = sound.wave[loud[0] * rows : (loud[-1] + 1) * rows]
-    return Sound(rate_hz=sound.rate_hz, wave=kept)
+    return Clip(rate_hz=sound.rate_hz, wave=kept)
 
 
-def _levelled(sound: Sound, rms: float) -> Sound:
+def _levelled(sound: Clip, rms: float) -> Clip:
     loud = loudness(sound)
     gain = np.float32(rms / loud if loud else 0.0)
-    return Sound(rate_hz=sound.rate_hz, wave=sound.wave * gain)
+    return Clip(rate_hz=sound.rate_hz, wave=sound.wave * gain)
 
 
 def _room_noise(rows: int, seed: int) -> Wave:

@@ -252,6 +252,22 @@ TOPICS: tuple[Topic, ...] = (
         slot_bytes=65536,
     ),
     Topic(
+        name="say",
+        kind=Kind.RING,
+        owner="any",
+        summary="what the robot is to say aloud: say id, text, urgency; or a say id to take back",
+        slots=32,
+        slot_bytes=8192,
+    ),
+    Topic(
+        name="voice_event",
+        kind=Kind.RING,
+        owner="speech",
+        summary="what became of what was to be said: began, finished, interrupted, failed, dropped",
+        slots=64,
+        slot_bytes=1024,
+    ),
+    Topic(
         name="plan",
         kind=Kind.RING,
         owner="planner",

@@ -218,6 +218,21 @@ class Audio:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class VoiceSettings:
+    """Describe how the robot sounds; `voice` and `program` are the engine's own words for them.
+
+    An empty `program` is the engine's usual one. `volume_ratio` is of the speaker's full scale.
+    """
+
+    engine: str = "espeak-ng"
+    voice: str = "en-gb"
+    program: str = ""
+    words_per_minute: int = 160
+    pitch: int = 50
+    volume_ratio: float = 0.8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointLimits:
     """Bound one joint's motion in its own unit (rad, or m for a finger)."""
 
@@ -311,6 +326,7 @@ class RobotDescription:
     estop: EstopButton | None = None
     microphone: Audio | None = None
     speaker: Audio | None = None
+    voice: VoiceSettings = VoiceSettings()
     protection: Protection = NOTHING_DECLARED
     planning: PlanBounds = NOT_BOUNDED
 

@@ -30,6 +30,7 @@ from vla_deploy.robots.description import (
     ServoBus,
     ServoModel,
     StopCategory,
+    VoiceSettings,
 )
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.mjcf import mjcf_faults, read_mjcf_names
@@ -50,6 +51,7 @@ SINGLE: Mapping[str, Shape] = {
     "estop": schema.ESTOP,
     "microphone": schema.AUDIO,
     "speaker": schema.AUDIO,
+    "voice": schema.VOICE,
     "home": schema.HOME,
     "planning": schema.PLANNING,
     "clearance": protection_schema.CLEARANCE,
@@ -173,6 +175,7 @@ def _build(document: Document, directory: Path, camera: Camera) -> RobotDescript
         estop=EstopButton(**document["estop"]) if "estop" in document else None,
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
+        voice=VoiceSettings(**document.get("voice", {})),
         limits={name: JointLimits(**row) for name, row in document["limits"].items()},
         groups={name: _group(name, row) for name, row in document["groups"].items()},
         hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},

@@ -90,6 +90,7 @@ ROBOT: Shape = {
     "estop": OPTIONAL_TABLE,
     "microphone": OPTIONAL_TABLE,
     "speaker": OPTIONAL_TABLE,
+    "voice": OPTIONAL_TABLE,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE,
@@ -184,6 +185,18 @@ AUDIO: Shape = {
     "path": TEXT,
     "rate_hz": one_of(8000, 16000, 22050, 24000, 32000, 44100, 48000),
     "channels": _integer(1, 8),
+}
+VOICE: Shape = {
+    "engine": one_of("espeak-ng", "piper", is_optional=True),
+    "voice": OPTIONAL_TEXT,
+    "program": OPTIONAL_TEXT,
+    "words_per_minute": replace(_integer(80, 450), is_optional=True),
+    "pitch": replace(_integer(0, 99), is_optional=True),
+    "volume_ratio": Check(
+        expected="a number in 0..1",
+        holds=lambda value: is_number(value) and 0.0 <= value <= 1.0,
+        is_optional=True,
+    ),
 }
 LIMITS: Shape = {
     "min": NUMBER,

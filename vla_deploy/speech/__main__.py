@@ -3,12 +3,14 @@
 import sys
 
 from platforms import load_profile
+from vla_deploy.aside import beside
 from vla_deploy.node import NodeContext
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
-from vla_deploy.speech.devices import linked_microphone
+from vla_deploy.speech.devices import linked_microphone, linked_speaker
 from vla_deploy.speech.node import SpeechNode
+from vla_deploy.speech.voice.engines import build_voice
 
 
 def build(context: NodeContext) -> SpeechNode:
@@ -16,7 +18,15 @@ def build(context: NodeContext) -> SpeechNode:
     robot = load_robot(context.robot)
     links = device_links(robot, context.devices_dir)
     profile = load_profile(context.profile)
-    return SpeechNode(context, robot, profile, linked_microphone(robot, links, context.clock))
+    clock = context.clock
+    speaker = linked_speaker(robot, links, clock)
+    return SpeechNode(
+        context,
+        robot,
+        profile,
+        linked_microphone(robot, links, clock),
+        voice=build_voice(robot.voice, speaker, clock, beside("voice")),
+    )
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from sim_twin.lockstep import Lockstep
 from sim_twin.sound.hearing import let_arrive
 from sim_twin.sound.room import NOISE_SIGMA, SPEAKER_LATENCY_S, Room
 from sim_twin.sound.talker import Talker, arrival, loudness
-from vla_deploy.speech.voice.sound import Sound
+from vla_deploy.speech.voice.clip import Clip
 
 RATE_HZ = 16_000
 FORMAT = AudioFormat(rate_hz=RATE_HZ)
@@ -100,5 +100,5 @@ def test_a_stated_noise_lies_under_the_words_and_around_them(snr_db: float) -> N
 def test_loudness_leaves_silence_out() -> None:
     wave = np.zeros(RATE_HZ, np.float32)
     wave[:1_600] = 0.2
-    assert loudness(Sound(rate_hz=RATE_HZ, wave=wave)) == pytest.approx(0.2)
-    assert loudness(Sound(rate_hz=RATE_HZ, wave=np.zeros(1_600, np.float32))) == 0.0
+    assert loudness(Clip(rate_hz=RATE_HZ, wave=wave)) == pytest.approx(0.2)
+    assert loudness(Clip(rate_hz=RATE_HZ, wave=np.zeros(1_600, np.float32))) == 0.0

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from vla_deploy.one_line import one_line
+from vla_deploy.speech.voice.clip import Clip
 from vla_deploy.speech.voice.errors import EngineMissing, SynthesisFailed
-from vla_deploy.speech.voice.sound import Sound
 
 TIMEOUT_S: Final = 10.0
 
@@ -19,7 +19,7 @@ class Engine(Protocol):
         """Return the engine and its voice, for people."""
         ...
 
-    def synthesise(self, text: str) -> Sound:
+    def synthesise(self, text: str) -> Clip:
         """Return the sound of a text; takes tens of milliseconds, or as long as the engine needs.
 
         Raises:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Final
 
+from vla_deploy.speech.voice.clip import Clip
 from vla_deploy.speech.voice.engine import run_program
-from vla_deploy.speech.voice.sound import Sound
 from vla_deploy.speech.voice.wav_stream import read_wav_stream
 
 PROGRAM: Final = "espeak-ng"
@@ -25,7 +25,7 @@ class EspeakEngine:
         """Return the engine and its voice."""
         return f"eSpeak NG, {self.voice}"
 
-    def synthesise(self, text: str) -> Sound:
+    def synthesise(self, text: str) -> Clip:
         """Return the sound of a text, after some 20 to 100 ms.
 
         Raises:

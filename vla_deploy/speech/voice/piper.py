@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from vla_deploy.speech.voice.clip import Clip
 from vla_deploy.speech.voice.engine import run_program
 from vla_deploy.speech.voice.errors import EngineMissing
-from vla_deploy.speech.voice.sound import Sound
 from vla_deploy.speech.voice.wav_stream import pcm_wave
 
 PROGRAM: Final = "piper"
@@ -33,7 +33,7 @@ class PiperEngine:
         """Return the engine and its voice."""
         return f"piper, {Path(self.voice).stem}"
 
-    def synthesise(self, text: str) -> Sound:
+    def synthesise(self, text: str) -> Clip:
         """Return the sound of a text, after a second or more on a small computer.
 
         Raises:
@@ -47,7 +47,7 @@ class PiperEngine:
             *("--length_scale", f"{slowness:.3f}"),
         )
         spoken = run_program(words, " ".join(text.split()) + "\n", _REMEDY)
-        return Sound(rate_hz=rate_hz, wave=pcm_wave(spoken))
+        return Clip(rate_hz=rate_hz, wave=pcm_wave(spoken))
 
     def _rate_hz(self) -> int:
         described = Path(f"{self.voice}.json")

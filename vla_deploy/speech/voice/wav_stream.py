@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
+from vla_deploy.speech.voice.clip import Clip, Wave
 from vla_deploy.speech.voice.errors import SynthesisFailed
-from vla_deploy.speech.voice.sound import Sound, Wave
 
 _RIFF: Final = struct.Struct("<4sI4s")
 _CHUNK: Final = struct.Struct("<4sI")
@@ -15,7 +15,7 @@ _PCM: Final = 1
 _BITS: Final = 16
 
 
-def read_wav_stream(data: bytes) -> Sound:
+def read_wav_stream(data: bytes) -> Clip:
     """Return the sound: what follows the header of `data`, to the end of what is there.
 
     Raises:
@@ -31,7 +31,7 @@ def read_wav_stream(data: bytes) -> Sound:
         if name == b"fmt ":
             rate_hz, channels = _format(data[at : at + length])
         elif name == b"data" and rate_hz:
-            return Sound(rate_hz=rate_hz, wave=pcm_wave(data[at : at + length], channels))
+            return Clip(rate_hz=rate_hz, wave=pcm_wave(data[at : at + length], channels))
         at += length + length % 2
     raise SynthesisFailed(f"expected a WAV with a format and samples, got {len(data)} bytes")
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
+from vla_deploy.speech.voice.clip import Clip
 from vla_deploy.speech.voice.errors import EngineMissing, SynthesisFailed
 from vla_deploy.speech.voice.espeak import EspeakEngine
 from vla_deploy.speech.voice.piper import PiperEngine
-from vla_deploy.speech.voice.sound import Sound
 from vla_deploy.speech.voice.wav_stream import read_wav_stream
 
 
@@ -131,12 +131,12 @@ def test_another_rate_keeps_a_tone_and_the_time(rate_hz: int, new_rate_hz: int) 
         times_s = np.arange(rate) / rate
         return (np.sin(2 * np.pi * 440 * times_s) * np.sin(np.pi * times_s)).astype(np.float32)
 
-    changed = Sound(rate_hz=rate_hz, wave=tone(rate_hz)).at_rate(new_rate_hz)
+    changed = Clip(rate_hz=rate_hz, wave=tone(rate_hz)).at_rate(new_rate_hz)
     assert changed.duration_s == pytest.approx(1.0)
     assert changed.wave == pytest.approx(tone(new_rate_hz), abs=0.01)
 
 
 def test_a_speaker_gets_every_channel_at_its_volume_and_never_wraps() -> None:
-    sound = Sound(rate_hz=8_000, wave=np.array([0.5, -1.0, 2.0], np.float32))
+    sound = Clip(rate_hz=8_000, wave=np.array([0.5, -1.0, 2.0], np.float32))
     samples = sound.samples(AudioFormat(rate_hz=8_000, channels=2), 0.5)
     assert samples.tolist() == [[8_192, 8_192], [-16_384, -16_384], [32_767, 32_767]]

@@ -1,4 +1,4 @@
-"""Hold one voice's sound, and bring it to another rate: that of a speaker, or of a room."""
+"""Hold a piece of sound, and bring it to another rate: that of a speaker, or of a room."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _APART_ROWS: Final = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sound:
+class Clip:
     """Hold a sound of one channel."""
 
     rate_hz: int
@@ -27,7 +27,7 @@ class Sound:
         """Return how long it lasts."""
         return len(self.wave) / self.rate_hz
 
-    def at_rate(self, rate_hz: int) -> "Sound":
+    def at_rate(self, rate_hz: int) -> "Clip":
         """Return the same sound at another rate, without what the lower of both cannot carry."""
         if rate_hz == self.rate_hz:
             return self
@@ -39,7 +39,7 @@ class Sound:
         rows = blocks * new_step
         resampled = np.fft.irfft(_cut(np.fft.rfft(padded), rows), rows) * (new_step / step)
         kept = math.ceil(len(self.wave) * new_step / step)
-        return Sound(rate_hz=rate_hz, wave=resampled[:kept].astype(np.float32))
+        return Clip(rate_hz=rate_hz, wave=resampled[:kept].astype(np.float32))
 
     def samples(self, format_: AudioFormat, volume_ratio: float) -> Samples:
         """Return it as a device of this format plays it, the same on every channel."""

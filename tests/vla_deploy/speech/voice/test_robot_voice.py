@@ -1,0 +1,184 @@
+"""The robot's voice on a stepped clock: order, interruption, a speaker that goes and comes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from drivers.clock import NS_PER_S
+from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.speech.voice.playback import LEAD_NS
+from vla_deploy.speech.voice.robot_voice import TAIL_NS
+from vla_deploy.speech.voice.waiting import MOST_WAITING
+
+if TYPE_CHECKING:
+    from conftest import VoiceRig
+
+LONG = "I have put the red cup into the box, and now I am on my way back to the kitchen table"
+
+
+def test_what_is_to_be_said_is_heard_whole_and_in_its_time(rig: VoiceRig) -> None:
+    rig.say("a")
+    rig.run_until("a", "finished")
+    assert rig.events == [("a", "began"), ("a", "finished")]
+    said = rig.speaker.said()
+    expected = EspeakEngine().synthesise("I am on my way").samples(rig.format, 0.8)
+    assert np.array_equal(said, expected)
+    took_ns = rig.times_ns["a", "finished"] - rig.times_ns["a", "began"]
+    assert took_ns == pytest.approx(rig.format.duration_ns(len(said)), abs=2 * rig.step_ns)
+
+
+def test_orders_follow_each_other_the_urgent_first(rig: VoiceRig) -> None:
+    for say_id, priority in (("a", "medium"), ("b", "low"), ("c", "medium"), ("d", "high")):
+        rig.say(say_id, "one", priority=priority)
+    rig.run_until("b", "finished")
+    assert [say_id for say_id, event in rig.events if event == "began"] == ["d", "a", "c", "b"]
+
+
+def test_an_interruption_is_heard_at_once(rig: VoiceRig) -> None:
+    rig.say("long", LONG)
+    rig.run_until("long", "began")
+    rig.run(1.0)
+    rig.say("now", "careful", interrupt=True)
+    asked_ns = rig.clock.ns
+    rig.run_until("now", "finished")
+    assert rig.events[1:3] == [("long", "interrupted"), ("now", "began")]
+    assert rig.reasons["long"] == "now came first"
+    sounded_ns = rig.times_ns["now", "began"] - asked_ns + LEAD_NS
+    assert sounded_ns < NS_PER_S // 4
+
+
+def test_the_more_urgent_is_not_interrupted(rig: VoiceRig) -> None:
+    rig.say("long", LONG, priority="high")
+    rig.run_until("long", "began")
+    rig.say("now", "hello", interrupt=True)
+    rig.run_until("now", "finished")
+    assert ("long", "finished") in rig.events
+
+
+def test_a_person_who_speaks_silences_the_voice_within_its_lead(rig: VoiceRig) -> None:
+    rig.say("long", LONG)
+    rig.say("next", "and more")
+    rig.run_until("long", "began")
+    rig.run(0.5)
+    rig.speaker.said()
+    rig.voice.barge_in(rig.clock.ns - NS_PER_S // 10)
+    rig.run(2.0)
+    assert rig.events[1:] == [("next", "dropped"), ("long", "interrupted")]
+    assert "noticed after 0.10 s" in rig.reasons["long"]
+    fade_rows = len(rig.speaker.said())
+    assert 0 < fade_rows <= 0.01 * rig.format.rate_hz
+
+
+def test_an_emergency_stop_silences_the_voice(rig: VoiceRig) -> None:
+    rig.say("long", LONG)
+    rig.run_until("long", "began")
+    operator = rig.space.ring_writer("operator")
+    operator.publish({"act": "arm", "source": "test", "reason": ""})
+    rig.run(0.1)
+    assert len(rig.events) == 1
+    operator.publish({"act": "estop", "source": "test", "reason": ""})
+    rig.run(0.02)
+    assert rig.events[1:] == [("long", "interrupted")]
+
+
+def test_an_order_is_taken_back_waiting_or_sounding(rig: VoiceRig) -> None:
+    rig.say("long", LONG)
+    rig.say("next", "and more")
+    rig.run_until("long", "began")
+    rig.publish({"say_id": "next", "cancel": True})
+    rig.publish({"say_id": "long", "cancel": True})
+    rig.publish({"say_id": "nobody", "cancel": True})
+    rig.run(0.1)
+    assert rig.events[1:] == [("next", "dropped"), ("long", "interrupted")]
+
+
+def test_a_lost_speaker_fails_what_is_said_and_a_replug_brings_the_voice_back(
+    rig: VoiceRig,
+) -> None:
+    rig.say("long", LONG)
+    rig.run_until("long", "began")
+    rig.unplug()
+    rig.say("next", "and more")
+    rig.run(0.2)
+    assert rig.events[1:] == [("long", "failed"), ("next", "failed")]
+    assert "plug it in" in rig.reasons["next"]
+    assert rig.voice.document()["state"] == "away"
+    rig.replug()
+    rig.run(5.0)
+    assert rig.voice.document()["state"] == "ready"
+    rig.say("again")
+    rig.run_until("again", "finished")
+
+
+def test_while_it_speaks_and_rings_out_it_says_what_sounds(rig: VoiceRig) -> None:
+    assert rig.voice.playing is None
+    rig.say("a")
+    rig.run_until("a", "began")
+    playing = rig.voice.playing
+    assert playing is not None
+    assert (playing.say_id, playing.text) == ("a", "I am on my way")
+    assert -40.0 < playing.level_db < -3.0
+    rig.run_until("a", "finished")
+    assert rig.voice.playing is playing
+    rig.run(TAIL_NS / NS_PER_S)
+    assert rig.voice.playing is None
+
+
+def test_a_line_that_is_too_long_loses_the_least_urgent(rig: VoiceRig) -> None:
+    rig.say("long", LONG)
+    rig.run_until("long", "began")
+    for number in range(MOST_WAITING):
+        rig.say(f"low-{number}", "one", priority="low")
+    rig.say("high", "one", priority="high")
+    rig.run(0.1)
+    assert rig.events[1:] == [(f"low-{MOST_WAITING - 1}", "dropped")]
+
+
+def test_news_that_waited_too_long_is_dropped(rig: VoiceRig) -> None:
+    for number in range(12):
+        rig.say(str(number), LONG)
+    rig.run_until("11", "dropped")
+    assert "waited for 20 s" in rig.reasons["11"]
+
+
+def test_a_text_without_end_is_cut_at_a_word_and_says_so(rig: VoiceRig) -> None:
+    rig.say("endless", "seven words that never come to an end " * 100)
+    rig.run_until("endless", "finished", at_most_s=60.0)
+    assert rig.reasons["endless"].startswith("only its first 39")
+
+
+@pytest.mark.parametrize(
+    ("message", "told"),
+    [
+        ({"say_id": "x"}, "text: expected words"),
+        ({"say_id": "x", "text": "  "}, "text: expected words"),
+        ({"say_id": "x", "text": 7}, "text: expected words"),
+        ({"say_id": "x", "text": "hi", "priority": "now"}, "expected one of low, medium, high"),
+        ({"say_id": "x", "text": "hi", "colour": "red"}, "got colour"),
+        ({"say_id": "x" * 90, "text": "hi"}, "say_id"),
+        ({"text": "hi"}, "say_id"),
+    ],
+)
+def test_what_is_no_order_fails_with_the_reason(
+    rig: VoiceRig, message: dict[str, Any], told: str
+) -> None:
+    rig.publish(message)
+    rig.run(0.1)
+    ((say_id, event),) = rig.events
+    assert event == "failed"
+    assert told in rig.reasons[say_id]
+
+
+def test_without_an_engine_everything_fails_with_the_remedy(
+    make_rig: Callable[..., VoiceRig],
+) -> None:
+    rig = make_rig(EspeakEngine(program="no-such-espeak"))
+    assert rig.voice.document()["state"] == "missing"
+    rig.say("a")
+    rig.run(0.2)
+    assert rig.events == [("a", "failed")]
+    assert "apt install espeak-ng" in rig.reasons["a"]

@@ -1,0 +1,226 @@
+"""Say aloud what the topic `say` asks for: one order after the other, and silent at a word."""
+
+import logging
+from collections import Counter
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.ipc import RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc.stop_button import ESTOP
+from vla_deploy.speech.companions import Playing
+from vla_deploy.speech.sound import level_db
+from vla_deploy.speech.voice.engine import Engine
+from vla_deploy.speech.voice.errors import EngineMissing, OrderRefused, VoiceError
+from vla_deploy.speech.voice.mouth import Mouth, OpenOutput
+from vla_deploy.speech.voice.orders import LONGEST_ID, Order, Withdrawal, read_order
+from vla_deploy.speech.voice.waiting import LONGEST_WAIT_NS, WaitingLine
+
+TAIL_NS: Final = 7 * NS_PER_S // 20
+"""For so long a speaker's latency and the room let what was said be heard."""
+_FIRST_WORDS: Final = "hello"
+_REASON_LETTERS: Final = 200  # of any alphabet, a slot holds them
+_log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True, kw_only=True)
+class _Saying:
+    """Hold what is being said: it is in preparation first, and `samples` come with its end."""
+
+    order: Order
+    prepared: "Future[Samples]"
+    samples: Samples | None = None
+    has_begun: bool = False
+
+
+class RobotVoice:
+    """Speak, a little in each step.
+
+    Text becomes sound beside the steps, by `aside`. A speaker that is away is tried again; what is
+    to be said meanwhile fails at once, and says why.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        open_output: OpenOutput,
+        clock: Clock,
+        aside: Executor,
+        *,
+        volume_ratio: float = 1.0,
+    ) -> None:
+        self._engine = engine
+        self._aside = aside
+        self._clock = clock
+        self._volume_ratio = volume_ratio
+        self._mouth = Mouth(open_output, clock)
+        self._waiting = WaitingLine()
+        self._saying: _Saying | None = None
+        self._sounding: Playing | None = None
+        self._missing = ""
+        self._counts: Counter[str] = Counter()
+        self._orders: RingReader
+        self._operator: RingReader
+        self._events: RingWriter
+
+    @property
+    def playing(self) -> Playing | None:
+        """Return what sounds at this moment, the room's answer to it included."""
+        silent_ns = self._mouth.sounds_until_ns + TAIL_NS
+        return self._sounding if self._clock.now_ns() < silent_ns else None
+
+    def start(self, space: SharedSpace) -> None:
+        """Open the topics, and try the engine for the first time."""
+        self._orders = space.ring_reader("say", from_start=False)
+        self._operator = space.ring_reader("operator", from_start=False)
+        self._events = space.ring_writer("voice_event")
+        self._aside.submit(self._engine.synthesise, _FIRST_WORDS).add_done_callback(self._tried)
+
+    def step(self) -> None:
+        """Take what is to be said, and hand the speaker what it has room for."""
+        for event in self._operator.drain():
+            if event.payload.get("act") == ESTOP:
+                self.fall_silent("the robot was stopped")
+        for event in self._orders.drain():
+            self._take(event.payload, event.stamp_ns)
+        while (late := self._waiting.expired(self._clock.now_ns())) is not None:
+            self._tell(late, "dropped", f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s")
+        if self._saying is None:
+            self._begin_next()
+        self._mouth.step()
+        if self._saying is not None:
+            self._advance(self._saying)
+
+    def barge_in(self, stamp_ns: int) -> None:
+        """Fall silent: a person has spoken into what the robot says, from `stamp_ns` on."""
+        late_s = (self._clock.now_ns() - stamp_ns) / NS_PER_S
+        self.fall_silent(f"somebody spoke, noticed after {late_s:.2f} s")
+
+    def fall_silent(self, reason: str) -> None:
+        """Break off what is being said and drop what waits."""
+        while (waiting := self._waiting.take()) is not None:
+            self._tell(waiting, "dropped", reason)
+        self._break_off(reason)
+
+    def document(self) -> dict[str, Any]:
+        """Return what `speech_status` tells under "voice"."""
+        why = self._missing or self._mouth.away
+        state = "missing" if self._missing else "away" if why else "ready"
+        return {
+            "state": state,
+            "why": why,
+            "engine": self._engine.name,
+            "volume": self._volume_ratio,
+            "waiting": len(self._waiting),
+            "counts": dict(self._counts),
+        }
+
+    def close(self) -> None:
+        """Fall silent and release everything; closing twice is allowed."""
+        self._mouth.cut()
+        self._mouth.close()
+        self._aside.shutdown(wait=False, cancel_futures=True)
+
+    # --- orders -------------------------------------------------------------------------------
+
+    def _take(self, payload: dict[str, Any], stamp_ns: int) -> None:
+        try:
+            order = read_order(payload, stamp_ns)
+        except OrderRefused as error:
+            _log.warning("say: %s", error)
+            self._publish(str(payload.get("say_id", ""))[:LONGEST_ID], "failed", str(error))
+            return
+        if isinstance(order, Withdrawal):
+            self._withdraw(order.say_id)
+            return
+        saying = self._saying
+        if order.interrupt and saying is not None and order.priority >= saying.order.priority:
+            self._break_off(f"{order.say_id} came first")
+        dropped = self._waiting.add(order)
+        if dropped is not None:
+            self._tell(dropped, "dropped", "too much waits to be said")
+
+    def _withdraw(self, say_id: str) -> None:
+        if self._saying is not None and self._saying.order.say_id == say_id:
+            self._break_off("it was taken back")
+        elif (order := self._waiting.withdraw(say_id)) is not None:
+            self._tell(order, "dropped", "it was taken back")
+
+    # --- saying -------------------------------------------------------------------------------
+
+    def _begin_next(self) -> None:
+        order = self._waiting.take()
+        if order is None:
+            return
+        format_ = self._mouth.format
+        if format_ is None or self._mouth.away:
+            self._tell(order, "failed", self._mouth.away)
+            return
+        self._saying = _Saying(
+            order=order, prepared=self._aside.submit(self._prepare, order.text, format_)
+        )
+
+    def _prepare(self, text: str, format_: AudioFormat) -> Samples:
+        return self._engine.synthesise(text).samples(format_, self._volume_ratio)
+
+    def _advance(self, saying: _Saying) -> None:
+        if saying.samples is None:
+            self._play_once_prepared(saying)
+            return
+        if self._mouth.away:
+            self._end(saying, "failed", self._mouth.away)
+        elif not saying.has_begun and self._mouth.has_begun:
+            saying.has_begun = True
+            self._sounding = _playing(saying.order, saying.samples)
+            self._tell(saying.order, "began", "")
+        elif self._mouth.is_done:
+            cut = f"only its first {len(saying.order.text)} letters" if saying.order.is_cut else ""
+            self._end(saying, "finished", cut)
+
+    def _play_once_prepared(self, saying: _Saying) -> None:
+        if not saying.prepared.done():
+            return
+        try:
+            saying.samples = saying.prepared.result()
+        except VoiceError as error:
+            self._missing = str(error) if isinstance(error, EngineMissing) else self._missing
+            self._end(saying, "failed", str(error))
+            return
+        self._missing = ""
+        self._mouth.play(saying.samples)
+        self._mouth.step()
+
+    def _break_off(self, reason: str) -> None:
+        saying = self._saying
+        if saying is not None:
+            self._end(saying, "interrupted" if saying.has_begun else "dropped", reason)
+
+    def _end(self, saying: _Saying, event: str, reason: str) -> None:
+        self._mouth.cut()
+        self._saying = None
+        self._tell(saying.order, event, reason)
+
+    # --- telling ------------------------------------------------------------------------------
+
+    def _tried(self, first_words: "Future[Any]") -> None:
+        """Remember why the engine cannot speak; called beside the steps, once."""
+        error = None if first_words.cancelled() else first_words.exception()
+        if isinstance(error, VoiceError):
+            self._missing = str(error)
+            _log.error("degraded: the robot has no voice: %s", error)
+
+    def _tell(self, order: Order, event: str, reason: str) -> None:
+        self._publish(order.say_id, event, reason)
+
+    def _publish(self, say_id: str, event: str, reason: str) -> None:
+        self._counts[event] += 1
+        self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
+
+
+def _playing(order: Order, samples: Samples) -> Playing:
+    ratio = samples.mean(axis=1, dtype=np.float32) / np.float32(FULL_SCALE)
+    return Playing(say_id=order.say_id, text=order.text, level_db=level_db(ratio))
