@@ -1,6 +1,6 @@
 """Ask which of several things was meant, by what tells them apart in the fewest words.
 
-    colour, kind, what it stands on or in, left or right, nearer or farther, size, then their ids
+colour, kind, what it stands on or in, left or right, nearer or farther, size, then their ids
 """
 
 import math

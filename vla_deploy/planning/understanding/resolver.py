@@ -195,7 +195,9 @@ class Resolver:
     def _only_thing(self, read: Expression, use: Use) -> Referent:
         """Take "it" for the only thing that could be meant, or ask."""
         scene, view = self.setting.scene, self.setting.view
-        found = [one for one in find(Query(), scene, view) if suits(one, use, Query(), self.setting)]
+        found = [
+            one for one in find(Query(), scene, view) if suits(one, use, Query(), self.setting)
+        ]
         if len(found) == 1:
             return self._seen(read, found[0], use, "nothing else is in sight", found)
         if found:

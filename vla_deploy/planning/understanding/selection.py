@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Final
 
@@ -42,10 +43,7 @@ def in_a_row(things: Sequence[Thing], view: Viewpoint | None) -> list[Thing] | N
         return None
     row = sorted(things, key=lambda thing: -bearing_rad(thing, view))
     bearings = [bearing_rad(thing, view) for thing in row]
-    apart = all(
-        left - right > LEAST_BEARING_RAD
-        for left, right in zip(bearings, bearings[1:], strict=False)
-    )
+    apart = all(left - right > LEAST_BEARING_RAD for left, right in pairwise(bearings))
     return row if apart else None
 
 
