@@ -122,4 +122,5 @@ def _pending(action: Event) -> Event:
         "execution_time_s": 0.0,
         "error": None,
         "retries": 0,
+        "note": None,
     }

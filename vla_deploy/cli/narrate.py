@@ -42,4 +42,5 @@ def _action_line(event: Mapping[str, Any]) -> str:
     line = f"{SIGNS.get(event['status'], event['status'])} {action_words(event)}"
     if event["status"] != "active":
         line += f"  ({event['execution_time_s']:.1f} s)"
-    return f"{line}  {event['error']}" if event["error"] else line
+    told = event["error"] or event.get("note")
+    return f"{line}  {told}" if told else line
