@@ -2,7 +2,7 @@
 
 from platforms.errors import ProfileError
 from platforms.ladder import LadderAction, LadderStep, LadderTiming, ProcessBudget, TotalBudget
-from platforms.profile import ModelChoice, ProcessSettings, Profile, load_profile
+from platforms.profile import ModelChoice, ProcessSettings, Profile, SpeechSettings, load_profile
 
 __all__ = [
     "LadderAction",
@@ -13,6 +13,7 @@ __all__ = [
     "ProcessSettings",
     "Profile",
     "ProfileError",
+    "SpeechSettings",
     "TotalBudget",
     "load_profile",
 ]

@@ -17,7 +17,9 @@ import numpy as np
 import pytest
 
 from platforms import ModelChoice
+from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
+    Context,
     Detection,
     Fit,
     ImageInput,
@@ -26,6 +28,7 @@ from vla_deploy.inference.manifest import (
     ModelFile,
     Tensor,
     Variant,
+    Whisper,
 )
 from vla_deploy.inference.manifest_file import write_manifest
 
@@ -395,3 +398,117 @@ def loopback() -> Iterator[LoopbackServer]:
     server.shutdown()
     thread.join()
     server.server_close()
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptedWhisper:
+    """Make models of the Whisper family that always say one text, as surely as they are told."""
+
+    folder: Path
+
+    def write(self, name: str, text: str, sureness: float = 30.0) -> Path:
+        """Write a model's files, without a manifest: weights that say a text by its positions."""
+        folder = self.folder / name
+        folder.mkdir(parents=True)
+        tokenizer = _tokenizer(text)
+        tokenizer.save(str(folder / "tokenizer.json"))
+        end = tokenizer.token_to_id("<|endoftext|>")
+        spec = _quiet_spec(tokenizer.get_vocab_size(), width=64)
+        said = [*tokenizer.encode(" " + text).ids, end]
+        weight = spec.decoder.projection.weight
+        weight[end, len(said) :] = sureness
+        for position, token in enumerate(said, start=1):  # after <|startoftranscript|>
+            weight[token, position] = sureness
+        spec.config.suppress_ids, spec.config.suppress_ids_begin = [], [end]
+        spec.config.lang_ids, spec.config.alignment_heads = [], [[0, 0]]
+        vocabulary = sorted(tokenizer.get_vocab().items(), key=lambda one: one[1])
+        spec.register_vocabulary([token for token, _ in vocabulary])
+        spec.validate()
+        spec.optimize(quantization="int8")
+        spec.save(str(folder))
+        return folder
+
+    def model(self, name: str, text: str, sureness: float = 30.0, **declared: Any) -> Path:
+        """Write a model with a manifest that says how it is read."""
+        folder = self.write(name, text, sureness)
+        paths = sorted(path.name for path in folder.iterdir())
+        whisper: dict[str, Any] = {"context": Context.TRIMMED, "hot_words": False, **declared}
+        manifest = Manifest(
+            name=name,
+            role="speech_to_text",
+            summary="says one text",
+            licence="Apache-2.0",
+            card="",
+            parts=tuple(ModelFile(path=path, sha256=sha256_of(folder / path)) for path in paths),
+            whisper=Whisper(languages=("en",), **whisper),
+        )
+        write_manifest(folder, manifest)
+        return folder
+
+
+def _tokenizer(text: str) -> Any:
+    """A byte-level vocabulary in Whisper's order: text, then its special tokens, times last."""
+    from tokenizers import Tokenizer, decoders, models, pre_tokenizers, trainers
+
+    tokenizer = Tokenizer(models.BPE())
+    tokenizer.pre_tokenizer = pre_tokenizers.ByteLevel(add_prefix_space=False)
+    tokenizer.decoder = decoders.ByteLevel()
+    trainer = trainers.BpeTrainer(
+        vocab_size=320,
+        initial_alphabet=pre_tokenizers.ByteLevel.alphabet(),
+        show_progress=False,
+    )
+    tokenizer.train_from_iterator(5 * [" " + text], trainer)
+    words = ("endoftext", "startoftranscript", "en", "translate", "transcribe", "startoflm")
+    tokenizer.add_special_tokens(
+        [f"<|{word}|>" for word in (*words, "startofprev", "nospeech", "notimestamps")]
+        + [f"<|{0.02 * number:.2f}|>" for number in range(1501)]
+    )
+    return tokenizer
+
+
+def _quiet_spec(vocabulary: int, width: int) -> Any:
+    """Weights of which none says anything but the position: one layer each, all zeros."""
+    from ctranslate2.specs import WhisperSpec
+
+    def zeros(*shape: int) -> Any:
+        return np.zeros(shape, np.float32)
+
+    spec = WhisperSpec(1, 1, 1, 1)
+    encoder, decoder = spec.encoder, spec.decoder
+    encoder.conv1.weight, encoder.conv1.bias = zeros(width, 80, 3), zeros(width)
+    encoder.conv2.weight, encoder.conv2.bias = zeros(width, width, 3), zeros(width)
+    encoder.position_encodings.encodings = zeros(1500, width)
+    decoder.embeddings.weight = zeros(vocabulary, width)
+    decoder.position_encodings.encodings = np.eye(448, width, dtype=np.float32)
+    decoder.position_encodings.encodings[width:, -1] = 1.0
+    decoder.projection.weight = zeros(vocabulary, width)
+    layers = (*encoder.layer, *decoder.layer)
+    for linear in [one for layer in layers for one in _linears(layer)]:
+        linear[0].weight, linear[0].bias = zeros(linear[1] * width, width), zeros(linear[1] * width)
+    norms = [encoder.layer_norm, decoder.layer_norm]
+    norms += [part.layer_norm for layer in layers for part in _parts(layer)]
+    for norm in norms:
+        norm.gamma, norm.beta = np.ones(width, np.float32), zeros(width)
+    return spec
+
+
+def _parts(layer: Any) -> list[Any]:
+    attention = [layer.attention] if hasattr(layer, "attention") else []
+    return [layer.self_attention, *attention, layer.ffn]
+
+
+def _linears(layer: Any) -> list[tuple[Any, int]]:
+    """The linear maps of a layer, each with the rows that it has for one of its columns."""
+    own, ffn = layer.self_attention.linear, layer.ffn
+    found = [(own[0], 3), (own[1], 1), (ffn.linear_0, 1), (ffn.linear_1, 1)]
+    if hasattr(layer, "attention"):
+        query, memory, out = layer.attention.linear
+        found += [(query, 1), (memory, 2), (out, 1)]
+    return found
+
+
+@pytest.fixture
+def scripted_whisper(tmp_path: Path) -> ScriptedWhisper:
+    pytest.importorskip("ctranslate2")
+    return ScriptedWhisper(tmp_path / "models")

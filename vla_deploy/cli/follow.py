@@ -1,4 +1,4 @@
-"""Follow one command to its end, which may be that nobody is left to plan or carry it out."""
+"""Follow one command to its end, which may be that nobody is left to carry it out."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
@@ -24,27 +24,22 @@ class _Pause(Protocol):
     def __call__(self) -> None: ...
 
 
-Newest = Callable[[], Sample | None]
-
-
 def follow_command(
     command_id: str,
     *,
     events: Callable[[], Sequence[Event]],
-    planner: Newest,
-    executor: Newest,
+    executor: Callable[[], Sample | None],
     clock: Clock,
     pause: _Pause,
 ) -> Iterator[Event]:
     """Return the command's events; the last is `finished` or `rejected`, told or found out.
 
-    `events` drains the ring of task events; `planner` and `executor` return their status while that
-    is young. Where the command answers a question, the one that was asked about is followed on.
+    `events` drains the ring of task events, `executor` returns its status while that is young.
 
     Raises:
         CommandFailed: nobody has answered in time.
     """
-    watch = Watch("planner", in_planner(command_id), planner, clock)
+    watch = ExecutorWatch(command_id, executor, clock)
     actions: dict[str, Event] = {}
     answer_by_ns = clock.now_ns() + round(ANSWER_TIMEOUT_S * NS_PER_S)
     answered = False
@@ -58,11 +53,6 @@ def follow_command(
             yield event
             if event["event"] in LAST_EVENTS:
                 return
-            if event["event"] == "answered":
-                command_id = str(event["of"])
-                watch = Watch("planner", in_planner(command_id), planner, clock)
-            if event["event"] == "plan":
-                watch = Watch("executor", in_executor(command_id), executor, clock)
         if why:
             yield lost(command_id, why, actions)
             return
@@ -71,41 +61,30 @@ def follow_command(
         pause()
 
 
-def in_planner(command_id: str) -> Callable[[Event], bool]:
-    """Return what tells whether a planner's status names a command."""
-    return lambda status: command_id in status.get("commands", ())
-
-
-def in_executor(command_id: str) -> Callable[[Event], bool]:
-    """Return what tells whether an executor's status names a command."""
-    return lambda status: status["command_id"] == command_id
-
-
-class Watch:
-    """Judge by a process' status whether it still works on a command."""
+class ExecutorWatch:
+    """Judge by the executor's status whether it still carries a command out."""
 
     def __init__(
-        self, who: str, has_it: Callable[[Event], bool], status: Newest, clock: Clock
+        self, command_id: str, executor: Callable[[], Sample | None], clock: Clock
     ) -> None:
-        self._who = who
-        self._has_it = has_it
-        self._status = status
+        self._command_id = command_id
+        self._executor = executor
         self._clock = clock
         self._pid: int | None = None
         self._seen_ns: int | None = None
 
     def why_lost(self) -> str:
-        """Return why nobody works on the command, or "" while somebody may."""
+        """Return why nobody carries the command out, or "" while somebody may."""
         now_ns = self._clock.now_ns()
-        sample = self._status()
+        sample = self._executor()
         if self._seen_ns is None:
             self._seen_ns = now_ns
-        if sample is not None and self._has_it(sample.document()):
+        if sample is not None and sample.document()["command_id"] == self._command_id:
             self._pid, self._seen_ns = sample.writer_pid, now_ns
         if sample is not None and self._pid not in (None, sample.writer_pid):
-            return f"the {self._who} ended while it had the command, and was started again"
+            return "the executor ended while it carried the command out, and was started again"
         if now_ns - self._seen_ns > SILENCE_LIMIT_S * NS_PER_S:
-            return f"the {self._who} has not spoken of the command for {SILENCE_LIMIT_S:g} s"
+            return f"the executor has not spoken of the command for {SILENCE_LIMIT_S:g} s"
         return ""
 
 
@@ -143,5 +122,4 @@ def _pending(action: Event) -> Event:
         "execution_time_s": 0.0,
         "error": None,
         "retries": 0,
-        "note": None,
     }

@@ -25,6 +25,7 @@ def build(context: NodeContext) -> SpeechNode:
         robot,
         profile,
         linked_microphone(robot, links, clock),
+        beside("recogniser"),
         voice=build_voice(robot.voice, speaker, clock, beside("voice")),
     )
 

@@ -1,22 +1,31 @@
 """The speech process hears through its companions, and says why it cannot, whatever is missing."""
 
+import dataclasses
 import sys
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat, AudioInput, Samples
 from drivers.audio.pushed import PushedInput
-from drivers.clock import NS_PER_S
+from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.errors import DeviceMissing
-from platforms import load_profile
+from platforms import Profile, load_profile
 from sim_twin.contracts.scripted import ManualClock
+from sim_twin.sound.acoustics import Acoustics
+from sim_twin.sound.talker import Talker, arrival
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.store import ModelStore
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
+from vla_deploy.speech.companions import Playing
 from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.sound import SoundBlock
+from vla_deploy.speech.voice.espeak import EspeakEngine
 
 
 class Listener:
@@ -41,24 +50,56 @@ class Listener:
         self.closed += 1
 
 
+class RobotVoice:
+    """Say one thing for as long as the test wants, and keep who barged in."""
+
+    def __init__(self) -> None:
+        self.playing: Playing | None = None
+        self.barged: list[int] = []
+
+    def start(self, space: SharedSpace) -> None:
+        self.space = space
+
+    def step(self) -> None:
+        """Nothing is to be done: `playing` is what the test sets."""
+
+    def barge_in(self, stamp_ns: int) -> None:
+        self.barged.append(stamp_ns)
+
+    def document(self) -> Mapping[str, Any]:
+        return {}
+
+    def close(self) -> None:
+        self.playing = None
+
+
 class Bench:
     """Step a node whose microphone is pushed, plugged in or not."""
 
-    def __init__(self, context: NodeContext, clock: ManualClock, format_: AudioFormat) -> None:
+    def __init__(
+        self, context: NodeContext, clock: ManualClock, format_: AudioFormat, models: Path
+    ) -> None:
         self.clock = clock
         self.format = format_
         self.plugged = True
         self.device: PushedInput | None = None
         self.listener = Listener()
+        self.voice = RobotVoice()
+        self.space = SharedSpace(context.run_dir / "ipc", clock)
+        store = ModelStore(models, embedded=models / "none")
         self.node = SpeechNode(
             context,
             load_robot("butler"),
             load_profile("desktop"),
             self.open,
+            voice=self.voice,
             listeners=[self.listener],
+            shelf=ModelShelf(store=store, engines=models, clock=MonotonicClock()),
         )
+        self._status = self.space.cell_reader("speech_status")
+        topics = ("heard", "utterance", "say", "operator")
+        self._rings = {name: self.space.ring_reader(name, from_start=True) for name in topics}
         self.node.start()
-        self._status = SharedSpace(context.run_dir / "ipc", clock).cell_reader("speech_status")
 
     def open(self) -> AudioInput:
         if not self.plugged:
@@ -78,6 +119,24 @@ class Bench:
                 self.device.push(samples[at : at + size])
             self.node.step()
 
+    def quiet(self, seconds: float) -> None:
+        """Let the microphone hear its own faint noise."""
+        noise = np.random.default_rng(1).standard_normal(
+            (round(seconds * self.format.rate_hz), self.format.channels)
+        )
+        self.play(np.rint(8.0 * noise).astype(np.int16))
+
+    def say(self, text: str, gain: float = 1.0, voice: str = "en-gb") -> None:
+        """Let a person in the room say something, and a second pass."""
+        talker = Talker(engine=EspeakEngine(voice=voice))
+        wave = arrival(text, talker, self.format.rate_hz, Acoustics()).sound.wave
+        samples = (gain * 32_768 * wave).clip(-32_768, 32_767).astype(np.int16)
+        self.play(np.repeat(samples[:, None], self.format.channels, axis=1))
+        self.quiet(1.0)
+
+    def told(self, topic: str) -> list[dict[str, Any]]:
+        return [dict(event.payload) for event in self._rings[topic].drain()]
+
     def status(self) -> dict[str, Any]:
         sample = self._status.latest()
         assert sample is not None
@@ -85,14 +144,20 @@ class Bench:
 
 
 MakeBench = Callable[..., Bench]
+TEXT = "pick up the red cup"
 
 
 @pytest.fixture
-def bench(context: NodeContext, clock: ManualClock) -> Any:
+def bench(context: NodeContext, clock: ManualClock, scripted_whisper: Any) -> Any:
     made: list[Bench] = []
 
-    def make(rate_hz: int = 16_000) -> Bench:
-        made.append(Bench(context, clock, AudioFormat(rate_hz=rate_hz)))
+    def make(
+        rate_hz: int = 16_000, channels: int = 1, *, text: str = TEXT, sureness: float = 30.0
+    ) -> Bench:
+        scripted_whisper.model("commands-whisper", text, sureness)
+        format_ = AudioFormat(rate_hz=rate_hz, channels=channels)
+        made.append(Bench(context, clock, format_, scripted_whisper.folder))
+        made[0].node.step()
         return made[0]
 
     yield make
@@ -102,7 +167,6 @@ def bench(context: NodeContext, clock: ManualClock) -> Any:
 
 def test_a_listener_hears_every_block_in_time_at_16_khz(bench: MakeBench, tone: Any) -> None:
     rig = bench(rate_hz=48_000)
-    rig.node.step()
     rig.play(tone(1.0, rate_hz=48_000))
     blocks = rig.listener.blocks
     assert sum(len(block.samples) for block in blocks) == pytest.approx(16_000, abs=50)
@@ -117,7 +181,7 @@ def test_a_microphone_that_is_unplugged_is_told_and_heard_again_when_it_is_back(
 ) -> None:
     rig = bench()
     rig.plugged = False
-    rig.play(tone(0.5))
+    rig.play(tone(4.0))
     assert (rig.status()["state"], rig.listener.blocks) == ("deaf", [])
     assert "plug it in" in rig.status()["why"]
     rig.plug()
@@ -152,3 +216,132 @@ def test_a_missing_extra_is_told_in_words(
     rig.play(tone(1.0, rate_hz=48_000))
     assert rig.status()["state"] == "deaf"
     assert "pip install 'vla-deploy[speech]'" in rig.status()["why"]
+
+
+def test_a_spoken_command_becomes_an_utterance_soon_after_its_last_word(bench: MakeBench) -> None:
+    rig = bench()
+    rig.quiet(1.0)
+    rig.say(TEXT)
+    (utterance,) = rig.told("utterance")
+    assert (utterance["text"], utterance["source"]) == (TEXT, "voice")
+    assert utterance["heard"]["confidence"] > 0.8
+    (heard,) = rig.told("heard")
+    assert 0 < heard["told_ns"] - heard["ended_ns"] < 300_000_000
+    status = rig.status()
+    assert (status["state"], status["why"]) == ("listening", "")
+    assert (status["heard"]["accepted"], status["model"]["name"]) == (1, "commands-whisper")
+    assert status["room"]["noise_floor_db"] < -60
+
+
+def test_48_khz_stereo_is_understood_alike(bench: MakeBench) -> None:
+    rig = bench(rate_hz=48_000, channels=2)
+    rig.quiet(1.0)
+    rig.say(TEXT)
+    assert [one["text"] for one in rig.told("utterance")] == [TEXT]
+
+
+def test_silence_noise_and_music_say_nothing(bench: MakeBench) -> None:
+    rig = bench()
+    rig.quiet(3.0)
+    loud = np.random.default_rng(2).standard_normal((5 * 16_000, 1))
+    rig.play((3_000 * loud).astype(np.int16))
+    time_s = np.arange(6 * 16_000) / 16_000
+    tones = sum(np.sin(2 * np.pi * hz * time_s) for hz in (220, 277, 330, 440))
+    rig.play((2_000 * tones).astype(np.int16)[:, None])
+    assert rig.status()["room"]["music"] is True
+    rig.quiet(2.0)
+    assert rig.told("utterance") == rig.told("say") == []
+    assert [one["verdict"] for one in rig.told("heard") if one["verdict"] != "rejected"] == []
+
+
+def test_an_unsure_reading_is_asked_again_and_never_carried_out(bench: MakeBench) -> None:
+    rig = bench(sureness=1.0)
+    rig.quiet(1.0)
+    rig.say("quelle heure est il maintenant", voice="fr")
+    rig.say(TEXT, gain=60.0)
+    french, clipped = rig.told("heard")
+    assert french["verdict"] == clipped["verdict"] == "rejected"
+    assert "at least 50% is needed" in french["reason"]
+    assert "overdriven" in clipped["reason"]
+    assert rig.told("utterance") == []
+    (asked,) = rig.told("say")
+    assert "say it again" in asked["text"], "once, not for each"
+
+
+def test_a_long_talk_without_a_pause_is_refused_once(bench: MakeBench) -> None:
+    rig = bench()
+    rig.node.commit(
+        dataclasses.replace(
+            rig.node.prepare(load_profile("desktop"), 0),
+            profile=short_phrases(load_profile("desktop")),
+        )
+    )
+    rig.quiet(1.0)
+    rig.say("and so we went on and on and never came to the end of what there was to say at all")
+    (heard,) = rig.told("heard")
+    assert heard["reason"] == "2 s of talk are no command"
+    assert rig.told("utterance") == rig.told("say") == []
+
+
+def short_phrases(profile: Profile) -> Profile:
+    return dataclasses.replace(
+        profile, speech=dataclasses.replace(profile.speech, longest_phrase_s=2.0)
+    )
+
+
+def test_a_spoken_stop_presses_the_button(bench: MakeBench) -> None:
+    rig = bench(text="stop")
+    rig.quiet(1.0)
+    rig.say("stop")
+    (press,) = rig.told("operator")
+    assert (press["act"], press["source"]) == ("estop", "voice")
+    assert rig.told("utterance") == []
+
+
+def test_the_robot_does_not_heed_itself_but_a_person_who_speaks_into_it(bench: MakeBench) -> None:
+    rig = bench(text="come here")
+    rig.quiet(1.0)
+    rig.voice.playing = Playing(say_id="s1", text="I will pick up the cup", level_db=-20.0)
+    rig.say("I will pick up the cup and bring it to you right now", gain=0.3)
+    assert rig.told("heard") == []
+    assert rig.voice.barged == []
+    assert rig.status()["speaking"] is True
+    heard_by_listeners = len(rig.listener.blocks)
+    rig.say("robot come over here to me please", gain=4.0)
+    assert len(rig.voice.barged) == 1
+    assert [one["text"] for one in rig.told("utterance")] == ["come here"]
+    assert len(rig.listener.blocks) > heard_by_listeners, "stop words stay live"
+
+
+def test_without_a_model_the_robot_is_deaf_and_says_so_for_each_phrase(
+    context: NodeContext, clock: ManualClock, tmp_path: Path
+) -> None:
+    rig = Bench(context, clock, AudioFormat(rate_hz=16_000), tmp_path / "nothing")
+    rig.node.step()
+    rig.quiet(1.0)
+    rig.say(TEXT)
+    status = rig.status()
+    assert status["state"] == "deaf"
+    assert status["why"].startswith("no model: commands-whisper: no model 'commands-whisper'")
+    (heard,) = rig.told("heard")
+    assert heard["verdict"] == "rejected"
+    assert heard["reason"].startswith("no model turns speech into text")
+    assert rig.told("utterance") == []
+    rig.node.stop()
+
+
+def test_another_profile_brings_another_model_and_the_way_back(
+    bench: MakeBench, scripted_whisper: Any
+) -> None:
+    rig = bench()
+    scripted_whisper.model("other", "turn left")
+    profile = load_profile("desktop")
+    choice = dataclasses.replace(profile.models["speech_to_text"], tiers=("other",))
+    other = dataclasses.replace(profile, models={"speech_to_text": choice})
+    before = rig.node.commit(rig.node.prepare(other, 0))
+    rig.quiet(1.0)
+    rig.say("turn left")
+    assert [one["text"] for one in rig.told("utterance")] == ["turn left"]
+    rig.node.discard(rig.node.commit(before))
+    rig.say(TEXT)
+    assert [one["text"] for one in rig.told("utterance")] == [TEXT]

@@ -1,0 +1,56 @@
+"""The best recogniser that is there is taken, and what was left out is told."""
+
+import dataclasses
+from typing import Any
+
+import pytest
+
+from drivers.clock import MonotonicClock
+from platforms import ModelChoice, Profile, load_profile
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.store import ModelStore
+from vla_deploy.speech.choosing import ears_of, open_best
+from vla_deploy.speech.errors import NoRecogniser
+
+
+@pytest.fixture
+def shelf(scripted_whisper: Any) -> ModelShelf:
+    store = ModelStore(scripted_whisper.folder, embedded=scripted_whisper.folder / "none")
+    return ModelShelf(store=store, engines=scripted_whisper.folder, clock=MonotonicClock())
+
+
+def profile_with(*tiers: str) -> Profile:
+    profile = load_profile("desktop")
+    choice: ModelChoice = dataclasses.replace(profile.models["speech_to_text"], tiers=tiers)
+    return dataclasses.replace(profile, models={**profile.models, "speech_to_text": choice})
+
+
+def test_the_first_tier_that_is_there_is_opened(shelf: ModelShelf, scripted_whisper: Any) -> None:
+    scripted_whisper.model("small", "turn left")
+    scripted_whisper.model("tiny", "turn right")
+    profile = profile_with("whisper-small.en", "small", "tiny")
+    recogniser = open_best(shelf, profile, 0)
+    assert recogniser.model.manifest.name == "small"
+    (notice,) = recogniser.notices
+    assert notice.startswith("whisper-small.en: no model 'whisper-small.en'")
+    assert open_best(shelf, profile, 2).model.manifest.name == "tiny"
+    assert open_best(shelf, profile, 9).model.manifest.name == "tiny"
+
+
+def test_a_spoiled_model_gives_way_to_the_next(shelf: ModelShelf, scripted_whisper: Any) -> None:
+    spoiled = scripted_whisper.model("spoiled", "turn left")
+    (spoiled / "model.bin").write_bytes(b"half")
+    scripted_whisper.model("tiny", "turn right")
+    recogniser = open_best(shelf, profile_with("spoiled", "tiny"), 0)
+    assert recogniser.model.manifest.name == "tiny"
+    assert "expected SHA-256" in recogniser.notices[0]
+
+
+def test_with_none_the_robot_says_why_and_goes_on(shelf: ModelShelf, scripted_whisper: Any) -> None:
+    (scripted_whisper.folder / "empty").mkdir(parents=True)
+    profile = profile_with("empty", "missing")
+    with pytest.raises(NoRecogniser, match=r"empty: no model 'empty'.*missing: no model"):
+        open_best(shelf, profile, 0)
+    ears = ears_of(shelf, profile, 0)
+    assert ears.recogniser is None
+    assert "no model 'empty'" in ears.why

@@ -1,0 +1,116 @@
+"""Any Whisper in CTranslate2's form is read, and whatever is wrong with one is told in words."""
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.clock import MonotonicClock
+from platforms import ModelChoice
+from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
+from vla_deploy.inference.manifest import Context
+from vla_deploy.inference.store import ModelStore
+from vla_deploy.speech.errors import SpeechMissing
+from vla_deploy.speech.recogniser import Recogniser, open_recogniser
+
+CHOICE = ModelChoice(
+    tiers=("ours",),
+    providers=("CPUExecutionProvider",),
+    precision="int8",
+    threads=1,
+    cpu_fallback=False,
+    memory_arena=True,
+)
+SECOND = np.zeros(16_000, np.float32)
+
+
+def opened(folder: Path, choice: ModelChoice = CHOICE) -> Recogniser:
+    store = ModelStore(folder.parent, embedded=folder.parent / "none")
+    return open_recogniser(store.load(folder.name), choice, beam=1, clock=MonotonicClock())
+
+
+@pytest.mark.parametrize("context", [Context.TRIMMED, Context.PADDED])
+def test_a_text_is_read_with_what_speaks_for_it(scripted_whisper: Any, context: Context) -> None:
+    folder = scripted_whisper.model("ours", "pick up the red cup", context=context)
+    recogniser = opened(folder)
+    reading = recogniser.read(SECOND)
+    assert reading.text == "pick up the red cup"
+    assert -0.3 < reading.log_probability <= 0.0
+    assert reading.no_speech < 0.1
+    assert (reading.language, reading.duration_s) == ("en", 1.0)
+    assert recogniser.document()["read"] == 1, "warming up is not counted"
+    recogniser.close()
+    with pytest.raises(RunFailed, match="closed"):
+        recogniser.read(SECOND)
+
+
+def test_trimmed_sound_costs_a_small_part_of_a_padded_window(scripted_whisper: Any) -> None:
+    trimmed, padded = (
+        opened(scripted_whisper.model(name, "turn left", context=context))
+        for name, context in (("short", Context.TRIMMED), ("long", Context.PADDED))
+    )
+    frames: list[int] = []
+    for recogniser in (trimmed, padded):
+        model = recogniser._whisper
+        encode = model.model.encode
+
+        def spied(features: Any, *, to_cpu: bool = False, encode: Any = encode) -> Any:
+            frames.append(features.shape[-1])
+            return encode(features, to_cpu=to_cpu)
+
+        model.model = _Spied(model.model, spied)
+        recogniser.read(SECOND)
+    assert frames == [140, 3000]
+
+
+class _Spied:
+    def __init__(self, model: Any, encode: Any) -> None:
+        self._model, self.encode = model, encode
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._model, name)
+
+
+def test_an_unsure_model_has_a_low_log_probability(scripted_whisper: Any) -> None:
+    reading = opened(scripted_whisper.model("ours", "pick up the red cup", 1.0)).read(SECOND)
+    assert reading.log_probability < -1.5
+
+
+def test_a_half_written_model_is_refused_before_it_is_loaded(scripted_whisper: Any) -> None:
+    folder = scripted_whisper.model("ours", "turn left")
+    weights = folder / "model.bin"
+    weights.write_bytes(weights.read_bytes()[:1000])
+    with pytest.raises(ModelFileSpoiled, match=r"model\.bin: expected SHA-256"):
+        opened(folder)
+
+
+def test_files_that_are_no_whisper_are_told(scripted_whisper: Any) -> None:
+    folder = scripted_whisper.write("ours", "turn left")
+    (folder / "model.bin").write_bytes(b"nothing of the kind")
+    declared = scripted_whisper.model("other", "turn left")
+    text = (declared / "model.toml").read_text().replace('"other"', '"ours"')
+    for path in folder.iterdir():
+        from vla_deploy.inference.file_check import sha256_of
+
+        text = text.replace(sha256_of(declared / path.name), sha256_of(path))
+    (folder / "model.toml").write_text(text)
+    with pytest.raises(ModelFileSpoiled, match="converted by CTranslate2"):
+        opened(folder)
+
+
+def test_what_nothing_here_can_run_is_refused(scripted_whisper: Any) -> None:
+    folder = scripted_whisper.model("ours", "turn left")
+    for change in ({"precision": "int4"}, {"providers": ("CUDAExecutionProvider",)}):
+        with pytest.raises(ProviderUnavailable, match="CTranslate2 here runs nothing of"):
+            opened(folder, dataclasses.replace(CHOICE, **change))
+
+
+def test_a_missing_extra_is_told(scripted_whisper: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = scripted_whisper.model("ours", "turn left")
+    monkeypatch.delitem(sys.modules, "vla_deploy.speech.whisper_runtime", raising=False)
+    monkeypatch.setitem(sys.modules, "faster_whisper", None)
+    with pytest.raises(SpeechMissing, match=r"pip install 'vla-deploy\[speech\]'"):
+        opened(folder)

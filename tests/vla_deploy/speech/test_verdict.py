@@ -1,0 +1,127 @@
+"""What was read becomes a command only if everything speaks for it; each refusal says why."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vla_deploy.inference.manifest import Calibration
+from vla_deploy.speech.confidence import confidence
+from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.verdict import Case, Verdict, judge
+from vla_deploy.speech.words import is_stop, is_unfinished, words_of
+
+READING = Reading(
+    text="Pick up the red cup.",
+    log_probability=-0.1,
+    no_speech=0.01,
+    compression=0.9,
+    language="en",
+    duration_s=2.0,
+    took_s=0.02,
+)
+PHRASE = Phrase(
+    number=1,
+    began_ns=0,
+    ended_ns=1_600_000_000,
+    voiced_s=1.6,
+    clipped_ratio=0.0,
+    voice=0.95,
+    samples=np.zeros(32_000, np.float32),
+)
+CASE = Case(reading=READING, phrase=PHRASE, confidence=0.9, least_confidence=0.5, languages=("en",))
+
+
+def case(reading: Any = None, phrase: Any = None, **changes: Any) -> Case:
+    return replace(
+        CASE,
+        reading=replace(READING, **(reading or {})),
+        phrase=replace(PHRASE, **(phrase or {})),
+        **changes,
+    )
+
+
+def test_a_sure_reading_is_a_command() -> None:
+    judgement = judge(CASE)
+    assert (judgement.verdict, judgement.reason) == (Verdict.ACCEPTED, "")
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason", "ask_again"),
+    [
+        ({"reading": {"text": " ... "}}, "a sound without words", False),
+        ({"confidence": 0.4}, "understood by 40%, at least 50% is needed", True),
+        (
+            {"confidence": 0.4, "phrase": {"clipped_ratio": 0.1}},
+            "overdriven: turn its gain down",
+            True,
+        ),
+        ({"reading": {"language": "fr"}}, "spoken in fr, but only en is understood", True),
+        ({"reading": {"no_speech": 0.93}}, "nobody spoke, by 93%", False),
+        ({"reading": {"compression": 4.2}}, "the text repeats itself (compression 4.2", False),
+        ({"phrase": {"voiced_s": 0.4}}, "12 words a second were read, at most 7", False),
+        ({"music": True, "phrase": {"voice": 0.6}}, "music, or another sound", False),
+        ({"own_words": "I pick up the red cup"}, "the robot heard itself", False),
+    ],
+)
+def test_what_speaks_against_it_is_told(
+    changed: dict[str, Any], reason: str, ask_again: bool
+) -> None:
+    judgement = judge(case(**changed))
+    assert judgement.verdict is Verdict.REJECTED
+    assert reason in judgement.reason
+    assert judgement.ask_again is ask_again
+
+
+def test_a_person_who_answers_what_the_robot_said_is_heard() -> None:
+    assert judge(case(own_words="Which cup do you mean?")).verdict is Verdict.ACCEPTED
+
+
+@pytest.mark.parametrize("text", ["Stop!", "stop stop stop", "robot, freeze", "Please halt now"])
+def test_a_call_to_stop_is_taken_where_a_command_would_not_be(text: str) -> None:
+    unsure = case(reading={"text": text}, confidence=0.3, own_words="stop")
+    assert judge(unsure).verdict is Verdict.STOP
+    assert judge(case(reading={"text": text}, confidence=0.1)).verdict is Verdict.REJECTED
+
+
+@pytest.mark.parametrize("text", ["stop at the table", "", "please", "do not stop", "it"])
+def test_other_sentences_are_no_call_to_stop(text: str) -> None:
+    assert not is_stop(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "unfinished"),
+    [
+        ("Pick up the", True),
+        ("put it in", True),
+        ("pick up the cup and", True),
+        ("", True),
+        ("pick up the red cup", False),
+        ("turn left", False),
+        ("go on", True),
+    ],
+)
+def test_words_that_end_no_command_are_known(text: str, unfinished: bool) -> None:
+    assert is_unfinished(text) is unfinished
+
+
+def test_words_are_told_from_punctuation() -> None:
+    assert words_of("What's that — 2 cups?") == ("what's", "that", "2", "cups")
+
+
+def test_confidence_grows_with_what_speaks_for_a_reading() -> None:
+    def sure(**changes: Any) -> float:
+        return confidence(replace(READING, **changes), None)
+
+    assert sure() > 0.9
+    assert sure() > sure(log_probability=-0.5) > sure(log_probability=-1.0) > sure(no_speech=1e3)
+    assert sure(compression=3.0) < sure(compression=2.0) == sure()
+    assert sure(text="") == 0.0
+    assert sure(log_probability=-1e6) == pytest.approx(0.0)
+
+
+def test_a_calibration_of_the_manifest_is_used() -> None:
+    flat = Calibration(bias=0.0, log_probability=0.0, no_speech=0.0, compression=0.0)
+    assert confidence(READING, flat) == 0.5

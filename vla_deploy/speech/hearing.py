@@ -1,0 +1,195 @@
+"""Follow the stream from frame to phrase to reading, with the robot's own voice held off."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S
+from platforms import SpeechSettings
+from vla_deploy.speech.companions import Playing
+from vla_deploy.speech.confidence import confidence
+from vla_deploy.speech.echo_gate import EchoGate
+from vla_deploy.speech.frames import Frame, Framing
+from vla_deploy.speech.phrases import ABOVE_FLOOR_DB, OFFSET, Happening, Phrase, Phrases, Step
+from vla_deploy.speech.readings import Answer, Readings
+from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.sound import SoundBlock, level_db
+from vla_deploy.speech.surroundings import Music, NoiseFloor
+from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge
+from vla_deploy.speech.voice_activity import VoiceActivity
+from vla_deploy.speech.words import is_stop, is_unfinished
+
+OWN_WORDS_NS: Final = NS_PER_S
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Heard:
+    """Hold a phrase, what was read in it, and what becomes of it."""
+
+    phrase: Phrase
+    answer: Answer | None
+    confidence: float
+    judgement: Judgement
+
+    @property
+    def text(self) -> str:
+        """Return its words, as far as any were read."""
+        reading = self.answer.reading if self.answer is not None else None
+        return "" if reading is None else reading.text
+
+
+class Hearing:
+    """Hold what hearing remembers between two blocks."""
+
+    def __init__(
+        self,
+        voice_activity: VoiceActivity,
+        readings: Readings,
+        settings: SpeechSettings,
+        hot_words: Callable[[], str],
+    ) -> None:
+        self.readings = readings
+        self.floor = NoiseFloor()
+        self.music = Music()
+        self.gate = EchoGate()
+        self.counts: Counter[str] = Counter()
+        self._activity = voice_activity
+        self._hot_words = hot_words
+        self._framing = Framing()
+        self._phrases = Phrases(settings)
+        self._own_words = ""
+        self._own_ns = 0
+        self._barge_ns: int | None = None
+        self._told: list[Heard] = []
+
+    @property
+    def settings(self) -> SpeechSettings:
+        """Return what a phrase is, and how surely it must be understood."""
+        return self._phrases.settings
+
+    @settings.setter
+    def settings(self, settings: SpeechSettings) -> None:
+        self._phrases.settings = settings
+
+    @property
+    def state(self) -> str:
+        """Return what hearing does at this moment."""
+        if self._phrases.is_open:
+            return "hearing"
+        return "transcribing" if self.readings.is_busy else "listening"
+
+    def feed(self, block: SoundBlock, playing: Playing | None) -> int | None:
+        """Take the next block; return since when a person speaks into what the robot says.
+
+        Raises:
+            RunFailed: the voice network fails.
+        """
+        self._barge_ns = None
+        for frame in self._framing.feed(block):
+            self._frame(frame, playing)
+        return self._barge_ns
+
+    def heard(self) -> Iterator[Heard]:
+        """Yield what has been understood, or not, since the last call."""
+        self._heed_draft()
+        told, self._told = self._told, []
+        yield from told
+        for answer in self.readings.answers():
+            yield self._judged(answer)
+
+    def document(self) -> dict[str, Any]:
+        """Return what hearing knows of the room, as `speech_status` tells it."""
+        return {
+            "noise_floor_db": round(self.floor.level_db, 1),
+            "music": self.music.plays,
+            "echo_db": round(self.gate.coupling_db, 1),
+            "counts": dict(self.counts),
+        }
+
+    def close(self) -> None:
+        """Release the networks."""
+        self.readings.close()
+        self._activity.close()
+
+    def _frame(self, frame: Frame, playing: Playing | None) -> None:
+        if not frame.follows:
+            self._activity.reset()
+            self._phrases.reset()
+            self.readings.forget_draft()
+        voice, level = self._activity.probability(frame.samples), level_db(frame.samples)
+        self._follow_own_voice(playing, frame)
+        if self.gate.is_shut:
+            voice = self._through_gate(frame, level, voice)
+        else:
+            self.floor.note(level, is_voice=voice >= OFFSET)
+            self.music.note(frame.samples, level, voice)
+        is_loud = level >= self.floor.level_db + ABOVE_FLOOR_DB
+        for happening in self._phrases.feed(frame, voice, is_loud=is_loud):
+            self._on(happening)
+
+    def _follow_own_voice(self, playing: Playing | None, frame: Frame) -> None:
+        self.gate.follow(playing)
+        if playing is not None:
+            self._own_words, self._own_ns = playing.text, frame.end_ns
+
+    def _through_gate(self, frame: Frame, level: float, voice: float) -> float:
+        """Return how probably a person speaks while the robot does."""
+        is_person = self.gate.is_person(level, voice)
+        if self.gate.barges_in():
+            self._barge_ns = frame.stamp_ns
+            self.counts["barged_in"] += 1
+        return voice if is_person else 0.0
+
+    def _on(self, happening: Happening) -> None:
+        phrase = happening.phrase
+        self.counts[happening.step.name.lower()] += 1
+        if happening.step is Step.PAUSED:
+            self.readings.draft(phrase, self._hot_words())
+        elif happening.step is Step.ENDED:
+            self.readings.finish(phrase, self._hot_words())
+        elif happening.step is not Step.BEGAN:
+            self.readings.forget_draft()
+        if happening.step is Step.TOO_LONG:
+            self._refuse(phrase, f"{self.settings.longest_phrase_s:g} s of talk are no command")
+
+    def _heed_draft(self) -> None:
+        """Wait longer for a speaker who pauses where the words so far are not all, or not sure."""
+        reading = self.readings.drafted() if self._phrases.is_open else None
+        if reading is None or is_stop(reading.text):
+            return
+        unsure = self._confidence(reading) < self.settings.least_confidence
+        if unsure or is_unfinished(reading.text):
+            self._phrases.wait_longer()
+
+    def _refuse(self, phrase: Phrase, reason: str) -> None:
+        judgement = Judgement(verdict=Verdict.REJECTED, reason=reason)
+        self._told.append(Heard(phrase=phrase, answer=None, confidence=0.0, judgement=judgement))
+
+    def _confidence(self, reading: Reading) -> float:
+        recogniser = self.readings.recogniser
+        return 0.0 if recogniser is None else confidence(reading, recogniser.declared.calibration)
+
+    def _judged(self, answer: Answer) -> Heard:
+        recogniser = self.readings.recogniser
+        if answer.reading is None or recogniser is None:
+            judgement = Judgement(verdict=Verdict.REJECTED, reason=answer.trouble)
+            return Heard(phrase=answer.phrase, answer=answer, confidence=0.0, judgement=judgement)
+        sure = self._confidence(answer.reading)
+        case = Case(
+            reading=answer.reading,
+            phrase=answer.phrase,
+            confidence=sure,
+            least_confidence=self.settings.least_confidence,
+            languages=recogniser.declared.languages,
+            music=self.music.plays,
+            own_words=self._own(answer.phrase),
+        )
+        judgement = judge(case)
+        if answer.trouble and judgement.verdict is not Verdict.STOP:
+            judgement = Judgement(verdict=Verdict.REJECTED, reason=answer.trouble, ask_again=True)
+        return Heard(phrase=answer.phrase, answer=answer, confidence=sure, judgement=judgement)
+
+    def _own(self, phrase: Phrase) -> str:
+        """Return what the robot itself said while, or just before, a phrase began."""
+        return self._own_words if phrase.began_ns - self._own_ns < OWN_WORDS_NS else ""

@@ -1,0 +1,133 @@
+"""Read phrases beside the steps: one in advance while a speaker pauses, the ended ones in order.
+
+The rule of lateness: whoever waited longer than `LATE_NS` for an answer has gone on, and what comes
+then is not carried out; of more than `MOST_WAITING` phrases that wait, the newest is refused.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from typing import Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.inference.errors import RunFailed
+from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.recogniser import Reading, Recogniser
+
+LATE_NS: Final = 5 * NS_PER_S
+MOST_WAITING: Final = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """Hold what was read in a phrase that has ended; None, and why, where nothing could be."""
+
+    phrase: Phrase
+    reading: Reading | None
+    trouble: str = ""
+
+
+@dataclass(slots=True)
+class _Asked:
+    phrase: Phrase
+    future: "Future[Reading]"
+
+
+class Readings:
+    """Hold the recogniser at work, or why there is none, and what it was asked."""
+
+    def __init__(self, executor: Executor, clock: Clock) -> None:
+        """Take an executor of one thread over, or one that works at once."""
+        self.why = "the recogniser is being loaded"
+        self.recogniser: Recogniser | None = None
+        self._executor = executor
+        self._clock = clock
+        self._draft: _Asked | None = None
+        self._ended: list[_Asked] = []
+        self._refused: list[Answer] = []
+        self._closed = False
+
+    @property
+    def is_busy(self) -> bool:
+        """Tell whether a phrase that has ended is being read."""
+        return bool(self._ended)
+
+    def take(self, recogniser: Recogniser | None, why: str) -> tuple[Recogniser | None, str]:
+        """Put another recogniser to work for the next phrase; return the one before."""
+        before = self.recogniser, self.why
+        self.recogniser, self.why = recogniser, why
+        return before
+
+    def release(self, recogniser: Recogniser) -> None:
+        """Close one that is at work no more, behind what it was asked last."""
+        if self._closed:
+            recogniser.close()
+        else:
+            self._executor.submit(recogniser.close)
+
+    def draft(self, phrase: Phrase, hot_words: str) -> None:
+        """Read a phrase in advance, unless something is being read."""
+        under_way = self._draft is not None and not self._draft.future.done()
+        if self.recogniser is not None and not under_way and not self._ended:
+            self._draft = self._ask(self.recogniser, phrase, hot_words)
+
+    def drafted(self) -> Reading | None:
+        """Return what was read in advance, as soon as it is there."""
+        draft = self._draft
+        if draft is None or not draft.future.done() or draft.future.exception() is not None:
+            return None
+        return draft.future.result()
+
+    def forget_draft(self) -> None:
+        """Say that the speaker has gone on: what was read in advance is not all."""
+        if self._draft is not None:
+            self._draft.future.cancel()
+            if self._draft.future.done():
+                self._draft = None
+
+    def finish(self, phrase: Phrase, hot_words: str) -> None:
+        """Take a phrase that has ended: by what was read in advance, if that was all of it."""
+        draft, self._draft = self._draft, None
+        if self.recogniser is None:
+            self._refuse(phrase, f"no model turns speech into text: {self.why}")
+        elif len(self._ended) >= MOST_WAITING:
+            self._refuse(phrase, f"{MOST_WAITING} phrases are waiting to be read already")
+        elif draft is not None and draft.phrase.ended_ns == phrase.ended_ns:
+            self._ended.append(_Asked(phrase, draft.future))
+        else:
+            self._ended.append(self._ask(self.recogniser, phrase, hot_words))
+
+    def answers(self) -> Iterator[Answer]:
+        """Yield what has been answered since the last call, in the order of the phrases."""
+        refused, self._refused = self._refused, []
+        yield from refused
+        while self._ended and self._ended[0].future.done():
+            asked = self._ended.pop(0)
+            try:
+                reading = asked.future.result()
+            except RunFailed as error:
+                yield Answer(phrase=asked.phrase, reading=None, trouble=str(error))
+                continue
+            late_ns = self._clock.now_ns() - asked.phrase.ended_ns
+            trouble = (
+                f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
+            )
+            yield Answer(phrase=asked.phrase, reading=reading, trouble=trouble)
+
+    def close(self) -> None:
+        """Release everything; what is under way is given up."""
+        self._closed = True
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        if self.recogniser is not None:
+            self.recogniser.close()
+        self.recogniser = None
+
+    def _late(self, phrase: Phrase) -> str:
+        late_ns = self._clock.now_ns() - phrase.ended_ns
+        return f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
+
+    def _ask(self, recogniser: Recogniser, phrase: Phrase, hot_words: str) -> _Asked:
+        return _Asked(phrase, self._executor.submit(recogniser.read, phrase.samples, hot_words))
+
+    def _refuse(self, phrase: Phrase, trouble: str) -> None:
+        self._refused.append(Answer(phrase=phrase, reading=None, trouble=trouble))

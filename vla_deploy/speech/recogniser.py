@@ -1,0 +1,219 @@
+"""Turn speech into text by a Whisper in CTranslate2's form, and tell what speaks for it."""
+
+import math
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Final
+
+import numpy as np
+
+from drivers.clock import NS_PER_S, Clock
+from drivers.latency import LatencyHistogram
+from platforms import ModelChoice
+from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
+from vla_deploy.inference.file_check import check_parts
+from vla_deploy.inference.manifest import Context, Whisper
+from vla_deploy.inference.providers import CPU, CUDA
+from vla_deploy.inference.stats import resident_mb
+from vla_deploy.inference.store import Model
+from vla_deploy.one_line import one_line
+from vla_deploy.speech.errors import SpeechMissing
+from vla_deploy.speech.sound import RATE_HZ, Sound
+
+_TOKENS_S: Final = 12.0
+_TOKENS: Final = 8
+_MOST_TOKENS: Final = 200
+_COMPUTE: Final = {
+    (CPU, "int8"): "int8",
+    (CPU, "fp16"): "float32",
+    (CPU, "fp32"): "float32",
+    (CUDA, "int8"): "int8_float16",
+    (CUDA, "fp16"): "float16",
+    (CUDA, "fp32"): "float32",
+}
+_DEVICES: Final = {CPU: "cpu", CUDA: "cuda"}
+_RUNTIME: Final = "vla_deploy.speech.whisper_runtime"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """Hold what a model read in a phrase, and what speaks for it.
+
+    `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
+    `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
+    as far as the model knows several.
+    """
+
+    text: str
+    log_probability: float
+    no_speech: float
+    compression: float
+    language: str
+    duration_s: float
+    took_s: float
+
+
+class Recogniser:
+    """Read phrases one at a time, in this thread or another one."""
+
+    def __init__(
+        self, model: Model, whisper: Any, clock: Clock, *, provider: str, beam: int
+    ) -> None:
+        """Take an open Whisper over; `open_recogniser` makes one."""
+        declared = model.manifest.whisper
+        assert declared is not None, "only manifests of a Whisper come here"
+        self.model = model
+        self.declared: Whisper = declared
+        self.provider = provider
+        self.notices: tuple[str, ...] = ()
+        self.load_s = 0.0
+        self.memory_mb = 0.0
+        self.latency = LatencyHistogram()
+        self._whisper: Any = whisper
+        self._clock = clock
+        self._beam = beam
+
+    def read(self, samples: Sound, hot_words: str = "") -> Reading:
+        """Return what is said in a phrase of at most 29 s.
+
+        Raises:
+            RunFailed: the model fails, or is closed.
+        """
+        if self._whisper is None:
+            raise RunFailed(f"{self.model.manifest.name}: it is closed")
+        started_ns = self._clock.now_ns()
+        try:
+            segments, info = self._transcribe(samples, hot_words)
+        except _model_errors() as error:
+            raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
+        took_ns = self._clock.now_ns() - started_ns
+        self.latency.record(took_ns)
+        weights = [max(1, len(one.tokens)) for one in segments]
+        return Reading(
+            text=" ".join(one.text.strip() for one in segments).strip(),
+            log_probability=_mean([one.avg_logprob for one in segments], weights, 0.0),
+            no_speech=_mean([one.no_speech_prob for one in segments], weights, 1.0),
+            compression=max((one.compression_ratio for one in segments), default=0.0),
+            language=info.language,
+            duration_s=len(samples) / RATE_HZ,
+            took_s=took_ns / NS_PER_S,
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return what it is and has cost, as `speech_status` tells it."""
+        return {
+            "name": self.model.manifest.name,
+            "provider": self.provider,
+            "calibrated": self.declared.calibration is not None,
+            "load_s": round(self.load_s, 3),
+            "memory_mb": round(self.memory_mb, 1),
+            "read": self.latency.count,
+            "p50_s": self.latency.percentile_ns(0.5) / NS_PER_S,
+            "p95_s": self.latency.percentile_ns(0.95) / NS_PER_S,
+            "notices": list(self.notices),
+        }
+
+    def close(self) -> None:
+        """Release the memory; closing twice is allowed."""
+        if self._whisper is not None:
+            self._whisper.model.unload_model()
+        self._whisper = None
+
+    def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
+        whisper = self._whisper
+        if self.declared.context == Context.TRIMMED:
+            whisper.content_frames = len(samples) // whisper.feature_extractor.hop_length
+        seconds = len(samples) / RATE_HZ
+        segments, info = whisper.transcribe(
+            samples,
+            language=self._language(),
+            beam_size=self._beam,
+            temperature=0.0,
+            without_timestamps=True,
+            condition_on_previous_text=False,
+            compression_ratio_threshold=None,
+            log_prob_threshold=None,
+            no_speech_threshold=None,
+            hotwords=hot_words if hot_words and self.declared.hot_words else None,
+            # CTranslate2 ends a text at half of what it is told.
+            max_new_tokens=min(_MOST_TOKENS, 2 * (_TOKENS + math.ceil(_TOKENS_S * seconds))),
+        )
+        return list(segments), info
+
+    def _language(self) -> str | None:
+        """Return the language to expect; None lets a model that knows several find out."""
+        return None if self._whisper.model.is_multilingual else "en"
+
+
+def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Clock) -> Recogniser:
+    """Open a model as a profile's choice asks, and warm it up.
+
+    Raises:
+        SpeechMissing: faster-whisper is not installed.
+        ModelFileSpoiled: a file is not what was checked in, or is none of a Whisper.
+        ProviderUnavailable: nothing here runs it as the choice asks.
+        RunFailed: it cannot run.
+    """
+    before_mb, started_ns = resident_mb(), clock.now_ns()
+    runtime = _runtime()
+    check_parts(model)
+    provider = _provider(choice, runtime)
+    declared = model.manifest.whisper
+    is_trimmed = declared is not None and declared.context == Context.TRIMMED
+    kind = runtime.TrimmedWhisper if is_trimmed else runtime.Whisper
+    try:
+        whisper = kind(
+            str(model.folder),
+            device=_DEVICES[provider],
+            compute_type=_COMPUTE[provider, choice.precision],
+            cpu_threads=choice.threads,
+            num_workers=1,
+            local_files_only=True,
+        )
+    except runtime.MODEL_ERRORS as error:
+        raise ModelFileSpoiled(
+            f"{model.folder}: {runtime.VERSION} cannot load it: {one_line(error)}; expected a "
+            "Whisper converted by CTranslate2: add the model again"
+        ) from error
+    recogniser = Recogniser(model, whisper, clock, provider=provider, beam=beam)
+    recogniser.read(np.zeros(RATE_HZ, np.float32))
+    recogniser.latency.reset()
+    recogniser.load_s = (clock.now_ns() - started_ns) / NS_PER_S
+    recogniser.memory_mb = max(0.0, resident_mb() - before_mb)
+    return recogniser
+
+
+def _provider(choice: ModelChoice, runtime: Any) -> str:
+    """Return the first provider of a choice that CTranslate2 has here.
+
+    Raises:
+        ProviderUnavailable: there is none.
+    """
+    asked = (*choice.providers, CPU) if choice.cpu_fallback else choice.providers
+    for provider in asked:
+        there = provider == CPU or (provider == CUDA and runtime.cuda_devices() > 0)
+        if there and (provider, choice.precision) in _COMPUTE:
+            return provider
+    raise ProviderUnavailable(
+        f"CTranslate2 here runs nothing of {', '.join(asked)} in {choice.precision}; "
+        "allow the CPU in int8 or fp32, or install a CTranslate2 built with CUDA"
+    )
+
+
+def _runtime() -> Any:
+    try:
+        return import_module(_RUNTIME)
+    except ImportError as error:
+        raise SpeechMissing(
+            f"turning speech into text needs faster-whisper ({error}): "
+            "pip install 'vla-deploy[speech]'"
+        ) from error
+
+
+def _model_errors() -> tuple[type[Exception], ...]:
+    errors: tuple[type[Exception], ...] = _runtime().MODEL_ERRORS
+    return errors
+
+
+def _mean(values: list[float], weights: list[int], nothing: float) -> float:
+    return float(np.average(values, weights=weights)) if values else nothing

@@ -1,0 +1,130 @@
+"""Decide what becomes of a phrase: a command for the planner, a stop, or nothing, with the reason.
+
+The first row of `_REFUSALS` that says something decides; it is told in `heard`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.words import is_stop, words_of
+
+FASTEST_WORDS_S: Final = 7.0
+MOST_COMPRESSION: Final = 2.4
+NO_SPEECH: Final = 0.8
+SURE_VOICE: Final = 0.7
+CLIPPED_RATIO: Final = 0.01
+STOP_CONFIDENCE: Final = 0.25
+"""A stop is taken where another command would be asked again: a stop too many does no harm."""
+
+
+class Verdict(StrEnum):
+    """Name what becomes of what was heard."""
+
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+    STOP = "stop"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """Hold all that a phrase is judged by; `own_words` are those the robot itself was saying."""
+
+    reading: Reading
+    phrase: Phrase
+    confidence: float
+    least_confidence: float
+    languages: tuple[str, ...]
+    music: bool = False
+    own_words: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """Say what becomes of a phrase, why, and whether asking again may help."""
+
+    verdict: Verdict
+    reason: str = ""
+    ask_again: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Refusal:
+    why: Callable[[Case], str]
+    ask_again: bool
+
+
+def judge(case: Case) -> Judgement:
+    """Return what becomes of a phrase."""
+    if is_stop(case.reading.text) and case.confidence >= STOP_CONFIDENCE:
+        return Judgement(verdict=Verdict.STOP)
+    for row in _REFUSALS:
+        reason = row.why(case)
+        if reason:
+            return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=row.ask_again)
+    return Judgement(verdict=Verdict.ACCEPTED)
+
+
+def _without_words(case: Case) -> str:
+    return "" if words_of(case.reading.text) else "a sound without words"
+
+
+def _own_voice(case: Case) -> str:
+    words, own = words_of(case.reading.text), set(words_of(case.own_words))
+    known = sum(word in own for word in words)
+    return "the robot heard itself" if own and known > 0.7 * len(words) else ""
+
+
+def _music(case: Case) -> str:
+    unsure = case.phrase.voice < SURE_VOICE
+    return "music, or another sound with a steady pitch" if case.music and unsure else ""
+
+
+def _language(case: Case) -> str:
+    spoken = case.reading.language
+    if spoken in case.languages:
+        return ""
+    return f"spoken in {spoken}, but only {', '.join(case.languages)} is understood"
+
+
+def _too_fast(case: Case) -> str:
+    words_s = len(words_of(case.reading.text)) / max(case.phrase.voiced_s, 0.1)
+    if words_s <= FASTEST_WORDS_S or case.phrase.voiced_s < 0.3:
+        return ""
+    return f"{words_s:.0f} words a second were read, at most {FASTEST_WORDS_S:.0f} can be said"
+
+
+def _repeats(case: Case) -> str:
+    ratio = case.reading.compression
+    if ratio <= MOST_COMPRESSION:
+        return ""
+    return f"the text repeats itself (compression {ratio:.1f}, at most {MOST_COMPRESSION})"
+
+
+def _nobody(case: Case) -> str:
+    probability = case.reading.no_speech
+    return f"nobody spoke, by {probability:.0%}" if probability > NO_SPEECH else ""
+
+
+def _unsure(case: Case) -> str:
+    if case.confidence >= case.least_confidence:
+        return ""
+    text = f"understood by {case.confidence:.0%}, at least {case.least_confidence:.0%} is needed"
+    if case.phrase.clipped_ratio > CLIPPED_RATIO:
+        text += "; the microphone is overdriven: turn its gain down, or speak from farther away"
+    return text
+
+
+_REFUSALS: Final = (
+    _Refusal(_without_words, ask_again=False),
+    _Refusal(_own_voice, ask_again=False),
+    _Refusal(_music, ask_again=False),
+    _Refusal(_language, ask_again=True),
+    _Refusal(_nobody, ask_again=False),
+    _Refusal(_repeats, ask_again=False),
+    _Refusal(_too_fast, ask_again=False),
+    _Refusal(_unsure, ask_again=True),
+)

@@ -1,0 +1,44 @@
+"""Import faster-whisper, here and nowhere else, with every way to the network closed first.
+
+It loads the hub's client, which would look for what a model's folder lacks. Threads of its
+arithmetic that wait for work give their core away.
+"""
+
+import os
+
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+os.environ["HF_HUB_OFFLINE"] = "1"
+os.environ["HF_HUB_DISABLE_TELEMETRY"] = "1"
+os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
+os.environ["KMP_BLOCKTIME"] = "0"
+
+import ctranslate2
+import faster_whisper
+import numpy as np
+from numpy.typing import NDArray
+
+MODEL_ERRORS: tuple[type[Exception], ...] = (RuntimeError, ValueError, OSError, KeyError, TypeError)
+VERSION: str = f"faster-whisper {faster_whisper.__version__}"
+_MARGIN_FRAMES = 40
+
+
+class TrimmedWhisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimported,unused-ignore]
+    """Give the encoder only the sound that is there, and a little silence.
+
+    For weights that were trained so: the library itself always pads to its window.
+    """
+
+    content_frames: int = 0
+
+    def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
+        """Return what the encoder makes of features, (mel bands, frames)."""
+        kept = self.content_frames + _MARGIN_FRAMES
+        return super().encode(np.ascontiguousarray(features[..., : kept + kept % 2]))
+
+
+Whisper = faster_whisper.WhisperModel
+
+
+def cuda_devices() -> int:
+    """Return how many GPUs this build of CTranslate2 can use."""
+    return int(ctranslate2.get_cuda_device_count())

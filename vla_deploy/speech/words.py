@@ -1,0 +1,34 @@
+"""Know the few words that hearing itself heeds: those that stop, and those that end no command."""
+
+import re
+from typing import Final
+
+STOPS: Final = frozenset({"stop", "halt", "freeze"})
+_POLITE: Final = frozenset({"robot", "butler", "please", "now", "hey", "moving", "it", "that"})
+_UNFINISHED: Final = frozenset(
+    {
+        "a", "an", "and", "at", "behind", "beside", "by", "from", "in", "into", "is", "my",
+        "near", "of", "on", "onto", "or", "put", "take", "the", "then", "this", "to",
+        "under", "with", "your", "bring",
+    }
+)  # fmt: skip
+_WORD: Final = re.compile(r"[^\W_]+(?:['’][^\W_]+)*")
+
+
+def words_of(text: str) -> tuple[str, ...]:
+    """Return the words of a text in small letters, without punctuation."""
+    return tuple(_WORD.findall(text.lower()))
+
+
+def is_stop(text: str) -> bool:
+    """Tell whether a text is nothing but a call to stop, however often and politely."""
+    words = words_of(text)
+    return any(word in STOPS for word in words) and all(
+        word in STOPS or word in _POLITE for word in words
+    )
+
+
+def is_unfinished(text: str) -> bool:
+    """Tell whether a speaker who pauses after these words has surely more to say."""
+    words = words_of(text)
+    return not words or words[-1] in _UNFINISHED
