@@ -14,7 +14,7 @@ import psutil
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import Case, Report
-from sim_twin.stack import LockstepStack
+from sim_twin.stack import LockstepStack, NotReady
 
 MOST_MIB_PER_H: Final = 1.0
 _WARM_UP_RATIO: Final = 0.25
@@ -23,11 +23,13 @@ _LEAST_SAMPLES: Final = 8
 _S_PER_H: Final = 3600.0
 _MIB: Final = 1 << 20
 _IDLE_S: Final = 20.0
+# The longest skill, to search the flat, may take 300 s by itself.
+_JOB_S: Final = 900.0
 JOBS: Final = (
     "pick up the red cup and put it in the box",
     "go to the kitchen",
     "look left",
-    "go home",
+    "go to the charging station",
     "pick up the red cup and put it on the coffee table",
     "turn around",
 )
@@ -73,7 +75,11 @@ class Soak:
         self._stack.close()
 
     def _do(self, job: str) -> None:
-        outcome = self._stack.say(job)
+        try:
+            outcome = self._stack.say(job, _JOB_S)
+        except NotReady as error:
+            self._stack.give(cancel=True)
+            outcome = {"error": str(error)}
         self._stack.events.clear()
         self.done += 1
         if not outcome.get("success"):

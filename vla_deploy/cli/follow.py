@@ -1,4 +1,4 @@
-"""Follow one command to its end, which may be that nobody is left to carry it out."""
+"""Follow one command to its end, which may be that nobody is left to plan or carry it out."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
@@ -24,22 +24,27 @@ class _Pause(Protocol):
     def __call__(self) -> None: ...
 
 
+Newest = Callable[[], Sample | None]
+
+
 def follow_command(
     command_id: str,
     *,
     events: Callable[[], Sequence[Event]],
-    executor: Callable[[], Sample | None],
+    planner: Newest,
+    executor: Newest,
     clock: Clock,
     pause: _Pause,
 ) -> Iterator[Event]:
     """Return the command's events; the last is `finished` or `rejected`, told or found out.
 
-    `events` drains the ring of task events, `executor` returns its status while that is young.
+    `events` drains the ring of task events; `planner` and `executor` return their status while that
+    is young. Where the command answers a question, the one that was asked about is followed on.
 
     Raises:
         CommandFailed: nobody has answered in time.
     """
-    watch = ExecutorWatch(command_id, executor, clock)
+    watch = Watch("planner", in_planner(command_id), planner, clock)
     actions: dict[str, Event] = {}
     answer_by_ns = clock.now_ns() + round(ANSWER_TIMEOUT_S * NS_PER_S)
     answered = False
@@ -53,6 +58,11 @@ def follow_command(
             yield event
             if event["event"] in LAST_EVENTS:
                 return
+            if event["event"] == "answered":
+                command_id = str(event["of"])
+                watch = Watch("planner", in_planner(command_id), planner, clock)
+            if event["event"] == "plan":
+                watch = Watch("executor", in_executor(command_id), executor, clock)
         if why:
             yield lost(command_id, why, actions)
             return
@@ -61,30 +71,41 @@ def follow_command(
         pause()
 
 
-class ExecutorWatch:
-    """Judge by the executor's status whether it still carries a command out."""
+def in_planner(command_id: str) -> Callable[[Event], bool]:
+    """Return what tells whether a planner's status names a command."""
+    return lambda status: command_id in status.get("commands", ())
+
+
+def in_executor(command_id: str) -> Callable[[Event], bool]:
+    """Return what tells whether an executor's status names a command."""
+    return lambda status: status["command_id"] == command_id
+
+
+class Watch:
+    """Judge by a process' status whether it still works on a command."""
 
     def __init__(
-        self, command_id: str, executor: Callable[[], Sample | None], clock: Clock
+        self, who: str, has_it: Callable[[Event], bool], status: Newest, clock: Clock
     ) -> None:
-        self._command_id = command_id
-        self._executor = executor
+        self._who = who
+        self._has_it = has_it
+        self._status = status
         self._clock = clock
         self._pid: int | None = None
         self._seen_ns: int | None = None
 
     def why_lost(self) -> str:
-        """Return why nobody carries the command out, or "" while somebody may."""
+        """Return why nobody works on the command, or "" while somebody may."""
         now_ns = self._clock.now_ns()
-        sample = self._executor()
+        sample = self._status()
         if self._seen_ns is None:
             self._seen_ns = now_ns
-        if sample is not None and sample.document()["command_id"] == self._command_id:
+        if sample is not None and self._has_it(sample.document()):
             self._pid, self._seen_ns = sample.writer_pid, now_ns
         if sample is not None and self._pid not in (None, sample.writer_pid):
-            return "the executor ended while it carried the command out, and was started again"
+            return f"the {self._who} ended while it had the command, and was started again"
         if now_ns - self._seen_ns > SILENCE_LIMIT_S * NS_PER_S:
-            return f"the executor has not spoken of the command for {SILENCE_LIMIT_S:g} s"
+            return f"the {self._who} has not spoken of the command for {SILENCE_LIMIT_S:g} s"
         return ""
 
 
@@ -122,4 +143,5 @@ def _pending(action: Event) -> Event:
         "execution_time_s": 0.0,
         "error": None,
         "retries": 0,
+        "note": None,
     }

@@ -15,9 +15,14 @@ SIGNS: Mapping[str, str] = {
 def line_of(event: Mapping[str, Any]) -> str | None:
     """Return one line for an event, or None for one that says nothing new."""
     match event["event"]:
+        case "queued":
+            return f"waits for {event['place']} before it"
+        case "planning":
+            return f"asking {', '.join(event['rungs'])} ..."
+        case "asked":
+            return f"robot asks: {event['question']}"
         case "plan":
-            steps = [action_words(action) for action in event["plan"]["actions"]]
-            return "plan: " + "; ".join(steps)
+            return _plan_line(event)
         case "action":
             return _action_line(event)
         case "said":
@@ -27,6 +32,12 @@ def line_of(event: Mapping[str, Any]) -> str | None:
         case "finished":
             return "done" if event["success"] else f"failed: {event['error']}"
     return None
+
+
+def _plan_line(event: Mapping[str, Any]) -> str:
+    steps = "; ".join(action_words(action) for action in event["plan"]["actions"])
+    rung = event.get("rung", "")
+    return f"plan: {steps}" + (f"  (by {rung})" if rung not in ("", "rules", "given") else "")
 
 
 def action_words(action: Mapping[str, Any]) -> str:
@@ -42,4 +53,5 @@ def _action_line(event: Mapping[str, Any]) -> str:
     line = f"{SIGNS.get(event['status'], event['status'])} {action_words(event)}"
     if event["status"] != "active":
         line += f"  ({event['execution_time_s']:.1f} s)"
-    return f"{line}  {event['error']}" if event["error"] else line
+    told = event["error"] or event.get("note")
+    return f"{line}  {told}" if told else line

@@ -2,7 +2,7 @@
 
 import itertools
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -62,24 +62,33 @@ class Session:
         message = {"act": act, "source": "cli", "reason": reason}
         self._space.ring_writer("operator").publish(message)
 
-    def command(self, **utterance: Any) -> Iterator[dict[str, Any]]:
+    def utter(self, **utterance: Any) -> str:
+        """Say something to the planner, and return the id that answers to it carry."""
+        command_id = f"cli-{os.getpid()}-{next(self._numbers)}"
+        message = {"command_id": command_id, "source": "cli"} | utterance
+        self._space.ring_writer("utterance").publish(message)
+        return command_id
+
+    def command(
+        self, pause: Callable[[], None] | None = None, **utterance: Any
+    ) -> Iterator[dict[str, Any]]:
         """Give a command and return its events, up to and including the last one.
+
+        `pause` waits for a moment between two looks at the events.
 
         Raises:
             CommandFailed: nobody answers; raised by the iterator.
         """
         from vla_deploy.cli.follow import follow_command  # loads pydantic: not on an estop's way
 
-        command_id = f"cli-{os.getpid()}-{next(self._numbers)}"
         events = self._space.ring_reader("task_event", from_start=False)
-        message = {"command_id": command_id, "source": "cli"} | utterance
-        self._space.ring_writer("utterance").publish(message)
         return follow_command(
-            command_id,
+            self.utter(**utterance),
             events=lambda: [event.payload for event in events.drain()],
+            planner=lambda: self.fresh("planner_status", age_limit_s=2.0),
             executor=lambda: self.fresh("executor_status", age_limit_s=1.0),
             clock=self.clock,
-            pause=self.pause,
+            pause=pause or self.pause,
         )
 
     def save_flight(self, reason: str, timeout_s: float) -> dict[str, Any] | None:

@@ -1,5 +1,6 @@
 """Share state, events and images between the robot's processes."""
 
+from vla_deploy.ipc.announcer import Announced, Announcer
 from vla_deploy.ipc.cell import CellReader, CellWriter, Sample
 from vla_deploy.ipc.claim_book import ClaimBook
 from vla_deploy.ipc.claims import Book, Claim
@@ -22,6 +23,8 @@ from vla_deploy.ipc.topics import BY_NAME, TOPICS, Field, Kind, Topic
 __all__ = [
     "BY_NAME",
     "TOPICS",
+    "Announced",
+    "Announcer",
     "BadPayload",
     "Book",
     "CellReader",

@@ -1,6 +1,7 @@
 """Bound a call by one moment, whatever it is waiting for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from threading import Event
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.model_servers.errors import TimedOut
@@ -8,29 +9,49 @@ from vla_deploy.model_servers.errors import TimedOut
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deadline:
-    """Hold when a call must have ended, and how long it was given."""
+    """Hold when a call must have ended, and how long it was given.
+
+    It has ended at once when whoever set it sets `recall`: nobody waits for the answer any more.
+    """
 
     clock: Clock
     end_ns: int
     given_s: float
+    recall: Event | None = None
 
     @classmethod
-    def within(cls, clock: Clock, given_s: float) -> "Deadline":
+    def within(cls, clock: Clock, given_s: float, recall: Event | None = None) -> "Deadline":
         """Return the deadline `given_s` from now."""
-        return cls(clock=clock, end_ns=clock.now_ns() + round(given_s * NS_PER_S), given_s=given_s)
+        end_ns = clock.now_ns() + round(given_s * NS_PER_S)
+        return cls(clock=clock, end_ns=end_ns, given_s=given_s, recall=recall)
+
+    def share(self, parts: int) -> "Deadline":
+        """Return the deadline of the next of so many equal parts of the time that is left."""
+        given_s = self.left_s / parts
+        end_ns = self.clock.now_ns() + round(given_s * NS_PER_S)
+        return replace(self, end_ns=end_ns, given_s=given_s)
+
+    @property
+    def is_recalled(self) -> bool:
+        """Tell whether nobody waits for the answer any more."""
+        return self.recall is not None and self.recall.is_set()
 
     @property
     def left_s(self) -> float:
         """Return the time left, at least 0."""
+        if self.is_recalled:
+            return 0.0
         return max(0.0, (self.end_ns - self.clock.now_ns()) / NS_PER_S)
 
     def bound_s(self, wanted_s: float | None = None) -> float:
         """Return the time that one wait may take: what is wanted, at most what is left.
 
         Raises:
-            TimedOut: nothing is left.
+            TimedOut: nothing is left, or nobody waits any more.
         """
         left_s = self.left_s
+        if self.is_recalled:
+            raise TimedOut("nobody waits for the answer any more")
         if left_s <= 0.0:
             raise TimedOut(f"no whole answer within {self.given_s:g} s")
         return left_s if wanted_s is None else min(wanted_s, left_s)

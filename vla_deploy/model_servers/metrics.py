@@ -54,13 +54,14 @@ class CallMetrics:
                 "retries": self._retries,
                 "tokens_in": self._tokens_in,
                 "tokens_out": self._tokens_out,
-                "latency_p50_s": _percentile(times_s, 50),
-                "latency_p95_s": _percentile(times_s, 95),
+                "latency_p50_s": percentile_s(times_s, 50),
+                "latency_p95_s": percentile_s(times_s, 95),
                 "latency_max_s": round(times_s[-1], 4) if times_s else None,
             }
 
 
-def _percentile(sorted_s: list[float], percent: int) -> float | None:
+def percentile_s(sorted_s: list[float], percent: int) -> float | None:
+    """Return a percentile of sorted times, None where there are none."""
     if len(sorted_s) < 2:
         return round(sorted_s[0], 4) if sorted_s else None
     return round(quantiles(sorted_s, n=100, method="inclusive")[percent - 1], 4)

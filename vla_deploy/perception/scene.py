@@ -13,28 +13,28 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.bystanders import Bystander, find_bystanders
-from vla_deploy.perception.cloud import AIM_SIGMA_RAD, Cloud, make_cloud
+from vla_deploy.perception.cloud import AIM_SIGMA_RAD, make_cloud
 from vla_deploy.perception.detection import Detection, Vector, detect
 from vla_deploy.perception.filtering import Estimate
 from vla_deploy.perception.hands import Hold
-from vla_deploy.perception.lens import project
+from vla_deploy.perception.in_view import Image, view_of
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.noise import covariance_of
 from vla_deploy.perception.shapes import half_turn
-from vla_deploy.perception.supports import Support, find_supports
+from vla_deploy.perception.supports import (
+    KnownSurface,
+    Support,
+    counter_clockwise,
+    find_supports,
+)
 from vla_deploy.perception.track import Sighting, Track
-from vla_deploy.perception.tracking import Tracker, View
+from vla_deploy.perception.tracking import Tracker
 from vla_deploy.perception.uncertainty import turned
 from vla_deploy.world.document import read_snapshot
 from vla_deploy.world.resting import BEGIN, LET_GO, Bounds, rest_of
 from vla_deploy.world.surfaces import Point, SurfaceBook
-from vla_deploy.world.thing import Rest
+from vla_deploy.world.thing import Rest, Surface
 
-# A missing thing is missed only where its kind would surely be found.
-CLEAR_RANGE_M = 1.6
-BORDER_PX = 12
-PATCH_PX = 2
-IN_FRONT_M = 0.05
 # The scene's cell is bounded: so much of it is for things, the most recently seen first.
 TOLD_BYTES = 25_000
 LOST_TOLD = 12
@@ -79,14 +79,15 @@ class Scene:
         camera's direction is known.
         """
         cloud = make_cloud(rgb, depth_m, camera, base_from_camera, body, aim_sigma_rad)
-        supports = find_supports(cloud)
+        supports = find_supports(cloud, [_known(one, base) for one in self._book.surfaces])
         self._surfaces = [self._surface(one, base) for one in supports if not one.is_floor]
         found = detect(cloud, supports, network)
         sightings = [_sighting(detection, base, stamp_ns) for detection in found]
         self.detections = [sighting.detection for sighting in sightings]
         self._bystanders = find_bystanders(cloud, network, base)
+        image = Image(cloud=cloud, camera=camera, base_from_camera=base_from_camera)
         views = {
-            id(track): _view(track, cloud, camera, base_from_camera, base)
+            id(track): view_of(_local(track, base), track.size_m, image, found)
             for track in self._tracker.tracks
         }
         self._tracker.update(sightings, views, stamp_ns)
@@ -170,27 +171,14 @@ def _sighting(detection: Detection, base: Pose2D, stamp_ns: int) -> Sighting:
     return Sighting(on_map, seen)
 
 
-def _view(
-    track: Track,
-    cloud: Cloud,
-    camera: Intrinsics,
-    base_from_camera: NDArray[np.float64],
-    base: Pose2D,
-) -> View:
-    """Tell whether the image shows a track's place with nothing in front of it."""
-    local = Pose2D(track.position_m[0], track.position_m[1], 0.0).relative_to(base)
-    point = np.array([local.x_m, local.y_m, track.position_m[2]])
-    x, y, z = base_from_camera[:3, :3].T @ (point - base_from_camera[:3, 3])
-    if not 0.2 < z < CLEAR_RANGE_M:
-        return View.HIDDEN
-    half = math.ceil(0.5 * camera.fx * max(track.size_m) / z)
-    border = BORDER_PX + half
-    u, v = (round(value) for value in project(camera, np.array([[x, y, z]]))[0])
-    if not (border <= u < camera.width - border and border <= v < camera.height - border):
-        return View.HIDDEN
-    around = np.s_[v - half : v + half + 1, u - half : u + half + 1]
-    patch = np.s_[v - PATCH_PX : v + PATCH_PX + 1, u - PATCH_PX : u + PATCH_PX + 1]
-    if cloud.own_body[around].any() or not cloud.valid[patch].all():
-        return View.HIDDEN
-    reach_m = 0.5 * max(track.size_m) + IN_FRONT_M
-    return View.CLEAR if np.median(cloud.depth_m[patch]) > z - reach_m else View.HIDDEN
+def _local(track: Track, base: Pose2D) -> Vector:
+    """Return a track's place in the base frame."""
+    x_m, y_m, z_m = track.position_m
+    local = Pose2D(x_m, y_m, 0.0).relative_to(base)
+    return local.x_m, local.y_m, z_m
+
+
+def _known(surface: Surface, base: Pose2D) -> KnownSurface:
+    corners = [Pose2D(x_m, y_m, 0.0).relative_to(base) for x_m, y_m in surface.polygon_m]
+    outline = np.array([(corner.x_m, corner.y_m) for corner in corners], dtype=np.float32)
+    return KnownSurface(height_m=surface.height_m, outline=counter_clockwise(outline))

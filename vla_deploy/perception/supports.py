@@ -1,5 +1,6 @@
 """Find the horizontal surfaces that things may stand on: the floor and table tops of any height."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -10,6 +11,9 @@ from vla_deploy.perception.cloud import Cloud, Floats, Mask, upward_area
 BIN_M = 0.01
 LAYER_M = 0.015
 MIN_AREA_M2 = 0.04
+# So little of a surface is enough where one is known: the rest is hidden by what stands on it.
+MIN_KNOWN_AREA_M2 = 0.01
+SAME_LEVEL_M = 0.02
 MAX_SUPPORTS = 6
 CELL_M = 0.02
 # What stands on a table hides a part of it, but does not cut it in two.
@@ -46,7 +50,15 @@ class Support:
         return abs(self.height_m(float(middle[0]), float(middle[1]))) < FLOOR_M
 
 
-def find_supports(cloud: Cloud) -> list[Support]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KnownSurface:
+    """Hold a surface seen before: height above the floor and convex outline (n, 2), base frame."""
+
+    height_m: float
+    outline: Floats
+
+
+def find_supports(cloud: Cloud, known: Sequence[KnownSurface] = ()) -> list[Support]:
     """Return the surfaces in view, the highest first."""
     # Surfaces are large: every other pixel of every other row is plenty.
     area = upward_area(cloud, STRIDE) * np.float32(STRIDE**2)
@@ -55,13 +67,14 @@ def find_supports(cloud: Cloud) -> list[Support]:
     supports: list[Support] = []
     left = area > 0.0
     for _ in range(MAX_SUPPORTS):
-        level = _strongest_level(z[left], area[left])
+        level = _strongest_level(z[left], area[left], known)
         if level is None:
             break
         layer = left & (np.abs(z - level) < 2.0 * LAYER_M)
         plane = _fit_plane(points[layer], level)
         on_plane = left & (np.abs(_above(points, plane)) < LAYER_M)
-        supports += _pieces(points, on_plane, area, plane)
+        near = [one for one in known if abs(one.height_m - level) < SAME_LEVEL_M]
+        supports += _pieces(points, on_plane, area, plane, near)
         left &= ~(on_plane | (np.abs(z - level) < LAYER_M))
     return sorted(supports, key=lambda s: -s.height_m(*map(float, s.outline.mean(axis=0))))
 
@@ -78,16 +91,19 @@ def inside(outline: Floats, points: Floats, margin_m: float) -> Mask:
     return within
 
 
-def _strongest_level(z: Floats, area: Floats) -> float | None:
+def _strongest_level(z: Floats, area: Floats, known: Sequence[KnownSurface]) -> float | None:
     if not z.size:
         return None
     bins = np.floor(z / BIN_M).astype(np.int64)
     first = int(bins.min())
     histogram = np.convolve(np.bincount(bins - first, weights=area), np.ones(3), mode="same")
-    best = int(np.argmax(histogram))
-    if histogram[best] < MIN_AREA_M2:
-        return None
-    return (first + best + 0.5) * BIN_M
+    levels = (first + np.arange(histogram.size) + 0.5) * BIN_M
+    needed = np.full(histogram.size, MIN_AREA_M2)
+    for one in known:
+        needed[np.abs(levels - one.height_m) < SAME_LEVEL_M] = MIN_KNOWN_AREA_M2
+    enough = np.where(histogram >= needed, histogram, 0.0)
+    best = int(np.argmax(enough))
+    return float(levels[best]) if enough[best] > 0.0 else None
 
 
 def _above(points: Floats, plane: tuple[float, float, float]) -> Floats:
@@ -112,7 +128,11 @@ def _fit_plane(points: Floats, level: float) -> tuple[float, float, float]:
 
 
 def _pieces(
-    points: Floats, on_plane: Mask, area: Floats, plane: tuple[float, float, float]
+    points: Floats,
+    on_plane: Mask,
+    area: Floats,
+    plane: tuple[float, float, float],
+    known: Sequence[KnownSurface],
 ) -> list[Support]:
     """Split the pixels of one plane into surfaces that do not touch."""
     xy = points[on_plane][:, :2]
@@ -126,16 +146,27 @@ def _pieces(
     _, labels = cv2.connectedComponents(grid, connectivity=8)
     label = labels[cells[:, 0], cells[:, 1]]
     areas = np.bincount(label, weights=area[on_plane])
+    pieces = [xy[label == index] for index in np.flatnonzero(areas >= MIN_KNOWN_AREA_M2)]
+    large = areas[areas >= MIN_KNOWN_AREA_M2] >= MIN_AREA_M2
     return [
-        Support(plane=plane, outline=_outline(xy[label == index]))
-        for index in np.flatnonzero(areas >= MIN_AREA_M2)
+        Support(plane=plane, outline=_outline(piece))
+        for piece, is_large in zip(pieces, large, strict=True)
+        if is_large or _is_on(piece, known)
     ]
+
+
+def _is_on(piece: Floats, known: Sequence[KnownSurface]) -> bool:
+    middle = np.median(piece, axis=0, keepdims=True)
+    return any(bool(inside(one.outline, middle, 0.0)[0]) for one in known)
 
 
 def _outline(xy: Floats) -> Floats:
     full = cv2.convexHull(np.ascontiguousarray(xy, dtype=np.float32))
-    hull: Floats = cv2.approxPolyDP(full, CORNER_M, True).reshape(-1, 2)
-    # `inside` needs counter-clockwise corners.
+    return counter_clockwise(cv2.approxPolyDP(full, CORNER_M, True).reshape(-1, 2))
+
+
+def counter_clockwise(hull: Floats) -> Floats:
+    """Return the corners of a convex outline in the order that `inside` needs."""
     x, y = hull.T
     area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
     return hull if area > 0.0 else np.ascontiguousarray(hull[::-1])

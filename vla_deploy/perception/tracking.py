@@ -3,12 +3,12 @@
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from enum import Enum
 from typing import Any
 
 from vla_deploy.perception.classes import OTHER
 from vla_deploy.perception.detection import Vector
 from vla_deploy.perception.identity import is_missing, likeliest, may_be, take_over
+from vla_deploy.perception.in_view import View
 from vla_deploy.perception.matching import match
 from vla_deploy.perception.track import (
     Sighting,
@@ -31,13 +31,6 @@ MAX_OBJECTS = 64
 MAX_TRACKS = 128
 VANISHED_KEPT = 32
 GONE = "its place was seen without it"
-
-
-class View(Enum):
-    """Say what the image shows at the place of a remembered thing."""
-
-    CLEAR = "its place is in clear view"
-    HIDDEN = "out of the image, too far, or something is in front"
 
 
 class Tracker:

@@ -34,13 +34,16 @@ class Proposal:
     """Hold a plan that nobody has checked yet, and which rung made it.
 
     `confidence` is 0 to 1. Where there is something to `read_back`, it is said, and nothing moves
-    before the person agrees.
+    before the person agrees. `saw_scene` tells that all of the scene may have shaped the plan, not
+    only the words. `origin` is the rung that made it first, where it was planned before.
     """
 
     plan: Plan
     rung: str
     confidence: float
     read_back: str = ""
+    saw_scene: bool = False
+    origin: str = ""
 
 
 class Rung(Protocol):
@@ -55,8 +58,8 @@ class Rung(Protocol):
         """Return a plan for the command; nothing moves by that.
 
         Raises:
-            Declined: this rung has no plan for it; the next one may.
-            Ambiguous: only the person can tell what is meant.
-            PlanningError: no rung could plan it.
+            Declined: this rung has no plan for it.
+            Ambiguous: only the person can tell what is meant, and is asked.
+            PlanningError: this rung cannot plan it; any of the others may.
         """
         ...

@@ -1,6 +1,7 @@
 """Group planning errors by what the person who gave the command can do.
 
 PlanningError
+├── CommandUnreadable give words or a plan, no more than fits
 ├── NotUnderstood     say it in other words
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 class PlanningError(Exception):
     """Base of everything that planning refuses."""
+
+
+class CommandUnreadable(PlanningError):
+    """Say what was expected of a command."""
 
 
 class NotUnderstood(PlanningError):

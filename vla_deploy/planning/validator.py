@@ -9,23 +9,36 @@ from vla_deploy.planning.graph import dependency_faults
 from vla_deploy.planning.knowledge import World, spoken_places
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.references import match_place, parse_object
+from vla_deploy.planning.symbolic import bounds_faults, symbolic_faults
+from vla_deploy.planning.symbolic.sharing import sharing_faults
+from vla_deploy.planning.symbolic.state import Pose
+from vla_deploy.world import Snapshot
 
 __all__ = ["World", "check_plan", "plan_faults", "spoken_places"]
 
 
-def check_plan(plan: Plan, world: World) -> None:
+def check_plan(
+    plan: Plan, world: World, scene: Snapshot | None = None, here: Pose | None = None
+) -> None:
     """Accept a plan or name everything that is wrong with it.
+
+    `here` is the robot's x, y (m) and yaw (rad) in the map. What nobody tells is not judged.
 
     Raises:
         PlanInvalid: carries all faults.
     """
-    faults = plan_faults(plan, world)
+    faults = plan_faults(plan, world, scene, here)
     if faults:
         raise PlanInvalid(faults)
 
 
-def plan_faults(plan: Plan, world: World) -> list[str]:
-    """Return every fault of a plan, in the order of its actions."""
+def plan_faults(
+    plan: Plan, world: World, scene: Snapshot | None = None, here: Pose | None = None
+) -> list[str]:
+    """Return every fault of a plan, in the order of its actions.
+
+    A plan whose actions are all right one by one is gone through symbol by symbol.
+    """
     faults: list[str] = []
     if not plan.feasible:
         faults.append(
@@ -35,7 +48,10 @@ def plan_faults(plan: Plan, world: World) -> list[str]:
         faults.append("it has no actions")
     for action in plan.actions:
         faults += [f'action "{action.id}": {fault}' for fault in _action_faults(action, world)]
-    return faults + dependency_faults(plan.actions)
+    faults += dependency_faults(plan.actions) + bounds_faults(plan.actions, world)
+    if faults:
+        return faults
+    return sharing_faults(plan.actions) + symbolic_faults(plan.actions, world, scene, here)
 
 
 def _action_faults(action: Action, world: World) -> list[str]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from vla_deploy.ipc import ClaimBook
+from vla_deploy.ipc import Announcer, ClaimBook
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription
@@ -30,15 +30,24 @@ class Held:
 
 @dataclass(slots=True, kw_only=True)
 class SkillContext:
-    """Carry everything a skill may use; `hands` is the executor's memory of each hand."""
+    """Carry everything a skill may use; `hands` is the executor's memory of each hand.
+
+    `say` shows a text, `voice` has it heard; `notes` are what results say beside their status.
+    """
 
     robot: RobotDescription
     link: RobotLink
     planner: PathPlanner
     arms: Mapping[str, ArmKinematics]
     say: Callable[[str], None]
+    voice: Announcer
     claims: ClaimBook
     hands: dict[str, Held | None] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+
+    def note(self, text: str) -> None:
+        """Have the result of the acting action say something, whatever its status."""
+        self.notes[self.link.acting] = text
 
     def holding_hand(self, wanted: str | None = None) -> str:
         """Return the hand that holds something.

@@ -31,6 +31,7 @@ class ActionRecord:
     execution_time_s: float = 0.0
     error: str = ""
     retries: int = 0
+    note: str = ""
 
     def document(self) -> dict[str, Any]:
         """Return the record as it is told in events and results."""
@@ -42,6 +43,7 @@ class ActionRecord:
             "execution_time_s": round(self.execution_time_s, 3),
             "error": self.error or None,
             "retries": self.retries,
+            "note": self.note or None,
         }
 
 
@@ -202,6 +204,7 @@ class PlanExecution:
             self._context.claims.release(self._holder(record.action))
         record.status = status
         record.error = error
+        record.note = self._context.notes.pop(record.action.id, "")
         self._tell(record)
 
     def _holder(self, action: Action) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.ipc import CellWriter, ClaimBook, RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc import Announcer, CellWriter, ClaimBook, RingReader, RingWriter, SharedSpace
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.node import NodeContext
@@ -46,6 +46,7 @@ class ExecutorNode:
             planner=base_planner(self._robot),
             arms={name: ArmKinematics(self._robot, name) for name in self._robot.hands},
             say=self._say,
+            voice=Announcer(self._space, "speak", self._clock),
             claims=ClaimBook(self._space, self._clock),
         )
         self._skills.claims.declare(body_of(self._robot))

@@ -36,12 +36,16 @@ class Robot:
         self._events = self.space.ring_writer("task_event")
         self._utterances = self.space.ring_reader("utterance", from_start=True)
         self._executor = self.space.cell_writer("executor_status")
+        self._planner = self.space.cell_writer("planner_status")
 
     def heard(self) -> list[dict]:
         return [event.payload for event in self._utterances.drain()]
 
     def tell(self, command_id: str, event: str, **details: object) -> None:
         self._events.publish({"command_id": command_id, "event": event} | details)
+
+    def plans(self, *command_ids: str) -> None:
+        self._planner.put_document({"commands": list(command_ids)})
 
     def executes(self, command_id: str | None) -> None:
         state = "executing" if command_id else "idle"

@@ -76,7 +76,7 @@ def test_what_a_person_can_mend_is_an_exception_of_that_module(module, name):
     [
         ([], "vla-deploy: the following arguments are required: COMMAND"),
         (["frobnicate"], "vla-deploy: argument COMMAND: invalid choice"),
-        (["say"], "vla-deploy say: one of the arguments text --plan is required"),
+        (["say"], "vla-deploy say: one of the arguments text --plan --answer is required"),
         (
             ["run", "--seed", "-1"],
             "vla-deploy run: argument --seed: expected a whole number from 0",

@@ -17,6 +17,16 @@ def action(status: str, error: str | None = None) -> dict:
             {"event": "plan", "plan": {"actions": [PICK, PICK]}},
             "plan: pick up red cup; pick up red cup",
         ),
+        (
+            {"event": "plan", "plan": {"actions": [PICK]}, "rung": "server bench"},
+            "plan: pick up red cup  (by server bench)",
+        ),
+        (
+            {"event": "planning", "rungs": ["parser", "server bench"]},
+            "asking parser, server bench ...",
+        ),
+        ({"event": "queued", "place": 2}, "waits for 2 before it"),
+        ({"event": "asked", "question": "Which cup?"}, "robot asks: Which cup?"),
         (action("active"), "… pick up red cup"),
         (
             action("active", "trying again after: slipped"),

@@ -2,6 +2,7 @@
 
 import pytest
 
+from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.follow import ANSWER_TIMEOUT_S, SILENCE_LIMIT_S
 from vla_deploy.cli.session import attach
@@ -82,7 +83,7 @@ def test_a_command_whose_executor_was_replaced_is_lost_at_once(session, robot, m
     monkeypatch.setattr(type(session), "fresh", lambda *_, **__: next(seen))
     started_s = robot.clock.now_s
     (last,) = events
-    assert "ended while it carried the command out" in last["error"]
+    assert "the executor ended while it had the command" in last["error"]
     assert robot.clock.now_s - started_s < 0.5
 
 
@@ -105,6 +106,36 @@ def test_the_end_of_a_command_is_seen_even_when_its_executor_ended_right_after(s
     robot.clock.time_ns += 60_000_000_000
     (last,) = events
     assert last["success"] is True
+
+
+def test_a_command_may_be_planned_for_long_while_the_planner_names_it(session, robot):
+    events = session.command(text="tidy up")
+    command_id = robot.heard()[-1]["command_id"]
+    robot.tell(command_id, "planning", rungs=["server bench"])
+    robot.clock.after_wait = lambda: robot.plans(command_id)
+    assert next(events)["event"] == "planning"
+    robot.clock.time_ns += 15 * NS_PER_S
+    robot.tell(command_id, "plan", plan=PLAN)
+    assert next(events)["event"] == "plan"
+
+
+def test_a_command_that_the_planner_forgot_is_told_as_lost(session, robot):
+    events = session.command(text="tidy up")
+    command_id = robot.heard()[-1]["command_id"]
+    robot.tell(command_id, "planning", rungs=["server bench"])
+    (planning, last) = events
+    assert planning["event"] == "planning"
+    assert last["error"].startswith("lost: the planner has not spoken of the command for 5 s")
+
+
+def test_an_answer_follows_the_command_that_asked(session, robot):
+    events = session.command(text="the red one", answer=True)
+    (given,) = robot.heard()
+    assert given["answer"] is True
+    robot.tell(given["command_id"], "answered", of="c9")
+    robot.tell("c9", "accepted")
+    robot.tell("c9", "finished", success=True, error=None, actions=[])
+    assert [one["event"] for one in events] == ["answered", "accepted", "finished"]
 
 
 def test_a_cell_that_is_too_old_counts_as_none(session, robot):

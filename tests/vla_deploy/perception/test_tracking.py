@@ -5,9 +5,10 @@ import pytest
 
 from vla_deploy.perception.detection import Detection
 from vla_deploy.perception.filtering import Estimate
+from vla_deploy.perception.in_view import View
 from vla_deploy.perception.noise import covariance_of
 from vla_deploy.perception.track import Sighting
-from vla_deploy.perception.tracking import Tracker, View
+from vla_deploy.perception.tracking import Tracker
 
 CLEAR, HIDDEN = View.CLEAR, View.HIDDEN
 

@@ -1,69 +1,16 @@
 """Talk to the planner through its topics, on a time that only the test moves."""
 
-from pathlib import Path
-
 import pytest
 
-from drivers.clock import NS_PER_S
-from vla_deploy.ipc import SharedSpace
-from vla_deploy.node import NodeContext
-from vla_deploy.planning.node import UTTERANCE_AGE_S, PlannerNode
-from vla_deploy.robots import load_robot
-
-
-class StepClock:
-    time_ns = NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.time_ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.time_ns = deadline_ns
-
-
-class Desk:
-    """Hold the other ends of the planner's topics."""
-
-    def __init__(self, run_dir: Path) -> None:
-        self.clock = StepClock()
-        self._space = SharedSpace(run_dir / "ipc", self.clock)
-        context = NodeContext(
-            run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=self.clock
-        )
-        self.planner = PlannerNode(context, load_robot("butler"))
-        self.planner.start()
-        self._utterances = self._space.ring_writer("utterance")
-        self._events = self._space.ring_reader("task_event", from_start=True)
-        self._plans = self._space.ring_reader("plan", from_start=True)
-        self._control = self._space.cell_writer("control_status")
-
-    def control(self, state: str) -> None:
-        self._control.put_document({"state": state, "cause": "", "detail": ""})
-
-    def give(self, **utterance: object) -> None:
-        self._utterances.publish({"command_id": "c1", "source": "test"} | utterance)
-
-    def answers(self) -> list[dict]:
-        self.planner.step()
-        return [event.payload for event in self._events.drain()]
-
-    def plans(self) -> list[dict]:
-        return [event.payload for event in self._plans.drain()]
-
-    def close(self) -> None:
-        self.planner.stop()
-        self._space.close()
+from vla_deploy.planning.node import AWAY, UTTERANCE_AGE_S
 
 
 @pytest.fixture
-def desk(tmp_path):
-    desk = Desk(tmp_path)
-    yield desk
-    desk.close()
+def desk(open_desk):
+    return open_desk()
 
 
 def test_a_command_becomes_a_plan_for_the_executor(desk):
-    desk.control("armed")
     desk.give(text="go to the kitchen")
     accepted, planned = desk.answers()
     assert (accepted["event"], planned["event"]) == ("accepted", "plan")
@@ -83,7 +30,7 @@ def test_a_command_to_a_disarmed_robot_is_refused_with_what_to_do(desk):
 
 def test_a_command_that_waited_too_long_for_the_planner_is_refused(desk):
     desk.give(text="go to the kitchen")
-    desk.clock.time_ns += round(UTTERANCE_AGE_S * NS_PER_S) + 1
+    desk.clock.pass_s(UTTERANCE_AGE_S + 0.1)
     desk.control("armed")
     (answer,) = desk.answers()
     assert answer["event"] == "rejected"
@@ -94,6 +41,95 @@ def test_a_command_that_waited_too_long_for_the_planner_is_refused(desk):
 @pytest.mark.parametrize("utterance", [{"cancel": True}, {"text": "stop"}])
 def test_a_stop_is_handed_on_however_old_it_is(desk, utterance):
     desk.give(**utterance)
-    desk.clock.time_ns += 60 * NS_PER_S
+    desk.clock.pass_s(60.0)
     assert desk.answers() == []
     assert desk.plans() == [{"command_id": "c1", "cancel": True}]
+
+
+def test_what_planned_it_is_told(desk):
+    desk.give(text="go to the kitchen")
+    planned = desk.answers()[1]
+    assert (planned["rung"], planned["confidence"]) == ("rules", 1.0)
+    (attempt,) = planned["attempts"]
+    assert (attempt["rung"], attempt["outcome"]) == ("rules", "planned")
+
+
+def test_why_nobody_planned_it_is_told(desk):
+    desk.give(text="sing a sea shanty")
+    (refused,) = desk.answers()
+    assert refused["event"] == "rejected"
+    assert refused["reason"].startswith('I do not understand "sing a sea shanty"')
+    assert [one["rung"] for one in refused["attempts"]] == ["rules", "cache"]
+
+
+def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
+    desk.give(plan=[{"action": "go_to", "params": {"location": "kitchen"}}])
+    desk.give(command_id="c2", plan=[{"action": "go_to", "params": {"location": "narnia"}}])
+    accepted, planned, refused = desk.answers()
+    assert (accepted["event"], planned["rung"]) == ("accepted", "given")
+    assert (refused["command_id"], refused["event"]) == ("c2", "rejected")
+    assert 'unknown place "narnia"' in refused["reason"]
+
+
+@pytest.mark.parametrize(
+    "utterance", [{}, {"text": ""}, {"text": 7}, {"text": None}, {"text": "go " * 1000}]
+)
+def test_an_utterance_that_is_no_command_is_refused_with_what_was_expected(desk, utterance):
+    desk.give(**utterance)
+    (answer,) = desk.answers()
+    assert answer["event"] == "rejected"
+    assert answer["reason"].startswith("expected a command")
+
+
+def test_a_plan_too_long_to_be_told_is_refused(desk):
+    says = [{"skill": "speak", "parameters": {"text": "x" * 500}} for _ in range(60)]
+    desk.give(plan={"goal": "talk", "actions": says})
+    assert [(one["event"]) for one in desk.answers()] == ["rejected"]
+    assert desk.plans() == []
+
+
+def test_a_plan_with_very_many_faults_is_refused_in_a_bounded_answer(desk):
+    desk.give(plan={"actions": [{"skill": f"fly_{number}"} for number in range(100)]})
+    (refused,) = desk.answers()
+    assert refused["reason"].endswith("... (and more)")
+    assert len(refused["reason"]) < 3000
+
+
+def test_a_restarted_planner_takes_up_what_nobody_has_answered(desk):
+    desk.give(text="go to the kitchen")
+    desk.clock.pass_s(1.0)
+    desk.start()
+    assert [one["event"] for one in desk.answers()] == ["accepted", "plan"]
+    desk.start()
+    assert desk.answers() == [], "it was answered"
+
+
+def test_a_restarted_planner_hands_on_a_stop_that_came_while_it_was_away(desk):
+    desk.give(text="stop")
+    desk.start()
+    assert desk.answers() == []
+    assert desk.plans() == [{"command_id": "c1", "cancel": True}]
+
+
+def test_a_restarted_planner_tells_which_commands_went_with_the_old_one(
+    open_desk, later, rung, propose
+):
+    desk = open_desk(rung("model", propose(("wait", {"duration_s": 1.0}))), aside=later)
+    desk.give(text="sing a sea shanty")
+    assert [one["event"] for one in desk.answers()] == ["planning"]
+    desk.start()
+    (lost,) = desk.told()
+    assert (lost["event"], lost["reason"]) == ("rejected", AWAY)
+    assert desk.answers() == []
+
+
+def test_the_status_tells_of_commands_rungs_and_the_cache(desk):
+    desk.give(text="go to the kitchen")
+    desk.give(text="sing a sea shanty")
+    desk.answers()
+    status = desk.status()
+    assert (status["heard"], status["planned"], status["refused"]) == (2, 1, 1)
+    assert status["by_rung"]["rules"]["planned"] == 1
+    assert status["by_rung"]["rules"]["declined"] == 1
+    assert status["cache"]["misses"] == 1
+    assert status["rungs"] == ["rules", "cache"]

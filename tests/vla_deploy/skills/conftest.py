@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import MonotonicClock
-from vla_deploy.ipc import ClaimBook, SharedSpace
+from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import load_robot
@@ -55,12 +55,14 @@ def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
     blocked[[0, -1], :] = blocked[:, [0, -1]] = True
     blocked[16:24, 50:70] = True
     grid = GridMap(resolution_m=0.05, origin_m=(0.0, 0.0), blocked=blocked)
+    space = SharedSpace(tmp_path, MonotonicClock())
     return SkillContext(
         robot=load_robot("butler"),
         link=cast("RobotLink", standing),
         planner=PathPlanner(grid, BODY_RADIUS_M),
         arms={},
         say=lambda _: None,
-        claims=ClaimBook(SharedSpace(tmp_path, MonotonicClock()), MonotonicClock()),
+        voice=Announcer(space, "speak", MonotonicClock()),
+        claims=ClaimBook(space, MonotonicClock()),
         hands={"left": None, "right": None},
     )

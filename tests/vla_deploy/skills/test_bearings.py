@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import CellReader, ClaimBook, SharedSpace
+from vla_deploy.ipc import Announcer, CellReader, ClaimBook, SharedSpace
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.navigation.place_judge import Doubt, PlaceState
@@ -40,6 +40,7 @@ class Told:
             planner=PathPlanner(grid, 0.2),
             arms={},
             say=lambda _: None,
+            voice=Announcer(space, "speak", self),
             claims=ClaimBook(space, self),
         )
         self.tell()

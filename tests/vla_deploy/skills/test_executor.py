@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import ClaimBook, SharedSpace
+from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.robots import load_robot
 from vla_deploy.skills import executor
@@ -90,6 +90,7 @@ def stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
         planner=None,  # type: ignore[arg-type]
         arms={},
         say=lambda _: None,
+        voice=Announcer(space, "speak", clock),
         claims=ClaimBook(space, clock),
     )
     context.claims.declare(body_of(robot))

@@ -5,7 +5,7 @@ from typing import cast
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import CellWriter, ClaimBook, Event, SharedSpace
+from vla_deploy.ipc import Announcer, CellWriter, ClaimBook, Event, SharedSpace
 from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.planning.readiness import refusal_of
@@ -134,13 +134,14 @@ def test_a_protective_stop_is_a_pause_and_no_refusal(
 
 def context_of(link: RobotLink) -> SkillContext:
     robot = load_robot("butler")
-    book = cast("ClaimBook", None)  # the pieces under test claim nothing
+    book = cast("ClaimBook", None)  # the pieces under test claim and say nothing
     return SkillContext(
         robot=robot,
         link=link,
         planner=cast("PathPlanner", None),
         arms={},
         say=lambda text: None,
+        voice=cast("Announcer", None),
         claims=book,
     )
 

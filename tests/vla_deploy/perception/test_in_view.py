@@ -1,0 +1,111 @@
+"""What is in view at a remembered place: the thing itself, something else, or nothing."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.perception.body import BodyMask
+from vla_deploy.perception.cloud import Cloud, make_cloud
+from vla_deploy.perception.detection import Detection, Vector, detect
+from vla_deploy.perception.in_view import Image, View, view_of
+from vla_deploy.perception.supports import KnownSurface, counter_clockwise, find_supports
+
+if TYPE_CHECKING:
+    from conftest import StillFlat
+
+pytestmark = pytest.mark.gl
+
+CUP_SIZE_M = (0.07, 0.07, 0.1)
+TABLE_M = 0.42
+BOX_M = (4.2, 0.456, TABLE_M)
+CUP_IN_BOX_M = (4.2, 0.466, 0.475)
+CLOSE = Pose2D(4.522, 0.839, -2.506)
+THINGS = {("box", "orange"), ("cup", "red")}
+TABLE_CORNERS = ((3.95, 0.25), (4.45, 0.25), (4.45, 0.65), (3.95, 0.65))
+
+
+def look(flat: "StillFlat") -> Image:
+    rgb, depth = flat.noisy_view(np.random.default_rng(0))
+    pose = flat.kinematics.camera_pose(flat.joints)
+    body = BodyMask(flat.robot).mask(flat.joints, flat.intrinsics)
+    cloud = make_cloud(rgb, depth, flat.intrinsics, pose, body)
+    return Image(cloud=cloud, camera=flat.intrinsics, base_from_camera=pose)
+
+
+def look_with_the_table_hidden(flat: "StillFlat", beyond_m: float) -> Cloud:
+    """Return the cloud of an image in which an arm hides the table but for what is near the box."""
+    image = look(flat)
+    x_m, y_m, _ = local(flat, BOX_M)
+    points = image.cloud.points
+    away_m = np.hypot(points[..., 0] - x_m, points[..., 1] - y_m)
+    hidden = (np.abs(points[..., 2] - TABLE_M) < 0.03) & (away_m > beyond_m)
+    return replace(image.cloud, valid=image.cloud.valid & ~hidden)
+
+
+def local(flat: "StillFlat", place: Vector) -> Vector:
+    x_m, y_m, z_m = place
+    moved = Pose2D(x_m, y_m, 0.0).relative_to(flat.base)
+    return moved.x_m, moved.y_m, z_m
+
+
+def known_table(flat: "StillFlat") -> KnownSurface:
+    corners = [local(flat, (x_m, y_m, 0.0))[:2] for x_m, y_m in TABLE_CORNERS]
+    outline = counter_clockwise(np.array(corners, dtype=np.float32))
+    return KnownSurface(height_m=TABLE_M, outline=outline)
+
+
+@pytest.fixture
+def boxed(flat: "StillFlat") -> "StillFlat":
+    flat.scatter(1)
+    flat.put("box", BOX_M)
+    flat.put("red_cup", CUP_IN_BOX_M)
+    flat.stand(CLOSE, head_tilt=0.85)
+    return flat
+
+
+def names(found: list[Detection]) -> set[tuple[str, str]]:
+    return {(one.class_name, one.colour) for one in found}
+
+
+def test_what_stands_on_a_table_that_it_nearly_covers_is_found_where_the_table_is_known(
+    boxed: "StillFlat",
+) -> None:
+    cloud = look_with_the_table_hidden(boxed, beyond_m=0.2)
+    assert not names(detect(cloud, find_supports(cloud))) & THINGS
+    supports = find_supports(cloud, [known_table(boxed)])
+    assert names(detect(cloud, supports)) >= THINGS
+
+
+def test_a_known_surface_is_not_believed_where_there_is_none(boxed: "StillFlat") -> None:
+    cloud = look(boxed).cloud
+    elsewhere = KnownSurface(height_m=0.2, outline=known_table(boxed).outline)
+    assert len(find_supports(cloud, [elsewhere])) == len(find_supports(cloud))
+
+
+def test_a_thing_that_stands_there_without_a_name_does_not_show_its_place_without_it(
+    boxed: "StillFlat",
+) -> None:
+    place = local(boxed, CUP_IN_BOX_M)
+    assert view_of(place, CUP_SIZE_M, look(boxed), []) is View.HIDDEN
+
+
+def test_a_box_around_a_place_does_not_explain_what_stands_in_it(boxed: "StillFlat") -> None:
+    image = look(boxed)
+    found = detect(image.cloud, find_supports(image.cloud, [known_table(boxed)]))
+    boxes = [one for one in found if one.class_name == "box"]
+    place = local(boxed, CUP_IN_BOX_M)
+    assert boxes
+    assert view_of(place, CUP_SIZE_M, image, boxes) is View.HIDDEN
+    assert view_of(place, CUP_SIZE_M, image, found) is View.CLEAR
+
+
+def test_the_place_of_what_was_taken_away_is_in_clear_view(boxed: "StillFlat") -> None:
+    boxed.put("red_cup", (2.2, 1.6, 0.5))
+    assert view_of(local(boxed, CUP_IN_BOX_M), CUP_SIZE_M, look(boxed), []) is View.CLEAR
+
+
+def test_what_is_out_of_the_image_is_hidden(boxed: "StillFlat") -> None:
+    assert view_of((-1.0, 0.0, 0.5), CUP_SIZE_M, look(boxed), []) is View.HIDDEN

@@ -1,0 +1,215 @@
+"""A time that only the test moves, and a world with two cups on a table."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.clock import NS_PER_S
+from vla_deploy.aside import AtOnce
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.node import NodeContext
+from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.node import PlannerNode
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.planner import Planner
+from vla_deploy.robots import load_robot
+from vla_deploy.world import Snapshot, Thing
+
+
+class StepClock:
+    def __init__(self) -> None:
+        self.time_ns = NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = deadline_ns
+
+    def pass_s(self, duration_s: float) -> None:
+        self.time_ns += round(duration_s * NS_PER_S)
+
+
+class ScriptedRung:
+    """A rung that does the next of what it was told: propose a plan, raise, or take its time."""
+
+    def __init__(self, name: str, clock: StepClock, *script: Any, takes_s: float = 0.0) -> None:
+        self.name = name
+        self.asked: list[Request] = []
+        self._clock = clock
+        self._script = list(script)
+        self._takes_s = takes_s
+
+    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+        self.asked.append(request)
+        self._clock.pass_s(self._takes_s)
+        said = self._script.pop(0) if len(self._script) > 1 else self._script[0]
+        if isinstance(said, Exception):
+            raise said
+        return said
+
+
+class Later(Executor):
+    """Does what it is given when the test says so, as a thread may."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[Future[Any], Callable[[], Any]]] = deque()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self._waiting.append((future, lambda: fn(*args, **kwargs)))
+        return future
+
+    def do_one(self) -> None:
+        future, work = self._waiting.popleft()
+        future.set_result(work())
+
+
+class Desk:
+    """Hold the other ends of the planner's topics."""
+
+    def __init__(self, run_dir: Path, clock: StepClock, *slow: Any, aside: Executor) -> None:
+        self.clock = clock
+        self.aside = aside
+        self._space = SharedSpace(run_dir / "ipc", clock)
+        self._context = NodeContext(
+            run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
+        )
+        self._slow = slow
+        self._utterances = self._space.ring_writer("utterance")
+        self._events = self._space.ring_reader("task_event", from_start=True)
+        self._plans = self._space.ring_reader("plan", from_start=True)
+        self._control = self._space.cell_writer("control_status")
+        self._status = self._space.cell_reader("planner_status")
+        self._scene = self._space.cell_writer("scene")
+        self._executor = self._space.ring_writer("task_event")
+        self.planner = self.start()
+
+    def start(self) -> PlannerNode:
+        """Start a planner; one that is there already is left as it was when it was killed."""
+        planner = Planner(self.clock, self._slow, within_s=20.0)
+        self.planner = PlannerNode(self._context, load_robot("butler"), planner, self.aside)
+        self.planner.start()
+        return self.planner
+
+    def control(self, state: str) -> None:
+        self._control.put_document({"state": state, "cause": "", "detail": ""})
+
+    def sees(self, *names: str) -> None:
+        """Let perception tell of things such as "red cup_1", a metre apart on the floor."""
+        objects = [
+            {"id": name, "class": name.partition("_")[0], "colour": colour,
+             "position_m": [1.0 + number, 1.0, 0.05], "size_m": [0.07, 0.07, 0.1],
+             "last_seen_ns": self.clock.now_ns()}
+            for number, (colour, name) in enumerate(one.split() for one in names)
+        ]  # fmt: skip
+        self._scene.put_document({"stamp_ns": self.clock.now_ns(), "objects": objects})
+
+    def give(self, **utterance: object) -> None:
+        self._utterances.publish({"command_id": "c1", "source": "test"} | utterance)
+
+    def executor_tells(self, **event: object) -> None:
+        self._executor.publish(event)
+
+    def answers(self) -> list[dict[str, Any]]:
+        self.planner.step()
+        return self.told()
+
+    def told(self) -> list[dict[str, Any]]:
+        return [event.payload for event in self._events.drain()]
+
+    def plans(self) -> list[dict[str, Any]]:
+        return [event.payload for event in self._plans.drain()]
+
+    def status(self) -> dict[str, Any]:
+        self.clock.pass_s(0.5)
+        self.planner.step()
+        sample = self._status.latest()
+        assert sample is not None
+        return sample.document()
+
+    def close(self) -> None:
+        self.planner.stop()
+        self._space.close()
+
+
+@pytest.fixture
+def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]:
+    """Open a desk with an armed robot and a planner that asks these slow rungs after rules."""
+    opened: list[Desk] = []
+
+    def open_desk(*slow: Any, aside: Executor | None = None) -> Desk:
+        desk = Desk(tmp_path, clock, *slow, aside=aside or AtOnce())
+        opened.append(desk)
+        desk.control("armed")
+        return desk
+
+    yield open_desk
+    for desk in opened:
+        desk.close()
+
+
+@pytest.fixture
+def later() -> Later:
+    return Later()
+
+
+@pytest.fixture
+def clock() -> StepClock:
+    return StepClock()
+
+
+@pytest.fixture
+def rung(clock: StepClock) -> Callable[..., ScriptedRung]:
+    return lambda name, *script, takes_s=0.0: ScriptedRung(name, clock, *script, takes_s=takes_s)
+
+
+@pytest.fixture(scope="session")
+def thing() -> Callable[..., Thing]:
+    def thing(name: str, colour: str = "red", **changes: Any) -> Thing:
+        kind = name.partition("_")[0]
+        told = {"position_m": (2.0, 1.5, 0.5), "size_m": (0.07, 0.07, 0.1)} | changes
+        return Thing(thing_id=name, kind=kind, colour=colour, **told)
+
+    return thing
+
+
+@pytest.fixture(scope="session")
+def scene(thing: Callable[..., Thing]) -> Snapshot:
+    return Snapshot(stamp_ns=NS_PER_S, things=(thing("cup_1"), thing("cup_2", "blue")))
+
+
+@pytest.fixture(scope="session")
+def ask(scene: Snapshot) -> Callable[..., Request]:
+    """Return a request to butler about that world, some values replaced."""
+    robot = load_robot("butler")
+
+    def ask(text: str, holding: dict[str, str | None] | None = None, **changes: Any) -> Request:
+        world = world_of(robot, holding or {"left": None, "right": None})
+        told = {"command_id": "c1", "text": text, "world": world, "scene": scene}
+        return Request(**(told | {"here": (0.0, 0.0, 0.0)} | changes))
+
+    return ask
+
+
+@pytest.fixture(scope="session")
+def propose() -> Callable[..., Proposal]:
+    """Return a proposal of one action after the other, each a skill with its parameters."""
+
+    def propose(
+        *steps: tuple[str, dict[str, Any]], rung: str = "model", **changes: Any
+    ) -> Proposal:
+        actions = [
+            {"id": f"a{number}", "skill": skill, "parameters": parameters}
+            for number, (skill, parameters) in enumerate(steps)
+        ]
+        plan = Plan.model_validate({"goal": "a test", "actions": actions})
+        return Proposal(**({"plan": plan, "rung": rung, "confidence": 0.9} | changes))
+
+    return propose

@@ -1,0 +1,205 @@
+"""Commands queue, a stop overtakes, questions wait for their answer: all seen from the topics."""
+
+import pytest
+
+from vla_deploy.planning.errors import Ambiguous, Declined
+from vla_deploy.planning.phrasing import Says
+from vla_deploy.planning.understanding import Candidate
+
+GO = ("navigate_to", {"place": "kitchen"})
+PICK = ("pick_up", {"object": "red cup"})
+RED = Candidate(name="cup_1", words="the red one", features=frozenset({"red"}))
+BLUE = Candidate(name="cup_2", words="the blue one", features=frozenset({"blue"}))
+WHICH = Ambiguous("Which cup, the red one or the blue one?", (RED, BLUE), "cup")
+
+
+def events(told: list[dict]) -> list[tuple[str, str]]:
+    return [(one["command_id"], one["event"]) for one in told]
+
+
+def test_a_step_does_not_wait_for_a_slow_plan_and_commands_keep_their_order(
+    open_desk, later, rung, propose
+):
+    desk = open_desk(rung("model", propose(GO), Declined("no idea")), aside=later)
+    desk.give(text="sing one")
+    desk.give(command_id="c2", text="sing two")
+    desk.give(command_id="c3", text="go to the kitchen")
+    assert events(desk.answers()) == [("c1", "planning")]
+    assert desk.status()["commands"] == ["c1", "c2", "c3"]
+    later.do_one()
+    assert events(desk.answers()) == [("c1", "accepted"), ("c1", "plan"), ("c2", "planning")]
+    later.do_one()
+    assert events(desk.answers()) == [("c2", "rejected"), ("c3", "accepted"), ("c3", "plan")]
+
+
+def test_a_command_that_comes_while_another_is_planned_is_told_that_it_waits(
+    open_desk, later, rung, propose
+):
+    desk = open_desk(rung("model", propose(GO)), aside=later)
+    desk.give(text="sing one")
+    desk.answers()
+    desk.give(command_id="c2", text="go to the kitchen")
+    assert events(desk.answers()) == [("c2", "queued")]
+
+
+def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, rung, propose):
+    model = rung("model", propose(GO))
+    desk = open_desk(model, aside=later)
+    desk.give(text="sing one")
+    desk.give(command_id="c2", text="go to the kitchen")
+    desk.answers()
+    desk.give(command_id="c3", text="stop")
+    assert events(desk.answers()) == [("c1", "rejected"), ("c2", "rejected")]
+    assert desk.plans() == [{"command_id": "c3", "cancel": True}]
+    later.do_one()
+    assert desk.answers() == []
+    assert desk.plans() == []
+    assert model.asked == [], "its deadline was called in"
+
+
+def test_too_many_commands_are_refused_at_once(open_desk, later, rung, propose):
+    desk = open_desk(rung("model", propose(GO)), aside=later)
+    for number in range(10):
+        desk.give(command_id=f"c{number}", text=f"sing {number}")
+    refused = [one for one in desk.answers() if one["event"] == "rejected"]
+    assert [one["command_id"] for one in refused] == ["c8", "c9"]
+    assert refused[0]["reason"] == Says.MANY_WAIT
+
+
+def test_a_rung_that_breaks_ends_its_command_and_no_other(open_desk, rung, propose):
+    desk = open_desk(rung("model", RuntimeError("out of memory"), propose(GO)))
+    desk.give(text="sing one")
+    desk.give(command_id="c2", text="sing two")
+    told = desk.answers()
+    assert events(told)[1:3] == [("c1", "rejected"), ("c2", "planning")]
+    assert "RuntimeError: out of memory" in told[1]["reason"]
+    assert events(told)[-1] == ("c2", "plan")
+
+
+class TestQuestions:
+    @pytest.fixture
+    def model(self, rung, propose):
+        return rung("model", WHICH, propose(PICK))
+
+    @pytest.fixture
+    def desk(self, open_desk, model):
+        desk = open_desk(model)
+        desk.give(text="hand it over")
+        return desk
+
+    def test_what_is_unclear_is_asked_and_nothing_moves(self, desk):
+        planning, asked = desk.answers()
+        assert (planning["event"], asked["event"]) == ("planning", "asked")
+        assert asked["question"] == "Which cup, the red one or the blue one?"
+        assert asked["choices"] == ["the red one", "the blue one"]
+        assert desk.plans() == []
+        assert desk.status()["question"] == asked["question"]
+
+    def test_the_answer_is_the_next_utterance(self, desk, model):
+        desk.answers()
+        desk.give(command_id="c2", text="the red one, please")
+        told = desk.answers()
+        assert events(told) == [
+            ("c2", "answered"), ("c1", "planning"), ("c1", "accepted"), ("c1", "plan"),
+        ]  # fmt: skip
+        assert told[0]["of"] == "c1"
+        assert model.asked[1].text == "hand it over"
+        assert dict(model.asked[1].conversation.choices) == {"cup": "cup_1"}
+        assert desk.plans()[0]["command_id"] == "c1"
+
+    @pytest.mark.parametrize("no", ["never mind", "cancel", "no"])
+    def test_no_leaves_it_and_stops_nothing_else(self, desk, no):
+        desk.answers()
+        desk.give(command_id="c2", text=no)
+        told = desk.answers()
+        assert events(told) == [("c2", "answered"), ("c1", "rejected")]
+        assert told[1]["reason"] == Says.LEFT
+        assert desk.plans() == []
+
+    def test_stop_ends_everything_also_while_a_question_waits(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="stop")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        assert desk.plans() == [{"command_id": "c2", "cancel": True}]
+
+    def test_another_command_takes_the_place_of_the_question(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="go to the kitchen")
+        told = desk.answers()
+        assert events(told) == [("c1", "rejected"), ("c2", "accepted"), ("c2", "plan")]
+        assert told[0]["reason"] == Says.REPLACED
+
+    def test_an_answer_that_picks_none_is_asked_again_but_not_for_ever(self, desk):
+        desk.answers()
+        for _ in range(2):
+            desk.give(command_id="c2", text="that one")
+            told = desk.answers()
+            assert events(told) == [("c2", "answered"), ("c1", "asked")]
+            assert told[1]["question"].startswith("Sorry, I did not get that. Which cup")
+        desk.give(command_id="c2", text="that one")
+        told = desk.answers()
+        assert (told[1]["event"], told[1]["reason"]) == ("rejected", Says.STILL_UNCLEAR)
+
+    def test_a_question_that_nobody_answers_is_left_politely(self, desk):
+        within_s = desk.answers()[-1]["answer_within_s"]
+        desk.clock.pass_s(within_s - 0.1)
+        assert desk.answers() == []
+        desk.clock.pass_s(0.2)
+        (left,) = desk.answers()
+        assert (left["command_id"], left["reason"]) == ("c1", Says.NO_ANSWER)
+
+    def test_what_is_meant_as_an_answer_only_is_never_a_command(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="go to the kitchen", answer=True)
+        (told,) = desk.answers()
+        assert (told["command_id"], told["event"]) == ("c2", "rejected")
+        assert told["reason"].startswith("that does not answer: Which cup")
+        desk.give(command_id="c3", text="no", answer=True)
+        desk.answers()
+        desk.give(command_id="c4", text="yes", answer=True)
+        (told,) = desk.answers()
+        assert (told["command_id"], told["reason"]) == ("c4", Says.NOTHING_ASKED)
+
+
+class TestReadingBack:
+    @pytest.fixture
+    def desk(self, open_desk, rung, propose):
+        desk = open_desk(rung("model", propose(GO, read_back="Shall I go to the kitchen?")))
+        desk.give(text="kitchen, like, you know")
+        return desk
+
+    def test_an_unsure_plan_is_read_back_before_anything_moves(self, desk):
+        asked = desk.answers()[-1]
+        assert (asked["event"], asked["question"]) == ("asked", "Shall I go to the kitchen?")
+        assert asked["plan"]["actions"][0]["skill"] == "navigate_to"
+        assert desk.plans() == []
+        desk.give(command_id="c2", text="yes please")
+        assert events(desk.answers()) == [("c2", "answered"), ("c1", "accepted"), ("c1", "plan")]
+        assert len(desk.plans()) == 1
+
+    def test_a_robot_that_was_disarmed_meanwhile_does_not_move(self, desk):
+        desk.answers()
+        desk.control("disarmed")
+        desk.give(command_id="c2", text="yes")
+        refused = desk.answers()[-1]
+        assert refused["event"] == "rejected"
+        assert "vla-deploy arm" in refused["reason"]
+        assert desk.plans() == []
+
+    def test_the_plan_that_was_agreed_to_is_kept_for_the_same_words(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="yes")
+        desk.answers()
+        desk.give(command_id="c3", text="kitchen, like, you know")
+        asked = desk.answers()[-1]
+        assert asked["event"] == "asked", "agreeing once is not agreeing for ever"
+        assert desk.status()["cache"]["hits"] == 1
+
+    def test_a_plan_that_failed_is_not_given_again(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="yes")
+        desk.answers()
+        desk.executor_tells(command_id="c1", event="finished", success=False, error="no way")
+        desk.give(command_id="c3", text="kitchen, like, you know")
+        desk.answers()
+        assert desk.status()["cache"]["hits"] == 0

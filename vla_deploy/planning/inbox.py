@@ -1,0 +1,77 @@
+"""Read what people and programs give the planner to do; nothing of it is trusted to be whole."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from vla_deploy.ipc import Event
+from vla_deploy.planning.errors import CommandUnreadable
+from vla_deploy.planning.rules import is_stop
+
+VOICE: Final = "voice"
+MOST_CHARACTERS: Final = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """Hold one utterance: words, or a `plan` made elsewhere.
+
+    `heard_confidence`, 0 to 1, is how sure the recogniser is of the words; None for typed text.
+    With `is_answer` the words are no command of their own.
+    """
+
+    command_id: str
+    told_ns: int
+    source: str = ""
+    text: str = ""
+    plan: Any = None
+    heard_confidence: float | None = None
+    is_answer: bool = False
+
+    @property
+    def is_spoken(self) -> bool:
+        """Tell whether it came by voice, so that answers are spoken too."""
+        return self.source == VOICE
+
+
+def asks_to_stop(event: Event) -> bool:
+    """Tell whether an utterance wants what is under way to end, whatever else it holds."""
+    return bool(event.payload.get("cancel")) or is_stop(str(event.payload.get("text", "")))
+
+
+def command_id_of(event: Event) -> str:
+    """Return the id that answers to an utterance carry."""
+    return str(event.payload.get("command_id", ""))
+
+
+def read_command(event: Event) -> Command:
+    """Return the command that an utterance holds.
+
+    Raises:
+        CommandUnreadable: it holds none, or one that is too long.
+    """
+    given = event.payload
+    text, plan = given.get("text", ""), given.get("plan")
+    if plan is None and not (isinstance(text, str) and text.strip()):
+        raise CommandUnreadable(f"expected a command in words or a plan, got {given!r:.120}")
+    if plan is None and len(text) > MOST_CHARACTERS:
+        raise CommandUnreadable(
+            f"expected a command of at most {MOST_CHARACTERS} characters, got {len(text)}; "
+            "say less at a time"
+        )
+    return Command(
+        command_id=command_id_of(event),
+        told_ns=event.stamp_ns,
+        source=str(given.get("source", "")),
+        text=text.strip() if plan is None else "",
+        plan=plan,
+        heard_confidence=_confidence(given.get("heard")),
+        is_answer=bool(given.get("answer")),
+    )
+
+
+def _confidence(heard: Any) -> float | None:
+    value = heard.get("confidence") if isinstance(heard, Mapping) else None
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    return min(1.0, max(0.0, float(value)))

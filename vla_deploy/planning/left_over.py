@@ -1,0 +1,31 @@
+"""Find what an earlier planner of this run left behind when it ended."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from vla_deploy.ipc import Event
+from vla_deploy.planning.inbox import command_id_of
+
+# What the planner says of a command while nobody else knows of it.
+_IN_WORK: Final = frozenset({"queued", "planning", "asked"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeftOver:
+    """Hold utterances that nobody has answered, and ids of commands that were being planned."""
+
+    unheard: tuple[Event, ...]
+    in_work: tuple[str, ...]
+
+
+def left_over(
+    utterances: Sequence[Event], events: Sequence[Event], plans: Sequence[Event]
+) -> LeftOver:
+    """Return what the topics tell of the time before; nothing in a run that has just begun."""
+    last = {command_id_of(event): str(event.payload["event"]) for event in events}
+    answered = last.keys() | {command_id_of(event) for event in plans}
+    return LeftOver(
+        unheard=tuple(one for one in utterances if command_id_of(one) not in answered),
+        in_work=tuple(name for name, event in last.items() if event in _IN_WORK),
+    )

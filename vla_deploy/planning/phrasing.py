@@ -1,0 +1,101 @@
+"""Put what the planner has to say into words: brief, plain, and nothing promised.
+
+Every sentence that a person hears or reads from the planner stands in one table.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from enum import StrEnum
+from typing import Any, Final
+
+from vla_deploy.planning.plan import Plan
+
+_MOST_STEPS: Final = 6
+
+
+class Says(StrEnum):
+    """List the planner's sentences; braces are filled."""
+
+    WORKING = "One moment."
+    CONFIRM = "Shall I {steps}?"
+    NOT_CLEAR = "Sorry, I did not get that. {question}"
+    LEFT = "All right, I leave it."
+    NO_ANSWER = "I got no answer, so I leave it."
+    REPLACED = "I leave the other thing, then."
+    NOTHING_ASKED = "Sorry, I am not waiting for an answer."
+    STILL_UNCLEAR = "Sorry, I still do not know what you mean, so I leave it."
+    NOT_UNDERSTOOD = "Sorry, I did not understand that."
+    REFUSED = "Sorry, I cannot do that: {reason}."
+    MANY_WAIT = "Sorry, too many commands wait already."
+    DONE = "Done."
+    FAILED = "Sorry, that did not work: {reason}."
+
+
+Parameters = Mapping[str, Any]
+# What each skill is called when it is proposed; what only leads up to it is left out.
+_PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
+    "navigate_to": lambda given: _going(given),
+    "move": lambda given: _driving(float(given["distance_m"])),
+    "turn": lambda given: "turn right" if float(given["angle_rad"]) < 0 else "turn left",
+    "look_at": lambda given: f"look {given.get('direction') or _at(given['object'])}",
+    "find_object": lambda given: f"look for {_the(given['object'])}",
+    "pick_up": lambda given: f"pick up {_the(given['object'])}",
+    "place": lambda given: f"put it {given['relation']} {_the(given['destination'])}",
+    "open_gripper": lambda given: f"open my {_hand(given)}",
+    "close_gripper": lambda given: f"close my {_hand(given)}",
+    "move_arm": lambda given: f"bring my arms to the pose {given['pose']}",
+    "speak": lambda given: "say something",
+    "wait": lambda given: f"wait {float(given['duration_s']):g} seconds",
+    "stop": lambda given: "stop",
+}
+
+
+def steps_in_words(plan: Plan) -> str:
+    """Return a plan as a person would say it: "go to the kitchen and pick up the red cup"."""
+    steps = list(_steps(plan))
+    if len(steps) > _MOST_STEPS:
+        steps = [*steps[:_MOST_STEPS], f"do {len(steps) - _MOST_STEPS} things more"]
+    return _listed(steps)
+
+
+def _steps(plan: Plan) -> Iterator[str]:
+    """Yield the steps that matter: a way to a thing is meant by what is done with it there."""
+    handled = {
+        str(action.parameters.get(name))
+        for action in plan.actions
+        for name in ("object", "destination")
+        if action.skill in ("pick_up", "place")
+    }
+    for action in plan.actions:
+        leads_up = action.skill in ("find_object", "navigate_to")
+        where = action.parameters.get("object", action.parameters.get("place"))
+        if not (leads_up and str(where) in handled):
+            yield _PHRASES[action.skill](action.parameters)
+
+
+def _listed(steps: Sequence[str]) -> str:
+    if len(steps) < 2:
+        return "".join(steps)
+    return f"{', '.join(steps[:-1])} and {steps[-1]}"
+
+
+def _going(given: Parameters) -> str:
+    if "place" in given:
+        return f"go to {_the(given['place'])}"
+    return f"go to {_the(given['object'])}" if "object" in given else "drive to a point on the map"
+
+
+def _driving(distance_m: float) -> str:
+    way = "back" if distance_m < 0 else "forward"
+    return f"drive {abs(distance_m):g} metres {way}"
+
+
+def _the(name: object) -> str:
+    return f"the {str(name).replace('_', ' ')}"
+
+
+def _at(name: object) -> str:
+    return f"at {_the(name)}"
+
+
+def _hand(given: Parameters) -> str:
+    return f"{given['arm']} hand" if given.get("arm") else "hand"

@@ -1,0 +1,104 @@
+"""Plan one command: what answers at once first, what takes time after it, in one time for all."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from drivers.clock import Clock
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.asking import Proposal, Request, Rung
+from vla_deploy.planning.dialects import Json, parse_plan
+from vla_deploy.planning.errors import Declined, NotUnderstood
+from vla_deploy.planning.ladder import Answer, Check, Ladder
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.plan_cache import PlanCache
+from vla_deploy.planning.rules_rung import RulesRung
+from vla_deploy.planning.validator import check_plan
+
+WITHIN_S: Final = 20.0
+
+
+def checked(plan: Plan, request: Request) -> Plan:
+    """Return a plan that may run in the world of a request.
+
+    Raises:
+        PlanInvalid: it may not; carries every fault.
+    """
+    check_plan(plan, request.world)
+    return plan
+
+
+class Planner:
+    """Hold the two parts of the ladder; the slow one is climbed beside a process' steps."""
+
+    def __init__(
+        self,
+        clock: Clock,
+        slow: Sequence[Rung] = (),
+        *,
+        within_s: float = WITHIN_S,
+        check: Check = checked,
+    ) -> None:
+        self.cache = PlanCache(clock)
+        self.within_s = within_s
+        self._clock = clock
+        self.check = check
+        self._quick = Ladder((RulesRung(), self.cache), check, clock)
+        self._slow = Ladder(slow, check, clock)
+
+    @property
+    def rungs(self) -> tuple[str, ...]:
+        """Return the names of all rungs, in the order in which they are asked."""
+        return tuple(rung.name for rung in (*self._quick.rungs, *self._slow.rungs))
+
+    @property
+    def slow_rungs(self) -> tuple[str, ...]:
+        """Return the names of the rungs that take time."""
+        return tuple(rung.name for rung in self._slow.rungs)
+
+    def plan(self, request: Request) -> Answer:
+        """Return the answer of all rungs together; blocks until then."""
+        deadline = Deadline.within(self._clock, self.within_s)
+        answer = self.plan_at_once(request, deadline)
+        return answer if answer.is_final else self.plan_slowly(request, deadline, answer)
+
+    def plan_at_once(self, request: Request, deadline: Deadline) -> Answer:
+        """Return the answer of the rungs that take no time."""
+        return _worded(self._quick.climb(request, deadline), request)
+
+    def plan_slowly(self, request: Request, deadline: Deadline, before: Answer) -> Answer:
+        """Return the answer of the others too; blocks until the deadline at most."""
+        return _worded(self._slow.climb(request, deadline, before), request)
+
+    def check_given(self, document: Json | list[object] | str, request: Request) -> Answer:
+        """Return the answer to a plan that somebody made elsewhere, in any dialect."""
+        deadline = Deadline.within(self._clock, self.within_s)
+        return Ladder((_GivenPlan(document),), self.check, self._clock).climb(request, deadline)
+
+    def accepted(self, request: Request, answer: Answer) -> None:
+        """Remember a plan that was handed on; what rules make is made anew as fast."""
+        proposal = answer.proposal
+        if proposal is not None and proposal.rung not in _NOT_KEPT:
+            self.cache.keep(request, proposal)
+
+
+@dataclass(frozen=True, slots=True)
+class _GivenPlan:
+    """Propose a plan that came with the command."""
+
+    document: Json | list[object] | str
+    name: str = field(default="given", init=False)
+
+    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+        del request, deadline  # the plan is there already
+        return Proposal(plan=parse_plan(self.document), rung=self.name, confidence=1.0)
+
+
+_NOT_KEPT: Final = frozenset({RulesRung.name, PlanCache.name, "given"})
+
+
+def _worded(answer: Answer, request: Request) -> Answer:
+    """Say to a person that nobody understood, where no rung has said more."""
+    if isinstance(answer.error, Declined):
+        return replace(answer, error=NotUnderstood(request.text))
+    return answer

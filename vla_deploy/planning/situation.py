@@ -1,0 +1,92 @@
+"""Read what the robot tells of itself into a planner's request."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+from drivers.clock import Clock
+from vla_deploy.ipc import CellReader, Sample, SharedSpace
+from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import NotReady
+from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.readiness import refusal_of
+from vla_deploy.planning.understanding import Conversation
+from vla_deploy.robots import RobotDescription
+from vla_deploy.world import Snapshot, Viewpoint, read_snapshot
+
+STATUS_AGE_S: Final = 2.0
+_POSE_AGE_S: Final = 1.0
+_SCENE_AGE_S: Final = 10.0
+
+Pose = tuple[float, float, float]
+
+
+class Situation:
+    """Hold the cells that say how the robot is, where it stands, and what it knows around it."""
+
+    def __init__(self, space: SharedSpace, clock: Clock, robot: RobotDescription) -> None:
+        self._clock = clock
+        self._robot = robot
+        self._is_free = base_planner(robot).is_free
+        self._pose: CellReader = space.cell_reader("pose")
+        self._scene: CellReader = space.cell_reader("scene")
+        self._executor: CellReader = space.cell_reader("executor_status")
+        self._control: CellReader = space.cell_reader("control_status")
+        self._table: CellReader = space.cell_reader("process_table")
+
+    def request(self, command: Command, conversation: Conversation) -> Request:
+        """Return the request for a command, with what is known now."""
+        here = self._here()
+        return Request(
+            command_id=command.command_id,
+            text=command.text,
+            world=world_of(self._robot, self._holding(), self._is_free),
+            scene=self._snapshot(here),
+            here=here,
+            conversation=conversation,
+            heard_confidence=command.heard_confidence,
+        )
+
+    def check_ready(self) -> None:
+        """Accept that the robot moves now.
+
+        Raises:
+            NotReady: it may not; says why, and what to do about it.
+        """
+        table = self._table.latest()
+        if table is not None and table.document().get("refusal"):
+            raise NotReady(str(table.document()["refusal"]))
+        control = self._fresh(self._control, STATUS_AGE_S)
+        refusal = refusal_of(control.document() if control is not None else None)
+        if refusal:
+            raise NotReady(refusal)
+
+    def _holding(self) -> Mapping[str, str | None]:
+        sample = self._fresh(self._executor, STATUS_AGE_S)
+        if sample is None:
+            return {}
+        holding: Mapping[str, str | None] = sample.document().get("holding", {})
+        return holding
+
+    def _here(self) -> Pose | None:
+        sample = self._fresh(self._pose, _POSE_AGE_S)
+        if sample is None:
+            return None
+        x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
+        return x_m, y_m, yaw_rad
+
+    def _snapshot(self, here: Pose | None) -> Snapshot | None:
+        sample = self._fresh(self._scene, _SCENE_AGE_S)
+        if sample is None:
+            return None
+        known = read_snapshot(sample.document(), self._clock.now_ns())
+        if here is None:
+            return known
+        return replace(known, robot=Viewpoint(x_m=here[0], y_m=here[1], yaw_rad=here[2]))
+
+    def _fresh(self, reader: CellReader, age_limit_s: float) -> Sample | None:
+        sample = reader.latest()
+        is_fresh = sample is not None and sample.age_s(self._clock.now_ns()) <= age_limit_s
+        return sample if is_fresh else None

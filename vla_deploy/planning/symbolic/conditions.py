@@ -1,0 +1,232 @@
+"""Judge, one by one, what must hold before an action; each answers met, unknown, or why not.
+
+What nobody knows is no fault: perception and the skills judge it when the time has come.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from vla_deploy.manipulation.errors import TooWide
+from vla_deploy.manipulation.grasps import grasps_from_above
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.symbolic.areas import zone_around, zone_at, zone_on_way
+from vla_deploy.planning.symbolic.state import State
+from vla_deploy.planning.symbolic.subjects import Subject, subject_of
+from vla_deploy.robots.description import KeepOutZone
+from vla_deploy.world import Snapshot
+from vla_deploy.world.reach import GRIP_HEIGHTS_M
+
+# Farther than that from where it stands, the robot is surely not before a thing.
+SURELY_AWAY_M: Final = 1.6
+PUT_INTO: Final = frozenset({"box"})
+
+MET: Final = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """Hold what an action is judged against, besides the state."""
+
+    parameters: Mapping[str, Any]
+    world: World
+    scene: Snapshot | None = None
+
+    def subject(self, name: str) -> Subject | None:
+        """Return the thing that a parameter names; None where it is a place, or not given."""
+        if name not in self.parameters:
+            return None
+        try:
+            return subject_of(str(self.parameters[name]), self.scene)
+        except UnknownObject:
+            return None
+
+    def place(self, name: str) -> str | None:
+        """Return the place that a parameter names, or None."""
+        value = self.parameters.get(name)
+        return match_place(value, self.world.places) if isinstance(value, str) else None
+
+
+# MET is no fault, None is not known, any other text says what is wrong.
+Answer = str | None
+Condition = Callable[[State, Setting], Answer]
+
+
+def is_known(state: State, setting: Setting) -> Answer:
+    """Has the thing been looked for, or seen?"""
+    subject = setting.subject("object") or setting.subject("destination")
+    if subject is None or subject.key in state.found or state.holds(subject.key):
+        return MET
+    if setting.scene is None or subject.thing is not None or subject.others:
+        return None
+    return f"the {subject.words} has not been seen; find_object comes first"
+
+
+def is_before(state: State, setting: Setting) -> Answer:
+    """Does the robot stand where the thing, or the place, is within reach?"""
+    place = setting.place("destination")
+    subject = setting.subject("object") or setting.subject("destination")
+    if place is not None:
+        return _is_before_place(state, place, setting.world)
+    if subject is None or state.at == subject.key:
+        return MET
+    if subject.thing is None:
+        away = bool(state.at) and state.at in setting.world.sites
+        return f"the robot went to {state.at}; navigate_to it first" if away else None
+    distance_m = state.distance_m(subject.thing)
+    if distance_m is None or distance_m <= SURELY_AWAY_M:
+        return None
+    return f"the {subject.words} is {distance_m:.1f} m away; navigate_to it first"
+
+
+def _is_before_place(state: State, place: str, world: World) -> Answer:
+    if state.at == place:
+        return MET
+    if place not in world.sites or state.spot is None:
+        return None
+    pose = world.sites[place].pose
+    distance_m = math.dist(state.spot, (pose.x_m, pose.y_m))
+    if distance_m <= SURELY_AWAY_M:
+        return None
+    return f"the {place} is {distance_m:.1f} m away; navigate_to it first"
+
+
+def has_free_hand(state: State, setting: Setting) -> Answer:
+    """Is the hand that shall take free, or any?"""
+    arm = str(setting.parameters.get("arm", ""))
+    if not state.hands:
+        return None
+    in_arm = [one for one in state.held if one.hand == arm and arm]
+    if in_arm:
+        return f"the {arm} hand holds the {in_arm[0].key}"
+    if state.free_hands() > 0:
+        return MET
+    return f"no hand is free ({', '.join(map(str, state.held))}); place something first"
+
+
+def holds_something(state: State, setting: Setting) -> Answer:
+    """Does the hand that shall put down hold something?"""
+    arm = str(setting.parameters.get("arm", ""))
+    if state.holding(arm):
+        return MET
+    if not state.hands or (arm and arm not in state.hands):
+        return None
+    return f"the {arm} hand holds nothing" if arm else "no hand holds anything"
+
+
+def knows_which(state: State, setting: Setting) -> Answer:
+    """With both hands full, is it said which one puts down?"""
+    if len(state.held) < 2 or "arm" in setting.parameters:
+        return MET
+    return f"{len(state.held)} hands hold something ({', '.join(map(str, state.held))}); say which"
+
+
+def is_not_held(state: State, setting: Setting) -> Answer:
+    """Is what shall be used not in a hand itself?"""
+    subject = setting.subject("object") or setting.subject("destination")
+    if subject is None or not state.holds(subject.key):
+        return MET
+    return f"a hand holds the {subject.words} itself"
+
+
+def can_be_gripped(state: State, setting: Setting) -> Answer:
+    """Is the thing narrow enough, and at a height, for a hand that points down?"""
+    del state
+    subject, opening_m = setting.subject("object"), setting.world.opening_max_m
+    if subject is None or subject.thing is None or opening_m is None:
+        return None
+    thing = subject.thing
+    try:
+        grasp = grasps_from_above(
+            thing.kind, thing.position_m, thing.size_m, thing.yaw_rad, opening_m
+        )[0]
+    except TooWide as error:
+        return str(error)
+    low_m, high_m = GRIP_HEIGHTS_M
+    height_m = grasp.point_m[2]
+    if low_m <= height_m <= high_m:
+        return MET
+    return f"its grip would be {height_m:.2f} m high, hands reach {low_m:g} to {high_m:g} m"
+
+
+def is_light_enough(state: State, setting: Setting) -> Answer:
+    """Is the thing within what one hand may carry?"""
+    del state
+    subject, limit_kg = setting.subject("object"), setting.world.bounds.payload_kg
+    mass_kg = None if subject is None else subject.mass_kg
+    if mass_kg is None or mass_kg <= limit_kg:
+        return None if mass_kg is None else MET
+    return f"it may weigh {mass_kg:.2f} kg by its size, a hand carries {limit_kg:g} kg"
+
+
+def takes_things(state: State, setting: Setting) -> Answer:
+    """Can something be put in or on the destination?"""
+    del state
+    place, subject = setting.place("destination"), setting.subject("destination")
+    relation = setting.parameters.get("relation")
+    if place is not None:
+        if relation == "in":
+            return f"nothing is put in the {place}, only on it"
+        bare = setting.world.furniture and place not in setting.world.furniture
+        return f"there is nothing at the {place} to put things on" if bare else MET
+    if relation == "in" and subject is not None and subject.kind not in PUT_INTO:
+        return f"a {subject.kind} is no container; things go into: {', '.join(sorted(PUT_INTO))}"
+    return MET
+
+
+def opens_empty(state: State, setting: Setting) -> Answer:
+    """Would opening the hand drop nothing?"""
+    held = state.holding(str(setting.parameters.get("arm", "")))
+    if not held:
+        return MET
+    return f"it would drop what is held ({held[0]}); place it instead"
+
+
+def may_go_there(state: State, setting: Setting) -> Answer:
+    """Is the goal outside the zones, and on free floor where a map is at hand?"""
+    world = setting.world
+    place, subject = setting.place("place"), setting.subject("object")
+    if subject is not None and subject.thing is not None:
+        return _refusal(zone_around(subject.thing.position_m, world), f"the {subject.words}")
+    if place is not None and place in world.sites:
+        pose = world.sites[place].pose
+        return _refusal(zone_at((pose.x_m, pose.y_m), world), f"the {place}")
+    if "x_m" in setting.parameters and "y_m" in setting.parameters:
+        return _may_stand(float(setting.parameters["x_m"]), float(setting.parameters["y_m"]), world)
+    return None
+
+
+def _may_stand(x_m: float, y_m: float, world: World) -> Answer:
+    refusal = _refusal(zone_at((x_m, y_m), world), f"the point {x_m:g}, {y_m:g} m")
+    if refusal:
+        return refusal
+    if world.is_free is not None and not world.is_free(x_m, y_m):
+        return f"the map shows no free floor at {x_m:g}, {y_m:g} m"
+    return MET
+
+
+def way_is_allowed(state: State, setting: Setting) -> Answer:
+    """Does the straight way keep out of the zones?"""
+    if state.pose is None:
+        return None
+    x_m, y_m, yaw_rad = state.pose
+    way_m = float(setting.parameters["distance_m"])
+    end = (x_m + way_m * math.cos(yaw_rad), y_m + way_m * math.sin(yaw_rad))
+    return _refusal(zone_on_way((x_m, y_m), end, setting.world), f"the way of {way_m:g} m")
+
+
+def _refusal(zone: KeepOutZone | None, what: str) -> Answer:
+    return MET if zone is None else f"{what} is in the {zone.name}: {zone.reason}"
+
+
+def is_slow_enough(state: State, setting: Setting) -> Answer:
+    """Is the speed within what the base may do?"""
+    del state
+    speed_m_s, most_m_s = setting.parameters.get("speed_m_s"), setting.world.max_speed_m_s
+    if speed_m_s is None or most_m_s is None:
+        return MET
+    too_fast = float(speed_m_s) > most_m_s
+    return f"{speed_m_s:g} m/s asked, {most_m_s:g} m/s at most" if too_fast else MET

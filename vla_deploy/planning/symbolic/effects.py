@@ -1,0 +1,93 @@
+"""Change the state as an action that succeeds would."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from vla_deploy.planning.symbolic.conditions import Setting
+from vla_deploy.planning.symbolic.state import Held, State
+from vla_deploy.world.thing import Rest
+
+Effect = Callable[[State, Setting], State]
+# Less than that and the robot still stands where it stood.
+SMALL_MOVE_M = 0.1
+
+
+def goes(state: State, setting: Setting) -> State:
+    """Stand at the goal."""
+    place, subject = setting.place("place"), setting.subject("object")
+    if subject is not None:
+        spot = None if subject.thing is None else subject.thing.xy_m
+        return replace(state, at=subject.key, spot=spot, pose=None)
+    if place is not None:
+        site = setting.world.sites.get(place)
+        if site is None:
+            return replace(state, at=place, spot=None, pose=None)
+        pose = (site.pose.x_m, site.pose.y_m, site.pose.yaw_rad)
+        return replace(state, at=place, spot=pose[:2], pose=pose)
+    x_m, y_m = float(setting.parameters["x_m"]), float(setting.parameters["y_m"])
+    yaw_rad = setting.parameters.get("yaw_rad")
+    facing = None if yaw_rad is None else (x_m, y_m, float(yaw_rad))
+    return replace(state, at="", spot=(x_m, y_m), pose=facing)
+
+
+def moves(state: State, setting: Setting) -> State:
+    """Stand a way ahead."""
+    way_m = float(setting.parameters["distance_m"])
+    at = state.at if abs(way_m) < SMALL_MOVE_M else ""
+    if state.pose is None:
+        return replace(state, at=at, spot=state.spot if at else None)
+    x_m, y_m, yaw_rad = state.pose
+    x_m, y_m = x_m + way_m * math.cos(yaw_rad), y_m + way_m * math.sin(yaw_rad)
+    return replace(state, at=at, spot=(x_m, y_m), pose=(x_m, y_m, yaw_rad))
+
+
+def turns(state: State, setting: Setting) -> State:
+    """Look another way, and so stand before nothing any more."""
+    if state.pose is None:
+        return replace(state, at="")
+    x_m, y_m, yaw_rad = state.pose
+    yaw_rad = math.remainder(yaw_rad + float(setting.parameters["angle_rad"]), 2 * math.pi)
+    return replace(state, at="", pose=(x_m, y_m, yaw_rad))
+
+
+def finds(state: State, setting: Setting) -> State:
+    """Know where the thing is; the search may have led anywhere unless it was in the scene."""
+    subject = setting.subject("object")
+    if subject is None or subject.key in state.found:
+        return state
+    found = state.found | {subject.key}
+    if subject.thing is not None or subject.others:
+        return replace(state, found=found)
+    return replace(state, found=found, at="", spot=None, pose=None)
+
+
+def takes(state: State, setting: Setting) -> State:
+    """Hold the thing in the hand that is named, or the only free one."""
+    subject = setting.subject("object")
+    if subject is None or state.holds(subject.key):
+        return state
+    free = [hand for hand in state.hands if not any(one.hand == hand for one in state.held)]
+    only = free[0] if len(free) == 1 else ""
+    hand = str(setting.parameters.get("arm", only))
+    return state.taking(Held(key=subject.key, kind=subject.kind, hand=hand))
+
+
+def puts(state: State, setting: Setting) -> State:
+    """Hold the thing no longer, and let it rest where it was put."""
+    held = state.holding(str(setting.parameters.get("arm", "")))[:1]
+    subject = setting.subject("destination")
+    of = subject.key if subject is not None else setting.place("destination") or ""
+    relation = str(setting.parameters.get("relation", "on"))
+    put = {one.key: Rest(relation, of) for one in held}
+    return replace(state.without(held), rests={**state.rests, **put})
+
+
+def lets_go(state: State, setting: Setting) -> State:
+    """Hold nothing in the hand that opens."""
+    return state.without(state.holding(str(setting.parameters.get("arm", ""))))
+
+
+def stays(state: State, _: Setting) -> State:
+    """Change nothing that plans are about."""
+    return state

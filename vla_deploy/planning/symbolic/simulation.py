@@ -1,0 +1,80 @@
+"""Go through a plan symbol by symbol and name every action that could not be done."""
+
+from collections.abc import Iterator, Sequence
+
+from vla_deploy.planning.catalogue import SKILLS
+from vla_deploy.planning.graph import execution_order
+from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.plan import Action
+from vla_deploy.planning.symbolic.conditions import Setting
+from vla_deploy.planning.symbolic.state import Pose, State, state_of
+from vla_deploy.planning.symbolic.table import LOGIC
+from vla_deploy.world import Snapshot
+
+
+def symbolic_faults(
+    actions: Sequence[Action],
+    world: World,
+    scene: Snapshot | None = None,
+    here: Pose | None = None,
+) -> list[str]:
+    """Return which action breaks which rule by which value, in the order of execution.
+
+    After an action that cannot be done the rest is judged as if it had been. The actions must be
+    valid one by one, and their dependencies acyclic.
+    """
+    return [
+        f'action "{action.id}": {action.skill} breaks "{rule}": {why}'
+        for action, rule, why in _broken(actions, state_of(world, scene, here), world, scene)
+    ]
+
+
+def end_state(
+    actions: Sequence[Action],
+    world: World,
+    scene: Snapshot | None = None,
+    here: Pose | None = None,
+) -> State:
+    """Return what would hold after the plan."""
+    state = state_of(world, scene, here)
+    for action in execution_order(actions):
+        state = after(action, state, world, scene)
+    return state
+
+
+def after(action: Action, state: State, world: World, scene: Snapshot | None) -> State:
+    """Return what holds after one action."""
+    setting = Setting(parameters=action.parameters, world=world, scene=scene)
+    return LOGIC[action.skill].effect(state, setting)
+
+
+def bounds_faults(actions: Sequence[Action], world: World) -> list[str]:
+    """Return by how much a plan is too long."""
+    bounds, faults = world.bounds, []
+    if len(actions) > bounds.max_actions:
+        faults.append(f"it has {len(actions)} actions, {bounds.max_actions} at most")
+    duration_s = sum(expected_s(action) for action in actions)
+    if duration_s > bounds.max_duration_s:
+        faults.append(f"it would take {duration_s:.0f} s, {bounds.max_duration_s:g} s at most")
+    return faults
+
+
+def expected_s(action: Action) -> float:
+    """Return how long an action is expected to take."""
+    if action.skill == "wait":
+        return float(action.parameters.get("duration_s", 0.0))
+    spec = SKILLS.get(action.skill)
+    return max(action.estimated_duration_s, 0.0 if spec is None else spec.estimated_duration_s)
+
+
+def _broken(
+    actions: Sequence[Action], state: State, world: World, scene: Snapshot | None
+) -> Iterator[tuple[Action, str, str]]:
+    for action in execution_order(actions):
+        logic = LOGIC[action.skill]
+        setting = Setting(parameters=action.parameters, world=world, scene=scene)
+        for rule, holds in logic.needs.items():
+            why = holds(state, setting)
+            if why:
+                yield action, rule, why
+        state = logic.effect(state, setting)

@@ -1,0 +1,92 @@
+"""Hold what is known at one step of a plan: where the robot is, what it holds, what is where."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from vla_deploy.planning.knowledge import World
+from vla_deploy.world import Snapshot, Thing
+from vla_deploy.world.thing import Rest
+
+Point = tuple[float, float]
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """Hold one thing in a hand; `hand` is "" where the skill chooses it."""
+
+    key: str
+    kind: str
+    hand: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.hand or 'a hand'}: {self.key}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """Hold the symbols.
+
+    `at` is the place or the thing (its key) that the robot stands before, "" elsewhere; `spot` is
+    about where that is, and `pose` exactly where, None where nobody knows. `hands` are the hands
+    whose holding is known; `found` are the keys of things that the plan has looked for; `rests`
+    tells what the plan has put where.
+    """
+
+    at: str = ""
+    spot: Point | None = None
+    pose: Pose | None = None
+    hands: tuple[str, ...] = ()
+    held: tuple[Held, ...] = ()
+    found: frozenset[str] = frozenset()
+    rests: Mapping[str, Rest] = field(default_factory=dict)
+
+    def holding(self, hand: str = "") -> tuple[Held, ...]:
+        """Return what that hand may hold; what any hand holds, where none is named."""
+        return tuple(one for one in self.held if not hand or one.hand in ("", hand))
+
+    def free_hands(self) -> int:
+        """Return how many of the known hands hold nothing."""
+        return len(self.hands) - len(self.held)
+
+    def holds(self, key: str) -> bool:
+        """Tell whether a hand holds that thing."""
+        return any(one.key == key for one in self.held)
+
+    def taking(self, held: Held) -> "State":
+        """Return the state with one thing more in the hands."""
+        rests = {key: rest for key, rest in self.rests.items() if key != held.key}
+        return replace(self, held=(*self.held, held), rests=rests)
+
+    def without(self, given: Iterable[Held]) -> "State":
+        """Return the state with some things no longer in the hands."""
+        gone = tuple(given)
+        return replace(self, held=tuple(one for one in self.held if one not in gone))
+
+    def distance_m(self, thing: Thing) -> float | None:
+        """Return about how far the robot is from a thing, None where that is not known."""
+        return None if self.spot is None else math.dist(self.spot, thing.xy_m)
+
+
+def state_of(world: World, scene: Snapshot | None, here: Pose | None) -> State:
+    """Return what is known before a plan begins."""
+    robot = scene.robot if scene is not None else None
+    if here is None and robot is not None:
+        here = (robot.x_m, robot.y_m, robot.yaw_rad)
+    return State(
+        spot=here[:2] if here is not None else None,
+        pose=here,
+        hands=tuple(world.holding),
+        held=tuple(_held(world, scene)),
+    )
+
+
+def _held(world: World, scene: Snapshot | None) -> Iterable[Held]:
+    """Yield what the hands hold: by the scene, which knows the thing, or by its kind."""
+    seen = {one.held_by: one for one in scene.things if one.held_by} if scene is not None else {}
+    for hand, thing in seen.items():
+        yield Held(key=thing.thing_id, kind=thing.kind, hand=hand)
+    for hand, kind in world.holding.items():
+        if kind and hand not in seen:
+            yield Held(key=kind, kind=kind, hand=hand)

@@ -1,0 +1,94 @@
+"""Tell what becomes of commands: to whoever follows them, to the executor, and aloud."""
+
+import json
+from typing import Any, Final
+
+from vla_deploy.ipc import RingWriter, SharedSpace
+from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.understanding import Question
+
+# What a slot of the topic holds, less what is told beside the plan.
+MOST_PLAN_CHARACTERS: Final = 12_000
+_MOST_REASON_CHARACTERS: Final = 2_000
+
+
+class Telling:
+    """Publish the planner's side of every command."""
+
+    def __init__(self, space: SharedSpace) -> None:
+        self._plans: RingWriter = space.ring_writer("plan")
+        self._events: RingWriter = space.ring_writer("task_event")
+
+    def cancelled_all(self, command_id: str) -> None:
+        """Let the executor end what it does."""
+        self._plans.publish({"command_id": command_id, "cancel": True})
+
+    def planning(self, command: Command, rungs: tuple[str, ...]) -> None:
+        """Tell that a plan takes time, and who is asked."""
+        self._tell(command, "planning", rungs=list(rungs))
+
+    def queued(self, command: Command, place: int) -> None:
+        """Tell that others are planned first."""
+        self._tell(command, "queued", place=place)
+
+    def asked(self, command: Command, question: Question, plan: Plan | None) -> None:
+        """Tell what only the person knows; `plan` is what a yes lets run."""
+        self._tell(
+            command,
+            "asked",
+            question=question.text,
+            choices=[one.words for one in question.candidates],
+            answer_within_s=question.limit_s,
+            plan=None if plan is None else plan.model_dump(mode="json"),
+        )
+
+    def answered(self, answer: Command, asked: Command) -> None:
+        """Tell that an utterance answers a question; what comes of it is told of the command."""
+        self._tell(answer, "answered", of=asked.command_id)
+
+    def refused(self, command: Command, reason: str, answer: Answer | None = None) -> None:
+        """Tell why nothing is done, and what every rung said."""
+        self._tell(command, "rejected", reason=_bounded(reason), **_attempts(answer))
+
+    def handed_on(self, command: Command, plan: Plan, answer: Answer) -> None:
+        """Give a plan to the executor, and tell who made it.
+
+        Raises:
+            PlanInvalid: it is too long to be told.
+        """
+        document = plan.model_dump(mode="json")
+        length = len(json.dumps(document))
+        if length > MOST_PLAN_CHARACTERS:
+            raise PlanInvalid(
+                [f"expected at most {MOST_PLAN_CHARACTERS} characters of JSON, got {length}"]
+            )
+        told = {"command_id": command.command_id, "event": "plan", "plan": document}
+        self._tell(command, "accepted")
+        self._events.publish(told | _maker(answer) | _attempts(answer))
+        self._plans.publish({"command_id": command.command_id, "plan": document})
+
+    def _tell(self, command: Command, event: str, **details: Any) -> None:
+        self._events.publish({"command_id": command.command_id, "event": event} | details)
+
+
+def _bounded(reason: str) -> str:
+    if len(reason) <= _MOST_REASON_CHARACTERS:
+        return reason
+    return f"{reason[:_MOST_REASON_CHARACTERS]} ... (and more)"
+
+
+def _maker(answer: Answer) -> dict[str, Any]:
+    proposal = answer.proposal
+    if proposal is None:
+        return {}
+    origin = {"origin": proposal.origin} if proposal.origin else {}
+    return {"rung": proposal.rung, "confidence": round(proposal.confidence, 3), **origin}
+
+
+def _attempts(answer: Answer | None) -> dict[str, Any]:
+    if answer is None or not answer.attempts:
+        return {}
+    return {"attempts": [one.document() for one in answer.attempts]}

@@ -1,0 +1,71 @@
+"""List how people refer to things beyond kind and colour: tables of pronouns, sides, extremes.
+
+The vocabulary of the world says what things are called; here is what points at them.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+PRONOUNS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "it": "it", "that": "it", "this": "it", "one": "it", "that one": "it", "this one": "it",
+        "the same": "it", "same one": "it", "the same one": "it", "that thing": "it",
+        "this thing": "it", "the thing": "it", "the one": "it", "itself": "it",
+        "them": "them", "those": "them", "these": "them", "all of them": "them", "them all": "them",
+        "both": "them", "both of them": "them",
+        "there": "there", "over there": "there", "that place": "there", "back there": "there",
+        "here": "here", "over here": "here", "back here": "here", "this place": "here",
+    }
+)  # fmt: skip
+IT: Final = "it"
+THEM: Final = "them"
+THERE: Final = "there"
+HERE: Final = "here"
+SIDES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "left": "left", "leftmost": "left", "left-most": "left", "lefthand": "left",
+        "right": "right", "rightmost": "right", "righthand": "right",
+        "middle": "middle", "central": "middle", "centre": "middle", "center": "middle",
+    }
+)  # fmt: skip
+# A superlative picks one where the adjective may leave several.
+EXTREMES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "biggest": "big", "largest": "big", "bigger": "big", "larger": "big",
+        "smallest": "small", "littlest": "small", "tiniest": "small", "smaller": "small",
+        "tallest": "tall", "taller": "tall", "highest": "tall",
+        "shortest": "short", "shorter": "short",
+        "longest": "long", "longer": "long",
+    }
+)  # fmt: skip
+ORDER_WORDS: Final[Mapping[str, str]] = MappingProxyType(
+    {"nearer": "nearest", "closer": "nearest", "further": "farthest", "furthest": "farthest",
+     "farther": "farthest"}
+)  # fmt: skip
+# What a kind of thing is called by in two words or more.
+COMPOUNDS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "set of keys": "keys", "bunch of keys": "keys", "remote control": "remote",
+        "remote controller": "remote", "cell phone": "phone", "mobile phone": "phone",
+        "smart phone": "phone", "glass of water": "glass", "cup of tea": "cup",
+        "cup of coffee": "cup", "bottle of water": "bottle", "can of coke": "can",
+        "key ring": "keys", "key chain": "keys",
+    }
+)  # fmt: skip
+# What a thing is for or made of, before its kind, tells no two of the known kinds apart.
+MODIFIERS: Final = frozenset(
+    {
+        "coffee", "tea", "water", "soda", "coke", "beer", "juice", "tennis", "toy", "rubber",
+        "plastic", "cardboard", "storage", "tv", "television", "car", "house", "door", "cell",
+        "mobile", "paper", "wooden", "metal", "ceramic", "drinking", "office", "favourite",
+        "favorite", "nice", "lovely", "same",
+    }
+)  # fmt: skip
+# Words between a thing and where it stands, which say nothing.
+SILENT: Final = frozenset(
+    {"is", "are", "which", "standing", "lying", "sitting", "resting", "please", "lies", "stands"}
+)
+EVERYTHING: Final = frozenset({"everything", "all", "anything"})
+COUNTS: Final[Mapping[str, int]] = MappingProxyType({"two": 2, "three": 3, "four": 4, "2": 2,
+                                                     "3": 3, "4": 4})  # fmt: skip

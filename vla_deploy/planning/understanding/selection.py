@@ -1,0 +1,76 @@
+"""Pick among things that fit an expression: by side, by extreme, by what was spoken of before."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Final
+
+from vla_deploy.world import Thing, Viewpoint
+
+# Things whose bearings differ by less stand one behind the other, not side by side.
+LEAST_BEARING_RAD: Final = 0.03
+# Below this ratio two things look the same size.
+DIFFERENCE_RATIO: Final = 1.08
+Measure = Callable[[Thing], float]
+
+
+def _volume(thing: Thing) -> float:
+    return thing.size_m[0] * thing.size_m[1] * thing.size_m[2]
+
+
+# The measure of which a superlative means the most.
+MEASURES: Final[Mapping[str, Measure]] = MappingProxyType(
+    {
+        "big": lambda thing: _volume(thing) ** (1.0 / 3.0),
+        "small": lambda thing: 1.0 / max(_volume(thing) ** (1.0 / 3.0), 1e-3),
+        "tall": lambda thing: thing.size_m[2],
+        "short": lambda thing: 1.0 / max(thing.size_m[2], 1e-3),
+        "long": lambda thing: max(thing.size_m[:2]),
+    }
+)
+
+
+def bearing_rad(thing: Thing, view: Viewpoint) -> float:
+    """Return how far to the left of straight ahead a thing is seen."""
+    angle = math.atan2(thing.xy_m[1] - view.y_m, thing.xy_m[0] - view.x_m) - view.yaw_rad
+    return math.atan2(math.sin(angle), math.cos(angle))
+
+
+def in_a_row(things: Sequence[Thing], view: Viewpoint | None) -> list[Thing] | None:
+    """Return things from left to right as they are seen, None where they are not side by side."""
+    if view is None or len(things) < 2:
+        return None
+    row = sorted(things, key=lambda thing: -bearing_rad(thing, view))
+    bearings = [bearing_rad(thing, view) for thing in row]
+    apart = all(left - right > LEAST_BEARING_RAD for left, right in pairwise(bearings))
+    return row if apart else None
+
+
+def on_side(things: Sequence[Thing], side: str, view: Viewpoint | None) -> list[Thing]:
+    """Return the leftmost, rightmost or middle thing; all of them where that tells none apart."""
+    row = in_a_row(things, view)
+    if row is None or (side == "middle" and len(row) % 2 == 0):
+        return list(things)
+    place = {"left": 0, "right": -1, "middle": len(row) // 2}[side]
+    return [row[place]]
+
+
+def most(things: Sequence[Thing], word: str) -> list[Thing]:
+    """Return the biggest, smallest, tallest thing; those that do not differ from it too."""
+    measure = MEASURES[word]
+    ranked = sorted(things, key=measure, reverse=True)
+    if not ranked:
+        return []
+    top = measure(ranked[0])
+    return [one for one in ranked if measure(one) * DIFFERENCE_RATIO > top]
+
+
+def facing(view: Viewpoint) -> Viewpoint:
+    """Return who stands before the robot and faces it: left and right are the other way round."""
+    return Viewpoint(
+        x_m=view.x_m + 2.0 * math.cos(view.yaw_rad),
+        y_m=view.y_m + 2.0 * math.sin(view.yaw_rad),
+        yaw_rad=view.yaw_rad + math.pi,
+        name="speaker",
+    )
