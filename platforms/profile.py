@@ -74,6 +74,7 @@ class SpeechSettings:
     A phrase ends after `end_silence_s`, after `unfinished_silence_s` where its words so far cannot
     be all. `pre_roll_s` before its first sound belongs to it. `beam` is how many readings the
     recogniser follows at once; what it understands below `least_confidence` is asked again.
+    `stop_words` says how easily a spoken stop is taken for one: low, normal, high, or off.
     """
 
     shortest_phrase_s: float
@@ -83,6 +84,7 @@ class SpeechSettings:
     pre_roll_s: float
     beam: int
     least_confidence: float
+    stop_words: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -144,6 +144,7 @@ _SPEECH: Keys = {
     "pre_roll_s": _Range(0, 1, "s"),
     "beam": _Range(1, 10, "", integer=True),
     "least_confidence": _Range(0, 1, ""),
+    "stop_words": _OneOf(("off", "low", "normal", "high")),
 }
 _BOARD: Keys = {"cpu_count": _Range(1, 256, "", integer=True), "memory_mb": _MEMORY_MB}
 _SETTINGS: Keys = {

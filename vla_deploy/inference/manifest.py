@@ -136,11 +136,40 @@ class Whisper:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SpottingMeasured:
+    """Declare how good a spotter was at its normal threshold, on voices that it had not learnt.
+
+    `missed_ratio` is of words in noise at 10 dB; `delay_p95_s` is from a word's end.
+    """
+
+    missed_ratio: float
+    false_alarms_per_hour: float
+    delay_p95_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyWords:
+    """Declare how a key word spotter's scores are read; `features` names what it is given.
+
+    Its output has the score of no word, then of each of `words`, for each moment. The mean score of
+    a word over `smoothing_frames` moments is held against one of `thresholds`: a name for each.
+    For `refractory_s` after a word, no other is told. `measured` is None where nobody has measured.
+    """
+
+    features: str
+    words: tuple[str, ...]
+    smoothing_frames: int
+    refractory_s: float
+    thresholds: Mapping[str, float]
+    measured: SpottingMeasured | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
     """Declare one model; `card` where there is one.
 
-    A graph has tensors and `files`, one for each variant, detectors a `detection` too; a Whisper
-    has `parts`, which are all needed, and `whisper`.
+    A graph has tensors and `files`, one for each variant, detectors a `detection` too, spotters
+    `key_words`; a Whisper has `parts`, which are all needed, and `whisper`.
     """
 
     name: str
@@ -152,5 +181,6 @@ class Manifest:
     outputs: tuple[Tensor, ...] = ()
     files: Mapping[Variant, ModelFile] = field(default_factory=dict)
     detection: Detection | None = None
+    key_words: KeyWords | None = None
     parts: tuple[ModelFile, ...] = ()
     whisper: Whisper | None = None

@@ -14,10 +14,12 @@ from vla_deploy.inference.manifest import (
     Detection,
     Fit,
     ImageInput,
+    KeyWords,
     Layout,
     Manifest,
     Measured,
     ModelFile,
+    SpottingMeasured,
     Tensor,
     Variant,
     Whisper,
@@ -59,6 +61,7 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 
 def _build(document: Document) -> Manifest:
     detection, whisper = document.get("detection"), document.get("whisper")
+    key_words = document.get("key_words")
     return Manifest(
         name=document["name"],
         role=document["role"],
@@ -71,6 +74,7 @@ def _build(document: Document) -> Manifest:
             Variant(name): ModelFile(**file) for name, file in document.get("files", {}).items()
         },
         detection=None if detection is None else _detection(detection),
+        key_words=None if key_words is None else _key_words(key_words),
         parts=tuple(ModelFile(**part) for part in document.get("parts", [])),
         whisper=None if whisper is None else _whisper(whisper),
     )
@@ -96,6 +100,17 @@ def _detection(table: Document) -> Detection:
                     "std": tuple(image["std"]),
                 }
             ),
+        }
+    )
+
+
+def _key_words(table: Document) -> KeyWords:
+    measured = table.get("measured")
+    return KeyWords(
+        **{
+            **table,
+            "words": tuple(table["words"]),
+            "measured": None if measured is None else SpottingMeasured(**measured),
         }
     )
 

@@ -6,6 +6,7 @@ from pathlib import PurePosixPath
 from typing import Any, Final
 
 from platforms.profile_schema import ROLES
+from vla_deploy.inference.key_words_schema import key_words_cross_faults, key_words_faults
 from vla_deploy.inference.manifest import Fit, Layout, Variant
 from vla_deploy.inference.whisper_schema import whisper_cross_faults, whisper_faults
 from vla_deploy.robots.schema import (
@@ -87,6 +88,7 @@ _GRAPH: Shape = {
     "outputs": TABLES,
     "files": TABLE,
     "detection": OPTIONAL_TABLE,
+    "key_words": OPTIONAL_TABLE,
 }
 _WHISPER: Shape = {**_HEAD, "parts": TABLES, "whisper": TABLE}
 _TENSOR: Shape = {
@@ -158,6 +160,8 @@ def _graph_key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
             expected = f"one of {', '.join(Variant)}"
             yield Fault(key=f"files.{name}", got="an unknown key", expected=expected)
         yield from check_record(_table(files[name]), f"files.{name}", _FILE)
+    if isinstance(document.get("key_words"), dict):
+        yield from key_words_faults(document["key_words"])
     if isinstance(document.get("detection"), dict):
         detection = document["detection"]
         yield from check_record(detection, "detection", _DETECTION)
@@ -177,6 +181,7 @@ def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fau
     for group in ("inputs", "outputs", "files"):
         if not document[group]:
             yield Fault(key=group, got="none", expected="one at least")
+    yield from key_words_cross_faults(document)
     if document["role"] == DETECTOR and "detection" not in document:
         yield Fault(key="detection", got="nothing", expected="a table, as the role is detector")
     if "detection" in document and document["inputs"]:

@@ -1,0 +1,155 @@
+"""Listen for stop words on the raw stream, and press the stop button the moment one is heard."""
+
+import logging
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from enum import StrEnum
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.inference.errors import InferenceError, RunFailed
+from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc.stop_button import StopButton
+from vla_deploy.speech.companions import Playing
+from vla_deploy.speech.sound import SoundBlock
+from vla_deploy.speech.stop_words.errors import StopWordsError
+from vla_deploy.speech.stop_words.own_voice import OwnVoice
+from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
+
+SOURCE: Final = "voice"
+OFF: Final = "off"
+KEPT: Final = 8
+OVERLAP_NS: Final = NS_PER_S // 2
+"""A phrase that ends so long before a word was settled may still have held it."""
+_log = logging.getLogger(__name__)
+
+OpenSpotter = Callable[[], tuple[Spotter, Mapping[str, float]]]
+
+
+class State(StrEnum):
+    """Say whether a spoken stop is heard."""
+
+    LIVE = "live"
+    OFF = "off"
+    BROKEN = "broken"
+
+
+class StopWords:
+    """Be the listener "stop_words": it needs no end of phrase, no recogniser and no planner.
+
+    While it is off or broken it says so in the log, in `speech_status` and to `doctor`: a robot
+    whose spoken stop is dead looks like one that nobody has spoken to.
+    """
+
+    name = "stop_words"
+
+    def __init__(
+        self,
+        open_spotter: OpenSpotter,
+        sensitivity: str,
+        clock: Clock,
+        playing: Callable[[], Playing | None] = lambda: None,
+    ) -> None:
+        """Take how the model is opened, which of its thresholds holds, and what the robot says."""
+        self._open_spotter = open_spotter
+        self._sensitivity = sensitivity
+        self._clock = clock
+        self._playing = playing
+        self._own = OwnVoice()
+        self._spotter: Spotter | None = None
+        self._thresholds: Mapping[str, float] = {}
+        self._pressed: deque[Spotted] = deque(maxlen=KEPT)
+        self._counts = {"spotted": 0, "own_voice": 0, "failed_runs": 0}
+        self._why = ""
+
+    @property
+    def state(self) -> State:
+        """Return whether a spoken stop is heard."""
+        if self._sensitivity == OFF:
+            return State.OFF
+        return State.BROKEN if self._spotter is None or self._why else State.LIVE
+
+    def start(self, space: SharedSpace) -> None:
+        """Open button and model; why it cannot be opened is told, and the robot goes on."""
+        self._button = StopButton(space, SOURCE, self._clock)
+        self._heard = space.ring_writer("heard")
+        if self._sensitivity == OFF:
+            self._why = "switched off by the profile: speech.stop_words"
+            _log.warning("degraded: nobody can stop the robot by voice: %s", self._why)
+            return
+        try:
+            self._spotter, self._thresholds = self._open_spotter()
+        except (InferenceError, StopWordsError) as error:
+            self._why = str(error)
+            _log.error("degraded: nobody can stop the robot by voice: %s", error)
+
+    def feed(self, block: SoundBlock) -> None:
+        """Take the next block, and press the button where a stop word was heard in it."""
+        self._own.follow(self._playing(), self._clock.now_ns())
+        if self._spotter is None:
+            return
+        if not block.follows:
+            self._spotter.reset()
+        own = self._own.sounds(block.end_ns)
+        threshold = self._thresholds["own_voice" if own else self._sensitivity]
+        runs = self._spotter.runs
+        try:
+            spotted = self._spotter.feed(block.samples, block.end_ns, threshold)
+        except RunFailed as error:
+            self._fail(error)
+            return
+        if self._spotter.runs > runs:
+            self._why = ""
+        if spotted is not None:
+            self._take(spotted)
+
+    def stopped_in(self, began_ns: int, ended_ns: int) -> bool:
+        """Tell whether a stop word was heard within a phrase, which then is no command."""
+        return any(
+            began_ns <= spotted.stamp_ns <= ended_ns + OVERLAP_NS for spotted in self._pressed
+        )
+
+    def document(self) -> Mapping[str, Any]:
+        """Return what `speech_status` tells under "stop_words"."""
+        newest = self._pressed[-1] if self._pressed else None
+        return {
+            "state": self.state,
+            "why": self._why,
+            "sensitivity": self._sensitivity,
+            "words": [] if self._spotter is None else list(self._spotter.words),
+            **self._counts,
+            "newest": None if newest is None else asdict(newest),
+        }
+
+    def close(self) -> None:
+        """Release button and topic; closing twice is allowed."""
+        self._button.close()
+        self._heard.close()
+
+    def _take(self, spotted: Spotted) -> None:
+        if self._own.takes(spotted.word, spotted.stamp_ns):
+            self._counts["own_voice"] += 1
+            return
+        self._button.press(f"heard {spotted.word!r}")
+        self._counts["spotted"] += 1
+        self._pressed.append(spotted)
+        now_ns = self._clock.now_ns()
+        self._heard.publish(
+            {
+                "text": spotted.word,
+                "confidence": round(spotted.score, 3),
+                "verdict": "stop",
+                "reason": "a stop word on the stream",
+                "began_ns": spotted.stamp_ns,
+                "ended_ns": spotted.stamp_ns,
+                "told_ns": now_ns,
+            }
+        )
+        _log.warning("stopped: heard %r, score %.2f", spotted.word, spotted.score)
+
+    def _fail(self, error: RunFailed) -> None:
+        self._counts["failed_runs"] += 1
+        if not self._why:
+            _log.error("degraded: nobody can stop the robot by voice: %s", error)
+        self._why = str(error)

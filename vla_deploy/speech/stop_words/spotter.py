@@ -1,0 +1,118 @@
+"""Spot words on a stream: frames in, a smoothed score per word out, held against a threshold."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from vla_deploy.inference.manifest import KeyWords, Manifest
+from vla_deploy.speech.sound import Sound, duration_ns
+from vla_deploy.speech.stop_words import features
+from vla_deploy.speech.stop_words.errors import SpotterMismatch
+
+
+class Scorer(Protocol):
+    """Run the model, as `ModelSession` does."""
+
+    def run(self, inputs: Mapping[str, NDArray[Any]]) -> Mapping[str, NDArray[Any]]:
+        """Return the outputs by name."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spotted:
+    """Tell that a word was heard: `stamp_ns` is the end of the sound that settled it."""
+
+    word: str
+    score: float
+    stamp_ns: int
+
+
+class Spotter:
+    """Follow one stream of sound at 16 kHz."""
+
+    def __init__(self, scorer: Scorer, manifest: Manifest) -> None:
+        """Take the model and what its manifest says of it.
+
+        Raises:
+            SpotterMismatch: it wants other features than there are, or none at all.
+        """
+        self._scorer = scorer
+        self._words = _checked(manifest)
+        self._input = manifest.inputs[0].name
+        self._output = manifest.outputs[0].name
+        self._held_frames = int(manifest.inputs[0].shape[2])
+        self._moments = int(manifest.outputs[0].shape[2])
+        self._step = self._moments * features.STRIDE
+        self.runs = 0
+        self._refractory_ns = round(self._words.refractory_s * NS_PER_S)
+        self.reset()
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Return the words that it knows."""
+        return self._words.words
+
+    def reset(self) -> None:
+        """Begin anew: what follows has nothing to do with what was heard."""
+        self._stream = features.LogMelStream()
+        self._frames = features.silence(self._held_frames)
+        self._fresh = np.zeros((0, features.BANDS), np.float32)
+        self._scores = np.zeros((0, len(self._words.words)), np.float32)
+        self._quiet_until_ns = 0
+
+    def feed(self, sound: Sound, end_ns: int, threshold: float) -> Spotted | None:
+        """Take the next piece of sound, whose last sample was at `end_ns`; tell what was said.
+
+        Raises:
+            RunFailed: the model fails; the sound is lost to it.
+        """
+        self._fresh = np.concatenate([self._fresh, self._stream.feed(sound)])
+        spotted: Spotted | None = None
+        while len(self._fresh) >= self._step:
+            new, self._fresh = self._fresh[: self._step], self._fresh[self._step :]
+            behind = len(self._fresh) * features.HOP + self._stream.waiting
+            found = self._judge(new, end_ns - duration_ns(behind), threshold)
+            spotted = spotted or found
+        return spotted
+
+    def _judge(self, new: features.Frames, stamp_ns: int, threshold: float) -> Spotted | None:
+        self._frames = np.concatenate([self._frames[len(new) :], new])
+        outputs = self._scorer.run({self._input: self._frames.T[None]})
+        self.runs += 1
+        scores = outputs[self._output][0, 1:].T
+        kept = self._words.smoothing_frames - 1 + self._moments
+        self._scores = np.concatenate([self._scores, scores])[-kept:]
+        best = _smoothed(self._scores, self._words.smoothing_frames)
+        number = int(best.argmax())
+        if best[number] < threshold or stamp_ns < self._quiet_until_ns:
+            return None
+        self._quiet_until_ns = stamp_ns + self._refractory_ns
+        return Spotted(word=self.words[number], score=float(best[number]), stamp_ns=stamp_ns)
+
+
+def _smoothed(scores: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """Return each word's best mean over `count` moments; those before the first count as 0."""
+    padded = np.concatenate([np.zeros((count - 1, scores.shape[1]), np.float32), scores])
+    windows = np.lib.stride_tricks.sliding_window_view(padded, count, axis=0)
+    best: NDArray[np.float32] = windows.mean(axis=2).max(axis=0)
+    return best
+
+
+def _checked(manifest: Manifest) -> KeyWords:
+    words, shapes = manifest.key_words, [tensor.shape for tensor in manifest.inputs]
+    if words is None or words.features != features.NAME:
+        got = "no [key_words]" if words is None else repr(words.features)
+        raise SpotterMismatch(f"{manifest.name}: expected features {features.NAME!r}, got {got}")
+    whole = len(shapes) == 1 and len(shapes[0]) == 3 and shapes[0][:2] == (1, features.BANDS)
+    if not whole or not all(
+        isinstance(shape[2], int) for shape in (shapes[0], manifest.outputs[0].shape)
+    ):
+        raise SpotterMismatch(
+            f"{manifest.name}: expected one input of shape (1, {features.BANDS}, frames) and a "
+            f"count of moments, got {shapes} and {manifest.outputs[0].shape}"
+        )
+    return words
