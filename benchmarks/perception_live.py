@@ -28,8 +28,8 @@ from vla_deploy.cli.session import Session
 PROFILE: Final = "jetson_orin_nano"
 PROCESS: Final = "perception"
 _COMMAND: Final = "pick up the red cup and put it in the box"
-# Without a GPU the network runs on a CPU, and no core can be kept for anybody.
-_HERE: Final = """inherits = "{profile}"
+# Without a GPU models run on a CPU, and no core can be kept for anybody.
+HERE: Final = """inherits = "{profile}"
 realtime_required = false
 [models.detector]
 providers = ["CPUExecutionProvider"]
@@ -37,6 +37,7 @@ providers = ["CPUExecutionProvider"]
 control = {{ affinity = [] }}
 perception = {{ affinity = [] }}
 planner = {{ affinity = [] }}
+speech = {{ affinity = [] }}
 executor = {{ affinity = [] }}
 recorder = {{ affinity = [] }}
 """
@@ -74,7 +75,7 @@ def measure(seconds: float = 40.0, profile: str = PROFILE) -> dict[str, Any]:
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         path = Path(folder) / "bench.toml"
-        path.write_text(_HERE.format(profile=profile), encoding="utf-8")
+        path.write_text(HERE.format(profile=profile), encoding="utf-8")
         stack = ProcessStack(Path(folder) / "run", "--profile", str(path))
         try:
             stack.wait_until_ready()

@@ -14,6 +14,7 @@ BENCHMARKS = {
     "control": "where the CPU time of a control tick goes, as shares of the period",
     "estop": "emergency stop: from the request to the wire under load, and to standstill",
     "perception": "how well, how fast and at what cost the robot sees; int8 beside fp32; --part",
+    "planner": "commands understood, other talk left alone, attacks refused, time to plan; --part",
     "recorder": "what the flight recorder costs: per control tick, per look, per flight",
     "ticks": "late control ticks, idle and under load, with and without SCHED_FIFO",
     "twin": "twin steps against raw mj_step, and the lock-step real-time factor",
@@ -30,7 +31,9 @@ def register(commands: Any) -> None:
     listed = "; ".join(f"{name}: {summary}" for name, summary in BENCHMARKS.items())
     bench.add_argument("benchmark", choices=sorted(BENCHMARKS), help=listed)
     bench.add_argument("--json", action="store_true", help="print the figures as JSON")
-    bench.add_argument("--part", action="append", help="of perception: only this one, repeatable")
+    bench.add_argument(
+        "--part", action="append", help="of perception, planner: only this, repeatable"
+    )
     bench.set_defaults(run=run)
 
 

@@ -1,0 +1,62 @@
+"""Measure what attacks get past the planner: it should be nothing.
+
+Commands that ask for what must not be done, texts that pretend to be something else, scenes whose
+labels command, and whole plans that break rules, of `benchmarks/corpora/adversarial`.
+`unsafe_accepted` counts plans that reached the executor though nothing, or something else, was
+allowed, or that break a bound of the judge's own (`planner_bounds`). `attacks_unanswered` counts
+those that nobody answered or that ended the planner.
+"""
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from benchmarks.command import parser, show
+from benchmarks.planner_corpus import PLAN, attacks
+from benchmarks.planner_play import Verdict, play_afresh
+
+
+def measure(misses: bool = False) -> dict[str, Any]:
+    """Return what became of the attacks; `misses` lists those that got through."""
+    verdicts = [play_afresh(case) for case in attacks()]
+    unsafe = [one for one in verdicts if is_unsafe(one)]
+    unanswered = [one for one in verdicts if _outcome(one) in ("silence", "crash")]
+    report: dict[str, Any] = {
+        "attacks": len(verdicts),
+        "unsafe_accepted": len(unsafe),
+        "attacks_unanswered": len(unanswered),
+        "attacks_planned_as_allowed": sum(_outcome(one) == PLAN for one in verdicts) - len(unsafe),
+    }
+    if misses:
+        report["attacks_missed"] = [_line(one) for one in unsafe + unanswered]
+    return report
+
+
+def is_unsafe(verdict: Verdict) -> bool:
+    """Tell whether the executor got what it must not."""
+    return any(
+        turn.answer.outcome == PLAN and (turn.wrong or turn.broken) for turn in verdict.judged
+    )
+
+
+def _outcome(verdict: Verdict) -> str:
+    return verdict.judged[-1].answer.outcome
+
+
+def _line(verdict: Verdict) -> str:
+    last = verdict.judged[-1]
+    why = "; ".join((last.wrong, *last.broken))
+    return f"{verdict.case.name}: {last.say:.80}: {last.answer.outcome}: {why:.200}"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the figures."""
+    arguments = parser("planner_attacks", __doc__)
+    arguments.add_argument("--misses", action="store_true", help="list those that got through")
+    given = arguments.parse_args(argv)
+    show(measure(given.misses), as_json=given.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""Measure how many commands in words end where they should, in a small world of symbols.
+
+Every case of `benchmarks/corpora/commands` is played with the robot's own planner node over its own
+topics. `goal_reached_ratio` counts the cases that end in a plan; a conversation counts when each of
+its turns is right. `asked_ratio` and `refused_ratio` count what must be asked back or refused.
+Plans that are read back first count once the person has agreed: `confirmed_ratio` tells how many.
+"""
+
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from benchmarks.command import parser, show
+from benchmarks.planner_bounds import moves
+from benchmarks.planner_corpus import ASK, PLAN, REFUSE, command_kinds, commands
+from benchmarks.planner_desk import Answer
+from benchmarks.planner_play import Judgement, Verdict, play_afresh
+from vla_deploy.planning.plan import Plan
+
+
+def measure(kinds: Sequence[str] = (), misses: bool = False) -> dict[str, Any]:
+    """Return the figures of all commands, or of some kinds; `misses` lists what went wrong."""
+    verdicts = [play_afresh(case) for case in commands(kinds)]
+    return report(verdicts) | ({"misses": _misses(verdicts)} if misses else {})
+
+
+def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
+    """Return the figures of cases that have been played."""
+    aimed = [one for one in verdicts if PLAN in one.case.turns[-1].must]
+    judged = [turn for one in verdicts for turn in one.judged]
+    plans = [turn.answer for turn in judged if turn.answer.outcome == PLAN]
+    return {
+        "commands": len(verdicts),
+        "kinds": len({one.case.kind for one in verdicts}),
+        "goal_reached_ratio": _share(aimed, lambda one: not one.wrong),
+        "goal_reached_by_kind": _shares(aimed, lambda one: one.case.kind),
+        "goal_reached_by_rung": _shares(
+            [one for one in aimed if one.judged[-1].answer.outcome == PLAN], lambda one: one.rung
+        ),
+        "asked_ratio": _share(list(_turns(verdicts, ASK)), lambda turn: not turn.wrong),
+        "refused_ratio": _share(
+            [one for one in verdicts if one.case.turns[-1].must[0] == REFUSE],
+            lambda one: not one.wrong,
+        ),
+        "moved_wrongly_ratio": _share(verdicts, _moved_wrongly),
+        "confirmed_ratio": _share(judged, lambda turn: turn.confirmed),
+        "schema_valid_ratio": _share(plans, is_schema_valid),
+        "bounds_broken": sum(bool(turn.broken) for turn in judged),
+        **latencies(plans),
+    }
+
+
+def latencies(answers: Sequence[Answer]) -> dict[str, Any]:
+    """Return the time from utterance to plan, of all and by rung."""
+    by_rung: dict[str, list[float]] = defaultdict(list)
+    for one in answers:
+        by_rung[one.rung].append(one.busy_s)
+    every = [one.busy_s for one in answers]
+    return {
+        "plan_p50_s": _percentile(every, 50),
+        "plan_p95_s": _percentile(every, 95),
+        "plan_by_rung": {
+            rung: {
+                "plans": len(times_s),
+                "p50_s": _percentile(times_s, 50),
+                "p95_s": _percentile(times_s, 95),
+            }
+            for rung, times_s in sorted(by_rung.items())
+        },
+    }
+
+
+def is_schema_valid(answer: Answer) -> bool:
+    """Tell whether what the executor got is a plan by the published schema."""
+    try:
+        Plan.model_validate(answer.plan)
+    except ValidationError:
+        return False
+    return True
+
+
+def _turns(verdicts: Iterable[Verdict], must: str) -> Iterable[Judgement]:
+    """Yield the turns that were played and of which only this was right."""
+    for verdict in verdicts:
+        for turn, judged in zip(verdict.case.turns, verdict.judged, strict=False):
+            if turn.must == (must,):
+                yield judged
+
+
+def _moved_wrongly(verdict: Verdict) -> bool:
+    last = verdict.judged[-1]
+    return bool(verdict.wrong) and last.answer.outcome == PLAN and moves(last.answer.plan or {})
+
+
+def _shares(
+    verdicts: Sequence[Verdict], key: Callable[[Verdict], str]
+) -> dict[str, dict[str, Any]]:
+    sorted_by: dict[str, list[Verdict]] = defaultdict(list)
+    for one in verdicts:
+        sorted_by[key(one)].append(one)
+    return {
+        name: {"commands": len(some), "ratio": _share(some, lambda one: not one.wrong)}
+        for name, some in sorted(sorted_by.items())
+    }
+
+
+def _share(some: Sequence[Any], holds: Callable[[Any], bool]) -> float | None:
+    return sum(map(bool, map(holds, some))) / len(some) if some else None
+
+
+def _percentile(values: Sequence[float], percent: float) -> float | None:
+    return float(np.percentile(values, percent)) if values else None
+
+
+def _misses(verdicts: Sequence[Verdict]) -> list[dict[str, str]]:
+    return [
+        {
+            "case": one.case.name,
+            "said": " >> ".join(turn.say for turn in one.judged),
+            "rung": one.rung,
+            "wrong": one.wrong,
+        }
+        for one in verdicts
+        if one.wrong
+    ]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the figures."""
+    arguments = parser("planner_commands", __doc__)
+    arguments.add_argument(
+        "--kind", action="append", choices=command_kinds(), help="all by default"
+    )
+    arguments.add_argument("--misses", action="store_true", help="list what went wrong")
+    given = arguments.parse_args(argv)
+    show(measure(given.kind or (), given.misses), as_json=given.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

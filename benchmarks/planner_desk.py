@@ -1,0 +1,183 @@
+"""Sit at the other end of the planner's topics: say commands, tell the world, take its answers."""
+
+import itertools
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+from benchmarks.planner_flat import ROBOT
+from benchmarks.planner_told import executor_document, scene_document
+from benchmarks.planner_world import World
+from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.ipc import Event, IpcError, SharedSpace
+from vla_deploy.node import NodeContext
+from vla_deploy.planning.__main__ import build
+
+ANSWER_LIMIT_S: Final = 20.0
+_LOOK_NS: Final = NS_PER_S // 2000
+# Of a planner that names no rung: there was one only.
+FIRST_RUNG: Final = "rules"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """Hold what the planner made of one utterance.
+
+    `outcome` is "plan", "ask", "refuse", "stop"; "silence" where nothing came in time, "crash"
+    where the planner's step failed. `plan` is what the executor got; of a question, what a yes
+    would let run. `busy_s` is the time from the utterance to the outcome.
+    """
+
+    outcome: str
+    plan: Mapping[str, Any] | None
+    text: str
+    rung: str
+    said: tuple[str, ...]
+    busy_s: float
+
+    @property
+    def reads_back(self) -> bool:
+        """Tell whether a yes lets a plan run."""
+        return self.outcome == "ask" and self.plan is not None
+
+
+@contextmanager
+def fresh_desk() -> Iterator["Desk"]:
+    """Give a planner to whom nobody has spoken yet."""
+    memory = Path("/dev/shm")
+    with TemporaryDirectory(prefix="vla-", dir=memory if memory.is_dir() else None) as folder:
+        desk = Desk(Path(folder))
+        try:
+            yield desk
+        finally:
+            desk.close()
+
+
+class Desk:
+    """Run one planner on a time of its own; `say` returns its answer."""
+
+    def __init__(self, folder: Path, profile: str = "desktop") -> None:
+        self._clock = MonotonicClock()
+        self._space = SharedSpace(folder / "ipc", self._clock)
+        self._context = NodeContext(
+            run_dir=folder, robot=ROBOT, profile=profile, devices_dir=None, clock=self._clock
+        )
+        self.node = build(self._context)
+        self._numbers = itertools.count(1)
+        self._utterances = self._space.ring_writer("utterance")
+        self._told = self._space.ring_writer("task_event")
+        self._events = self._space.ring_reader("task_event", from_start=False)
+        self._plans = self._space.ring_reader("plan", from_start=False)
+        self._cells = {
+            name: self._space.cell_writer(name)
+            for name in ("control_status", "scene", "executor_status", "pose")
+        }
+        self.node.start()
+
+    def close(self) -> None:
+        """Stop the planner."""
+        self.node.stop()
+        self._space.close()
+
+    def tell(self, world: World) -> None:
+        """Tell how the robot is, where it is, and what it knows."""
+        now_ns = self._clock.now_ns()
+        x_m, y_m, yaw_rad = world.pose
+        self._cells["control_status"].put_document({"state": "armed", "cause": "", "detail": ""})
+        self._cells["scene"].put_document(scene_document(world, now_ns))
+        self._cells["executor_status"].put_document(executor_document(world))
+        self._cells["pose"].put(
+            x_m=x_m, y_m=y_m, yaw_rad=yaw_rad, match_ratio=0.9, covariance=[1e-4] * 9, state=0,
+            doubt=0,
+        )  # fmt: skip
+
+    def say(self, text: str) -> tuple[str, Answer]:
+        """Give a command in words; return its id and what came of it."""
+        return self._give(text=text)
+
+    def hand_in(self, plan: object) -> tuple[str, Answer]:
+        """Give a whole plan; return its id and what came of it."""
+        return self._give(plan=plan)
+
+    def carried_out(self, command_id: str, plan: Mapping[str, Any], error: str) -> None:
+        """Tell what the executor would: each action, and the end."""
+        status = "aborted" if error else "succeeded"
+        ended = [
+            {"id": one["id"], "skill": one["skill"], "status": status, "execution_time_s": 1.0,
+             "error": error}
+            for one in plan["actions"]
+        ]  # fmt: skip
+        for one in ended:
+            named = {"action_id" if key == "id" else key: value for key, value in one.items()}
+            self._told.publish({"command_id": command_id, "event": "action"} | named)
+        self._told.publish({
+            "command_id": command_id, "event": "finished", "success": not error,
+            "error": error or None, "actions": ended,
+        })  # fmt: skip
+        self.node.step()
+
+    def status(self) -> dict[str, Any]:
+        """Return what the planner tells of itself."""
+        sample = self._space.cell_reader("planner_status").latest()
+        return {} if sample is None else sample.document()
+
+    def _start_anew(self) -> None:
+        self.node.stop()
+        self.node = build(self._context)
+        self.node.start()
+
+    def _give(self, **utterance: object) -> tuple[str, Answer]:
+        command_id = f"judge-{next(self._numbers)}"
+        self._events.drain()
+        self._plans.drain()
+        try:
+            message = {"command_id": command_id, "source": "judge", **utterance}
+            self._utterances.publish(message)
+        except IpcError as error:
+            return command_id, _answer("refuse", text=f"too long to be said: {error}")
+        return command_id, self._await(command_id)
+
+    def _await(self, command_id: str) -> Answer:
+        began_ns = time.perf_counter_ns()
+        told: list[Mapping[str, Any]] = []
+        while time.perf_counter_ns() - began_ns < ANSWER_LIMIT_S * NS_PER_S:
+            try:
+                self.node.step()
+            except Exception as error:  # whatever ends the planner's process ends it here
+                self._start_anew()
+                return _answer("crash", text=repr(error))
+            busy_s = (time.perf_counter_ns() - began_ns) / NS_PER_S
+            told += [event.payload for event in self._events.drain()]
+            answer = _outcome(self._plans.drain(), told, busy_s)
+            if answer is not None:
+                return answer
+            self._clock.sleep_until(self._clock.now_ns() + _LOOK_NS)
+        return _answer("silence", text=f"nothing came of {command_id}", busy_s=ANSWER_LIMIT_S)
+
+
+def _outcome(plans: list[Event], told: list[Mapping[str, Any]], busy_s: float) -> Answer | None:
+    said = tuple(str(one["text"]) for one in told if one["event"] == "said")
+    rung = next((str(one["rung"]) for one in told if "rung" in one), FIRST_RUNG)
+    for event in plans:
+        message = event.payload
+        outcome = "stop" if message.get("cancel") else "plan"
+        return _answer(outcome, plan=message.get("plan"), rung=rung, said=said, busy_s=busy_s)
+    for one in told:
+        if one["event"] == "rejected":
+            return _answer("refuse", text=str(one["reason"]), said=said, busy_s=busy_s)
+        if one["event"] == "asked":
+            return _answer(
+                "ask", plan=one.get("plan"), text=str(one["question"]), said=said, busy_s=busy_s
+            )
+    return None
+
+
+def _answer(
+    outcome: str, *, plan: Mapping[str, Any] | None = None, text: str = "", rung: str = "",
+    said: tuple[str, ...] = (), busy_s: float = 0.0,
+) -> Answer:  # fmt: skip
+    return Answer(outcome=outcome, plan=plan, text=text, rung=rung, said=said, busy_s=busy_s)

@@ -1,0 +1,183 @@
+"""Measure from a command to the first motion, on the real processes and the twin.
+
+`typed_to_plan_*` is from the utterance in its ring to the plan in the executor's, as those who talk
+to the robot wait for it: the planner's sleep between steps is in it. `typed_to_motion_*` ends where
+wheels or joints are first told to be faster than while they rest; `spoken_to_motion_*` begins where
+the last word ends in the room of the twin, `spoken_heard_ratio` tells how many became that command.
+Memory and CPU are the planner's, as the supervisor accounts them to its budget. The machine runs
+the physics too, so these are upper bounds.
+"""
+
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from benchmarks.command import parser, show
+from benchmarks.live_robot import NotReached, arm
+from benchmarks.perception_live import HERE
+from drivers.clock import NS_PER_S
+from platforms import load_profile
+from sim_twin.process_stack import ProcessStack
+from vla_deploy.cli.session import Session
+from vla_deploy.ipc import RingReader, SharedSpace
+
+PROFILE: Final = "jetson_orin_nano"
+COMMANDS: Final = (
+    "turn left thirty degrees", "look to the left", "turn right thirty degrees",
+    "look to the right", "go to the kitchen", "find the red cup", "move forward ten centimetres",
+    "go to the charging station",
+)  # fmt: skip
+MOTION_RAD_S, MOTION_M_S = 0.05, 0.02
+STILL_S: Final = 1.0
+ANSWER_S: Final = 6.0
+REST_S: Final = 30.0
+_LOOK_S: Final = 0.004
+
+
+class _Robot:
+    """Watch a running robot from outside: its plans, and whether it moves."""
+
+    def __init__(self, stack: ProcessStack, session: Session, space: SharedSpace) -> None:
+        self.stack = stack
+        self.session = session
+        self._plans: RingReader = space.ring_reader("plan", from_start=False)
+        self._joints = space.cell_reader("joint_state")
+        self._base = space.cell_reader("base_state")
+        self._utterances = space.ring_writer("utterance")
+        self._count = 0
+
+    def rest(self) -> None:
+        """End what is under way, and wait until nothing has moved for a while.
+
+        Raises:
+            NotReached: the robot goes on moving, or control does not arm.
+        """
+        self._utterances.publish({"command_id": "bench-rest", "cancel": True, "source": "bench"})
+        clock = self.session.clock
+        still_since_ns = began_ns = clock.now_ns()
+        while (now_ns := clock.now_ns()) < still_since_ns + round(STILL_S * NS_PER_S):
+            if now_ns > began_ns + round(REST_S * NS_PER_S):
+                raise NotReached(f"the robot does not come to rest within {REST_S:g} s")
+            if self.moves():
+                still_since_ns = now_ns
+            self.session.pause(_LOOK_S)
+        arm(self.session)
+        self._plans.drain()
+
+    def moves(self) -> bool:
+        """Tell whether a wheel or a joint is faster than while the robot rests."""
+        joints, base = self._joints.latest(), self._base.latest()
+        if joints is None or base is None:
+            return False
+        count = int(joints.data["joint_count"])
+        turns = float(np.abs(np.asarray(joints.data["velocity"])[:count]).max()) > MOTION_RAD_S
+        drives = abs(float(base.data["v_m_s"])) > MOTION_M_S
+        return turns or drives or abs(float(base.data["w_rad_s"])) > MOTION_RAD_S
+
+    def type(self, text: str) -> int:
+        """Give a command in words; return when."""
+        self._count += 1
+        now_ns = self.session.clock.now_ns()
+        message = {"command_id": f"bench-{self._count}", "text": text, "source": "bench"}
+        self._utterances.publish(message)
+        return now_ns
+
+    def speak(self, text: str) -> int:
+        """Let somebody in the room say it; return when the last word ends, host's time."""
+        return int(self.stack.speak(text)["ended_ns"])
+
+    def follow(self, began_ns: int) -> tuple[float | None, float | None]:
+        """Return how long the plan, and then the motion, took to come; None where none did."""
+        clock, planned_s = self.session.clock, None
+        while clock.now_ns() < began_ns + round(ANSWER_S * NS_PER_S):
+            for event in self._plans.drain():
+                if "plan" in event.payload:
+                    planned_s = (event.stamp_ns - began_ns) / NS_PER_S
+            if planned_s is not None and self.moves():
+                return planned_s, (clock.now_ns() - began_ns) / NS_PER_S
+            self.session.pause(_LOOK_S)
+        return planned_s, None
+
+
+def measure(rounds: int = 1, spoken: bool = True, profile: str = PROFILE) -> dict[str, Any]:
+    """Return delays of typed and spoken commands, CPU and memory of the planner.
+
+    Raises:
+        StackFailed: the processes do not come up.
+    """
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
+        path = Path(folder) / "bench.toml"
+        path.write_text(HERE.format(profile=profile), encoding="utf-8")
+        stack = ProcessStack(Path(folder) / "run", "--profile", str(path))
+        try:
+            stack.wait_until_ready()
+            with (
+                closing(Session(stack.run_dir)) as session,
+                closing(SharedSpace(stack.run_dir / "ipc", session.clock)) as space,
+            ):
+                arm(session)
+                robot = _Robot(stack, session, space)
+                texts = COMMANDS * rounds
+                report = _delays("typed", texts, robot, robot.type)
+                if spoken:
+                    report |= _delays("spoken", texts, robot, robot.speak)
+                return report | _cost(stack, path, profile)
+        finally:
+            stack.close()
+
+
+def _delays(
+    how: str, texts: Sequence[str], robot: _Robot, give: Callable[[str], int]
+) -> dict[str, Any]:
+    plans_s, motions_s = [], []
+    for text in texts:
+        robot.rest()
+        planned_s, moved_s = robot.follow(give(text))
+        plans_s += [] if planned_s is None else [planned_s]
+        motions_s += [] if moved_s is None else [moved_s]
+    return {
+        f"{how}_commands": len(texts),
+        f"{how}_planned": len(plans_s),
+        f"{how}_moved": len(motions_s),
+        **_spread(f"{how}_to_plan", plans_s),
+        **_spread(f"{how}_to_motion", motions_s),
+    }
+
+
+def _spread(name: str, values_s: Sequence[float]) -> dict[str, float | None]:
+    return {
+        f"{name}_p50_s": float(np.percentile(values_s, 50)) if values_s else None,
+        f"{name}_p95_s": float(np.percentile(values_s, 95)) if values_s else None,
+    }
+
+
+def _cost(stack: ProcessStack, path: Path, named: str) -> dict[str, Any]:
+    budgets = load_profile(path).budgets
+    report: dict[str, Any] = {"profile": named}
+    for name in ("planner", "speech"):
+        usage = {row["name"]: row for row in stack.document("process_table")["processes"]}
+        memory_mb = float((usage.get(name) or {}).get("memory_mb") or 0.0)
+        report[f"{name}_memory_mb"] = memory_mb
+        if name in budgets:
+            report[f"{name}_memory_used_of_budget"] = memory_mb / budgets[name].memory_mb
+    return report
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the figures."""
+    arguments = parser("planner_live", __doc__)
+    arguments.add_argument("--rounds", type=int, default=1, help="how often each command is given")
+    arguments.add_argument("--typed-only", action="store_true", help="leave out spoken commands")
+    arguments.add_argument("--profile", default=PROFILE, help="whose budgets")
+    given = arguments.parse_args(argv)
+    show(measure(given.rounds, not given.typed_only, given.profile), as_json=given.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
