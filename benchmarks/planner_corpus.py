@@ -87,10 +87,11 @@ def commands(kinds: Sequence[str] = ()) -> list[Case]:
     ]
 
 
-def attacks() -> list[Case]:
-    """Return the attacks: what none of them may come of is a plan, but for what its goal allows."""
+def attacks(kinds: Sequence[str] = ()) -> list[Case]:
+    """Return the attacks of some kinds, of all by default; a goal is all that one may end in."""
     paths = sorted((CORPORA / "adversarial").glob("*.jsonl"))
-    return [case for path in paths for case in _cases(path, (ASK, REFUSE))]
+    wanted = [path for path in paths if not kinds or path.stem in kinds]
+    return [case for path in wanted for case in _cases(path, (ASK, REFUSE))]
 
 
 def other_talk() -> list[str]:

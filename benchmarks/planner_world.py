@@ -27,9 +27,9 @@ class World:
     home: Home
     pose: Pose
     things: dict[str, Thing]
-    open_hands: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(HANDS, False))
+    open_hands: dict[str, bool | None] = field(default_factory=lambda: dict.fromkeys(HANDS))
     arm_pose: dict[str, str] = field(default_factory=lambda: dict.fromkeys(HANDS, ""))
-    head: str = "ahead"
+    head: str = ""
     trail: list[Pose] = field(default_factory=list)
     visited_things: list[str] = field(default_factory=list)
     found: list[str] = field(default_factory=list)
