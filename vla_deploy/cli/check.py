@@ -10,10 +10,11 @@ from platforms import load_profile
 from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import read_plan
+from vla_deploy.planning.asking import Request
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import plan_schema
-from vla_deploy.planning.validator import check_plan
+from vla_deploy.planning.planner import checked
 from vla_deploy.robots import load_robot
 
 SCHEMAS: Final[Mapping[str, Callable[[], dict[str, Any]]]] = {
@@ -47,8 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"robot {robot.name}: {len(robot.joint_names)} servos, {len(robot.places)} places: ok")
     print(f"profile {profile.name}: ok")
     if arguments.plan:
-        plan = parse_plan(read_plan(arguments.plan))
-        check_plan(plan, world_of(robot, {}))
+        request = Request(command_id="", text="", world=world_of(robot, {}))
+        plan = checked(parse_plan(read_plan(arguments.plan)), request)
         print(f"plan {arguments.plan}: {len(plan.actions)} actions: ok")
     return 0
 

@@ -85,17 +85,11 @@ def _rename(**names: str) -> ParameterMap:
 
 
 _OBJECT = _rename(object_name="object", target="object", item="object", object_id="object")
+# What is put may be named with it: grounding fetches it first.
 _PUT = _rename(
     location="destination", target="destination", container="destination", surface="destination",
+    object_name="object", item="object", object_id="object",
 )  # fmt: skip
-
-
-def _put(given: Json) -> Json:
-    put = _PUT(given)
-    put.pop("object", None)
-    put.pop("object_name", None)
-    put.setdefault("relation", "in" if "box" in str(put.get("destination", "")).lower() else "on")
-    return put
 
 
 SKILL_DIALECT: Mapping[str, tuple[str, ParameterMap]] = {
@@ -112,9 +106,9 @@ SKILL_DIALECT: Mapping[str, tuple[str, ParameterMap]] = {
     "pick": ("pick_up", _OBJECT),
     "grasp": ("pick_up", _OBJECT),
     "grab": ("pick_up", _OBJECT),
-    "place": ("place", _put),
-    "put_down": ("place", _put),
-    "put": ("place", _put),
+    "place": ("place", _PUT),
+    "put_down": ("place", _PUT),
+    "put": ("place", _PUT),
     "release": ("open_gripper", _rename()),
     "detect_object": ("find_object", _OBJECT),
     "find_object": ("find_object", _OBJECT),

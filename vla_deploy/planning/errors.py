@@ -3,6 +3,7 @@
 PlanningError
 ├── CommandUnreadable give words or a plan, no more than fits
 ├── NotUnderstood     say it in other words
+├── NotAble           ask for something that the robot can do
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
@@ -35,6 +36,10 @@ class NotUnderstood(PlanningError):
             f'I do not understand "{text}"; try: go to the kitchen, find the keys, '
             "pick up the red cup and put it in the box, bring me the bottle, stop"
         )
+
+
+class NotAble(PlanningError):
+    """Say why the robot cannot do such a thing at all, however it is said."""
 
 
 class UnknownPlace(PlanningError):

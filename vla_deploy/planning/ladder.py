@@ -12,6 +12,7 @@ from vla_deploy.planning.asking import Proposal, Request, Rung
 from vla_deploy.planning.errors import (
     Ambiguous,
     Declined,
+    NotAble,
     NotUnderstood,
     PlanInvalid,
     PlanningError,
@@ -76,7 +77,7 @@ class Answer:
     @property
     def is_final(self) -> bool:
         """Tell whether nobody else needs to be asked."""
-        return self.plan is not None or isinstance(self.error, Ambiguous)
+        return self.plan is not None or isinstance(self.error, Ambiguous | NotAble)
 
 
 _OUTCOMES: Final = (

@@ -1,9 +1,11 @@
 """Define the one canonical plan that every planner emits and the executor runs."""
 
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
+
+MOST_ACTIONS: Final = 100
 
 
 class ActionStatus(StrEnum):
@@ -53,7 +55,7 @@ class Plan(BaseModel):
     summary: str = ""
     reasoning: str = ""
     feasible: bool = True
-    actions: tuple[Action, ...] = Field(default=(), max_length=100)
+    actions: tuple[Action, ...] = Field(default=(), max_length=MOST_ACTIONS)
     safety_concerns: tuple[str, ...] = ()
     success_criteria: tuple[str, ...] = ()
 

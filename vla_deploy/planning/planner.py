@@ -13,19 +13,23 @@ from vla_deploy.planning.ladder import Answer, Check, Ladder
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
 from vla_deploy.planning.rules_rung import RulesRung
+from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
 WITHIN_S: Final = 20.0
 
 
 def checked(plan: Plan, request: Request) -> Plan:
-    """Return a plan that may run in the world of a request.
+    """Return a plan grounded in the world of a request, and valid there.
 
     Raises:
-        PlanInvalid: it may not; carries every fault.
+        PlanInvalid: it may not run; carries every fault.
+        Ambiguous: only the person can tell what is meant.
+        PlanningError: it speaks of what the robot does not know.
     """
-    check_plan(plan, request.world)
-    return plan
+    grounded = ground_plan(plan, request).plan
+    check_plan(grounded, request.world, request.scene, request.here)
+    return grounded
 
 
 class Planner:

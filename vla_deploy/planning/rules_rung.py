@@ -4,7 +4,7 @@ from typing import Final
 
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Proposal, Request
-from vla_deploy.planning.rules import plan_command
+from vla_deploy.planning.rules import draft_plan
 
 
 class RulesRung:
@@ -15,5 +15,4 @@ class RulesRung:
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
         """Return the plan; a rule fits or it does not, so there is no doubt about it."""
         del deadline  # rules take no time
-        plan = plan_command(request.text, request.world, request.here)
-        return Proposal(plan=plan, rung=self.name, confidence=1.0)
+        return Proposal(plan=draft_plan(request), rung=self.name, confidence=1.0)

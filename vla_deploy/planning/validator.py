@@ -14,7 +14,7 @@ from vla_deploy.planning.symbolic.sharing import sharing_faults
 from vla_deploy.planning.symbolic.state import Pose
 from vla_deploy.world import Snapshot
 
-__all__ = ["World", "check_plan", "plan_faults", "spoken_places"]
+__all__ = ["World", "action_faults", "check_plan", "plan_faults", "spoken_places"]
 
 
 def check_plan(
@@ -47,14 +47,16 @@ def plan_faults(
     if plan.feasible and not plan.actions:
         faults.append("it has no actions")
     for action in plan.actions:
-        faults += [f'action "{action.id}": {fault}' for fault in _action_faults(action, world)]
-    faults += dependency_faults(plan.actions) + bounds_faults(plan.actions, world)
+        faults += [f'action "{action.id}": {fault}' for fault in action_faults(action, world)]
+    faults += dependency_faults(plan.actions)
     if faults:
         return faults
-    return sharing_faults(plan.actions) + symbolic_faults(plan.actions, world, scene, here)
+    faults += bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
+    return faults + symbolic_faults(plan.actions, world, scene, here)
 
 
-def _action_faults(action: Action, world: World) -> list[str]:
+def action_faults(action: Action, world: World) -> list[str]:
+    """Return what is wrong with one action by itself: skill, parameters, types, ranges, names."""
     spec = SKILLS.get(action.skill)
     if spec is None:
         return [f'unknown skill "{action.skill}"; known: {", ".join(SKILLS)}']

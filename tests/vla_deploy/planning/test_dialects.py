@@ -81,7 +81,7 @@ def test_text_made_to_cost_time_or_stack_is_refused(text: str, fault: str) -> No
         (
             {"action": "put_down", "params": {"object": "cup", "location": "box"}},
             "place",
-            {"destination": "box", "relation": "in"},
+            {"object": "cup", "destination": "box"},
         ),
     ],
 )

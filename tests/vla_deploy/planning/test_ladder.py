@@ -32,8 +32,8 @@ def test_the_first_plan_that_may_run_wins_and_the_others_are_not_asked(clock, as
 
 def test_a_plan_that_the_validator_refuses_falls_to_the_next_rung(clock, ask, propose, rung):
     answer = climb(clock, ask("go"), rung("bad", propose(NOWHERE)), rung("good", propose(GO)))
-    assert answer.attempts[0].outcome is Outcome.INVALID
-    assert 'unknown place "narnia"' in answer.attempts[0].reason
+    assert answer.attempts[0].outcome is Outcome.REFUSED
+    assert 'I do not know the place "narnia"' in answer.attempts[0].reason
     assert answer.proposal.plan.actions[0].parameters == {"place": "kitchen"}
 
 

@@ -68,7 +68,7 @@ def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
     accepted, planned, refused = desk.answers()
     assert (accepted["event"], planned["rung"]) == ("accepted", "given")
     assert (refused["command_id"], refused["event"]) == ("c2", "rejected")
-    assert 'unknown place "narnia"' in refused["reason"]
+    assert 'I do not know the place "narnia"' in refused["reason"]
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,10 @@ def after(action: Action, state: State, world: World, scene: Snapshot | None) ->
 
 
 def bounds_faults(actions: Sequence[Action], world: World) -> list[str]:
-    """Return by how much a plan is too long."""
+    """Return by how much a plan is too long, in actions or in time.
+
+    The actions must be valid one by one.
+    """
     bounds, faults = world.bounds, []
     if len(actions) > bounds.max_actions:
         faults.append(f"it has {len(actions)} actions, {bounds.max_actions} at most")

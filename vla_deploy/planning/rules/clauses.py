@@ -1,0 +1,55 @@
+"""Take a sentence apart: politeness off, a stop recognised, one clause for each thing to do."""
+
+import re
+from typing import Final
+
+from vla_deploy.planning.references import words_of
+
+MOST_LETTERS: Final = 400
+# More clauses than that are no command that rules should answer.
+MOST_CLAUSES: Final = 12
+STOP_WORDS: Final = frozenset(
+    {
+        "stop", "halt", "freeze", "cancel", "abort", "stop now", "stop it", "stop moving",
+        "stop there", "stop right there", "stop everything", "stop all", "never mind", "nevermind",
+        "dont move", "do not move", "stand still", "hold still", "hold it", "emergency stop",
+        "stop stop", "stop stop stop", "no stop", "whoa", "wait stop", "cancel it", "abort mission",
+        "stop what you are doing", "stop what youre doing", "cancel everything", "stop at once",
+        "stop immediately", "halt now", "freeze now", "enough",
+    }
+)  # fmt: skip
+_POLITE: Final = re.compile(
+    r"^(?:please|could you|can you|would you|will you|robot|butler|hey butler|hey robot|"
+    r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
+    r"i would like you to|i'd like you to|i need you to|you should|you need to|you have to|you can|"
+    r"let's|lets|let us|go ahead and|first|would you mind|do me a favour and|do me a favor and|"
+    r"be so kind and|so|well|um|uh|quickly|maybe|perhaps)\b[, ]*"
+    r"|[, ]*\b(?:please|for me|thanks|thank you|now|right now|if you can|if you could|will you|"
+    r"would you|could you|butler|robot|quickly|immediately|at once)$|[.!?, ]+$"
+)
+_SPLIT: Final = re.compile(
+    r"\s*(?:[,;.]?\s*\b(?:and then|and after that|after that|afterwards|then|and)\b|[,;]|\.\s)\s*"
+)
+
+
+def is_stop(text: str) -> bool:
+    """Tell whether a command means: stop what you are doing."""
+    if len(text) > MOST_LETTERS:
+        return False
+    return " ".join(words_of(polite_off(text).replace("'", ""))) in _STOPS
+
+
+_STOPS: Final = frozenset(" ".join(words_of(spoken)) for spoken in STOP_WORDS) | {"stop that"}
+
+
+def polite_off(text: str) -> str:
+    """Return a command in lower case without what only asks nicely."""
+    text = " ".join(text.lower().replace("\u2019", "'").split())
+    while (shorter := _POLITE.sub("", text).strip()) != text and shorter:
+        text = shorter
+    return text
+
+
+def segments(text: str) -> list[str]:
+    """Return what stands between the conjunctions of a sentence."""
+    return [polite_off(part) for part in _SPLIT.split(text) if part.strip(" .!?,")]

@@ -1,0 +1,84 @@
+"""Clean with what there is: put things away, and drive over the floor in rows.
+
+There is no brush, cloth or suction; what needs one is refused (`refusals.py`).
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.planning.errors import NotAble
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.rules.building import STORE, Groups, Step, look_around
+from vla_deploy.planning.understanding.insertions import surface_of
+from vla_deploy.world import Thing
+
+MOST_THINGS: Final = 6
+# Half the side of the square around a place, and how far apart the rows are.
+REACH_M: Final = 1.0
+ROW_M: Final = 0.5
+MOST_POINTS: Final = 20
+
+
+def tidy(groups: Groups, request: Request) -> list[Step]:
+    """Put away what lies on a piece of furniture, or everywhere; look first where none is known."""
+    lying = _lying(groups.get("place"), request)
+    if not lying:
+        there = {"place": groups["place"]} if "place" in groups else {}
+        said = "I know of nothing there to put away. I look around."
+        return [("speak", {"text": said}), *look_around(there, request)]
+    steps: list[Step] = []
+    for thing in lying[:MOST_THINGS]:
+        where = {"destination": STORE, "relation": "in"}
+        steps.append(("place", {"object": thing.thing_id, **where}))
+    left = len(lying) - MOST_THINGS
+    said = f"{left} more things are left; tell me again." if left > 0 else "That is put away."
+    return [*steps, ("speak", {"text": said})]
+
+
+def _lying(place: str | None, request: Request) -> list[Thing]:
+    """Return what can be put away: not what is in a box already, nor what a hand cannot take."""
+    things = () if request.scene is None else request.scene.things
+    at = None if place is None else match_place(place, request.world.places)
+    surface = None if at is None else surface_of(at, request.world)
+    return [
+        one
+        for one in things
+        if one.kind in GRASPABLE_CLASSES
+        and not one.held_by
+        and (one.rests is None or one.rests.relation != "in")
+        and (surface is None or (one.rests is not None and one.rests.of == surface))
+    ]
+
+
+def patrol(groups: Groups, request: Request) -> list[Step]:
+    """Drive over the free floor around a place in rows.
+
+    Raises:
+        NotAble: no map is at hand, or no floor is free there.
+    """
+    name = match_place(groups["place"], request.world.places)
+    site = request.world.sites.get(name or "")
+    if site is None:
+        raise NotAble(f'I do not know the area "{groups["place"]}"')
+    if request.world.is_free is None:
+        raise NotAble("without a map I cannot drive over an area")
+    points = list(rows(request, site.pose.x_m, site.pose.y_m))
+    if not points:
+        raise NotAble(f"the map shows no free floor around the {name}")
+    return [("navigate_to", {"x_m": x_m, "y_m": y_m}) for x_m, y_m in points[:MOST_POINTS]]
+
+
+def rows(request: Request, x_m: float, y_m: float) -> Iterator[tuple[float, float]]:
+    """Yield the ends of rows of free floor in a square, each row begun where the last ended."""
+    is_free = request.world.is_free
+    count = round(2 * REACH_M / ROW_M) + 1
+    steps = [round(-REACH_M + ROW_M * step, 3) for step in range(count)]
+    for number, across_m in enumerate(steps):
+        row_y_m = round(y_m + across_m, 3)
+        row = [round(x_m + along_m, 3) for along_m in steps]
+        free = [at for at in row if is_free is not None and is_free(at, row_y_m)]
+        ends = sorted({free[0], free[-1]}) if free else []
+        for at in ends if number % 2 == 0 else reversed(ends):
+            yield at, row_y_m

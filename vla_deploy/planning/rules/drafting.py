@@ -1,0 +1,149 @@
+"""Draft a plan from the table of rules: clause by clause, in the speaker's own words."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import NotUnderstood, UnknownObject
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.rules.building import Groups, Step, parts_of
+from vla_deploy.planning.rules.clauses import MOST_CLAUSES, MOST_LETTERS, polite_off, segments
+from vla_deploy.planning.rules.intents import PRIORITIES, Intent
+from vla_deploy.planning.rules.refusals import refuse_unable
+from vla_deploy.planning.rules.table import RULES, Rule
+from vla_deploy.planning.understanding.expressions import read_expression
+
+# Which hand to take: said at the end of a clause, whatever it is about.
+_WITH_HAND: Final = re.compile(
+    r"(?P<own>.+?),? (?:with|using|in) (?:the|your) (?P<arm>left|right) (?:hand|arm|gripper)"
+)
+_HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
+
+
+@dataclass(slots=True)
+class _Draft:
+    """Hold the steps so far, what they are for, and the last clause, which the next may shorten."""
+
+    request: Request
+    steps: list[tuple[Step, Intent]] = field(default_factory=list)
+    clause: str = ""
+    thing: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """Hold the rule that a clause fits."""
+
+    rule: Rule
+    groups: Groups
+
+
+def draft_plan(request: Request) -> Plan:
+    """Return the plan of a command as it was said; `ground_plan` makes it one that can run.
+
+    Raises:
+        NotUnderstood: no rule covers a clause.
+        NotAble: the robot cannot do such a thing.
+        UnknownObject: a clause names an object the robot cannot recognise.
+    """
+    text = request.text
+    if len(text) > MOST_LETTERS:
+        raise NotUnderstood(f"{text[:60]}...")
+    said = polite_off(text)
+    helped = _HELP.fullmatch(said)
+    parts = segments(said if helped is None else helped["own"])
+    if not parts or len(parts) > MOST_CLAUSES:
+        raise NotUnderstood(text)
+    draft = _Draft(request)
+    while parts:
+        parts = parts[_take_clause(parts, draft) :]
+    return Plan(goal=text.strip(), summary=_summary(draft.steps), actions=_chain(draft.steps))
+
+
+def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
+    """Build the longest clause that the parts begin with; return how many parts it took."""
+    for count in range(len(parts), 1, -1):
+        clause = " and ".join(parts[:count])
+        fit = _fit(clause)
+        if fit is not None and _is_whole(fit, draft.request):
+            _build(clause, fit, draft)
+            return count
+    clause = parts[0]
+    refuse_unable(clause)
+    fit = _fit(clause)
+    if fit is None and draft.thing and _is_one(clause, draft.request):
+        # "pick up the cup, then the ball": the clause before says what to do.
+        clause = draft.clause.replace(draft.thing, clause, 1)
+        fit = _fit(clause)
+    if fit is None:
+        raise NotUnderstood(parts[0])
+    _build(clause, fit, draft)
+    return 1
+
+
+def _fit(clause: str) -> _Fit | None:
+    hand = _WITH_HAND.fullmatch(clause)
+    own = clause if hand is None else hand["own"]
+    for rule in RULES:
+        found = rule.pattern.fullmatch(own)
+        if found is None:
+            continue
+        groups = {
+            name.removesuffix("2"): value
+            for name, value in found.groupdict().items()
+            if value is not None
+        }
+        return _Fit(rule, groups | ({"arm": hand["arm"]} if hand is not None else {}))
+    return None
+
+
+def _is_whole(fit: _Fit, request: Request) -> bool:
+    """Tell whether each of several things or places that a clause lists is one."""
+    listed = [name for name in ("object", "place") if " and " in fit.groups.get(name, "")]
+    others = [name for name in fit.groups if name not in listed and " and " in fit.groups[name]]
+    return bool(listed) and not others and all(
+        _is_one(part, request) for name in listed for part in parts_of(fit.groups[name])
+    )  # fmt: skip
+
+
+def _is_one(text: str, request: Request) -> bool:
+    if match_place(text, request.world.places):
+        return True
+    try:
+        read_expression(text)
+    except UnknownObject:
+        return False
+    return True
+
+
+def _build(clause: str, fit: _Fit, draft: _Draft) -> None:
+    steps = fit.rule.build(fit.groups, draft.request)
+    draft.steps += [(step, fit.rule.intent) for step in steps]
+    draft.clause = clause
+    draft.thing = fit.groups.get("object", fit.groups.get("place", ""))
+
+
+def _chain(steps: Sequence[tuple[Step, Intent]]) -> tuple[Action, ...]:
+    return tuple(
+        Action(
+            id=f"a{number}",
+            skill=skill,
+            parameters=parameters,
+            depends_on=(f"a{number - 1}",) if number > 1 else (),
+            priority=PRIORITIES[intent],
+        )
+        for number, ((skill, parameters), intent) in enumerate(steps, start=1)
+    )
+
+
+def _summary(steps: Sequence[tuple[Step, Intent]]) -> str:
+    """Return the intents and the steps in words."""
+    intents = ", ".join(dict.fromkeys(intent.value for _, intent in steps))
+    said = ", ".join(
+        " ".join([skill.replace("_", " "), *(str(value) for value in parameters.values())])
+        for (skill, parameters), _ in steps
+    )
+    return f"{intents}: {said}"

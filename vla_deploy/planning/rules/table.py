@@ -1,0 +1,134 @@
+"""List the rules: what a clause looks like, what it is for, and what builds its steps."""
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from vla_deploy.planning.rules import building, cleaning, telling
+from vla_deploy.planning.rules.building import Builder
+from vla_deploy.planning.rules.intents import Intent
+from vla_deploy.planning.understanding.quantities import NUMBER
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """Hold one row; a clause that fits `pattern` whole is built by `build`."""
+
+    intent: Intent
+    pattern: re.Pattern[str]
+    build: Builder
+
+
+_OBJECT: Final = r"(?P<object>.+?)"
+_PLACE: Final = r"(?P<place>.+)"
+_METRES: Final = (
+    rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:m|meters?|metres?|cm|centimeters?|centimetres?|"
+    r"feet|foot|steps?|paces?|inch|inches))"
+)
+_ANGLE: Final = rf"(?P<quantity>{NUMBER} ?(?:degrees?|deg|°|rad|radians?))"
+_SECONDS: Final = (
+    rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment))"
+)
+_WAY: Final = r"(?P<way>forwards?|ahead|straight(?: ahead| on)?|backwards?|back(?: up)?|in reverse)"
+_SIDE: Final = r"(?P<way>left|right|around|clockwise|counter-?clockwise|anti-?clockwise)"
+_HAND: Final = r"(?:the |your |a )?(?:(?P<arm>left|right) )?(?:grippers?|hands?|fingers|claws?)"
+_INTO: Final = (
+    r"(?P<relation>(?:back )?(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon))"
+)
+_ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
+    # --- stop
+    (Intent.STOP, r"(?:stop|halt|freeze|stand still)(?: moving| there)?", building.stop),
+    # --- questions
+    (Intent.QUESTION, r"what (?:do|can) you see|what is there|what's there|what is around(?: you)?|"
+     r"describe (?:the (?:scene|room)|what you see)|tell me what you see|what is in front of you|"
+     r"what objects (?:do you see|are there)", telling.tell_sight),
+    (Intent.QUESTION, rf"what(?:'s| is| do you see| can you see)(?: there)? (?:on|at) {_PLACE}",
+     telling.tell_sight),
+    (Intent.QUESTION, r"what (?:are you holding|do you (?:hold|have)|have you got)"
+     r"(?: in your hands?)?|what(?:'s| is) in your hands?|are you holding (?:anything|something)|"
+     r"do you (?:hold|have) (?:anything|something)(?: in your hands?)?", telling.tell_hands),
+    (Intent.QUESTION, r"where are you|where am i|which room (?:are you|is this)(?: in)?",
+     telling.tell_place),
+    (Intent.QUESTION, rf"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
+     rf"have you seen|do you know where) {_OBJECT}(?: is| are)?", telling.tell_or_find),
+    (Intent.QUESTION, rf"(?:do you see|is there|are there|see) (?:any |an? )?{_OBJECT}"
+     r"(?: there| here| anywhere)?", telling.tell_whether),
+    # --- assist
+    (Intent.ASSIST, r"help(?: me)?|i need (?:some |your )?help|assist(?: me)?|help out|"
+     r"what (?:can|could) you do(?: for me)?|who are you|what are you|how can you help(?: me)?",
+     telling.tell_abilities),
+    (Intent.ASSIST, r"(?:hold|take) (?:this|that) from me|hold this", building.hold),
+    # --- bring
+    (Intent.MANIPULATION, rf"(?:bring|fetch|get|give|hand|pass) me {_OBJECT}", building.bring),
+    (Intent.MANIPULATION, rf"(?:bring|carry|take|fetch|get|hand|give|deliver|pass) {_OBJECT} "
+     r"(?:over )?(?:here|(?:back )?to me)", building.bring),
+    (Intent.MANIPULATION, rf"fetch {_OBJECT}", building.bring),
+    # --- put
+    (Intent.MANIPULATION, rf"(?:put|set|lay) {_OBJECT} down|(?:put|set|lay) down (?P<object2>.+?)",
+     building.put_down),
+    (Intent.MANIPULATION, r"(?:let go(?: of)?|drop|release|let loose)(?: of)?(?: (?P<object>it|"
+     r"that|this|them))?", building.put_down),
+    (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
+     r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", building.put_away),
+    (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|take|stow|store|"
+     rf"leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} (?:down )?{_INTO} "
+     r"(?P<destination>.+)", building.put),
+    # --- straight and turning
+    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come|back) {_WAY}"
+     rf"(?: (?:by |for )?{_METRES})?", building.drive),
+    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step)(?: by)? {_METRES} {_WAY}", building.drive),
+    (Intent.NAVIGATION, rf"(?P<way>back up|reverse)(?: (?:by )?{_METRES})?", building.drive),
+    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|face|swivel)(?: to)?(?: the| your)? ?{_SIDE}"
+     rf"(?: (?:by )?{_ANGLE})?", building.turn),
+    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|swivel)(?: by)? {_ANGLE}"
+     rf"(?: (?:to )?(?:the )?{_SIDE})?", building.turn),
+    (Intent.NAVIGATION, r"(?:make|take|do) an? (?P<way>left|right)(?: turn)?|do a u-?turn",
+     building.turn),
+    # --- arms
+    (Intent.MANIPULATION, rf"(?P<verb>open|close|shut) {_HAND}", building.gripper),
+    (Intent.MANIPULATION, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?"
+     r"(?: in)?", building.tuck),
+    (Intent.MANIPULATION, r"(?:move|bring|put) (?:your |the )?(?:(?P<arm>left|right) )?arms? "
+     r"(?:to|into|in) (?:the )?(?P<pose>[a-z_ ]+?)(?: pose| position)?", building.pose),
+    # --- go
+    (Intent.NAVIGATION, r"(?:go|drive|come|move|navigate|return|walk|head|travel|roll|proceed|get|"
+     rf"run)(?: back| over| on)? (?:to|towards?|into) {_PLACE}", building.go),
+    (Intent.NAVIGATION, rf"(?:go|come|return|drive|head|walk|navigate|move)(?: back)? {_PLACE}",
+     building.go),
+    (Intent.NAVIGATION, rf"(?:visit|approach|make your way to|find your way to|park at|dock at|"
+     rf"wait at|position yourself at|take yourself to) {_PLACE}", building.go),
+    (Intent.NAVIGATION, r"(?P<place>dock|charge)(?: yourself)?", building.go),
+    # --- search
+    (Intent.SEARCH, rf"(?:search|check|look (?:in|on|around|through)|scan) {_PLACE} for {_OBJECT}",
+     building.find),
+    (Intent.SEARCH, rf"(?:find|search for|locate|look for|seek|hunt for|try to find|track down|"
+     rf"spot|detect|show me|point out|go (?:and )?find|look around for) {_OBJECT}", building.find),
+    (Intent.SEARCH, r"look around|have a look around|scan (?:the )?(?:room|area|surroundings)",
+     building.look_around),
+    (Intent.SEARCH, rf"(?:look around|scan|check(?: on)?) (?:in |at |on )?{_PLACE}",
+     building.look_around),
+    (Intent.SEARCH, r"(?:look|have a look|take a look|gaze|glance)(?: at| to| towards?)? "
+     r"(?P<what>.+)", building.look),
+    # --- clean
+    (Intent.CLEANING, r"(?:clean|tidy|clear)(?: things)?(?: up)?|clear (?:things )?away",
+     cleaning.tidy),
+    (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", cleaning.tidy),
+    (Intent.CLEANING, rf"(?:patrol|inspect|sweep(?: through)?|cover(?: the floor (?:of|in))?|"
+     rf"drive (?:all )?over(?: the floor (?:of|in))?) {_PLACE}", cleaning.patrol),
+    # --- pick
+    (Intent.MANIPULATION, rf"(?:pick|lift)(?: up)? {_OBJECT}(?: up)?", building.pick),
+    (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove)"
+     rf"(?: hold of)? {_OBJECT}", building.pick),
+    # --- the rest
+    (Intent.ASSIST, r"(?:say|repeat|announce|repeat after me|speak)[:,]? (?P<text>.+)",
+     building.speak),
+    (Intent.ASSIST, r"(?P<text>hello|hi|good morning|good evening|good night)(?: there)?",
+     building.speak),
+    (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay(?: here| there)?)(?: (?:for )?{_SECONDS})?",
+     building.wait),
+)  # fmt: skip
+
+RULES: Final[tuple[Rule, ...]] = tuple(
+    Rule(intent=intent, pattern=re.compile(pattern), build=build)
+    for intent, pattern, build in _ROWS
+)

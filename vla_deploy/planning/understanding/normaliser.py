@@ -1,0 +1,97 @@
+"""Bring the values of a plan into the catalogue's form: units, hands, poses, ids.
+
+Only what has one meaning is changed. What has none stays as it is, and the validator names it.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from vla_deploy.planning.catalogue import ARMS, SKILLS, Type
+from vla_deploy.planning.plan import Action
+from vla_deploy.planning.understanding.quantities import UNITS, quantity_of
+
+LONGEST_ID: Final = 48
+DIRECTIONS: Final[Mapping[str, str]] = {
+    "forward": "ahead", "forwards": "ahead", "straight": "ahead", "straight ahead": "ahead",
+    "front": "ahead", "upwards": "up", "downwards": "down", "floor": "down", "ceiling": "up",
+}  # fmt: skip
+RELATIONS: Final[Mapping[str, str]] = {
+    "into": "in", "inside": "in", "inside of": "in", "within": "in", "onto": "on",
+    "on top of": "on", "upon": "on", "over": "on", "at": "on", "to": "on",
+}  # fmt: skip
+# With these, whichever hand is best takes.
+_ANY_ARM: Final = frozenset({"", "any", "either", "auto", "default", "none", "null"})
+
+
+def normalised(action: Action, poses: frozenset[str] = frozenset()) -> Action:
+    """Return an action with its values in the catalogue's form; what is None is left out."""
+    spec = SKILLS.get(action.skill)
+    if spec is None:
+        return action
+    parameters: dict[str, Any] = {}
+    for name, value in action.parameters.items():
+        if value is None or (name == "arm" and str(value).strip().lower() in _ANY_ARM):
+            continue
+        parameter = spec.parameters.get(name)
+        if parameter is not None and parameter.type is Type.NUMBER:
+            value = _number(name, value)
+        elif name in _TEXTS and isinstance(value, str):
+            value = _TEXTS[name](value, poses)
+        parameters[name] = value
+    return action.model_copy(update={"parameters": parameters})
+
+
+def _number(name: str, value: Any) -> Any:
+    """Return "50 cm" in the unit that the parameter's name ends in."""
+    dimension = next((one for one in ("m_s", "rad", "m", "s") if name.endswith(f"_{one}")), "")
+    if not isinstance(value, str) or dimension not in UNITS:
+        return value
+    quantity = quantity_of(value[:40], dimension)
+    return value if quantity is None else quantity
+
+
+def _arm(value: str, _: frozenset[str]) -> str:
+    side = re.sub(r"[ _-]?(?:hand|arm|gripper)$", "", value.strip().lower())
+    return side if side in ARMS else value
+
+
+def _pose(value: str, poses: frozenset[str]) -> str:
+    spoken = re.sub(r"[ -]+", "_", value.strip().lower())
+    return spoken if spoken in poses else value
+
+
+def _named(table: Mapping[str, str]) -> Callable[[str, frozenset[str]], str]:
+    return lambda value, _: table.get(value.strip().lower(), value.strip().lower())
+
+
+_TEXTS: Final[Mapping[str, Callable[[str, frozenset[str]], str]]] = {
+    "arm": _arm,
+    "pose": _pose,
+    "direction": _named(DIRECTIONS),
+    "relation": _named(RELATIONS),
+}
+
+
+def with_unique_ids(actions: Sequence[Action]) -> tuple[Action, ...]:
+    """Give each action an id of its own; who depends on a doubled id means the latest before it."""
+    taken: set[str] = set()
+    latest: dict[str, str] = {}
+    unique = []
+    for action in actions:
+        depends_on = tuple(latest.get(one, one) for one in action.depends_on)
+        name = free_id(action.id, taken)
+        taken.add(name)
+        latest[action.id] = name
+        unique.append(action.model_copy(update={"id": name, "depends_on": depends_on}))
+    return tuple(unique)
+
+
+def free_id(wanted: str, taken: set[str]) -> str:
+    """Return an id like the wanted one that is not taken."""
+    if wanted not in taken:
+        return wanted
+    number = 2
+    while f"{wanted[:LONGEST_ID]}_{number}" in taken:
+        number += 1
+    return f"{wanted[:LONGEST_ID]}_{number}"

@@ -1,0 +1,189 @@
+"""Say, for each skill, which of its parameters refer to something, and resolve them."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final
+
+from vla_deploy.planning.errors import UnknownObject, UnknownPlace
+from vla_deploy.planning.plan import Action
+from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.symbolic.conditions import PUT_INTO
+from vla_deploy.planning.symbolic.state import Held, State
+from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.understanding import phrases
+from vla_deploy.planning.understanding.conversation import Role
+from vla_deploy.planning.understanding.fitting import Use
+from vla_deploy.planning.understanding.insertions import (
+    Step,
+    is_surface,
+    nearest_furniture,
+    surface_of,
+)
+from vla_deploy.planning.understanding.places import is_like_place, resolve_place
+from vla_deploy.planning.understanding.resolver import Referent, Resolver
+
+Parameters = Mapping[str, Any]
+GetState = Callable[[], State]
+# So near to where one stands for a table, that table is "here".
+HERE_M: Final = 1.2
+
+
+def grounded_steps(action: Action, resolver: Resolver, state: GetState) -> Iterator[Step]:
+    """Yield an action with what it refers to resolved: several for "both cups", none if it is done.
+
+    `state` tells what holds after the steps yielded so far.
+
+    Raises:
+        PlanningError: what it refers to is not known, or must be asked.
+    """
+    handle = _HANDLERS.get(action.skill)
+    if handle is None:
+        yield action.skill, action.parameters
+        return
+    yield from handle(action.parameters, resolver, state)
+
+
+def _navigate(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
+    del state
+    rest = {name: value for name, value in given.items() if name not in ("place", "object")}
+    goal = given.get("place", given.get("object"))
+    if not isinstance(goal, str) or ("place" in given and "object" in given):
+        yield "navigate_to", given
+        return
+    if phrases.PRONOUNS.get(_spoken(goal)) == phrases.HERE:
+        yield "navigate_to", {**rest, **_here(goal, resolver)}
+        return
+    thing = _thing_unless_place(goal, resolver, Use.SEE)
+    if thing is None:
+        yield "navigate_to", {**rest, "place": resolve_place(goal, resolver)}
+        return
+    yield from _on_furniture(thing)
+    yield "navigate_to", {**rest, "object": thing.name}
+
+
+def _here(text: str, resolver: Resolver) -> Parameters:
+    here = resolver.setting.request.here
+    if here is None:
+        raise UnknownPlace(text, set(resolver.setting.request.world.places.values()))
+    x_m, y_m, yaw_rad = (round(value, 3) for value in here)
+    resolver.note(text, Role.PLACE, f"{x_m}, {y_m}", "where the command was given")
+    return {"x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad}
+
+
+def _thing_unless_place(text: str, resolver: Resolver, use: Use) -> Referent | None:
+    """Return the thing that a text names, None where it names a place by its name or no thing."""
+    if match_place(text, resolver.setting.request.world.places):
+        return None
+    if phrases.PRONOUNS.get(_spoken(text)) == phrases.THERE:
+        latest = next(iter(resolver.setting.spoken_of()), None)
+        if latest is None or latest.role is Role.PLACE:
+            return None
+        text = latest.thing_id or latest.means
+    try:
+        return resolver.thing(text, use)
+    except UnknownObject:
+        if use is Use.ONTO and not is_like_place(text, resolver):
+            raise
+        return None
+
+
+def _see(skill: str) -> Callable[[Parameters, Resolver, GetState], Iterator[Step]]:
+    def handle(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
+        del state
+        if not isinstance(given.get("object"), str):
+            yield skill, given
+            return
+        thing = resolver.things(given["object"], Use.SEE)[0]
+        yield from _on_furniture(thing)
+        yield skill, {**given, "object": thing.name}
+
+    return handle
+
+
+def _pick(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
+    if not isinstance(given.get("object"), str):
+        yield "pick_up", given
+        return
+    for thing in resolver.things(given["object"], Use.TAKE):
+        if _held(thing, state(), resolver) is None:
+            yield from _on_furniture(thing)
+            yield "pick_up", {**given, "object": thing.name}
+
+
+def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
+    put = {name: value for name, value in given.items() if name != "object"}
+    things: tuple[Referent | None, ...] = (None,)
+    if isinstance(given.get("object"), str):
+        things = resolver.things(given["object"], Use.PUT)
+    destination = _destination(given, resolver, state)
+    for thing in things:
+        if thing is not None and _held(thing, state(), resolver) is None:
+            yield from _on_furniture(thing)
+            yield "pick_up", {"object": thing.name, **_arm(given)}
+        held = None if thing is None else _held(thing, state(), resolver)
+        hand = (
+            {"arm": held.hand} if held is not None and held.hand and len(state().held) > 1 else {}
+        )
+        yield "place", {**put, **destination, **hand}
+
+
+def _arm(given: Parameters) -> Parameters:
+    return {"arm": given["arm"]} if "arm" in given else {}
+
+
+def _held(thing: Referent, state: State, resolver: Resolver) -> Held | None:
+    """Return the holding of a thing, which without a scene goes by its kind alone."""
+    key = subject_of(thing.name, resolver.setting.request.scene).key
+    return next((one for one in state.held if one.key in (key, thing.kind)), None)
+
+
+def _destination(given: Parameters, resolver: Resolver, state: GetState) -> Parameters:
+    """Return where to put it and how; without a word about it, on the nearest furniture."""
+    text = given.get("destination")
+    if text is not None and not isinstance(text, str):
+        return {}
+    relation = given.get("relation")
+    if text is None or phrases.PRONOUNS.get(_spoken(text)) == phrases.HERE:
+        return _put_here(text or "down", resolver, state())
+    thing = _thing_unless_place(text, resolver, Use.ONTO)
+    if thing is not None:
+        default = "in" if thing.kind in PUT_INTO else "on"
+        return {"destination": thing.name, "relation": relation or default}
+    world = resolver.setting.request.world
+    place = resolve_place(text, resolver)
+    surface = surface_of(place, world)
+    if surface != place:
+        resolver.note(place, Role.DESTINATION, surface, "the furniture there")
+    return {"destination": surface, "relation": "on"}
+
+
+def _put_here(text: str, resolver: Resolver, state: State) -> Parameters:
+    world = resolver.setting.request.world
+    table = state.at if is_surface(state.at, world) else nearest_furniture(state.spot, world)
+    if table is None:
+        raise UnknownPlace(text, set(world.places.values()))
+    near = state.spot is not None and math.dist(
+        state.spot, (world.sites[table].pose.x_m, world.sites[table].pose.y_m)
+    ) <= HERE_M  # fmt: skip
+    why = "it is here" if near or state.at == table else "the nearest furniture"
+    resolver.note(text, Role.DESTINATION, table, why)
+    return {"destination": table, "relation": "on"}
+
+
+def _on_furniture(thing: Referent) -> Iterator[Step]:
+    """Go first to the furniture on which an unseen thing was said to be."""
+    if thing.look_at:
+        yield "navigate_to", {"place": thing.look_at}
+
+
+def _spoken(text: str) -> str:
+    return " ".join(words_of(text)) or text.strip().lower()
+
+
+_HANDLERS: Final[Mapping[str, Callable[[Parameters, Resolver, GetState], Iterator[Step]]]] = {
+    "navigate_to": _navigate,
+    "find_object": _see("find_object"),
+    "look_at": _see("look_at"),
+    "pick_up": _pick,
+    "place": _place,
+}
