@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from platforms import SpeechSettings
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.sound import SoundBlock
 
@@ -35,6 +36,14 @@ class StreamListener(Protocol):
 
     def feed(self, block: SoundBlock) -> None:
         """Take the next block; one that does not follow the last one begins anew."""
+        ...
+
+    def refuses(self, began_ns: int, ended_ns: int) -> str:
+        """Return why a phrase of that time is no command; empty where it may be one."""
+        ...
+
+    def heed(self, settings: SpeechSettings) -> None:
+        """Go by the settings of another profile from now on."""
         ...
 
     def document(self) -> Mapping[str, Any]:

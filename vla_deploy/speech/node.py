@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -18,12 +18,13 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.speech.choosing import Ears, ears_of
 from vla_deploy.speech.companions import Playing, StreamListener, Voice
 from vla_deploy.speech.errors import SpeechError, SpeechMissing
-from vla_deploy.speech.hearing import Hearing
+from vla_deploy.speech.hearing import Heard, Hearing
 from vla_deploy.speech.hot_words import HotWords
 from vla_deploy.speech.microphone import Microphone, OpenInput
 from vla_deploy.speech.readings import Readings
 from vla_deploy.speech.sound import SoundBlock
 from vla_deploy.speech.telling import Telling
+from vla_deploy.speech.verdict import Judgement, Verdict
 from vla_deploy.speech.voice_activity import open_voice_activity
 
 STATUS_PERIOD_NS: Final = round(NS_PER_S / BY_NAME["speech_status"].rate_hz)
@@ -96,7 +97,7 @@ class SpeechNode:
         self._take_loaded()
         if self._hearing is not None:
             for heard in self._hearing.heard():
-                self._telling.tell(heard)
+                self._telling.tell(self._after_listeners(heard))
         self._tell_status()
 
     def stop(self) -> None:
@@ -115,6 +116,8 @@ class SpeechNode:
     def commit(self, prepared: Prepared) -> Prepared:
         """Change settings and recogniser between two phrases."""
         before, self._profile = self._profile, prepared.profile
+        for listener in self._listeners:
+            listener.heed(prepared.profile.speech)
         hearing = self._hearing
         if hearing is None:
             return Prepared(profile=before, ears=Ears(recogniser=None, why=self._deaf))
@@ -185,6 +188,17 @@ class SpeechNode:
             return
         if barged_ns is not None and self._voice is not None:
             self._voice.barge_in(barged_ns)
+
+    def _after_listeners(self, heard: Heard) -> Heard:
+        """Keep a phrase from being a command that a listener has taken for something else."""
+        if heard.judgement.verdict is Verdict.STOP:
+            return heard
+        for listener in self._listeners:
+            reason = listener.refuses(heard.phrase.began_ns, heard.phrase.ended_ns)
+            if reason:
+                judgement = Judgement(verdict=Verdict.REJECTED, reason=reason)
+                return replace(heard, judgement=judgement)
+        return heard
 
     def _playing(self) -> Playing | None:
         return None if self._voice is None else self._voice.playing

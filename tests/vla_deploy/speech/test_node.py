@@ -13,7 +13,7 @@ from drivers.audio.base import AudioFormat, AudioInput, Samples
 from drivers.audio.pushed import PushedInput
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.errors import DeviceMissing
-from platforms import Profile, load_profile
+from platforms import Profile, SpeechSettings, load_profile
 from sim_twin.contracts.scripted import ManualClock
 from sim_twin.sound.acoustics import Acoustics
 from sim_twin.sound.talker import Talker, arrival
@@ -36,12 +36,19 @@ class Listener:
     def __init__(self) -> None:
         self.blocks: list[SoundBlock] = []
         self.closed = 0
+        self.refusal = ""
 
     def start(self, space: SharedSpace) -> None:
         self.space = space
 
     def feed(self, block: SoundBlock) -> None:
         self.blocks.append(block)
+
+    def refuses(self, began_ns: int, ended_ns: int) -> str:
+        return self.refusal
+
+    def heed(self, settings: SpeechSettings) -> None:
+        self.settings = settings
 
     def document(self) -> Mapping[str, Any]:
         return {"blocks": len(self.blocks)}
@@ -296,6 +303,23 @@ def test_a_spoken_stop_presses_the_button(bench: MakeBench) -> None:
     (press,) = rig.told("operator")
     assert (press["act"], press["source"]) == ("estop", "voice")
     assert rig.told("utterance") == []
+
+
+def test_a_phrase_that_a_listener_has_taken_is_no_command(bench: MakeBench) -> None:
+    rig = bench()
+    rig.listener.refusal = "'stop' was heard in it"
+    rig.quiet(1.0)
+    rig.say(TEXT)
+    (heard,) = rig.told("heard")
+    assert (heard["verdict"], heard["reason"]) == ("rejected", "'stop' was heard in it")
+    assert rig.told("utterance") == rig.told("say") == []
+
+
+def test_listeners_heed_the_settings_of_another_profile(bench: MakeBench) -> None:
+    rig = bench()
+    changed = short_phrases(load_profile("desktop"))
+    rig.node.commit(dataclasses.replace(rig.node.prepare(changed, 0), profile=changed))
+    assert rig.listener.settings is changed.speech
 
 
 def test_the_robot_does_not_heed_itself_but_a_person_who_speaks_into_it(bench: MakeBench) -> None:

@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
+from platforms import SpeechSettings
 from vla_deploy.inference.errors import InferenceError, RunFailed
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
@@ -19,6 +20,7 @@ from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
 
 SOURCE: Final = "voice"
 OFF: Final = "off"
+OFF_WHY: Final = "switched off by the profile: speech.stop_words"
 KEPT: Final = 8
 OVERLAP_NS: Final = NS_PER_S // 2
 """A phrase that ends so long before a word was settled may still have held it."""
@@ -47,13 +49,13 @@ class StopWords:
     def __init__(
         self,
         open_spotter: OpenSpotter,
-        sensitivity: str,
+        settings: SpeechSettings,
         clock: Clock,
         playing: Callable[[], Playing | None] = lambda: None,
     ) -> None:
         """Take how the model is opened, which of its thresholds holds, and what the robot says."""
         self._open_spotter = open_spotter
-        self._sensitivity = sensitivity
+        self._sensitivity = settings.stop_words
         self._clock = clock
         self._playing = playing
         self._own = OwnVoice()
@@ -61,33 +63,35 @@ class StopWords:
         self._thresholds: Mapping[str, float] = {}
         self._pressed: deque[Spotted] = deque(maxlen=KEPT)
         self._counts = {"spotted": 0, "own_voice": 0, "failed_runs": 0}
-        self._why = ""
+        self._broken = ""
 
     @property
     def state(self) -> State:
         """Return whether a spoken stop is heard."""
         if self._sensitivity == OFF:
             return State.OFF
-        return State.BROKEN if self._spotter is None or self._why else State.LIVE
+        return State.BROKEN if self._broken else State.LIVE
 
     def start(self, space: SharedSpace) -> None:
         """Open button and model; why it cannot be opened is told, and the robot goes on."""
         self._button = StopButton(space, SOURCE, self._clock)
         self._heard = space.ring_writer("heard")
-        if self._sensitivity == OFF:
-            self._why = "switched off by the profile: speech.stop_words"
-            _log.warning("degraded: nobody can stop the robot by voice: %s", self._why)
-            return
         try:
             self._spotter, self._thresholds = self._open_spotter()
         except (InferenceError, StopWordsError) as error:
-            self._why = str(error)
-            _log.error("degraded: nobody can stop the robot by voice: %s", error)
+            self._break(str(error))
+        self._warn_if_off()
+
+    def heed(self, settings: SpeechSettings) -> None:
+        """Go by the sensitivity of another profile from now on."""
+        changed, self._sensitivity = self._sensitivity != settings.stop_words, settings.stop_words
+        if changed:
+            self._warn_if_off()
 
     def feed(self, block: SoundBlock) -> None:
         """Take the next block, and press the button where a stop word was heard in it."""
         self._own.follow(self._playing(), self._clock.now_ns())
-        if self._spotter is None:
+        if self._spotter is None or self._sensitivity == OFF:
             return
         if not block.follows:
             self._spotter.reset()
@@ -97,25 +101,27 @@ class StopWords:
         try:
             spotted = self._spotter.feed(block.samples, block.end_ns, threshold)
         except RunFailed as error:
-            self._fail(error)
+            self._counts["failed_runs"] += 1
+            self._break(str(error))
             return
         if self._spotter.runs > runs:
-            self._why = ""
+            self._broken = ""
         if spotted is not None:
             self._take(spotted)
 
-    def stopped_in(self, began_ns: int, ended_ns: int) -> bool:
-        """Tell whether a stop word was heard within a phrase, which then is no command."""
-        return any(
-            began_ns <= spotted.stamp_ns <= ended_ns + OVERLAP_NS for spotted in self._pressed
-        )
+    def refuses(self, began_ns: int, ended_ns: int) -> str:
+        """Return that a stop word was heard in a phrase of that time, if so: it is no command."""
+        for spotted in self._pressed:
+            if began_ns <= spotted.stamp_ns <= ended_ns + OVERLAP_NS:
+                return f"{spotted.word!r} was heard in it: the robot has stopped"
+        return ""
 
     def document(self) -> Mapping[str, Any]:
         """Return what `speech_status` tells under "stop_words"."""
         newest = self._pressed[-1] if self._pressed else None
         return {
             "state": self.state,
-            "why": self._why,
+            "why": OFF_WHY if self._sensitivity == OFF else self._broken,
             "sensitivity": self._sensitivity,
             "words": [] if self._spotter is None else list(self._spotter.words),
             **self._counts,
@@ -148,8 +154,11 @@ class StopWords:
         )
         _log.warning("stopped: heard %r, score %.2f", spotted.word, spotted.score)
 
-    def _fail(self, error: RunFailed) -> None:
-        self._counts["failed_runs"] += 1
-        if not self._why:
-            _log.error("degraded: nobody can stop the robot by voice: %s", error)
-        self._why = str(error)
+    def _break(self, why: str) -> None:
+        if not self._broken:
+            _log.error("degraded: nobody can stop the robot by voice: %s", why)
+        self._broken = why
+
+    def _warn_if_off(self) -> None:
+        if self._sensitivity == OFF:
+            _log.warning("degraded: nobody can stop the robot by voice: %s", OFF_WHY)

@@ -1,12 +1,29 @@
-"""Open the spotter that a profile chooses."""
+"""Open the spotter that a profile chooses, and build the listener around it."""
 
 from collections.abc import Mapping
+from typing import Final
 
 from platforms import Profile
 from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.node import NodeContext
+from vla_deploy.speech.companions import Voice
+from vla_deploy.speech.stop_words.listener import StopWords
 from vla_deploy.speech.stop_words.spotter import Spotter
 
-ROLE = "key_words"
+ROLE: Final = "key_words"
+
+
+def build_stop_words(
+    context: NodeContext, profile: Profile, voice: Voice | None = None
+) -> StopWords:
+    """Return the listener; it opens the profile's model when the node starts."""
+    shelf = ModelShelf.of_base(context.run_dir.parent, context.clock)
+    return StopWords(
+        lambda: open_spotter(shelf, profile),
+        profile.speech,
+        context.clock,
+        lambda: None if voice is None else voice.playing,
+    )
 
 
 def open_spotter(shelf: ModelShelf, profile: Profile) -> tuple[Spotter, Mapping[str, float]]:

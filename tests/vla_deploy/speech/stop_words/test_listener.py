@@ -1,5 +1,6 @@
 """A stop word presses the button at once; whatever keeps it from being heard is told loudly."""
 
+import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
+from platforms import SpeechSettings, load_profile
 from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.ipc import SharedSpace
@@ -18,6 +20,10 @@ from vla_deploy.speech.stop_words.spotter import Spotter
 
 THRESHOLDS = {"low": 0.9, "normal": 0.7, "high": 0.5, "own_voice": 0.95}
 BLOCK = 512
+
+
+def settings(sensitivity: str) -> SpeechSettings:
+    return dataclasses.replace(load_profile("desktop").speech, stop_words=sensitivity)
 
 
 class Ear:
@@ -32,7 +38,9 @@ class Ear:
         self._open_spotter = open_spotter
 
     def listen(self, sensitivity: str = "normal") -> StopWords:
-        self.listener = StopWords(self._open_spotter, sensitivity, self.clock, lambda: self.playing)
+        self.listener = StopWords(
+            self._open_spotter, settings(sensitivity), self.clock, lambda: self.playing
+        )
         self.listener.start(self.space)
         return self.listener
 
@@ -83,9 +91,9 @@ def test_the_phrase_that_held_the_word_is_known_afterwards(ear: Ear) -> None:
     ear.hear(0.4, 0.3)
     ended_ns = ear.clock.ns
     ear.hear(2.0, 0.0)
-    assert listener.stopped_in(began_ns, ended_ns)
-    assert not listener.stopped_in(0, began_ns - NS_PER_S)
-    assert not listener.stopped_in(ended_ns, ear.clock.ns)
+    assert "'stop' was heard" in listener.refuses(began_ns, ended_ns)
+    assert listener.refuses(0, began_ns - NS_PER_S) == ""
+    assert listener.refuses(ended_ns, ear.clock.ns) == ""
 
 
 def speaking(text: str, say_id: str = "a") -> Playing:
@@ -143,6 +151,16 @@ def test_switched_off_it_says_so_and_hears_nothing(
     assert listener.state is State.OFF
     assert "speech.stop_words" in listener.document()["why"]
     assert "nobody can stop the robot by voice" in caplog.text
+
+
+def test_another_profile_switches_it_on_and_off_while_it_runs(ear: Ear) -> None:
+    listener = ear.listen("off")
+    listener.heed(settings("normal"))
+    ear.word()
+    assert len(ear.presses()) == 1
+    listener.heed(settings("off"))
+    ear.word()
+    assert (ear.presses(), listener.state) == ([], State.OFF)
 
 
 def test_without_its_model_it_says_so_and_the_node_goes_on(
