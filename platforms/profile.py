@@ -20,6 +20,7 @@ __all__ = [
     "PROFILES",
     "BoardLimits",
     "ModelChoice",
+    "PlanningSettings",
     "ProcessSettings",
     "Profile",
     "SpeechSettings",
@@ -88,6 +89,22 @@ class SpeechSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PlanningSettings:
+    """Declare who plans what rules do not cover, and how long that may take.
+
+    `servers` are names of `servers.toml`, asked in this order after the model on board; of all
+    that take time, `max_rungs` at most. `within_s` is the time for all of them together. An unsure
+    server is asked for `candidates` plans; a prompt has `prompt_characters` at most.
+    """
+
+    within_s: float
+    servers: tuple[str, ...]
+    max_rungs: int
+    candidates: int
+    prompt_characters: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
     """Declare how the stack runs on one kind of computer.
 
@@ -111,6 +128,7 @@ class Profile:
     board: BoardLimits
     processes: Mapping[str, ProcessSettings]
     speech: SpeechSettings
+    planning: PlanningSettings
     models: Mapping[str, ModelChoice]
     budgets: Mapping[str, ProcessBudget]
     total: TotalBudget
@@ -153,6 +171,9 @@ def _build(name: str, values: Table) -> Profile:
             for process, table in values["processes"].items()
         },
         "speech": SpeechSettings(**values["speech"]),
+        "planning": PlanningSettings(
+            **{**values["planning"], "servers": tuple(values["planning"]["servers"])}
+        ),
         "models": {role: _model(table) for role, table in values.get("models", {}).items()},
         "total": TotalBudget(**budgets.pop("total")),
         "budgets": {process: ProcessBudget(**table) for process, table in budgets.items()},

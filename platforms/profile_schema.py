@@ -175,7 +175,16 @@ _TIMING: Keys = {
     "fall_s": _Range(0.1, 3600, "s"),
     "release_ratio": _Range(0.1, 1.0, ""),
 }
-_TABLES: Final = ("board", "processes", "speech", "models", "budgets", "ladder", "ladder_timing")
+_PLANNING: Keys = {
+    "within_s": _Range(1, 300, "s"),
+    "servers": _ListOf(_Text(), empty=True),
+    "max_rungs": _Range(0, 8, "", integer=True),
+    "candidates": _Range(1, 5, "", integer=True),
+    "prompt_characters": _Range(6000, 200_000, "characters", integer=True),
+}
+_TABLES: Final = (
+    "board", "processes", "speech", "planning", "models", "budgets", "ladder", "ladder_timing",
+)  # fmt: skip
 
 
 def schema_faults(values: Table) -> Iterator[Fault]:
@@ -185,6 +194,7 @@ def schema_faults(values: Table) -> Iterator[Fault]:
     yield from _table_faults("board", values.get("board"), _BOARD)
     yield from _group_faults("processes", values.get("processes"), NODES, _SETTINGS)
     yield from _table_faults("speech", values.get("speech"), _SPEECH)
+    yield from _table_faults("planning", values.get("planning"), _PLANNING)
     yield from _model_faults(values.get("models", {}))
     yield from _budget_faults(values.get("budgets"))
     yield from _ladder_faults(values.get("ladder"))

@@ -6,11 +6,11 @@ from typing import Final
 from vla_deploy.analysis.claims import SceneClaims
 from vla_deploy.analysis.cross_check import weighed
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.analysis.picture import small_jpeg
 from vla_deploy.analysis.prompt import chat_about
 from vla_deploy.analysis.question import Analyser, Question
 from vla_deploy.model_servers.asking import StructuredAsker
 from vla_deploy.model_servers.errors import ModelServerError
+from vla_deploy.model_servers.picture import small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
 

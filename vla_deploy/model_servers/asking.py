@@ -23,6 +23,8 @@ Shape = TypeVar("Shape", bound=BaseModel)
 # How servers say that they know no schema; one fails with 500 instead.
 _NO_SUCH_RUNG: Final = frozenset({400, 404, 415, 422, 500, 501})
 _MOST_FAULTS: Final = 8
+# What is wrong with a long answer is seen from its beginning.
+_ECHOED_CHARACTERS: Final = 8_000
 _REPAIRABLE: Final = (AnswerMalformed, AnswerInvalid)
 
 
@@ -41,6 +43,11 @@ class StructuredAsker(Generic[Shape]):
     def rung(self) -> str:
         """Return how the server is asked now."""
         return self._server.format.rungs[self._rung]
+
+    @property
+    def schema_characters(self) -> int:
+        """Return how long the schema is that every question carries in words."""
+        return len(_in_words(self._schema))
 
     def ask(self, chat: Chat, deadline: Deadline | None = None) -> Shape:
         """Return the model's answer; one that has the wrong shape is sent back with its faults.
@@ -98,14 +105,18 @@ def _faults(error: ValidationError) -> tuple[str, ...]:
 
 def _with_schema(system: str, schema: Mapping[str, Any]) -> str:
     """Say the schema in words too: not every server enforces it, and none its bounds."""
+    return f"{system}\n\n{_in_words(schema)}".lstrip()
+
+
+def _in_words(schema: Mapping[str, Any]) -> str:
     text = json.dumps(schema, ensure_ascii=False, separators=(",", ":"))
     wish = "Answer with one JSON object and nothing else. It must follow this JSON Schema:"
-    return f"{system}\n\n{wish}\n{text}".lstrip()
+    return f"{wish}\n{text}"
 
 
 def _repair(chat: Chat, text: str, error: AnswerUnusable) -> Chat:
     """Return the conversation that sends an answer back, without images: its form is wrong."""
     before = tuple(replace(message, images=()) for message in chat.messages)
-    said = Message(role=Role.ASSISTANT, text=text)
+    said = Message(role=Role.ASSISTANT, text=text[:_ECHOED_CHARACTERS])
     wish = Message(text=f"That cannot be used: {error}. Answer again with the JSON object only.")
     return replace(chat, messages=(*before, said, wish))

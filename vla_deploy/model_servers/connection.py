@@ -17,6 +17,8 @@ from vla_deploy.model_servers.settings import ServerSettings
 
 # The client sends a buffer in a loop with one time-out for each turn: small buffers, few turns.
 _CHUNK_BYTES: Final = 16_384
+# How often a wait for the answer looks whether anybody still wants it.
+_LOOK_S: Final = 0.2
 
 
 class GuardedBackend(httpcore2.NetworkBackend):
@@ -76,7 +78,16 @@ class _DeadlineStream(httpcore2.NetworkStream):
         self._deadline = deadline
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        return self._stream.read(max_bytes, self._deadline.bound_s(timeout))
+        silence_s = self._deadline.bound_s(timeout)
+        if self._deadline.recall is None:
+            return self._stream.read(max_bytes, silence_s)
+        silence = Deadline.within(self._deadline.clock, silence_s)
+        while True:
+            try:
+                return self._stream.read(max_bytes, self._deadline.bound_s(_LOOK_S))
+            except httpcore2.ReadTimeout:
+                if silence.left_s <= 0.0:
+                    raise
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         for start in range(0, len(buffer), _CHUNK_BYTES):

@@ -2,7 +2,10 @@
 
 import sys
 
+from platforms import load_profile
+from vla_deploy.aside import beside
 from vla_deploy.node import NodeContext
+from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
@@ -10,7 +13,10 @@ from vla_deploy.robots import load_robot
 
 def build(context: NodeContext) -> PlannerNode:
     """Build the node from what the process was started with."""
-    return PlannerNode(context, load_robot(context.robot))
+    robot = load_robot(context.robot)
+    settings = load_profile(context.profile).planning
+    planner = open_planner(robot, settings, context.clock, context.run_dir.parent)
+    return PlannerNode(context, robot, planner, beside("plan"))
 
 
 if __name__ == "__main__":

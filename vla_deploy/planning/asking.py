@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.model_servers.picture import Image
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding.conversation import Conversation
@@ -16,7 +17,9 @@ class Request:
 
     `here` is the robot's x and y in metres and its yaw in radians, in the map. `recollections` are
     what the robot remembers that may bear on the command, a sentence each. `heard_confidence`, 0 to
-    1, is how sure the recogniser is of the words; None for typed text.
+    1, is how sure the recogniser is of the words; None for typed text. `image` (rows, columns, RGB)
+    is what the robot sees now, where a rung can use it. `failed` tells plans for this command that
+    were tried before, and what went wrong.
     """
 
     command_id: str
@@ -27,6 +30,8 @@ class Request:
     conversation: Conversation = field(default_factory=Conversation)
     recollections: tuple[str, ...] = ()
     heard_confidence: float | None = None
+    image: Image | None = field(default=None, compare=False, repr=False)
+    failed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -142,12 +142,11 @@ class Desk:
             **self.accounts.document(),
             "commands": [*held, *(one.command_id for one in self._queue)],
             "question": None if question is None else question.text,
-            "rungs": list(self.planner.rungs),
-            "cache": self.planner.cache.document(),
+            **self.planner.document(),
         }
 
     def _begin(self, command: Command) -> None:
-        request = self._situation.request(command, self._talk)
+        request = self._situation.request(command, self._talk, self.planner.sees)
         if command.plan is not None:
             self._conclude(command, request, self.planner.check_given(command.plan, request))
             return

@@ -7,6 +7,7 @@ PlanningError
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
+├── CannotBeDone      ask for something else: a planner has seen that this cannot be done
 ├── Declined          ask the next rung of the ladder: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
 ├── NotReady          reset and arm the robot first
@@ -67,6 +68,10 @@ class DependsOnView(UnknownObject):
             f'"{name}": left, right, in front and behind change while I drive; say what it is '
             "on, in or next to",
         )
+
+
+class CannotBeDone(PlanningError):
+    """Say why a planner thinks that a command cannot be carried out."""
 
 
 class Declined(PlanningError):

@@ -4,9 +4,11 @@ from concurrent.futures import Executor
 from typing import Final
 
 from drivers.clock import NS_PER_S
+from platforms import Profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace
 from vla_deploy.node import NodeContext
+from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.desk import Desk
 from vla_deploy.planning.errors import NotReady, PlanningError
 from vla_deploy.planning.inbox import Command, asks_to_stop, command_id_of, read_command
@@ -39,6 +41,7 @@ class PlannerNode:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
         self._robot = robot
+        self._base = context.run_dir.parent
         self._planner = planner or Planner(context.clock)
         self._aside = aside or AtOnce()
         self._status_due_ns = 0
@@ -76,6 +79,19 @@ class PlannerNode:
         """Close the topics; what is planned beside the steps is given up."""
         self._aside.shutdown(wait=False, cancel_futures=True)
         self._space.close()
+
+    def prepare(self, profile: Profile, model_tier: int) -> Planner:
+        """Build the planner that a profile asks for."""
+        del model_tier  # servers have no tiers
+        return open_planner(self._robot, profile.planning, self._clock, self._base)
+
+    def commit(self, prepared: Planner) -> Planner:
+        """Plan by the new planner from the next command on."""
+        before, self._desk.planner = self._desk.planner, prepared
+        return before
+
+    def discard(self, prepared: Planner) -> None:
+        """Release nothing: a server holds no connection between two calls."""
 
     def _take_up(self, before: LeftOver) -> None:
         for command_id in before.in_work:

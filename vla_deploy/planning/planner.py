@@ -1,8 +1,8 @@
 """Plan one command: what answers at once first, what takes time after it, in one time for all."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final, Protocol, runtime_checkable
 
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
@@ -32,8 +32,25 @@ def checked(plan: Plan, request: Request) -> Plan:
     return grounded
 
 
+@runtime_checkable
+class Served(Protocol):
+    """Tell more of a rung that asks a server."""
+
+    @property
+    def sees(self) -> bool:
+        """Tell whether its model takes images, and may be shown them."""
+        ...
+
+    def document(self) -> dict[str, Any]:
+        """Return how its server has been doing."""
+        ...
+
+
 class Planner:
-    """Hold the two parts of the ladder; the slow one is climbed beside a process' steps."""
+    """Hold the two parts of the ladder; the slow one is climbed beside a process' steps.
+
+    `away` tells which servers it should ask and cannot, with the reason.
+    """
 
     def __init__(
         self,
@@ -42,9 +59,11 @@ class Planner:
         *,
         within_s: float = WITHIN_S,
         check: Check = checked,
+        away: Mapping[str, str] | None = None,
     ) -> None:
         self.cache = PlanCache(clock)
         self.within_s = within_s
+        self.away = dict(away or {})
         self._clock = clock
         self.check = check
         self._quick = Ladder((RulesRung(), self.cache), check, clock)
@@ -59,6 +78,21 @@ class Planner:
     def slow_rungs(self) -> tuple[str, ...]:
         """Return the names of the rungs that take time."""
         return tuple(rung.name for rung in self._slow.rungs)
+
+    @property
+    def sees(self) -> bool:
+        """Tell whether any rung can use an image."""
+        return any(isinstance(rung, Served) and rung.sees for rung in self._slow.rungs)
+
+    def document(self) -> dict[str, Any]:
+        """Return how cache and servers have been doing, as JSON takes it."""
+        servers = [rung.document() for rung in self._slow.rungs if isinstance(rung, Served)]
+        return {
+            "rungs": list(self.rungs),
+            "cache": self.cache.document(),
+            "servers": servers,
+            "away": self.away,
+        }
 
     def plan(self, request: Request) -> Answer:
         """Return the answer of all rungs together; blocks until then."""

@@ -1,11 +1,15 @@
 """Read what the robot tells of itself into a planner's request."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from drivers.clock import Clock
-from vla_deploy.ipc import CellReader, Sample, SharedSpace
+import numpy as np
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.ipc import CellReader, FrameReader, Sample, SharedSpace
+from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotReady
@@ -14,11 +18,14 @@ from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription
-from vla_deploy.world import Snapshot, Viewpoint, read_snapshot
+from vla_deploy.world import SceneUnreadable, Snapshot, Viewpoint, read_snapshot
 
 STATUS_AGE_S: Final = 2.0
 _POSE_AGE_S: Final = 1.0
 _SCENE_AGE_S: Final = 10.0
+_IMAGE_AGE_S: Final = 2.0
+
+_log = logging.getLogger(__name__)
 
 Pose = tuple[float, float, float]
 
@@ -35,9 +42,12 @@ class Situation:
         self._executor: CellReader = space.cell_reader("executor_status")
         self._control: CellReader = space.cell_reader("control_status")
         self._table: CellReader = space.cell_reader("process_table")
+        self._frames: FrameReader = space.frame_reader("rgbd")
 
-    def request(self, command: Command, conversation: Conversation) -> Request:
-        """Return the request for a command, with what is known now."""
+    def request(
+        self, command: Command, conversation: Conversation, with_image: bool = False
+    ) -> Request:
+        """Return the request for a command, with what is known now; an image where it is of use."""
         here = self._here()
         return Request(
             command_id=command.command_id,
@@ -47,6 +57,7 @@ class Situation:
             here=here,
             conversation=conversation,
             heard_confidence=command.heard_confidence,
+            image=self._image() if with_image else None,
         )
 
     def check_ready(self) -> None:
@@ -81,10 +92,21 @@ class Situation:
         sample = self._fresh(self._scene, _SCENE_AGE_S)
         if sample is None:
             return None
-        known = read_snapshot(sample.document(), self._clock.now_ns())
+        try:
+            known = read_snapshot(sample.document(), self._clock.now_ns())
+        except SceneUnreadable as error:  # a fault of perception: plan as if it were away
+            _log.warning("%s", error)
+            return None
         if here is None:
             return known
         return replace(known, robot=Viewpoint(x_m=here[0], y_m=here[1], yaw_rad=here[2]))
+
+    def _image(self) -> Image | None:
+        frame = self._frames.latest()
+        if frame is None or self._clock.now_ns() - frame.stamp_ns > _IMAGE_AGE_S * NS_PER_S:
+            return None
+        pixels = np.frombuffer(frame.payload, np.uint8, 3 * frame.width * frame.height)
+        return pixels.reshape(frame.height, frame.width, 3)
 
     def _fresh(self, reader: CellReader, age_limit_s: float) -> Sample | None:
         sample = reader.latest()

@@ -3,8 +3,10 @@
 from typing import Final
 
 import cv2
+import numpy as np
+from numpy.typing import NDArray
 
-from vla_deploy.analysis.question import Image
+Image = NDArray[np.uint8]
 
 LONGEST_PX: Final = 640
 MOST_BYTES: Final = 150_000

@@ -1,0 +1,55 @@
+"""Build the planner that a profile asks for; what is missing is done without, and told."""
+
+import logging
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from drivers.clock import Clock
+from platforms.profile import PlanningSettings
+from vla_deploy.model_servers.errors import ModelServerError
+from vla_deploy.model_servers.shelf import ServerShelf
+from vla_deploy.one_line import one_line
+from vla_deploy.planning.asking import Rung
+from vla_deploy.planning.knowledge import spoken_places
+from vla_deploy.planning.planner import Planner, checked
+from vla_deploy.planning.served.rung import Effort, ServedRung
+from vla_deploy.robots import RobotDescription
+
+_log = logging.getLogger(__name__)
+
+
+def open_planner(
+    robot: RobotDescription,
+    settings: PlanningSettings,
+    clock: Clock,
+    base: Path,
+    on_board: Sequence[Rung] = (),
+) -> Planner:
+    """Return a planner for a robot: rules, cache, the models `on_board`, then the servers.
+
+    `base` is the runtime directory, which tells where `servers.toml` lies. Nothing is sent yet.
+    """
+    away: dict[str, str] = {}
+    servers = _served(robot, settings, clock, base, away) if settings.servers else ()
+    for name, why in away.items():
+        _log.warning("planning does without server %s: %s", name, why)
+    slow = (*on_board, *servers)[: settings.max_rungs]
+    return Planner(clock, slow, within_s=settings.within_s, away=away)
+
+
+def _served(
+    robot: RobotDescription,
+    settings: PlanningSettings,
+    clock: Clock,
+    base: Path,
+    away: dict[str, str],
+) -> Iterator[Rung]:
+    places = sorted(set(spoken_places(robot.places).values()))
+    effort = Effort(candidates=settings.candidates, prompt_characters=settings.prompt_characters)
+    for name in settings.servers:
+        try:
+            server = ServerShelf.of_base(base, clock).open(name)
+        except ModelServerError as error:
+            away[name] = one_line(error)
+            continue
+        yield ServedRung(server, robot.name, places, checked, effort)

@@ -1,0 +1,75 @@
+"""Tell a situation as data for a model: rows of quoted, bounded texts, what matters most first."""
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.prompts.quoting import SENTENCE_CHARACTERS, plain
+from vla_deploy.planning.understanding import Turn
+from vla_deploy.world import Snapshot, Thing, Viewpoint
+from vla_deploy.world.words import size_word
+
+MOST_THINGS: Final = 60
+MOST_RECOLLECTIONS: Final = 8
+_UNKNOWN_KIND: Final = "object"
+
+
+def situation_of(request: Request) -> dict[str, Any]:
+    """Return all that a planner should know of a request, apart from the command itself."""
+    scene = request.scene
+    things = [] if scene is None else _things(request, scene)
+    gone = [] if scene is None else [plain(one.thing) for one in scene.lost]
+    return {
+        "things": things,
+        "left_out": 0 if scene is None else len(scene.things) - len(things),
+        "gone": gone,
+        "hands": {plain(hand): _held(what) for hand, what in request.world.holding.items()},
+        "places": sorted({plain(place) for place in request.world.places.values()}),
+        "said_before": [_turn(one) for one in reversed(request.conversation.turns)],
+        "remembered": [
+            plain(one, SENTENCE_CHARACTERS) for one in request.recollections[:MOST_RECOLLECTIONS]
+        ],
+    }
+
+
+def _things(request: Request, scene: Snapshot) -> list[dict[str, Any]]:
+    words = set(request.text.casefold().split())
+
+    def rank(thing: Thing) -> tuple[bool, float]:
+        is_named = not words.isdisjoint((thing.kind, thing.colour, thing.thing_id))
+        return (not is_named, _distance_m(thing, scene.robot))
+
+    nearest = sorted(scene.things, key=rank)[:MOST_THINGS]
+    return [dict(_thing(one, scene.robot)) for one in nearest]
+
+
+def _thing(thing: Thing, robot: Viewpoint | None) -> Iterator[tuple[str, Any]]:
+    yield "id", plain(thing.thing_id)
+    yield "kind", plain(thing.kind) if thing.kind != _UNKNOWN_KIND else "not recognised"
+    yield "colour", plain(thing.colour)
+    yield "size", size_word(thing)
+    if thing.rests is not None:
+        yield plain(thing.rests.relation), plain(thing.rests.of)
+    if thing.held_by:
+        yield "held_by", plain(thing.held_by)
+    if robot is not None:
+        yield "away_m", round(_distance_m(thing, robot), 1)
+
+
+def _distance_m(thing: Thing, robot: Viewpoint | None) -> float:
+    return 0.0 if robot is None else math.dist(thing.xy_m, (robot.x_m, robot.y_m))
+
+
+def _held(what: str | None) -> str | None:
+    return None if what is None else plain(what)
+
+
+def _turn(turn: Turn) -> dict[str, str]:
+    told = {
+        "person": plain(turn.said, SENTENCE_CHARACTERS),
+        "done": plain(turn.understood, SENTENCE_CHARACTERS),
+        "robot": plain(turn.answer, SENTENCE_CHARACTERS),
+        "ended": turn.outcome.value,
+    }
+    return {key: value for key, value in told.items() if value}

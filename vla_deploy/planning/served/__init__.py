@@ -1,0 +1,1 @@
+"""Plan with models that run behind a server."""

@@ -1,0 +1,124 @@
+"""Read what a model answers: a plan in any dialect, a question, or that it cannot be done."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Final
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
+
+from vla_deploy.planning.catalogue import SKILLS
+from vla_deploy.planning.dialects import ACTION_KEYS, PLAN_LISTS, parse_plan
+from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.prompts.quoting import plain
+from vla_deploy.planning.served.step_schema import steps_schema
+
+_REASON_CHARACTERS: Final = 400
+_QUESTION_CHARACTERS: Final = 160
+_MOST_STEPS: Final = 100
+_KNOWN_KEYS: Final = frozenset(alias for aliases in ACTION_KEYS.values() for alias in aliases)
+_PARAMETER_KEYS: Final = frozenset(ACTION_KEYS["parameters"])
+
+
+class PlanAnswer(BaseModel):
+    """Hold an answer whose steps can be read; whether they may run is for others to say.
+
+    `reasoning` comes first, so that a model thinks before it decides.
+    """
+
+    model_config = ConfigDict(extra="ignore")
+
+    reasoning: str = ""
+    question: str | None = None
+    feasible: bool = True
+    steps: tuple[dict[str, Any], ...] = Field(default=(), max_length=_MOST_STEPS)
+    confidence: float = Field(default=0.5, ge=0.0, le=1.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_any_dialect(cls, document: Any) -> Any:
+        """Call the list of steps by its name here; older tools wrap it in `plan`, too."""
+        if not isinstance(document, Mapping):
+            return document
+        inner = document.get("plan")
+        if isinstance(inner, Mapping):
+            document = {**document, **inner}
+        found = next(
+            (document[key] for key in PLAN_LISTS if isinstance(document.get(key), list)), None
+        )
+        return document if found is None else {**document, "steps": found}
+
+    @field_validator("reasoning")
+    @classmethod
+    def _short(cls, text: str) -> str:
+        return plain(text, _REASON_CHARACTERS)
+
+    @field_validator("question")
+    @classmethod
+    def _one_question(cls, text: str | None) -> str | None:
+        return plain(text, _QUESTION_CHARACTERS) or None if text else None
+
+    @model_validator(mode="after")
+    def _is_readable(self) -> "PlanAnswer":
+        """Read the steps once, so that a model is told at once what cannot be read."""
+        try:
+            self.plan("")
+        except PlanInvalid as error:
+            raise ValueError("; ".join(error.faults)) from error
+        return self
+
+    def plan(self, goal: str) -> Plan:
+        """Return the steps as a plan for a goal, as yet unchecked.
+
+        Raises:
+            PlanInvalid: they are none.
+        """
+        return parse_plan(
+            {
+                "goal": goal or "unnamed",
+                "reasoning": self.reasoning,
+                "feasible": self.feasible,
+                "actions": [_action(step) for step in self.steps],
+            }
+        )
+
+
+def answer_for(places: Sequence[str]) -> type[PlanAnswer]:
+    """Return the shape of answers for a robot that knows these places."""
+    schema = steps_schema(places)
+
+    class Answer(PlanAnswer):
+        steps: Annotated[tuple[dict[str, Any], ...], WithJsonSchema(schema)] = Field(
+            default=(), max_length=_MOST_STEPS
+        )
+
+    Answer.__name__ = PlanAnswer.__name__  # it titles the schema that models read
+    return Answer
+
+
+def _action(step: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a step with its parameters apart; what is null was not given."""
+    given = {key: _told(value) for key, value in step.items() if value is not None}
+    if _PARAMETER_KEYS.isdisjoint(given):
+        parameters = {key: value for key, value in given.items() if key not in _KNOWN_KEYS}
+        given = {key: value for key, value in given.items() if key in _KNOWN_KEYS}
+        given["parameters"] = parameters
+    # A skill that is none of ours is a word of another dialect.
+    if "skill" in given and given["skill"] not in SKILLS and "action" not in given:
+        given["action"] = given.pop("skill")
+    return given
+
+
+def _told(value: Any) -> Any:
+    """Return what a model wrote without what nobody could see; only texts can hide anything."""
+    if isinstance(value, str):
+        return plain(value, 500)
+    if isinstance(value, Mapping):
+        return {plain(key): _told(one) for key, one in value.items()}
+    return [_told(one) for one in value] if isinstance(value, list) else value
