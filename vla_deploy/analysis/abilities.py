@@ -51,18 +51,6 @@ class Arms:
         return False
 
 
-def body_of(robot: RobotDescription, planner: PathPlanner) -> Body:
-    """Return what the robot takes things with, and where its base fits."""
-    openings_m = [
-        robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
-    ]
-    return Body(
-        opening_max_m=max(openings_m, default=0.0),
-        hands=tuple(robot.hands),
-        is_free=planner.is_free,
-    )
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abilities:
     """Hold a robot's body for judging goals; `spoken` maps every name of a place to the place."""
@@ -83,7 +71,7 @@ class Abilities:
         """
         planner = base_planner(robot)
         return cls(
-            body=body_of(robot, planner),
+            body=Body.of(robot, planner.is_free),
             arms=Arms(robot),
             planner=planner,
             places=robot.places,

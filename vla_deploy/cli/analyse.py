@@ -13,13 +13,12 @@ from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis, Task
 from vla_deploy.analysis.geometric import GeometricAnalyser
 from vla_deploy.analysis.question import Analyser, Image, Question, question_of
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
-from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
+from vla_deploy.cli.known_world import FRESH_S, running_robot, told_scene
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.ipc import Frame
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.navigation.place_judge import PlaceState
-from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.runtime import default_base
 from vla_deploy.world import Viewpoint
 
@@ -27,7 +26,6 @@ EXAMPLES: Final = """  vla-deploy analyse
   vla-deploy analyse --goal "pick up the red cup and put it in the box"
   vla-deploy analyse --server bench --json      ask a model too: vla-deploy servers list
 """
-FRESH_S: Final = 5.0
 
 
 def register(commands: Any) -> None:
@@ -63,9 +61,7 @@ def ask(session: Session, goal: str) -> Question:
     Raises:
         UsageError: perception is silent.
     """
-    scene = session.document("scene", age_limit_s=FRESH_S)
-    if scene is None:
-        raise UsageError("perception tells no scene; see: vla-deploy status")
+    scene = told_scene(session)
     executor = session.document("executor_status", age_limit_s=FRESH_S) or {}
     return question_of(
         scene,
@@ -84,10 +80,7 @@ def analyser_for(session: Session, arguments: argparse.Namespace) -> Analyser:
         UsageError: the supervisor is silent.
         ModelServerError: the server is not declared, or its key is missing.
     """
-    table = session.document("process_table", age_limit_s=FRESH_S)
-    if table is None:
-        raise UsageError("the supervisor does not tell which robot this is; see: vla-deploy status")
-    measuring = GeometricAnalyser(Abilities.of(load_robot(table["robot"])))
+    measuring = GeometricAnalyser(Abilities.of(running_robot(session)))
     if arguments.server is None:
         return measuring
     base: Path = arguments.runtime_base or default_base()

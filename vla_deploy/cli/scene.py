@@ -5,33 +5,29 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from vla_deploy.analysis.abilities import body_of
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.example import add_command
+from vla_deploy.cli.example import add_top_command
+from vla_deploy.cli.known_world import running_robot, told_scene
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.references import match_place
-from vla_deploy.robots import RobotDescription, load_robot
-from vla_deploy.world import Query, Viewpoint, parse_query, read_snapshot
+from vla_deploy.robots import RobotDescription
+from vla_deploy.world import Body, Query, Viewpoint, parse_query, read_snapshot
 from vla_deploy.world.report import report
 from vla_deploy.world.surfaces import furniture_points
 
-FRESH_S = 5.0
+EXAMPLES = """  vla-deploy scene
+  vla-deploy scene --of "red cup" --relations
+  vla-deploy scene --of cup --on "coffee table"
+  vla-deploy scene --why-not reachable
+  vla-deploy scene --of keys --look --json
+"""
 
 
 def register(commands: Any) -> None:
     """Add the command."""
-    scene = add_command(
-        commands,
-        "scene",
-        "tell what the robot knows of the things around it",
-        "  vla-deploy scene\n"
-        "  vla-deploy scene --of 'red cup' --relations\n"
-        "  vla-deploy scene --of cup --on 'coffee table'\n"
-        "  vla-deploy scene --why-not reachable\n"
-        "  vla-deploy scene --of keys --look --json\n",
-    )
+    scene = add_top_command(commands, "scene", EXAMPLES)
     scene.add_argument("--of", metavar="WORDS", default="", help='such as "small cup", "cup_1"')
     scene.add_argument("--near", metavar="WORDS", help="only what is near this thing or furniture")
     scene.add_argument("--on", metavar="WORDS", help="only what is on this thing or furniture")
@@ -59,17 +55,11 @@ def collect(session: Session, arguments: argparse.Namespace) -> dict[str, Any]:
         UsageError: perception is silent, or the place is none the robot knows.
         UnknownWord: the question has a word that means nothing here.
     """
-    document = session.document("scene", age_limit_s=FRESH_S)
-    if document is None:
-        raise UsageError("perception tells no scene; see: vla-deploy status")
-    table = session.document("process_table", age_limit_s=FRESH_S)
-    if table is None:
-        raise UsageError("the supervisor does not tell which robot this is; see: vla-deploy status")
-    robot = load_robot(table["robot"])
+    document, robot = told_scene(session), running_robot(session)
     snapshot = read_snapshot(document, session.clock.now_ns())
     view = _view(arguments.view, robot)
     query = _query(arguments, robot)
-    body = body_of(robot, base_planner(robot))
+    body = Body.of(robot, base_planner(robot).is_free)
     return report(snapshot, query, body, furniture_points(robot.places), view)
 
 

@@ -4,10 +4,11 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above
+from vla_deploy.robots import RobotDescription
 from vla_deploy.world.footprint import depth_inside_m
 from vla_deploy.world.reach import GRIP_HEIGHTS_M, IsFree, is_in_reach, stands_around
 from vla_deploy.world.resting import IN, ON
@@ -65,6 +66,16 @@ class Body:
     opening_max_m: float
     hands: tuple[str, ...]
     is_free: IsFree | None = None
+
+    @classmethod
+    def of(cls, robot: RobotDescription, is_free: IsFree | None) -> Self:
+        """Read a robot file: the widest opening of its hands, and their names."""
+        openings_m = [
+            robot.limits[hand.gripper].max * hand.opening_ratio for hand in robot.hands.values()
+        ]
+        return cls(
+            opening_max_m=max(openings_m, default=0.0), hands=tuple(robot.hands), is_free=is_free
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
