@@ -12,7 +12,6 @@ from drivers.camera.protocol import (
     CRC,
     HEADER_BYTES,
     Command,
-    Intrinsics,
     encode_request,
 )
 from sim_twin.errors import ModelMismatch
@@ -41,7 +40,7 @@ class HeadCamera:
         self._view = fixed_camera(model, camera.site)
         self._renderer: Renderer | None = None
         _check_fovy(model, camera)
-        self.device = CameraDevice(self.render, _intrinsics(camera), seed=seed)
+        self.device = CameraDevice(self.render, camera.pinhole, seed=seed)
 
     def open(self) -> None:
         """Open OpenGL now rather than at the first frame.
@@ -77,17 +76,6 @@ def camera_line(head: HeadCamera, camera: Camera, now_ns: Callable[[], int]) -> 
     """Return the camera's line, on which faults may act."""
     frame_bytes = HEADER_BYTES + camera.width * camera.height * BYTES_PER_PIXEL + CRC.size
     return LineTamper(head.device, now_ns, frame_bytes, tells_time=False)
-
-
-def _intrinsics(camera: Camera) -> Intrinsics:
-    return Intrinsics(
-        width=camera.width,
-        height=camera.height,
-        fx=camera.focal_px,
-        fy=camera.focal_px,
-        cx=(camera.width - 1) / 2,
-        cy=(camera.height - 1) / 2,
-    )
 
 
 def _check_fovy(model: mujoco.MjModel, camera: Camera) -> None:

@@ -104,14 +104,7 @@ class _Studio:
         self._kinematics = RobotModel(self._robot)
         camera = self._robot.camera
         self._renderer = Renderer(self._stage.model, camera.width, camera.height)
-        self._camera = Intrinsics(
-            width=camera.width,
-            height=camera.height,
-            fx=camera.focal_px,
-            fy=camera.focal_px,
-            cx=(camera.width - 1) / 2,
-            cy=(camera.height - 1) / 2,
-        )
+        self._camera = camera.pinhole
 
     def scene(self) -> TableScene:
         stage, random = self._stage, self._random

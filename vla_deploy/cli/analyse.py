@@ -6,17 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis, Task
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.analysis.question import Analyser, Image, Question, question_of
+from vla_deploy.analysis.question import Analyser, Question, question_of
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.known_world import FRESH_S, running_robot, told_scene
 from vla_deploy.cli.session import Session, attach
-from vla_deploy.ipc import Frame
+from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.supervisor.runtime import default_base
@@ -62,13 +60,14 @@ def ask(session: Session, goal: str) -> Question:
         UsageError: perception is silent.
     """
     scene = told_scene(session)
+    frame = session.frame("rgbd", age_limit_s=FRESH_S)
     executor = session.document("executor_status", age_limit_s=FRESH_S) or {}
     return question_of(
         scene,
         now_ns=session.clock.now_ns(),
         robot=_pose(session),
         holding=executor.get("holding", {}),
-        image=_image(session.frame("rgbd", age_limit_s=FRESH_S)),
+        image=None if frame is None else colours(frame),
         goal=goal,
     )
 
@@ -95,13 +94,6 @@ def _pose(session: Session) -> Viewpoint | None:
         return None
     x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
     return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
-
-
-def _image(frame: Frame | None) -> Image | None:
-    if frame is None:
-        return None
-    pixels = np.frombuffer(frame.payload, np.uint8, 3 * frame.width * frame.height)
-    return pixels.reshape(frame.height, frame.width, 3)
 
 
 def as_text(analysis: SceneAnalysis) -> str:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.ipc.rgbd_image import colours, depths_m
 from vla_deploy.perception.camera_tools.board import Board, Image
 from vla_deploy.perception.history import JointHistory
 from vla_deploy.perception.model_tools.images import image_paths, read_image
@@ -22,8 +23,6 @@ from vla_deploy.robots.schema import is_number
 
 Array = NDArray[np.float64]
 JOINTS_FILE: Final = "joints.json"
-MILLIMETRE_M: Final = 0.001
-BYTES_PER_PIXEL: Final = 5
 # A head that turns or shakes gives images of no known pose.
 STILL_RAD: Final = 0.002
 STILL_NS: Final = NS_PER_S // 4
@@ -119,8 +118,12 @@ def from_robot(session: Session, robot: RobotDescription, seconds: float) -> Ite
             seen = frame.sequence
             positions = _still_positions(joints, frame.stamp_ns)
             if positions is not None:
-                rgb, depth_m = _unpacked(frame.payload, frame.width, frame.height)
-                yield Shot(name=f"image {seen}", rgb=rgb, positions=positions, depth_m=depth_m)
+                yield Shot(
+                    name=f"image {seen}",
+                    rgb=colours(frame),
+                    positions=positions,
+                    depth_m=depths_m(frame),
+                )
         session.pause(_WAIT_S)
 
 
@@ -131,18 +134,6 @@ def _still_positions(joints: JointHistory, stamp_ns: int) -> Array | None:
     if now is None or before is None or float(np.abs(now - before).max()) > STILL_RAD:
         return None
     return now
-
-
-def _unpacked(payload: bytes, width: int, height: int) -> tuple[Image, NDArray[np.float32]]:
-    pixels = width * height
-    if len(payload) != BYTES_PER_PIXEL * pixels:
-        raise UsageError(
-            f"an image of {width} x {height} has {len(payload)} bytes, expected "
-            f"{BYTES_PER_PIXEL * pixels}; do robot and command come from the same release?"
-        )
-    rgb = np.frombuffer(payload, dtype=np.uint8, count=3 * pixels).reshape(height, width, 3)
-    depth = np.frombuffer(payload, dtype="<u2", offset=3 * pixels).reshape(height, width)
-    return rgb, depth.astype(np.float32) * np.float32(MILLIMETRE_M)
 
 
 def _joints_of(folder: Path, robot: RobotDescription) -> dict[str, Array]:

@@ -7,6 +7,7 @@ import numpy as np
 from drivers.camera.protocol import Intrinsics
 from drivers.clock import NS_PER_S
 from vla_deploy.ipc import Sample, SharedSpace
+from vla_deploy.ipc.rgbd_image import depths_m
 from vla_deploy.navigation.depth_band import depth_band
 from vla_deploy.navigation.mapping import Mapper
 from vla_deploy.navigation.place_judge import PlaceState
@@ -15,9 +16,7 @@ from vla_deploy.perception.body_state import BodyState
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel, full_positions
 
-MILLIMETRE_M: Final = 0.001
 FRESH_YAW_NS: Final = NS_PER_S // 10
-RGB_BYTES: Final = 3
 
 
 class MapRecorder:
@@ -77,10 +76,8 @@ class MapRecorder:
         if positions is None:
             return
         camera = self._intrinsics(frame.width, frame.height)
-        pixels = frame.width * frame.height
-        depth = np.frombuffer(frame.payload, "<u2", pixels, RGB_BYTES * pixels)
         standing, floor = depth_band(
-            (depth.reshape(frame.height, frame.width) * MILLIMETRE_M).astype(np.float32),
+            depths_m(frame),
             camera,
             self._body.camera_pose(positions),
             self._body.mask(positions, camera),

@@ -175,8 +175,11 @@ class Camera:
     @property
     def intrinsics(self) -> Intrinsics:
         """Return the calibrated lens, or the pinhole of the robot file's opening angle."""
-        if self.lens is not None:
-            return self.lens.intrinsics
+        return self.pinhole if self.lens is None else self.lens.intrinsics
+
+    @property
+    def pinhole(self) -> Intrinsics:
+        """Return the lens without faults that has the robot file's size and opening angle."""
         return Intrinsics(
             width=self.width,
             height=self.height,

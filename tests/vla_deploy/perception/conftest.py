@@ -60,15 +60,7 @@ class StillFlat:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        camera = self.robot.camera
-        return Intrinsics(
-            width=camera.width,
-            height=camera.height,
-            fx=camera.focal_px,
-            fy=camera.focal_px,
-            cx=(camera.width - 1) / 2,
-            cy=(camera.height - 1) / 2,
-        )
+        return self.robot.camera.pinhole
 
     def positions(self, **joints: float) -> NDArray[np.float64]:
         """Return the joint array of the tucked pose with some joints changed."""
