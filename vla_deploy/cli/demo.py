@@ -1,4 +1,8 @@
-"""`vla-deploy demo`: the main job on the twin, told step by step and judged by physics."""
+"""`vla-deploy demo`: the main job on the twin, from a spoken command to a cup in a box.
+
+A synthetic voice says the command in the twin's room; the robot hears, plans and acts, tells every
+step, and physics judges. A robot that cannot hear words is given the command as text, and says so.
+"""
 
 import argparse
 import json
@@ -7,10 +11,13 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.cli.aloud import USUAL_VOICE
+from vla_deploy.cli.demo_sound import MotionWatch, SpokenCommand, await_ears
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.narrate import action_words, line_of
@@ -24,7 +31,8 @@ from vla_deploy.supervisor.supervisor import Supervisor
 COMMAND = "pick up the red cup and put it in the box"
 EXAMPLES = """  vla-deploy demo
   vla-deploy demo --seed 7 --json
-  vla-deploy demo --command "bring me the blue ball"
+  vla-deploy demo --command "bring me the blue ball" --voice en-us+f4 --snr 10
+  vla-deploy demo --typed
 """
 SETTLE_S = 1.0
 ARM_TIMEOUT_S = 20.0
@@ -35,6 +43,9 @@ def register(commands: Any) -> None:
     demo = add_top_command(commands, "demo", EXAMPLES)
     add_robot_arguments(demo)
     demo.add_argument("--command", dest="order", default=COMMAND, help=f'default: "{COMMAND}"')
+    demo.add_argument("--voice", default=USUAL_VOICE, help="who says it, a voice of eSpeak NG")
+    demo.add_argument("--snr", type=float, metavar="DB", help="over noise, this much louder")
+    demo.add_argument("--typed", action="store_true", help="give the command as text, say nothing")
     demo.add_argument("--out", type=Path, default=Path("out"), help="folder for film and outcome")
     demo.add_argument(
         "--headless", action="store_true", help="make no film and open no window, whatever there is"
@@ -90,18 +101,20 @@ class Demo:
         self._clock = MonotonicClock()
         self._plan: dict[str, Any] = {"actions": []}
         self._last: dict[str, Any] = {}
+        self._spoken: SpokenCommand | None = None
+        self._why_typed = "asked for by --typed" if arguments.typed else ""
 
     def run(self) -> dict[str, Any]:
         """Start everything, give the command, follow it, ask the referee, stop everything."""
         self._tell(f"starting the twin of {self._options.robot} (seed {self._options.seed})")
         with Supervisor(self._options) as supervisor:
             supervisor.start()
-            session = Session(supervisor.run_dir, SteppingClock(self._clock, supervisor))
+            clock = SteppingClock(self._clock, supervisor)
+            session = Session(supervisor.run_dir, clock)
             self._wait_armed(session)
             film = self._start_film(session)
             started_ns = self._clock.now_ns()
-            self._tell(f'command: "{self._arguments.order}"')
-            self._follow(session)
+            self._follow(self._give_command(session, clock), session)
             wall_s = (self._clock.now_ns() - started_ns) / NS_PER_S
             session.pause(SETTLE_S)
             judged = self._judge(session)
@@ -119,8 +132,23 @@ class Demo:
                 raise CommandFailed(f"the robot did not arm within {ARM_TIMEOUT_S:g} s: {status}")
             session.pause(0.1)
 
-    def _follow(self, session: Session) -> None:
-        for event in session.command(text=self._arguments.order):
+    def _give_command(self, session: Session, clock: SteppingClock) -> Iterator[dict[str, Any]]:
+        """Return the events of the command: said aloud, or as text where the robot is deaf."""
+        order = self._arguments.order
+        self._why_typed = self._why_typed or await_ears(session)
+        if self._why_typed:
+            self._tell(f'command as text: "{order}" (not spoken: {self._why_typed})')
+            return session.command(text=order)
+        motion = MotionWatch(session)
+        clock.meanwhile = motion.look
+        self._spoken = spoken = SpokenCommand(session, motion)
+        self._tell(f'a voice says: "{order}"')
+        hearing = spoken.say(order, self._arguments.voice, self._arguments.snr)
+        self._tell(hearing.line())
+        return spoken.events(hearing)
+
+    def _follow(self, events: Iterator[dict[str, Any]], session: Session) -> None:
+        for event in events:
             self._last = event
             if event["event"] == "plan":
                 self._plan = event["plan"]
@@ -181,6 +209,8 @@ class Demo:
             "wall_s": round(wall_s, 2),
             "seed": self._options.seed,
             "command": self._arguments.order,
+            "spoken": self._spoken.document() if self._spoken else None,
+            "why_typed": self._why_typed or None,
             "actions": self._last.get("actions", []),
             "placement_error_m": judged["placement_error_m"],
             "judged_by": judged["judged_by"],
@@ -218,9 +248,25 @@ def _summary(outcome: dict[str, Any], path: Path) -> str:
     lines = [
         f"{'success' if outcome['success'] else 'failed'} after {outcome['wall_s']:.1f} s "
         f"(judged by {outcome['judged_by']}{placed})",
+        *_spoken_lines(outcome["spoken"]),
         f"peak memory of all processes: {outcome['peak_memory_mb']} MB "
         f"({outcome['memory_kind']}); share of a core: {shares}",
         *(f"{name}: {file}" for name, file in outcome["film"].items()),
         f"outcome: {path}",
     ]
     return "\n".join(lines)
+
+
+def _spoken_lines(spoken: dict[str, Any] | None) -> list[str]:
+    if spoken is None:
+        return []
+    took = [
+        f"{name} {spoken[key]:.2f} s"
+        for name, key in (
+            ("text", "end_to_text_s"),
+            ("plan", "end_to_plan_s"),
+            ("first motion", "end_to_motion_s"),
+        )
+        if spoken[key] is not None
+    ]
+    return [f"from the end of the words to {', '.join(took)}"]

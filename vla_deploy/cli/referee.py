@@ -1,8 +1,9 @@
-"""Ask the twin's referee what really happened, while the supervisor goes on with its work."""
+"""Ask the twin what really happened, while the supervisor goes on with its work."""
 
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from drivers.clock import NS_PER_S, MonotonicClock
@@ -17,6 +18,8 @@ class SteppingClock:
     """Let the supervisor do its work whenever its own process waits."""
 
     def __init__(self, clock: MonotonicClock, supervisor: Supervisor) -> None:
+        self.meanwhile: Callable[[], None] = lambda: None
+        """What else is done while somebody waits; it must not wait itself."""
         self._clock = clock
         self._supervisor = supervisor
 
@@ -32,6 +35,7 @@ class SteppingClock:
         """
         while True:
             self._supervisor.step()
+            self.meanwhile()
             if self._supervisor.stop_requested:
                 raise KeyboardInterrupt
             now_ns = self._clock.now_ns()
@@ -41,19 +45,30 @@ class SteppingClock:
 
 
 def ask_referee(session: Session, op: str, **details: str) -> dict[str, Any]:
-    """Return the referee's answer; it is started by name: the robot never imports the twin.
+    """Return the referee's answer.
+
+    Raises:
+        CommandFailed: it gives no answer.
+    """
+    words = [word for name, value in details.items() for word in (f"--{name}", value)]
+    return answer_of(session, "sim_twin.referee", "--run-dir", str(session.run_dir), op, *words)
+
+
+def answer_of(session: Session, module: str, *words: str) -> dict[str, Any]:
+    """Return what a module of the twin prints; it is started by name: the robot never imports it.
 
     It may take seconds, in which the robot must not lose its supervisor.
 
     Raises:
         CommandFailed: it gives no answer.
     """
-    command = [sys.executable, "-m", "sim_twin.referee", "--run-dir", str(session.run_dir), op]
-    for name, value in details.items():
-        command += [f"--{name}", value]
     pipe = subprocess.PIPE
     with subprocess.Popen(
-        command, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+        [sys.executable, "-m", module, *words],
+        stdout=pipe,
+        stderr=pipe,
+        text=True,
+        start_new_session=True,
     ) as asked:
         try:
             while asked.poll() is None:
@@ -63,6 +78,6 @@ def ask_referee(session: Session, op: str, **details: str) -> dict[str, Any]:
             raise
         answer_text, complaint = asked.communicate()
     if asked.returncode != 0:
-        raise CommandFailed(complaint.strip() or f"the referee failed at {op}")
+        raise CommandFailed(complaint.strip() or f"{module} failed with {words}")
     answer: dict[str, Any] = json.loads(answer_text)
     return answer

@@ -4,9 +4,11 @@ import argparse
 import json
 import select
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final, TextIO
 
+from vla_deploy.cli.aloud import STOP, USUAL_VOICE, Aloud
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.narrate import line_of
@@ -16,6 +18,7 @@ EXIT_ASKED: Final = 3
 EXAMPLES = """  vla-deploy say "go to the kitchen"
   vla-deploy say "pick up the red cup and put it in the box"
   vla-deploy say --plan plan.json --json
+  vla-deploy say --aloud "go to the kitchen" --voice en-us+f4 --snr 10
   vla-deploy say --answer "the red one"           to what the robot has asked
 
 exit code 3: the robot asks something, and nobody is at the terminal to answer
@@ -29,14 +32,25 @@ def register(commands: Any) -> None:
     what.add_argument("text", nargs="?", help="the command in words")
     what.add_argument("--plan", type=Path, help="a plan as JSON, in any of the known dialects")
     what.add_argument("--answer", metavar="WORDS", help="answer what the robot has asked")
+    say.add_argument(
+        "--aloud", action="store_true", help="let a synthetic person say it in the twin's room"
+    )
+    say.add_argument("--voice", help=f"whose voice, of eSpeak NG (default: {USUAL_VOICE})")
+    say.add_argument("--snr", type=float, metavar="DB", help="over noise, this much louder")
     say.add_argument("--json", action="store_true", help="print the outcome as JSON")
     say.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Give the command; Ctrl-C cancels it."""
+    _check_aloud(arguments)
+    utterance = _utterance(arguments)
     session = attach(arguments.runtime_base)
-    outcome = Follower(session, quiet=arguments.json).follow(_utterance(arguments))
+    follower = Follower(session, quiet=arguments.json)
+    if arguments.aloud:
+        outcome = follow_aloud(session, follower, arguments)
+    else:
+        outcome = follower.follow(utterance)
     if arguments.json:
         print(json.dumps(outcome, indent=2))
     if outcome["event"] == "asked":
@@ -56,6 +70,32 @@ def _utterance(arguments: argparse.Namespace) -> dict[str, Any]:
     return {"text": arguments.text}
 
 
+def _check_aloud(arguments: argparse.Namespace) -> None:
+    if arguments.aloud and not arguments.text:
+        raise UsageError("--aloud says a command in words: give them, and no plan or answer")
+    if not arguments.aloud and (arguments.voice or arguments.snr is not None):
+        raise UsageError("--voice and --snr say how words sound: add --aloud")
+
+
+def follow_aloud(
+    session: Session, follower: "Follower", arguments: argparse.Namespace
+) -> dict[str, Any]:
+    """Have a command said in the twin's room, tell what was heard, return the last event.
+
+    Raises:
+        UsageError: there is no twin, the robot is deaf, or it heard no command.
+        CommandFailed: the robot heard nothing.
+    """
+    aloud = Aloud(session)
+    hearing = aloud.speak(arguments.text, arguments.voice or USUAL_VOICE, arguments.snr)
+    if not arguments.json:
+        print(hearing.line(), flush=True)
+    heard = {"heard": hearing.told, "end_to_text_s": round(hearing.end_to_text_s, 3)}
+    if hearing.told["verdict"] == STOP:
+        return {"event": "finished", "success": True, "error": None} | heard
+    return follower.narrate(aloud.follow(hearing, follower.pause)) | heard
+
+
 class Follower:
     """Give a command, narrate its events, and pass on what the person answers at the terminal.
 
@@ -70,9 +110,13 @@ class Follower:
 
     def follow(self, utterance: dict[str, Any]) -> dict[str, Any]:
         """Return the last event, or the question that nobody here can answer."""
+        return self.narrate(self._session.command(self.pause, **utterance))
+
+    def narrate(self, events: Iterable[dict[str, Any]]) -> dict[str, Any]:
+        """Tell a command's events and return the last one; Ctrl-C cancels the command."""
         last: dict[str, Any] = {}
         try:
-            for event in self._session.command(self._pause, **utterance):
+            for event in events:
                 last = event
                 self._tell(event)
                 self._is_asked = event["event"] == "asked"
@@ -88,7 +132,7 @@ class Follower:
         if line and not self._quiet and event["event"] != "rejected":
             print(line, flush=True)
 
-    def _pause(self) -> None:
+    def pause(self) -> None:
         """Wait for a moment; what is typed meanwhile is the answer to what was asked."""
         self._session.pause()
         if self._is_asked and select.select([self._terminal], [], [], 0.0)[0]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.ipc import CellReader, Frame, FrameReader, Sample, SharedSpace
+from vla_deploy.ipc import CellReader, Frame, FrameReader, RingReader, Sample, SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP, StopButton
 from vla_deploy.supervisor.runtime import default_base, running
 
@@ -79,11 +79,25 @@ class Session:
         Raises:
             CommandFailed: nobody answers; raised by the iterator.
         """
+        events = self.events("task_event")
+        return self.follow(self.utter(**utterance), events, pause)
+
+    def events(self, topic: str) -> RingReader:
+        """Return what comes on a ring from now on."""
+        return self._space.ring_reader(topic, from_start=False)
+
+    def follow(
+        self, command_id: str, events: RingReader, pause: Callable[[], None] | None = None
+    ) -> Iterator[dict[str, Any]]:
+        """Return the task events of a command that was given, up to and including the last one.
+
+        Raises:
+            CommandFailed: nobody answers; raised by the iterator.
+        """
         from vla_deploy.cli.follow import follow_command  # loads pydantic: not on an estop's way
 
-        events = self._space.ring_reader("task_event", from_start=False)
         return follow_command(
-            self.utter(**utterance),
+            command_id,
             events=lambda: [event.payload for event in events.drain()],
             planner=lambda: self.fresh("planner_status", age_limit_s=2.0),
             executor=lambda: self.fresh("executor_status", age_limit_s=1.0),

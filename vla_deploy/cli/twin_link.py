@@ -9,6 +9,11 @@ from vla_deploy.json_line import ask_by_line
 _SOCKET: Final = Path("dev") / "referee"
 
 
+def has_twin(run_dir: Path) -> bool:
+    """Tell whether the run's robot is a twin."""
+    return (run_dir / _SOCKET).is_socket()
+
+
 def ask_twin(run_dir: Path, op: str, **details: Any) -> dict[str, Any]:
     """Return the twin's answer.
 
@@ -17,7 +22,7 @@ def ask_twin(run_dir: Path, op: str, **details: Any) -> dict[str, Any]:
         CommandFailed: the twin is there and does not answer.
     """
     path = run_dir / _SOCKET
-    if not path.is_socket():
+    if not has_twin(run_dir):
         raise UsageError(
             f"this run has no twin ({path} is not there): faults are for the twin alone; "
             "start one: vla-deploy run --twin"
