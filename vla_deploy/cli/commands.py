@@ -20,6 +20,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "run": Command("run", "run the robot until Ctrl-C"),
     "demo": Command("demo", "do the main job on the twin"),
     "say": Command("say", "give the robot a command and follow it"),
+    "hear": Command("hear", "tell what is understood of a recording, or of what you say now"),
     "status": Command("status", "tell what runs and how the robot is"),
     "scene": Command("scene", "tell what the robot knows of the things around it"),
     "budget": Command(
@@ -46,7 +47,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "check": Command("check", "check a robot, a profile or a plan, and report all faults"),
     "schema": Command("check", "print the JSON Schema of a plan or of an analysis"),
     "map": Command("map", "record, look at, check and convert maps in the ROS format"),
-    "models": Command("models", "add, list, measure, quantise and verify models"),
+    "models": Command("models", "add, fetch, list, measure, quantise and verify models"),
     "analyse": Command("analyse", "tell what the scene holds, and whether a goal can be reached"),
     "servers": Command("servers", "see and try the model servers that the robot may ask"),
     "doctor": Command("doctor", "examine this computer, and say how to mend what is wrong"),

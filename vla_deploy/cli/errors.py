@@ -30,6 +30,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.planning.errors": "PlanningError",
     "platforms.errors": "ProfileError",
     "vla_deploy.robots.errors": "RobotFileError",
+    "vla_deploy.speech.errors": "SpeechError",
     "vla_deploy.supervisor.errors": "SupervisorError",
     "vla_deploy.telemetry.errors": "TelemetryError",
     "vla_deploy.world.errors": "WorldError",

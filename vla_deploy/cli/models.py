@@ -1,11 +1,11 @@
-"""`vla-deploy models`: add, list, measure, quantise and verify models."""
+"""`vla-deploy models`: add, fetch, list, measure, quantise and verify models."""
 
 import argparse
 import dataclasses
 import json
 import sys
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -13,10 +13,11 @@ from typing import Any, Final
 from drivers.clock import MonotonicClock
 from platforms import ModelChoice, Profile, load_profile
 from platforms.profile import profile_names
+from vla_deploy.cli import models_whisper
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.models_arguments import Run, register_acts
 from vla_deploy.inference.errors import AccuracyLost, InferenceError
-from vla_deploy.inference.manifest import Fit
+from vla_deploy.inference.manifest import Fit, ModelFile
 from vla_deploy.inference.manifest_file import document_of
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
@@ -70,6 +71,8 @@ def show_model(arguments: argparse.Namespace) -> int:
 def add(arguments: argparse.Namespace) -> int:
     """Check a model, try it out and keep it."""
     shelf = _shelf(arguments)
+    if arguments.whisper is not None:
+        return _tell(arguments, *models_whisper.add(arguments, shelf))
     model, trial = add_model(
         shelf.store,
         _request(arguments),
@@ -95,6 +98,11 @@ def add(arguments: argparse.Namespace) -> int:
     return _tell(arguments, document, text)
 
 
+def fetch(arguments: argparse.Namespace) -> int:
+    """Fetch a published model, check it, try it out and keep it."""
+    return _tell(arguments, *models_whisper.fetch_whisper(arguments, _shelf(arguments)))
+
+
 def remove(arguments: argparse.Namespace) -> int:
     """Delete a model that was added."""
     _shelf(arguments).store.remove(arguments.name)
@@ -105,6 +113,9 @@ def bench_model(arguments: argparse.Namespace) -> int:
     """Measure a model's files beside each other."""
     shelf = _shelf(arguments)
     model = shelf.store.load(arguments.name)
+    if model.manifest.whisper is not None:
+        told = models_whisper.measure(arguments, shelf, model, _profile(arguments))
+        return _tell(arguments, *told)
     choice = _choice(model, _profile(arguments))
     if arguments.threads:
         choice = dataclasses.replace(choice, threads=arguments.threads)
@@ -121,6 +132,8 @@ def quantise_model(arguments: argparse.Namespace) -> int:
     """Make the int8 files and keep them if the model still sees as well."""
     shelf = _shelf(arguments)
     model = shelf.store.load(arguments.name)
+    if model.manifest.whisper is not None:
+        raise UsageError(f"{arguments.name} is a Whisper: CTranslate2 quantises as it converts")
     if model.is_embedded and not arguments.new_name:
         raise UsageError(f"{arguments.name} comes with the software; name your own by --as NAME")
     classes = model.manifest.detection.classes if model.manifest.detection else ()
@@ -146,7 +159,7 @@ def verify_models(arguments: argparse.Namespace) -> int:
     profile = _profile(arguments)
     findings: list[Finding] = []
     for name in arguments.names or shelf.store.names():
-        findings += verify(shelf, name, profile if _concerns(shelf, name, profile) else None)
+        findings += _findings(shelf, name, profile if _concerns(shelf, name, profile) else None)
     lines = [
         f"{'ok  ' if one.is_ok else 'FAIL'} {one.model:<20} {one.check:<24} {one.detail}"
         for one in findings
@@ -159,6 +172,7 @@ RUNS: Final[Mapping[str, Run]] = {
     "list": list_models,
     "show": show_model,
     "add": add,
+    "fetch": fetch,
     "remove": remove,
     "bench": bench_model,
     "quantise": quantise_model,
@@ -169,6 +183,17 @@ RUNS: Final[Mapping[str, Run]] = {
 def _shelf(arguments: argparse.Namespace) -> ModelShelf:
     base: Path = arguments.runtime_base or default_base()
     return ModelShelf.of_base(base, MonotonicClock())
+
+
+def _findings(shelf: ModelShelf, name: str, profile: Profile | None) -> Iterator[Finding]:
+    """Check a model by its kind; one whose manifest cannot be read is told as such."""
+    try:
+        model = shelf.store.load(name)
+    except InferenceError:
+        return verify(shelf, name, profile)
+    if model.manifest.whisper is not None:
+        return models_whisper.findings(shelf, model, profile)
+    return verify(shelf, name, profile)
 
 
 def _profile(arguments: argparse.Namespace) -> Profile:
@@ -195,7 +220,7 @@ def _request(arguments: argparse.Namespace) -> Request:
         classes=arguments.classes,
         adapter=arguments.adapter,
         size_px=arguments.size,
-        summary=arguments.summary,
+        summary=arguments.summary or "a detector that was added",
         licence=arguments.licence,
         card=arguments.card,
         colour=arguments.colour,
@@ -229,6 +254,7 @@ def _row(shelf: ModelShelf, name: str, used_by: list[str]) -> dict[str, Any]:
         str(variant): _size_mb(model.folder / file.path)
         for variant, file in model.manifest.files.items()
     }
+    sizes |= {part.path: _size_mb(model.folder / part.path) for part in _weights(model)}
     return {
         "name": name,
         "role": model.manifest.role,
@@ -238,6 +264,11 @@ def _row(shelf: ModelShelf, name: str, used_by: list[str]) -> dict[str, Any]:
         "used_by": used_by,
         "fault": "",
     }
+
+
+def _weights(model: Model) -> tuple[ModelFile, ...]:
+    """Return the part of a model of several that its size is in."""
+    return tuple(part for part in model.manifest.parts if part.path.endswith(".bin"))
 
 
 def _missing_row(name: str, used_by: list[str]) -> dict[str, Any]:

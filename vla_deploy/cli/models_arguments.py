@@ -10,11 +10,13 @@ from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.inference.manifest import Fit
 from vla_deploy.inference.manifest_schema import COLOURS
 from vla_deploy.perception.detectors.adapters import ADAPTERS
+from vla_deploy.speech.model_tools.fetching import PUBLISHED
 
 EXAMPLES: Final = """  vla-deploy models list
   vla-deploy models add mugs --onnx best.onnx --classes classes.txt
   vla-deploy models quantise mugs --images photos --labelled validation
   vla-deploy models bench mugs
+  vla-deploy models fetch whisper-small.en
   vla-deploy models verify
 """
 _SIZE: Final = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4})")
@@ -34,6 +36,7 @@ def register_acts(commands: Any, runs: Mapping[str, Run]) -> None:
     for act in (show, remove):
         act.add_argument("name", help="of the model")
     _add(acts)
+    _fetch(acts)
     _bench(acts)
     _quantise(acts)
     _verify(acts)
@@ -46,12 +49,18 @@ def _add(acts: Any) -> None:
     add = add_command(
         acts,
         "add",
-        "add a detector of your own, after a check and a trial run",
+        "add a detector or a Whisper of your own, after a check and a trial run",
         "  vla-deploy models add mugs --onnx best.onnx --classes classes.txt\n"
-        "  vla-deploy models add mugs --onnx best.onnx --adapter yolo_end_to_end --licence MIT\n",
+        "  vla-deploy models add mugs --onnx best.onnx --adapter yolo_end_to_end --licence MIT\n"
+        "  vla-deploy models add mine --whisper whisper-mine-ct2 --languages en\n",
     )
     add.add_argument("name", help="to call it by; profiles name it as a tier")
-    add.add_argument("--onnx", type=Path, required=True, metavar="FILE", help="the model, in fp32")
+    kind = add.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--onnx", type=Path, metavar="FILE", help="a detector, in fp32")
+    kind.add_argument(
+        "--whisper", type=Path, metavar="DIR", help="a Whisper, as CTranslate2 converts it"
+    )
+    _add_whisper_arguments(add)
     add.add_argument(
         "--classes",
         type=Path,
@@ -68,10 +77,24 @@ def _add(acts: Any) -> None:
     add.add_argument("--score", type=float, default=0.25, help="least score (default: 0.25)")
     add.add_argument("--iou", type=float, default=0.45, help="overlap of doubles (default: 0.45)")
     _add_image_arguments(add)
-    add.add_argument("--summary", default="a detector that was added", help="what it is")
+    add.add_argument("--summary", help="what it is")
     add.add_argument("--licence", default="not stated", help="the licence of its weights")
     add.add_argument("--card", type=Path, metavar="FILE", help="a model card to keep with it")
     add.add_argument("--replace", action="store_true", help="replace one of that name")
+
+
+def _add_whisper_arguments(add: argparse.ArgumentParser) -> None:
+    add.add_argument(
+        "--languages", default="en", metavar="CODES", help="that may be understood (default: en)"
+    )
+    add.add_argument(
+        "--trimmed",
+        action="store_true",
+        help="its weights were trained on sound without the padding to 30 s",
+    )
+    add.add_argument(
+        "--no-hot-words", action="store_true", help="give it no names of things and places"
+    )
 
 
 def _add_image_arguments(add: argparse.ArgumentParser) -> None:
@@ -93,15 +116,30 @@ def _bench(acts: Any) -> None:
     bench = add_command(
         acts,
         "bench",
-        "measure fp32 beside int8, a run of each in turn",
+        "measure a detector's files beside each other, or a Whisper on sounds",
         "  vla-deploy models bench detector\n"
         "  vla-deploy models bench mugs --images photos --profile jetson_orin_nx --json\n",
     )
     bench.add_argument("name", help="of the model")
     bench.add_argument("--images", type=Path, metavar="DIR", help="to run on (default: noise)")
+    bench.add_argument(
+        "--sounds", type=Path, metavar="DIR", help="WAV files to read (default: noise)"
+    )
     bench.add_argument("--rounds", type=_count, default=60, help="frames of each (default: 60)")
     _profile(bench)
     bench.add_argument("--threads", type=_count, help="(default: as the profile says)")
+
+
+def _fetch(acts: Any) -> None:
+    fetch = add_command(
+        acts,
+        "fetch",
+        "fetch a published Whisper from the Hugging Face hub, checked by its hashes",
+        "  vla-deploy models fetch whisper-small.en\n",
+    )
+    fetch.add_argument("name", choices=[*PUBLISHED], help="of the model")
+    fetch.add_argument("--endpoint", metavar="URL", help="a mirror of the hub")
+    fetch.add_argument("--replace", action="store_true", help="replace one of that name")
 
 
 def _quantise(acts: Any) -> None:

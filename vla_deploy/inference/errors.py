@@ -8,6 +8,7 @@ InferenceError
 ├── ProviderUnavailable  nothing here runs it as the profile asks: mend profile or installation
 ├── RunFailed            a run failed, or told what cannot be: a robot goes on without the answer
 ├── ImagesInvalid        images or labels to measure with cannot be used: mend the folder
+├── FetchFailed          a published model did not come: mend the network, or add it by hand
 ├── ToolMissing          an optional package is not installed: install it
 └── AccuracyLost         quantising costs more accuracy than allowed: nothing was installed
 """
@@ -54,6 +55,10 @@ class RunFailed(InferenceError):
 
 class ImagesInvalid(InferenceError):
     """Say that images or labels cannot be used."""
+
+
+class FetchFailed(InferenceError):
+    """Say that a published model could not be fetched."""
 
 
 class ToolMissing(InferenceError):

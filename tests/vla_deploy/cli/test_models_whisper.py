@@ -1,0 +1,185 @@
+"""A person's Whisper is added, fetched, checked and measured by the same commands as a detector."""
+
+import hashlib
+import json
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vla_deploy.cli.main import main
+from vla_deploy.state_dir import models_dir_of
+
+Vla = Callable[..., tuple[int, str, str]]
+SHA = "0123456789012345678901234567890123456789"
+
+
+@pytest.fixture
+def base(tmp_path: Path) -> Path:
+    return tmp_path / "base"
+
+
+@pytest.fixture
+def vla(base: Path, capsys: pytest.CaptureFixture[str]) -> Vla:
+    def vla(*arguments: str) -> tuple[int, str, str]:
+        code = main(["--runtime-base", str(base), "models", *arguments])
+        told = capsys.readouterr()
+        return code, told.out, told.err
+
+    return vla
+
+
+@pytest.fixture
+def files(scripted_whisper: Any) -> Path:
+    folder: Path = scripted_whisper.write("converted", "turn left")
+    return folder
+
+
+def test_a_whisper_is_added_listed_checked_measured_and_removed(
+    vla: Vla, files: Path, base: Path
+) -> None:
+    code, out, _ = vla("add", "mine", "--whisper", str(files), "--trimmed", "--json")
+    assert code == 0
+    assert json.loads(out)["reads_in_silence"] == "turn left"
+    row = next(row for row in json.loads(vla("list", "--json")[1]) if row["name"] == "mine")
+    assert (row["role"], row["from"], list(row["files"])) == (
+        "speech_to_text",
+        "added",
+        ["model.bin"],
+    )
+    shown = json.loads(vla("show", "mine", "--json")[1])
+    assert shown["whisper"] == {"languages": ["en"], "context": "trimmed", "hot_words": True}
+    code, out, _ = vla("verify", "mine", "--profile", "desktop")
+    assert (code, out.count("ok  ")) == (0, 4)
+    code, out, _ = vla("bench", "mine", "--rounds", "2", "--profile", "desktop", "--json")
+    figures = json.loads(out)
+    assert (code, len(figures["rows"])) == (0, 3)
+    assert all(0 < row["real_time_factor"] < 1 for row in figures["rows"])
+    assert vla("quantise", "mine", "--images", "a", "--labelled", "b")[0] == 2
+    assert vla("remove", "mine")[0] == 0
+    assert not (models_dir_of(base) / "mine").exists()
+
+
+def test_an_empty_and_a_half_written_folder_are_refused_and_leave_nothing(
+    vla: Vla, files: Path, base: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "empty").mkdir()
+    code, _, errors = vla("add", "mine", "--whisper", str(tmp_path / "empty"))
+    assert code == 2
+    assert "model.bin, config.json, tokenizer.json, vocabulary.json missing" in errors
+    assert "ct2-transformers-converter" in errors
+    weights = files / "model.bin"
+    weights.write_bytes(weights.read_bytes()[:5_000])
+    code, _, errors = vla("add", "mine", "--whisper", str(files))
+    assert code == 2
+    assert "cannot load it" in errors
+    assert not (models_dir_of(base) / "mine").exists()
+
+
+def test_verify_tells_a_part_that_has_changed(vla: Vla, files: Path, base: Path) -> None:
+    vla("add", "mine", "--whisper", str(files))
+    (models_dir_of(base) / "mine" / "tokenizer.json").write_text("{}")
+    code, out, _ = vla("verify", "mine")
+    assert code == 1
+    assert "FAIL mine                 files" in out
+    assert "expected SHA-256" in out
+
+
+class Hub:
+    """Serve one repository as the hub does: what it holds, then each file of that commit."""
+
+    def __init__(self, folder: Path) -> None:
+        self.files = {path.name: path.read_bytes() for path in folder.iterdir()}
+        self.files["README.md"] = b"not asked for"
+        self.asked: list[str] = []
+        self.tells_wrong_hash = False
+
+    def siblings(self) -> list[dict[str, Any]]:
+        return [self._sibling(name, data) for name, data in self.files.items()]
+
+    def _sibling(self, name: str, data: bytes) -> dict[str, Any]:
+        blob = hashlib.sha1(b"blob %d\0" % len(data) + data).hexdigest()
+        told: dict[str, Any] = {"rfilename": name, "size": len(data), "blobId": blob}
+        if name == "model.bin":
+            digest = hashlib.sha256(data + b"x" * self.tells_wrong_hash).hexdigest()
+            told["lfs"] = {"sha256": digest, "size": len(data), "pointerSize": 130}
+        return told
+
+
+@pytest.fixture
+def hub(files: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Hub, str]]:
+    import huggingface_hub.constants
+
+    monkeypatch.setattr(huggingface_hub.constants, "HF_HUB_OFFLINE", False)
+    served = Hub(files)
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            served.asked.append(self.path)
+            if self.path.startswith("/api/"):
+                answer = {"id": "a/b", "sha": SHA, "siblings": served.siblings()}
+                self._send(json.dumps(answer).encode(), "application/json")
+            else:
+                self._send(served.files[self.path.rpartition("/")[2]], "application/octet-stream")
+
+        do_HEAD = do_GET  # noqa: N815 - http.server's name
+
+        def _send(self, body: bytes, kind: str) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(body)))
+            self.send_header("X-Repo-Commit", SHA)
+            self.send_header("ETag", f'"{hashlib.sha256(body).hexdigest()}"')
+            self.end_headers()
+            if self.command == "GET":
+                self.wfile.write(body)
+
+        def log_message(self, *args: Any) -> None:
+            """Say nothing on the terminal."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+    thread.start()
+    yield served, f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_published_whisper_is_fetched_at_one_commit_and_checked(
+    vla: Vla, hub: tuple[Hub, str]
+) -> None:
+    served, endpoint = hub
+    code, out, errors = vla("fetch", "whisper-tiny.en", "--endpoint", endpoint, "--json")
+    assert (code, errors) == (0, "")
+    assert json.loads(out)["reads_in_silence"] == "turn left"
+    fetched = [path for path in served.asked if not path.startswith("/api/")]
+    assert all(f"Systran/faster-whisper-tiny.en/resolve/{SHA}/" in path for path in fetched)
+    assert not any(path.endswith("README.md") for path in fetched)
+    shown = json.loads(vla("show", "whisper-tiny.en", "--json")[1])
+    assert shown["whisper"]["context"] == "padded"
+    assert vla("verify", "whisper-tiny.en", "--profile", "desktop")[0] == 0
+
+
+def test_a_file_that_is_not_what_the_hub_says_is_refused(
+    vla: Vla, hub: tuple[Hub, str], base: Path
+) -> None:
+    served, endpoint = hub
+    served.tells_wrong_hash = True
+    code, _, errors = vla("fetch", "whisper-tiny.en", "--endpoint", endpoint)
+    assert code == 2
+    assert "model.bin: expected the hash" in errors
+    assert not (models_dir_of(base) / "whisper-tiny.en").exists()
+
+
+def test_without_a_network_it_says_what_to_do(vla: Vla, monkeypatch: pytest.MonkeyPatch) -> None:
+    import huggingface_hub.constants
+
+    monkeypatch.setattr(huggingface_hub.constants, "HF_HUB_OFFLINE", False)
+    code, _, errors = vla("fetch", "whisper-small.en", "--endpoint", "http://127.0.0.1:9")
+    assert code == 2
+    assert "the hub was not reached" in errors
+    assert "vla-deploy models add NAME --whisper FOLDER" in errors

@@ -1,0 +1,136 @@
+"""`vla-deploy hear`: tell what is understood of a recording, or of what is said now."""
+
+import argparse
+import dataclasses
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from platforms import Profile, load_profile
+from vla_deploy.cli.errors import CommandFailed, UsageError
+from vla_deploy.cli.example import add_top_command
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.links import device_links
+from vla_deploy.speech.choosing import open_best
+from vla_deploy.speech.devices import linked_microphone
+from vla_deploy.speech.hearing import Heard, Hearing
+from vla_deploy.speech.microphone import Microphone
+from vla_deploy.speech.model_tools.benching import sound_of
+from vla_deploy.speech.recording import StreamClock, described, hear_recording, open_hearing
+from vla_deploy.supervisor.profile_choice import start_profile
+from vla_deploy.supervisor.runtime import default_base
+
+_STEP_NS: Final = NS_PER_S // 50
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    hear = add_top_command(
+        commands,
+        "hear",
+        "  vla-deploy hear command.wav --json\n"
+        "  vla-deploy hear --microphone --seconds 20\n"
+        "  vla-deploy hear command.wav --model whisper-small.en\n",
+    )
+    source = hear.add_mutually_exclusive_group(required=True)
+    source.add_argument("file", type=Path, nargs="?", metavar="FILE.wav", help="a recording")
+    source.add_argument("--microphone", action="store_true", help="the robot's own, live")
+    hear.add_argument("--robot", default="butler", help="whose microphone (default: butler)")
+    hear.add_argument("--model", help="recogniser (default: as the profile says)")
+    hear.add_argument("--profile", help="name or path (default: the one of the next start)")
+    hear.add_argument("--words", default="", help="names of things and places that may occur")
+    hear.add_argument("--seconds", type=float, help="how long to listen (default: until Ctrl-C)")
+    hear.add_argument("--json", action="store_true", help="print JSON, live a line for each phrase")
+    hear.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print each phrase with what becomes of it; no robot is needed, and none hears of it."""
+    profile = _profile(arguments)
+    base: Path = arguments.runtime_base or default_base()
+    recogniser = open_best(ModelShelf.of_base(base, MonotonicClock()), profile, 0)
+    for notice in recogniser.notices:
+        print(f"vla-deploy: degraded: {notice}", file=sys.stderr)
+    clock = StreamClock()
+    live: Clock = MonotonicClock()
+    used = live if arguments.microphone else clock
+    hearing = open_hearing(recogniser, "", profile, used, arguments.words)
+    try:
+        if arguments.microphone:
+            return _listen(arguments, hearing, live)
+        return _read(arguments, list(hear_recording(hearing, clock, sound_of(arguments.file))))
+    finally:
+        hearing.close()
+
+
+def _profile(arguments: argparse.Namespace) -> Profile:
+    profile = load_profile(arguments.profile or start_profile(arguments.runtime_base)[0])
+    if arguments.model is None:
+        return profile
+    choice = profile.models["speech_to_text"]
+    only = dataclasses.replace(choice, tiers=(arguments.model,))
+    return dataclasses.replace(profile, models={**profile.models, "speech_to_text": only})
+
+
+def _read(arguments: argparse.Namespace, phrases: list[Heard]) -> int:
+    if arguments.json:
+        print(json.dumps([described(heard) for heard in phrases], indent=2))
+        return 0
+    for heard in phrases:
+        print(_line(heard))
+    if not phrases:
+        print(f"{arguments.file}: nobody speaks")
+    return 0
+
+
+def _listen(arguments: argparse.Namespace, hearing: Hearing, clock: Clock) -> int:
+    """Follow the microphone until its time is over, or Ctrl-C."""
+    robot = load_robot(arguments.robot)
+    opened = linked_microphone(robot, device_links(robot), clock)
+    if opened is None:
+        raise UsageError(f"robot {robot.name} has no [microphone]; hear a FILE.wav instead")
+    microphone = Microphone("microphone", opened, clock)
+    began_ns = clock.now_ns()
+    deadline_ns = began_ns + round((arguments.seconds or 1e9) * NS_PER_S)
+    try:
+        for heard in _live(microphone, hearing, clock, deadline_ns):
+            told = described(heard)
+            since_s = began_ns / NS_PER_S
+            told |= {key: round(told[key] - since_s, 3) for key in ("began_s", "ended_s")}
+            print(json.dumps(told) if arguments.json else _line(heard, began_ns), flush=True)
+    finally:
+        microphone.close()
+    return 0
+
+
+def _live(
+    microphone: Microphone, hearing: Hearing, clock: Clock, deadline_ns: int
+) -> Iterator[Heard]:
+    """Yield phrases as they end.
+
+    Raises:
+        CommandFailed: the microphone is not there.
+    """
+    while clock.now_ns() < deadline_ns:
+        block = microphone.poll()
+        if block is not None:
+            hearing.feed(block, None)
+            yield from hearing.heard()
+        elif microphone.away:
+            raise CommandFailed(microphone.away)
+        clock.sleep_until(clock.now_ns() + _STEP_NS)
+
+
+def _line(heard: Heard, since_ns: int = 0) -> str:
+    began_s, ended_s = (
+        (one - since_ns) / NS_PER_S for one in (heard.phrase.began_ns, heard.phrase.ended_ns)
+    )
+    reason = f" ({heard.judgement.reason})" if heard.judgement.reason else ""
+    return (
+        f"{began_s:7.2f} to {ended_s:.2f} s  {heard.judgement.verdict:<8} "
+        f"{heard.confidence:>4.0%}  {heard.text!r}{reason}"
+    )

@@ -1,0 +1,124 @@
+"""Do what `vla-deploy models` does with a Whisper: add, fetch, measure and check it."""
+
+import argparse
+import dataclasses
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from platforms import ModelChoice, Profile
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.manifest import Context, Whisper
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.store import Model
+from vla_deploy.perception.model_tools.verifying import Finding
+from vla_deploy.speech.errors import SpeechError
+from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, add_whisper
+from vla_deploy.speech.model_tools.benching import Bench, bench, noises, recordings
+from vla_deploy.speech.model_tools.checks import Check, checks_of
+from vla_deploy.speech.model_tools.fetching import fetch
+from vla_deploy.speech.recogniser import Reading
+
+Told = tuple[dict[str, object], str]
+
+
+def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
+    """Check a Whisper, try it out and keep it."""
+    request = Request(
+        name=arguments.name,
+        folder=arguments.whisper,
+        whisper=Whisper(
+            languages=tuple(arguments.languages.split(",")),
+            context=Context.TRIMMED if arguments.trimmed else Context.PADDED,
+            hot_words=not arguments.no_hot_words,
+        ),
+        summary=arguments.summary or "a recogniser that was added",
+        licence=arguments.licence,
+        card=arguments.card,
+    )
+    return _told(*add_whisper(shelf.store, request, clock=shelf.clock, replace=arguments.replace))
+
+
+def fetch_whisper(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
+    """Fetch a published Whisper, check it, try it out and keep it."""
+    with tempfile.TemporaryDirectory(prefix="vla-deploy-fetch-") as directory:
+        folder = Path(directory)
+        published = fetch(arguments.name, folder, arguments.endpoint)
+        request = Request(
+            name=arguments.name,
+            folder=folder,
+            whisper=Whisper(languages=published.languages, context=Context.PADDED, hot_words=True),
+            summary=published.summary,
+            licence=published.licence,
+        )
+        return _told(
+            *add_whisper(shelf.store, request, clock=shelf.clock, replace=arguments.replace)
+        )
+
+
+def measure(
+    arguments: argparse.Namespace, shelf: ModelShelf, model: Model, profile: Profile
+) -> Told:
+    """Measure what a Whisper costs."""
+    choice: ModelChoice = profile.models.get(model.manifest.role, PLAIN_CHOICE)
+    if arguments.threads:
+        choice = dataclasses.replace(choice, threads=arguments.threads)
+    sounds = recordings(sorted(arguments.sounds.glob("*.wav"))) if arguments.sounds else noises()
+    figures = bench(
+        model,
+        choice,
+        sounds,
+        beam=profile.speech.beam,
+        rounds=arguments.rounds,
+        clock=shelf.clock,
+    )
+    return figures.document(), _bench_text(figures)
+
+
+def findings(shelf: ModelShelf, model: Model, profile: Profile | None) -> Iterator[Finding]:
+    """Check an installed Whisper."""
+    name = model.manifest.name
+    yield Finding(model=name, check="manifest", is_ok=True, detail=str(model.folder))
+    for check, act in checks_of(shelf, model, profile):
+        yield _finding(name, check, act)
+
+
+def _finding(model: str, check: str, act: Check) -> Finding:
+    try:
+        return Finding(model=model, check=check, is_ok=True, detail=act())
+    except (InferenceError, SpeechError) as error:
+        return Finding(model=model, check=check, is_ok=False, detail=str(error))
+
+
+def _told(model: Model, silence: Reading) -> Told:
+    name = model.manifest.name
+    document: dict[str, object] = {
+        "name": name,
+        "folder": str(model.folder),
+        "reads_in_silence": silence.text,
+        "no_speech": silence.no_speech,
+        "took_s": silence.took_s,
+    }
+    text = (
+        f"added {name} in {model.folder}; a second of silence took "
+        f"{1000 * silence.took_s:.0f} ms and reads {silence.text!r}\n"
+        f"next: vla-deploy models bench {name}, then name it in a profile: "
+        f'[models.speech_to_text] tiers = ["{name}", "commands-whisper"]'
+    )
+    return document, text
+
+
+def _bench_text(figures: Bench) -> str:
+    rows = [
+        f"{row.sound:<20} {row.duration_s:>5.1f} s {1000 * row.median_s:>8.1f} ms "
+        f"{1000 * row.p95_s:>8.1f} ms {row.real_time_factor:>6.3f}  {row.text}"
+        for row in figures.rows
+    ]
+    return "\n".join(
+        [
+            f"{'sound':<20} {'length':>7} {'median':>11} {'p95':>11} {'factor':>6}  text",
+            *rows,
+            f"{figures.provider}, {figures.threads} threads, beam {figures.beam}; loaded in "
+            f"{figures.load_s:.2f} s, {figures.memory_mb:.0f} MB",
+        ]
+    )
