@@ -11,6 +11,7 @@ from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.confirmation import confirmation_of
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
@@ -28,6 +29,7 @@ from vla_deploy.planning.understanding import (
     Verdict,
     reply,
 )
+from vla_deploy.planning.understanding.mentioned import mentions_of
 
 MOST_WAITING: Final = 8
 _MOST_ASKED: Final = 3
@@ -180,8 +182,9 @@ class Desk:
                 self._situation.check_ready()
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["nobody was asked for a plan"])
-            if answer.proposal is not None and answer.proposal.read_back:
-                raise Ambiguous(answer.proposal.read_back)
+            question = _read_back(answer) or confirmation_of(answer.plan, request)
+            if question:
+                raise Ambiguous(question)
             self._hand_on(command, request, answer, answer.plan)
         except Ambiguous as error:
             self._ask(command, request, answer, error)
@@ -198,6 +201,7 @@ class Desk:
                 command_id=command.command_id,
                 told_ns=command.told_ns,
                 understood=plan.summary,
+                mentioned=mentions_of(plan, request.scene),
                 plan=plan,
                 here=request.here,
             )
@@ -298,3 +302,7 @@ class Desk:
         question = self._talk.question
         assert question is not None, "whoever waits has asked"
         return question
+
+
+def _read_back(answer: Answer) -> str:
+    return "" if answer.proposal is None else answer.proposal.read_back

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 from vla_deploy.planning.errors import DependsOnView, UnknownObject
 from vla_deploy.world import Query, Snapshot, Thing, UnknownWord, Viewpoint, find, parse_query
@@ -36,6 +37,7 @@ def words_of(text: str) -> list[str]:
     return [word for word in words if word not in ARTICLES]
 
 
+@lru_cache(maxsize=512)
 def parse_object(text: str) -> ObjectQuery:
     """Read "the red cup", "mug", "the small cup next to the book", or an id such as "cup_1".
 

@@ -120,7 +120,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove)"
      rf"(?: hold of)? {_OBJECT}", building.pick),
     # --- the rest
-    (Intent.ASSIST, r"(?:say|repeat|announce|repeat after me|speak)[:,]? (?P<text>.+)",
+    (Intent.ASSIST, r"(?:say|announce|repeat after me)[:,]? (?P<text>.+)",
      building.speak),
     (Intent.ASSIST, r"(?P<text>hello|hi|good morning|good evening|good night)(?: there)?",
      building.speak),

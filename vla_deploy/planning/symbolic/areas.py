@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from vla_deploy.planning.knowledge import World
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world.footprint import polygon_depth_m
-from vla_deploy.world.reach import stands_around
+from vla_deploy.world.reach import IsFree, stands_around
 
 Point = tuple[float, float]
 STEP_M = 0.1
@@ -29,16 +29,38 @@ def zone_on_way(start: Point, end: Point, world: World) -> KeepOutZone | None:
 
 
 def zone_around(position_m: tuple[float, float, float], world: World) -> KeepOutZone | None:
-    """Return the zone within which one would have to stand to reach a thing, or None."""
-    inside = zone_at(position_m[:2], world)
-    if inside is None:
+    """Return the zone that a thing lies in, or in which one would stand to reach it, or None."""
+    lies_in = (one for one in world.zones if polygon_depth_m(position_m, one.polygon_m) > 0.0)
+    inside = next(lies_in, None)
+    if inside is not None:
+        return inside
+    near = zone_at(position_m[:2], world)
+    if near is None:
         return None
     stands = stands_around(position_m, lambda x_m, y_m: zone_at((x_m, y_m), world) is None)
-    return inside if next(stands, None) is None else None
+    return near if next(stands, None) is None else None
+
+
+def blocked_on_way(start: Point, end: Point, is_free: IsFree) -> float | None:
+    """Return how far a straight way leads over free floor, None where all of it is free.
+
+    Furniture that the robot stands at may be nearer than the map allows; away from it is free.
+    """
+    was_free = is_free(*start)
+    for point in _points(start, end):
+        now_free = is_free(*point)
+        if not now_free and (was_free or point == end):
+            return math.dist(start, point)
+        was_free = was_free or now_free
+    return None
 
 
 def _points(start: Point, end: Point) -> Iterator[Point]:
     count = max(1, math.ceil(math.dist(start, end) / STEP_M))
     for step in range(1, count + 1):
         share = step / count
-        yield (start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
+        yield (
+            end
+            if step == count
+            else (start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
+        )

@@ -13,7 +13,7 @@ from vla_deploy.manipulation.grasps import grasps_from_above
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.symbolic.areas import zone_around, zone_at, zone_on_way
+from vla_deploy.planning.symbolic.areas import blocked_on_way, zone_around, zone_at, zone_on_way
 from vla_deploy.planning.symbolic.state import State
 from vla_deploy.planning.symbolic.subjects import Subject, subject_of
 from vla_deploy.robots.description import KeepOutZone
@@ -22,6 +22,8 @@ from vla_deploy.world.reach import GRIP_HEIGHTS_M
 
 # Farther than that from where it stands, the robot is surely not before a thing.
 SURELY_AWAY_M: Final = 1.6
+# Less than that and the robot still stands where it stood.
+SMALL_MOVE_M: Final = 0.1
 PUT_INTO: Final = frozenset({"box"})
 
 MET: Final = ""
@@ -209,13 +211,17 @@ def _may_stand(x_m: float, y_m: float, world: World) -> Answer:
 
 
 def way_is_allowed(state: State, setting: Setting) -> Answer:
-    """Does the straight way keep out of the zones?"""
+    """Does the straight way keep out of the zones, and on free floor where a map is at hand?"""
     if state.pose is None:
         return None
     x_m, y_m, yaw_rad = state.pose
     way_m = float(setting.parameters["distance_m"])
     end = (x_m + way_m * math.cos(yaw_rad), y_m + way_m * math.sin(yaw_rad))
-    return _refusal(zone_on_way((x_m, y_m), end, setting.world), f"the way of {way_m:g} m")
+    refusal = _refusal(zone_on_way((x_m, y_m), end, setting.world), f"the way of {way_m:g} m")
+    if refusal or setting.world.is_free is None or abs(way_m) < SMALL_MOVE_M:
+        return refusal
+    free_m = blocked_on_way((x_m, y_m), end, setting.world.is_free)
+    return MET if free_m is None else f"{way_m:g} m asked, the map shows {free_m:.1f} m of room"
 
 
 def _refusal(zone: KeepOutZone | None, what: str) -> Answer:

@@ -4,13 +4,11 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from vla_deploy.planning.symbolic.conditions import Setting
+from vla_deploy.planning.symbolic.conditions import SMALL_MOVE_M, Setting
 from vla_deploy.planning.symbolic.state import Held, State
 from vla_deploy.world.thing import Rest
 
 Effect = Callable[[State, Setting], State]
-# Less than that and the robot still stands where it stood.
-SMALL_MOVE_M = 0.1
 
 
 def goes(state: State, setting: Setting) -> State:

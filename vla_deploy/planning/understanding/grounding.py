@@ -24,6 +24,8 @@ from vla_deploy.planning.validator import action_faults
 
 # A free hand takes two steps, then the thing is looked for and driven to.
 MOST_INSERTED: Final = 6
+# What the description of an action says that its author did not ask for.
+PUT_IN: Final = "put in"
 # Doing these a second time at once changes nothing.
 IDEMPOTENT: Final = frozenset(
     {"navigate_to", "look_at", "find_object", "open_gripper", "close_gripper", "move_arm", "stop"}
@@ -89,6 +91,7 @@ class _Grounder:
         self._state = state_of(request.world, request.scene, request.here)
         self._last: dict[str, tuple[str, ...]] = {}
         self._taken: set[str] = set()
+        self._judged = 0
 
     def add(self, action: Action) -> None:
         """Ground an action, with what must come before it, into none, one or several."""
@@ -101,8 +104,16 @@ class _Grounder:
             step = _made(action, skill, parameters)
             if own:
                 step = action.model_copy(update={"parameters": dict(parameters)})
+            step = self._as_sure(step)
             needed = self._append(step, self._prepared(step, needed), inserted=not own)
         self._last[action.id] = needed
+
+    def _as_sure(self, step: Action) -> Action:
+        """Let a step be as feasible as its words, read since the step before, are sure."""
+        fresh = self.resolver.decisions[self._judged :]
+        self._judged = len(self.resolver.decisions)
+        sure = min((one.certainty for one in fresh), default=1.0)
+        return step.model_copy(update={"feasibility_score": min(step.feasibility_score, sure)})
 
     def _prepared(self, step: Action, needed: tuple[str, ...]) -> tuple[str, ...]:
         """Put in what must come before a step; return what the step then needs."""
@@ -140,7 +151,13 @@ class _Grounder:
 def _made(action: Action, skill: str, parameters: Parameters) -> Action:
     """Return an action that is put in before another, of the same priority."""
     name = f"{action.id[:40]}_{skill}"
-    return Action(id=name, skill=skill, parameters=dict(parameters), priority=action.priority)
+    return Action(
+        id=name,
+        skill=skill,
+        parameters=dict(parameters),
+        priority=action.priority,
+        description=PUT_IN,
+    )
 
 
 def _completed(action: Action) -> Action:

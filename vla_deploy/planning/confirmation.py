@@ -1,0 +1,101 @@
+"""Decide which plans wait for a person's yes: one table of risks, each with what it says of one.
+
+The robot file sets how far it goes (`[planning] require_confirmation`): never, risky, always. What
+is unsure is always asked, since nobody has asked for it surely.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.phrasing import Says, steps_in_words
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.symbolic.conditions import Setting
+from vla_deploy.planning.symbolic.simulation import expected_s
+from vla_deploy.planning.understanding.grounding import PUT_IN
+from vla_deploy.robots.plan_bounds import Confirm
+
+Risk = Callable[[Plan, Request], str]
+
+# Below that the words may mean something else, or may have been other words.
+SURE: Final = 0.7
+SURELY_HEARD: Final = 0.6
+MANY_ACTIONS: Final = 25
+LONG_S: Final = 900.0
+MANY_THINGS: Final = 4
+HEAVY_RATIO: Final = 0.8
+FAR_BACK_M: Final = -1.0
+# These move nothing.
+STILL: Final = frozenset({"speak", "wait", "stop"})
+
+
+def confirmation_of(plan: Plan, request: Request) -> str:
+    """Return the question to ask before a plan runs, or "" where it may run at once."""
+    if all(action.skill in STILL for action in plan.actions):
+        return ""
+    wanted = request.world.bounds.require_confirmation
+    risks = () if wanted is Confirm.NEVER else _RISKS
+    reasons = [reason for risk in (*_DOUBTS, *risks) if (reason := risk(plan, request))]
+    if not reasons and wanted is not Confirm.ALWAYS:
+        return ""
+    question = Says.CONFIRM.format(steps=steps_in_words(plan))
+    return " ".join([question, *(f"{reason}." for reason in reasons)])
+
+
+def _is_unsure(plan: Plan, _: Request) -> str:
+    unsure = min((action.feasibility_score for action in plan.actions), default=1.0) < SURE
+    return "I am not sure that I understood you" if unsure else ""
+
+
+def _is_unheard(_: Plan, request: Request) -> str:
+    heard = request.heard_confidence
+    unheard = heard is not None and heard < SURELY_HEARD
+    return "I am not sure that I heard you right" if unheard else ""
+
+
+def _has_concerns(plan: Plan, _: Request) -> str:
+    return f"There may be a danger: {'; '.join(plan.safety_concerns)}" if plan.safety_concerns else ""
+
+
+def _is_long(plan: Plan, _: Request) -> str:
+    long_s = sum(expected_s(action) for action in plan.actions)
+    if long_s <= LONG_S and len(plan.actions) <= MANY_ACTIONS:
+        return ""
+    return f"It takes {len(plan.actions)} steps and about {long_s / 60:.0f} minutes"
+
+
+def _moves_many(plan: Plan, _: Request) -> str:
+    count = sum(action.skill == "pick_up" for action in plan.actions)
+    return f"I would move {count} things" if count >= MANY_THINGS else ""
+
+
+def _is_heavy(plan: Plan, request: Request) -> str:
+    limit_kg = HEAVY_RATIO * request.world.bounds.payload_kg
+    for action in plan.actions:
+        mass_kg = _mass_kg(action, request)
+        if mass_kg is not None and mass_kg > limit_kg:
+            return f"The {action.parameters['object']} may weigh {mass_kg:.1f} kg"
+    return ""
+
+
+def _mass_kg(action: Action, request: Request) -> float | None:
+    setting = Setting(parameters=action.parameters, world=request.world, scene=request.scene)
+    subject = setting.subject("object") if action.skill == "pick_up" else None
+    return None if subject is None else subject.mass_kg
+
+
+def _puts_down_first(plan: Plan, _: Request) -> str:
+    first = any(one.skill == "place" and one.description == PUT_IN for one in plan.actions)
+    return "My hands are full: I would put something down first" if first else ""
+
+
+def _goes_back_far(plan: Plan, _: Request) -> str:
+    ways_m = [float(one.parameters["distance_m"]) for one in plan.actions if one.skill == "move"]
+    back_m = min(ways_m, default=0.0)
+    return f"I would drive {-back_m:g} m backward" if back_m < FAR_BACK_M else ""
+
+
+_DOUBTS: Final[tuple[Risk, ...]] = (_is_unsure, _is_unheard)
+_RISKS: Final[tuple[Risk, ...]] = (
+    _has_concerns, _is_long, _moves_many, _is_heavy, _puts_down_first, _goes_back_far,
+)  # fmt: skip

@@ -1,0 +1,49 @@
+"""Tell what a plan is about, so that the next command can say "it", "there" and "the other one"."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.understanding.conversation import Mention, Role
+from vla_deploy.world import Snapshot
+
+_ROLES: Final = {"object": Role.OBJECT, "destination": Role.DESTINATION, "place": Role.PLACE}
+
+
+def mentions_of(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
+    """Return what a grounded plan names, in its order, each once."""
+    found = {}
+    for action in plan.actions:
+        for mention in _mentions(action, plan, scene):
+            found.setdefault((mention.means, mention.thing_id), mention)
+    return tuple(found.values())
+
+
+def _mentions(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Mention]:
+    for name, role in _ROLES.items():
+        value = action.parameters.get(name)
+        if not isinstance(value, str):
+            continue
+        role = _role(value, role, plan)
+        try:
+            subject = subject_of(value, scene)
+        except UnknownObject:
+            yield Mention(said=value, means=value, role=Role.PLACE)
+            continue
+        thing = subject.thing
+        yield Mention(
+            said=value,
+            means=subject.words if thing is None else str(thing),
+            role=role,
+            thing_id="" if thing is None else thing.thing_id,
+            kind=subject.kind,
+            colour="" if thing is None else thing.colour,
+        )
+
+
+def _role(value: str, role: Role, plan: Plan) -> Role:
+    """Return the part that a name plays in the whole plan: what is driven to, to put, is put to."""
+    put_to = any(one.parameters.get("destination") == value for one in plan.actions)
+    return Role.DESTINATION if put_to else role
