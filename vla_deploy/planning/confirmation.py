@@ -54,7 +54,9 @@ def _is_unheard(_: Plan, request: Request) -> str:
 
 
 def _has_concerns(plan: Plan, _: Request) -> str:
-    return f"There may be a danger: {'; '.join(plan.safety_concerns)}" if plan.safety_concerns else ""
+    return (
+        f"There may be a danger: {'; '.join(plan.safety_concerns)}" if plan.safety_concerns else ""
+    )
 
 
 def _is_long(plan: Plan, _: Request) -> str:

@@ -3,11 +3,11 @@
 PlanningError
 ├── CommandUnreadable give words or a plan, no more than fits
 ├── NotUnderstood     say it in other words
-├── NotAble           ask for something that the robot can do
 ├── UnknownPlace      name a place the robot knows
 ├── UnknownObject     name a kind of object the robot knows
 │   └── DependsOnView say what it stands on, in or next to
 ├── CannotBeDone      ask for something else: a planner has seen that this cannot be done
+│   └── NotAble       nor can any other planner: the robot lacks what it takes
 ├── Declined          ask the next rung of the ladder: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
 ├── NotReady          reset and arm the robot first
@@ -39,10 +39,6 @@ class NotUnderstood(PlanningError):
         )
 
 
-class NotAble(PlanningError):
-    """Say why the robot cannot do such a thing at all, however it is said."""
-
-
 class UnknownPlace(PlanningError):
     """Say that a place is not in the robot file."""
 
@@ -72,6 +68,10 @@ class DependsOnView(UnknownObject):
 
 class CannotBeDone(PlanningError):
     """Say why a planner thinks that a command cannot be carried out."""
+
+
+class NotAble(CannotBeDone):
+    """Say what the robot lacks for such a thing, however it is said and whoever plans it."""
 
 
 class Declined(PlanningError):

@@ -14,7 +14,7 @@ _ROLES: Final = {"object": Role.OBJECT, "destination": Role.DESTINATION, "place"
 
 def mentions_of(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
     """Return what a grounded plan names, in its order, each once."""
-    found = {}
+    found: dict[tuple[str, str], Mention] = {}
     for action in plan.actions:
         for mention in _mentions(action, plan, scene):
             found.setdefault((mention.means, mention.thing_id), mention)

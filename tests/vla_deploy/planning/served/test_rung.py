@@ -12,7 +12,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanInvalid
+from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanInvalid, UnknownPlace
 from vla_deploy.planning.planner import checked
 from vla_deploy.planning.served.rung import Effort, ServedRung
 
@@ -120,12 +120,12 @@ def test_a_model_whose_plan_is_refused_is_told_why_once(loopback, served, ask):
     assert places_of(proposal) == ["kitchen"]
     wish = loopback.heard[1].body["messages"][-1]["content"]
     assert "refused: " in wish
-    assert 'unknown place "narnia"' in wish
+    assert 'I do not know the place "narnia"' in wish
 
 
 def test_the_number_of_calls_is_bounded_whatever_the_model_does(loopback, served, ask):
     loopback.then(loopback.says(answer(NOWHERE)))
-    with pytest.raises(PlanInvalid, match="narnia"):
+    with pytest.raises(UnknownPlace, match="narnia"):
         served().propose(ask(TIDY), within())
     assert len(loopback.heard) == 6
 

@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import pytest
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.confirmation import confirmation_of
+from vla_deploy.planning.knowledge import World, world_of
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.understanding.grounding import PUT_IN
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.plan_bounds import Confirm
+from vla_deploy.world import Snapshot, Thing
+
+GO = Action(id="a", skill="navigate_to", parameters={"place": "kitchen"})
+PICK = Action(id="p", skill="pick_up", parameters={"object": "bottle"})
+
+
+@pytest.fixture(scope="module")
+def butler() -> World:
+    return world_of(load_robot("butler"), {"left": None, "right": None})
+
+
+def ask(world: World, *actions: Action, **changes: object) -> str:
+    heard = changes.pop("heard_confidence", None)
+    scene = changes.pop("scene", None)
+    plan = Plan(goal="x", actions=actions).model_copy(update=changes)
+    request = Request(
+        command_id="c", text="x", world=world, scene=scene, heard_confidence=heard
+    )  # fmt: skip
+    return confirmation_of(plan, request)
+
+
+def test_an_ordinary_plan_runs_at_once(butler: World) -> None:
+    assert ask(butler, GO, PICK) == ""
+
+
+def test_the_robot_file_says_how_far_it_goes(butler: World) -> None:
+    back = Action(id="b", skill="move", parameters={"distance_m": -2.0})
+    always, never = (
+        replace(butler, bounds=replace(butler.bounds, require_confirmation=one))
+        for one in (Confirm.ALWAYS, Confirm.NEVER)
+    )
+    assert ask(always, GO) == "Shall I go to the kitchen?"
+    assert ask(never, back) == ""
+    assert ask(butler, back).endswith("I would drive 2 m backward.")
+
+
+def test_what_moves_nothing_needs_no_yes(butler: World) -> None:
+    always = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.ALWAYS))
+    assert ask(always, Action(id="s", skill="speak", parameters={"text": "hello"})) == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"feasibility_score": 0.6}, "I am not sure that I understood you."),
+        ({"description": PUT_IN, "skill": "place",
+          "parameters": {"destination": "coffee_table", "relation": "on"}},
+         "My hands are full: I would put something down first."),
+    ],
+)  # fmt: skip
+def test_each_risk_of_an_action_is_told(butler: World, change: dict[str, object], why: str) -> None:
+    assert ask(butler, PICK.model_copy(update=change)).endswith(why)
+
+
+def test_each_risk_of_a_plan_is_told(butler: World) -> None:
+    assert "There may be a danger: it is hot." in ask(butler, GO, safety_concerns=("it is hot",))
+    assert "not sure that I heard" in ask(butler, GO, heard_confidence=0.4)
+    assert ask(butler, GO, heard_confidence=0.9) == ""
+    assert "I would move 4 things." in ask(butler, *[PICK] * 4)
+    assert "It takes 70 steps and about 18 minutes." in ask(butler, *[GO] * 70)
+
+
+def test_doubt_is_asked_even_where_risks_are_not(butler: World) -> None:
+    never = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.NEVER))
+    assert ask(never, PICK.model_copy(update={"feasibility_score": 0.6}))
+
+
+def test_a_heavy_thing_is_asked_for(butler: World) -> None:
+    full = Thing(thing_id="bottle_1", kind="bottle", colour="green",
+                 position_m=(2.0, 1.5, 0.5), size_m=(0.06, 0.06, 0.20))  # fmt: skip
+    said = ask(butler, PICK, scene=Snapshot(stamp_ns=0, things=(full,)))
+    assert said.endswith("The bottle may weigh 0.5 kg.")
