@@ -21,6 +21,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "demo": Command("demo", "do the main job on the twin"),
     "say": Command("say", "give the robot a command and follow it"),
     "hear": Command("hear", "tell what is understood of a recording, or of what you say now"),
+    "plan": Command("plan", "tell what would be done for a command, and who planned it"),
     "status": Command("status", "tell what runs and how the robot is"),
     "scene": Command("scene", "tell what the robot knows of the things around it"),
     "budget": Command(

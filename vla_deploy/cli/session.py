@@ -26,6 +26,11 @@ class Session:
         self._frames: dict[str, FrameReader] = {}
         self._numbers = itertools.count(1)
 
+    @property
+    def space(self) -> SharedSpace:
+        """Return the run's shared memory."""
+        return self._space
+
     def fresh(self, topic: str, age_limit_s: float | None = None) -> Sample | None:
         """Return the newest sample of a cell, or None when there is none that young."""
         if topic not in self._cells:

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import CellReader, FrameReader, Sample, SharedSpace
+from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace
+from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.planning.asking import Request
@@ -105,8 +104,11 @@ class Situation:
         frame = self._frames.latest()
         if frame is None or self._clock.now_ns() - frame.stamp_ns > _IMAGE_AGE_S * NS_PER_S:
             return None
-        pixels = np.frombuffer(frame.payload, np.uint8, 3 * frame.width * frame.height)
-        return pixels.reshape(frame.height, frame.width, 3)
+        try:
+            return colours(frame)
+        except BadPayload as error:  # a fault of perception: plan as if it saw nothing
+            _log.warning("%s", error)
+            return None
 
     def _fresh(self, reader: CellReader, age_limit_s: float) -> Sample | None:
         sample = reader.latest()
