@@ -9,6 +9,7 @@ from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.whisper_schema import SPEECH_TO_TEXT
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import NoRecogniser, SpeechError
+from vla_deploy.speech.model_tools.fetching import PUBLISHED
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 
 _log = logging.getLogger(__name__)
@@ -37,6 +38,9 @@ def open_best(shelf: ModelShelf, profile: Profile, model_tier: int) -> Recognise
     first = min(model_tier, len(choice.tiers) - 1)
     reasons: list[str] = []
     for name in (*choice.tiers[first:], *reversed(choice.tiers[:first])):
+        if name not in shelf.store.names():
+            reasons.append(_absent(name))
+            continue
         try:
             model = shelf.store.load(name)
             if model.manifest.whisper is None:
@@ -49,6 +53,11 @@ def open_best(shelf: ModelShelf, profile: Profile, model_tier: int) -> Recognise
         recogniser.notices = tuple(reasons)
         return recogniser
     raise NoRecogniser("; ".join(reasons))
+
+
+def _absent(name: str) -> str:
+    remedy = f"fetch {name}" if name in PUBLISHED else f"add {name} --whisper FOLDER"
+    return f"{name} is not here (vla-deploy models {remedy})"
 
 
 def ears_of(shelf: ModelShelf, profile: Profile, model_tier: int) -> Ears:

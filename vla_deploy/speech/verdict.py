@@ -10,7 +10,7 @@ from typing import Final
 
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.recogniser import Reading
-from vla_deploy.speech.words import is_stop, words_of
+from vla_deploy.speech.words import is_courtesy, is_stop, words_of
 
 FASTEST_WORDS_S: Final = 7.0
 MOST_COMPRESSION: Final = 2.4
@@ -72,6 +72,10 @@ def _without_words(case: Case) -> str:
     return "" if words_of(case.reading.text) else "a sound without words"
 
 
+def _courtesy(case: Case) -> str:
+    return "a courtesy: nothing to do, nothing to answer" if is_courtesy(case.reading.text) else ""
+
+
 def _own_voice(case: Case) -> str:
     words, own = words_of(case.reading.text), set(words_of(case.own_words))
     known = sum(word in own for word in words)
@@ -120,6 +124,7 @@ def _unsure(case: Case) -> str:
 
 _REFUSALS: Final = (
     _Refusal(_without_words, ask_again=False),
+    _Refusal(_courtesy, ask_again=False),
     _Refusal(_own_voice, ask_again=False),
     _Refusal(_music, ask_again=False),
     _Refusal(_language, ask_again=True),

@@ -5,6 +5,9 @@ from typing import Final
 
 STOPS: Final = frozenset({"stop", "halt", "freeze"})
 _POLITE: Final = frozenset({"robot", "butler", "please", "now", "hey", "moving", "it", "that"})
+_COURTESIES: Final = frozenset(
+    {"please", "thanks", "thank", "you", "um", "uh", "hm", "hmm", "ah", "oh", "er"}
+)
 _UNFINISHED: Final = frozenset(
     {
         "a", "an", "and", "at", "behind", "beside", "by", "from", "in", "into", "is", "my",
@@ -26,6 +29,11 @@ def is_stop(text: str) -> bool:
     return any(word in STOPS for word in words) and all(
         word in STOPS or word in _POLITE for word in words
     )
+
+
+def is_courtesy(text: str) -> bool:
+    """Tell whether a text has nothing in it to do or to answer."""
+    return all(word in _COURTESIES for word in words_of(text))
 
 
 def is_unfinished(text: str) -> bool:

@@ -70,4 +70,4 @@ def test_silence_says_nothing_and_faults_are_one_line(hear: Hear, tmp_path: Path
     assert "no such file" in errors
     code, _, errors = hear(str(path), "--model", "unheard-of")
     assert code == 2
-    assert "no model 'unheard-of'" in errors
+    assert "unheard-of is not here" in errors

@@ -32,7 +32,7 @@ def test_the_first_tier_that_is_there_is_opened(shelf: ModelShelf, scripted_whis
     recogniser = open_best(shelf, profile, 0)
     assert recogniser.model.manifest.name == "small"
     (notice,) = recogniser.notices
-    assert notice.startswith("whisper-small.en: no model 'whisper-small.en'")
+    assert notice == ("whisper-small.en is not here (vla-deploy models fetch whisper-small.en)")
     assert open_best(shelf, profile, 2).model.manifest.name == "tiny"
     assert open_best(shelf, profile, 9).model.manifest.name == "tiny"
 
@@ -49,8 +49,8 @@ def test_a_spoiled_model_gives_way_to_the_next(shelf: ModelShelf, scripted_whisp
 def test_with_none_the_robot_says_why_and_goes_on(shelf: ModelShelf, scripted_whisper: Any) -> None:
     (scripted_whisper.folder / "empty").mkdir(parents=True)
     profile = profile_with("empty", "missing")
-    with pytest.raises(NoRecogniser, match=r"empty: no model 'empty'.*missing: no model"):
+    with pytest.raises(NoRecogniser, match=r"empty is not here .*; missing is not here"):
         open_best(shelf, profile, 0)
     ears = ears_of(shelf, profile, 0)
     assert ears.recogniser is None
-    assert "no model 'empty'" in ears.why
+    assert "vla-deploy models add empty --whisper FOLDER" in ears.why

@@ -346,7 +346,7 @@ def test_without_a_model_the_robot_is_deaf_and_says_so_for_each_phrase(
     rig.say(TEXT)
     status = rig.status()
     assert status["state"] == "deaf"
-    assert status["why"].startswith("no model: commands-whisper: no model 'commands-whisper'")
+    assert status["why"].startswith("no model: commands-whisper is not here")
     (heard,) = rig.told("heard")
     assert heard["verdict"] == "rejected"
     assert heard["reason"].startswith("no model turns speech into text")

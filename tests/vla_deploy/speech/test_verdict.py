@@ -52,6 +52,7 @@ def test_a_sure_reading_is_a_command() -> None:
     ("changed", "reason", "ask_again"),
     [
         ({"reading": {"text": " ... "}}, "a sound without words", False),
+        ({"reading": {"text": "Please. Thank you!"}}, "a courtesy", False),
         ({"confidence": 0.4}, "understood by 40%, at least 50% is needed", True),
         (
             {"confidence": 0.4, "phrase": {"clipped_ratio": 0.1}},
