@@ -42,6 +42,7 @@ def collect(session: Session) -> dict[str, Any]:
         "executor": session.document("executor_status", age_limit_s=2.0),
         "pose": None if pose is None else _pose_document(pose),
         "scene": session.document("scene", age_limit_s=5.0),
+        "speech": session.document("speech_status", age_limit_s=2.0),
         "profile": session.document("profile_status", age_limit_s=3.0),
         "dashboard_url": None,
     }
@@ -67,6 +68,7 @@ def as_text(status: dict[str, Any]) -> str:
             _control(status),
             _pose(status),
             _task(status),
+            _ears(status),
             _scene(status),
             *_sight(status),
         ]
@@ -169,3 +171,14 @@ def _model(model: dict[str, Any]) -> str:
     cost = f"{1000 * model['p50_s']:.0f} ms, {model['memory_mb']:.0f} MB"
     notices = f" ({'; '.join(model['notices'])})" if model["notices"] else ""
     return f"form and {model['model']} {model['variant']} on {model['provider']}, {cost}{notices}"
+
+
+def _ears(status: dict[str, Any]) -> str:
+    """Say whether the robot understands what is said to it, and why not."""
+    speech = status["speech"]
+    if speech is None:
+        return "hears: nothing, speech is silent"
+    if speech["state"] == "deaf":
+        return f"hears: no words ({speech['why']}); type commands"
+    counts = ", ".join(f"{speech['heard'][name]} {name}" for name in ("accepted", "rejected"))
+    return f"hears: {speech['state']} by {speech['model']['name']}, {counts}"

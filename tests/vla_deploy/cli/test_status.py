@@ -6,7 +6,7 @@ import pytest
 
 from vla_deploy.cli.status import as_text
 
-SILENT = ("process_table", "profile", "control", "pose", "executor")
+SILENT = ("process_table", "profile", "control", "pose", "executor", "speech")
 MODEL = {
     "model": "detector",
     "variant": "int8_u8s8",
@@ -39,3 +39,15 @@ def test_that_the_network_is_done_without_is_told_with_the_reason(
 def test_what_spoils_the_images_is_told() -> None:
     text = told({"mode": "network", "why": "", "model": MODEL}, "dark: 1, limit 0.9 (...)")
     assert text.endswith("  image: dark: 1, limit 0.9 (...)")
+
+
+def test_whether_spoken_words_are_understood_is_told_and_why_not() -> None:
+    def ears(speech: dict[str, Any] | None) -> str:
+        return as_text({**dict.fromkeys(SILENT), "scene": None, "speech": speech}).split("\n")[-2]
+
+    assert ears(None) == "hears: nothing, speech is silent"
+    deaf = {"state": "deaf", "why": "robot butler has no [microphone]"}
+    assert ears(deaf) == "hears: no words (robot butler has no [microphone]); type commands"
+    heard = {"accepted": 3, "rejected": 1}
+    well = {"state": "listening", "why": "", "model": {"name": "whisper-small.en"}, "heard": heard}
+    assert ears(well) == "hears: listening by whisper-small.en, 3 accepted, 1 rejected"

@@ -17,6 +17,7 @@ SETTINGS = SpeechSettings(
     pre_roll_s=0.32,
     beam=1,
     least_confidence=0.5,
+    stop_words="normal",
 )
 
 
