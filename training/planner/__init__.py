@@ -1,0 +1,1 @@
+"""Train the embedded command parser: phrases, network, export, judgement."""

@@ -1,0 +1,185 @@
+"""Compose whole commands with their answers: clauses, politeness, slips, joints, chatter, noise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from random import Random
+from typing import Final
+
+from training.planner.clause import Clause, Group, Said, load_groups, make_clause
+from training.planner.grammar import Sequence, expand
+from training.planner.hearing import misheard
+from training.planner.manners import (
+    ASKING,
+    CALLS,
+    CLAUSE_SLIPS,
+    ENDINGS,
+    FILLERS,
+    GERUND_ASKING,
+    JOINTS,
+    OPENINGS,
+    REASONS,
+)
+from vla_deploy.planning.command_parser.grammar import answer_text
+
+# How often each kind of step is drawn, of those that may stand among others.
+WEIGHTS: Final[Mapping[str, float]] = {
+    "go": 12, "pick": 13, "put": 22, "bring": 15, "find": 9, "where": 5, "look": 6, "move": 7,
+    "turn": 7, "open": 4, "close": 3, "pose": 3, "say": 6, "wait": 5, "stop": 2, "give": 1.5,
+    "tidy": 1.5, "ask": 2.5,
+}  # fmt: skip
+_LATER: Final = frozenset(WEIGHTS) - {"where", "stop"}
+_ALONE: Final[Mapping[str, float]] = {"unknown": 12, "impossible": 7, "nothing": 3}
+_DOUBLING: Final = frozenset({"get", "put", "grab", "set", "stop", "spin", "run", "drop", "pop", "let", "shut",
+                              "slip", "zip", "step", "sit", "swim", "hop", "hit", "cut", "dig", "trot"})  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """Hold a command as plain words and the answer that is right for it."""
+
+    command: str
+    answer: str
+
+
+class Composer:
+    """Make examples by chance; the same random numbers give the same examples."""
+
+    def __init__(self, held_out: bool = False, chatter: tuple[str, ...] = ()) -> None:
+        self._every = load_groups(held_out=False)
+        self._groups = load_groups(held_out=True) if held_out else self._every
+        self._chatter = chatter
+        alone = {do: weight for do, weight in _ALONE.items() if do in self._groups}
+        several = {do: weight for do, weight in WEIGHTS.items() if do in self._groups}
+        self._kinds = ["steps", *alone]
+        self._kind_weights = [100 - sum(alone.values()), *alone.values()]
+        self._actions, self._action_weights = [*several], [*several.values()]
+
+    def example(self, random: Random) -> Example:
+        """Return one command with its answer."""
+        kind = random.choices(self._kinds, self._kind_weights)[0]
+        clauses, sentence = self._steps(random) if kind == "steps" else self._alone(kind, random)
+        sentence = _with_fillers(misheard(sentence, random), random)
+        return Example(" ".join(word.text for word in sentence), _answer(clauses, sentence))
+
+    def _alone(self, kind: str, random: Random) -> tuple[list[Clause], list[Said]]:
+        if kind == "unknown" and self._chatter and random.random() < 0.6:
+            words = random.choice(self._chatter).split()
+            clause = Clause(tuple((word, None) for word in words), {"do": "unknown"}, False)
+        else:
+            clause = self._clause(kind, random)
+        sentence = self._polite(clause, 0, random, 0.6 if kind != "unknown" else 0.2)
+        if kind == "unknown" and random.random() < 0.15:
+            sentence += _plain(self._clause("unknown", random))
+        if kind == "unknown" and random.random() < 0.06:
+            random.shuffle(sentence)
+        return [clause], sentence
+
+    def _steps(self, random: Random) -> tuple[list[Clause], list[Said]]:
+        count = random.choices((1, 2, 3, 4), (64, 28, 7, 1))[0]
+        clauses: list[Clause] = []
+        sentence: list[Said] = []
+        for number in range(count):
+            clause = self._clause(self._action(random, number), random, _names_thing(clauses))
+            if number and not clause.is_imperative and random.random() < 0.8:
+                clause = self._imperative(random, _names_thing(clauses))
+            sentence += _words(JOINTS, random) if number else []
+            sentence += self._polite(clause, number, random, 0.55 if number == 0 else 0.12)
+            clauses.append(clause)
+        return clauses, self._surrounded(sentence, random)
+
+    def _surrounded(self, sentence: list[Said], random: Random) -> list[Said]:
+        """Put a slip or a remark before a command, which change nothing."""
+        chance = random.random()
+        if chance < 0.03:
+            dropped = self._imperative(random)
+            return [*_plain(dropped), *_words(CLAUSE_SLIPS, random), *sentence]
+        if chance < 0.07:
+            return [*_words(OPENINGS, random), *sentence]
+        if chance < 0.085:
+            dropped = self._imperative(random)
+            never = random.choice(("but don't", "and do not", "but do not", "but never", "don't", "without trying to"))
+            return [*sentence, *_unowned(never), *_plain(dropped)]
+        return [*sentence, *_words(REASONS, random)] if chance < 0.11 else sentence
+
+    def _action(self, random: Random, number: int) -> str:
+        while True:
+            action = random.choices(self._actions, self._action_weights)[0]
+            if number == 0 or action in _LATER:
+                return action
+
+    def _clause(self, do: str, random: Random, after_thing: bool = False) -> Clause:
+        groups = self._groups[do]
+        sizes = [len(group.imperative) + len(group.free) for group in groups]
+        return make_clause(random.choices(groups, sizes)[0], random, self._every, after_thing)
+
+    def _imperative(self, random: Random, after_thing: bool = False) -> Clause:
+        while True:
+            groups = self._groups[self._action(random, 1)]
+            group = random.choice(groups)
+            if group.imperative:
+                commanding = Group(group.fixed, group.imperative, ())
+                return make_clause(commanding, random, self._every, after_thing)
+
+    def _polite(self, clause: Clause, number: int, random: Random, share: float) -> list[Said]:
+        words = [Said(text, (number, field) if field else None) for text, field in clause.words]
+        before: list[Said] = []
+        if clause.is_imperative and random.random() < share:
+            if random.random() < 0.12:
+                before += _words(GERUND_ASKING, random)
+                words = [Said(_gerund(words[0].text), words[0].owner), *words[1:]]
+            else:
+                before += _words(ASKING, random)
+        if random.random() < 0.35 * share:
+            before = [*_words(CALLS, random), *before]
+        after = _words(ENDINGS, random) if random.random() < 0.4 * share and not _is_saying(clause) else []
+        return [*before, *words, *after]
+
+
+def _answer(clauses: list[Clause], sentence: list[Said]) -> str:
+    """Return the answer; copied words are taken from the sentence as it arrived."""
+    steps = []
+    for number, clause in enumerate(clauses):
+        copied: dict[str, list[str]] = {}
+        for word in sentence:
+            if word.owner is not None and word.owner[0] == number:
+                copied.setdefault(word.owner[1], []).append(word.text)
+        steps.append({**clause.step, **{field: " ".join(words) for field, words in copied.items()}})
+    return answer_text(steps)
+
+
+def _with_fillers(sentence: list[Said], random: Random) -> list[Said]:
+    if random.random() > 0.07:
+        return sentence
+    filled = list(sentence)
+    for _ in range(random.choice((1, 1, 2))):
+        filled.insert(random.randrange(len(filled) + 1), Said(random.choice(FILLERS), None))
+    return filled
+
+
+def _gerund(verb: str) -> str:
+    if verb in _DOUBLING:
+        return f"{verb}{verb[-1]}ing"
+    return f"{verb[:-1] if verb.endswith('e') and not verb.endswith('ee') else verb}ing"
+
+
+def _names_thing(clauses: list[Clause]) -> bool:
+    return any(field == "what" for clause in clauses for _, field in clause.words)
+
+
+def _is_saying(clause: Clause) -> bool:
+    """Tell whether what follows would belong to what is to be said."""
+    return any(field in ("text", "name") for _, field in clause.words)
+
+
+def _words(sequence: Sequence, random: Random) -> list[Said]:
+    return [Said(str(word), None) for word in expand(sequence, random)]
+
+
+def _plain(clause: Clause) -> list[Said]:
+    return [Said(text, None) for text, _ in clause.words]
+
+
+def _unowned(text: str) -> list[Said]:
+    return [Said(word, None) for word in text.split()]
+
+

@@ -1,0 +1,48 @@
+"""Set the sizes of a training."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from training.planner.network import Shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Hold how long to train on how much; `budget_s` is wall-clock time, over all sittings.
+
+    `rate` is the largest step of AdamW, which the embedding and the norms take; `matrix_rate` that
+    of Muon, which the matrices take. `pool` examples are drawn and sorted by length at a time.
+    """
+
+    name: str
+    budget_s: float
+    shape: Shape = field(default_factory=Shape)
+    seed: int = 6
+    batch: int = 128
+    pool: int = 8192
+    rate: float = 2e-3
+    matrix_rate: float = 0.015
+    decay: float = 0.02
+    warm_up_ratio: float = 0.02
+    judged: int = 400
+    save_every_s: float = 120.0
+
+
+SIZES: Final[Mapping[str, Settings]] = {
+    "tiny": Settings(
+        name="tiny",
+        budget_s=4.0,
+        shape=Shape(width=32, layers=2, heads=2, inner=64),
+        batch=32,
+        pool=256,
+        judged=20,
+    ),
+    "trial": Settings(name="trial", budget_s=180.0),
+    "full": Settings(
+        name="full", budget_s=2700.0
+    ),
+    "long": Settings(
+        name="long", budget_s=14_400.0, shape=Shape(width=256, layers=5, heads=4, inner=688)
+    ),
+}

@@ -1,0 +1,124 @@
+"""Say what the command parser may answer: steps, their fields, and the words that it may copy.
+
+What is closed (left, on) comes from a table; everything else is copied from the command, word by
+word, so the model cannot name a thing or place that nobody said.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Final
+
+# Fields whose words are copied. A value begins with a space: then a word at its beginning is the
+# same token as in the command, which makes copying easy to learn.
+COPIED_FIELDS: Final = frozenset({"what", "where", "from", "to", "by", "text", "name"})
+# Words that stand for what was not said: "come here" goes to "me".
+IMPLIED_WORDS: Final = ("me", "back", "charging", "station")
+MOST_STEPS: Final = 6
+MOST_WORDS: Final = 24
+
+_ARMS: Final = ("left", "right")
+_WAYS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "look": ("ahead", "left", "right", "up", "down"),
+        "move": ("forward", "backward"),
+        "turn": ("left", "right", "around"),
+    }
+)
+RELATIONS: Final = (
+    "in", "on", "to", "under", "next to", "near", "behind", "in front of", "left of", "right of",
+)  # fmt: skip
+SUBJECTS: Final = ("holding", "seeing", "place", "doing", "able")
+# The fields of each step in their order; those in brackets may be missing.
+STEPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "go": ("where",),
+        "pick": ("what", "[from]", "[arm]"),
+        "put": ("what", "[how]", "[where]"),
+        "bring": ("what", "[from]", "[to]"),
+        "give": (),
+        "find": ("what", "[from]"),
+        "where": ("what",),
+        "look": ("[way]", "[what]"),
+        "move": ("way", "[by]"),
+        "turn": ("way", "[by]"),
+        "open": ("[arm]", "[what]"),
+        "close": ("[arm]",),
+        "pose": ("name", "[arm]"),
+        "say": ("text",),
+        "wait": ("[by]",),
+        "stop": (),
+        "ask": ("about",),
+        "tidy": ("[where]",),
+        "nothing": (),
+        "impossible": (),
+        "unknown": (),
+    }
+)
+JsonSchema = dict[str, Any]
+Step = Mapping[str, str]
+
+
+def answer_schema(words: Sequence[str] = ()) -> JsonSchema:
+    """Return the JSON Schema of an answer to a command of these words; without, that of any."""
+    word = "|".join(sorted({re.escape(one) for one in (*words, *IMPLIED_WORDS)}))
+    if not words:
+        word = "[a-z0-9_'.]+"
+    copied = {"type": "string", "pattern": f"^( ({word})){{1,{MOST_WORDS}}}$"}
+    return {
+        "type": "object",
+        "properties": {
+            "steps": {
+                "type": "array",
+                "items": {"anyOf": [_step_schema(do, copied) for do in STEPS]},
+                "minItems": 1,
+                "maxItems": MOST_STEPS,
+            }
+        },
+        "required": ["steps"],
+        "additionalProperties": False,
+    }
+
+
+def answer_text(steps: Sequence[Step]) -> str:
+    """Return steps as the model writes them: fields in their order, no spaces between.
+
+    Raises:
+        KeyError: a step lacks a field that it must have, or is none.
+    """
+    return '{"steps":[' + ",".join(map(_step_text, steps)) + "]}"
+
+
+def field_names(do: str) -> tuple[tuple[str, bool], ...]:
+    """Return each field of a step in its order, and whether the step must have it."""
+    return tuple((name.strip("[]"), not name.startswith("[")) for name in STEPS[do])
+
+
+def _step_text(step: Step) -> str:
+    fields = [f'"do":"{step["do"]}"']
+    for name, is_needed in field_names(step["do"]):
+        if is_needed or name in step:
+            space = " " if name in COPIED_FIELDS else ""
+            fields.append(f'"{name}":"{space}{step[name]}"')
+    return "{" + ",".join(fields) + "}"
+
+
+def _step_schema(do: str, copied: JsonSchema) -> JsonSchema:
+    closed = {
+        "arm": _ARMS,
+        "how": RELATIONS,
+        "about": SUBJECTS,
+        "way": _WAYS.get(do, ()),
+    }
+    properties: dict[str, Any] = {"do": {"const": do}}
+    needed = ["do"]
+    for name, is_needed in field_names(do):
+        properties[name] = copied if name in COPIED_FIELDS else {"enum": list(closed[name])}
+        if is_needed:
+            needed.append(name)
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": needed,
+        "additionalProperties": False,
+    }
