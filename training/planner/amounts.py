@@ -7,7 +7,18 @@ Word = tuple[str, bool]
 _ONES: Final = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
                 "eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen",
                 "eighteen", "nineteen")  # fmt: skip
-_TENS: Final = ("", "", "twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety")
+_TENS: Final = (
+    "",
+    "",
+    "twenty",
+    "thirty",
+    "forty",
+    "fifty",
+    "sixty",
+    "seventy",
+    "eighty",
+    "ninety",
+)
 _METRES: Final = ("meters", "metres", "meter", "metre", "m")
 _CENTIMETRES: Final = ("centimeters", "centimetres", "centimeter", "cm", "centimetre")
 _ODD_LENGTHS: Final = (
@@ -59,16 +70,24 @@ def angle(random: Random) -> list[Word]:
     """Return an angle."""
     if random.random() < 0.25:
         return _all(random.choice(_ODD_ANGLES))
-    value = random.choice((15, 30, 45, 60, 90, 90, 90, 120, 135, 180, 270, 360, random.randint(1, 360)))
-    return _all(f"{_number(random, value)} {random.choice(('degrees', 'degrees', 'degree', 'deg'))}")
+    value = random.choice(
+        (15, 30, 45, 60, 90, 90, 90, 120, 135, 180, 270, 360, random.randint(1, 360))
+    )
+    return _all(
+        f"{_number(random, value)} {random.choice(('degrees', 'degrees', 'degree', 'deg'))}"
+    )
 
 
 def duration(random: Random) -> list[Word]:
     """Return a length of time."""
     if random.random() < 0.3:
         return _all(random.choice(_ODD_TIMES))
-    unit = random.choice(("seconds", "seconds", "seconds", "minutes", "sec", "secs", "s", "second", "minute"))
-    return _all(f"{_number(random, random.choice((random.randint(1, 12), random.randint(1, 90))))} {unit}")
+    unit = random.choice(
+        ("seconds", "seconds", "seconds", "minutes", "sec", "secs", "s", "second", "minute")
+    )
+    return _all(
+        f"{_number(random, random.choice((random.randint(1, 12), random.randint(1, 90))))} {unit}"
+    )
 
 
 def _number(random: Random, value: int, whole: float = 0.9) -> str:

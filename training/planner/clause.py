@@ -44,7 +44,13 @@ CLOSED: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
     ),
 }  # fmt: skip
 # The field of a step that a closed slot fills.
-_FIELD_OF: Final[Mapping[str, str]] = {"how": "how", "arm": "arm", "side": "way", "way": "way", "direction": "way"}
+_FIELD_OF: Final[Mapping[str, str]] = {
+    "how": "how",
+    "arm": "arm",
+    "side": "way",
+    "way": "way",
+    "direction": "way",
+}
 _PRONOUNS: Final = ("it", "it", "it", "it", "them", "that", "this")
 
 
@@ -129,7 +135,9 @@ def _owned(words: list[Word], field: str | None) -> list[tuple[str, str | None]]
 
 
 def _other_clause(random: Random, groups: Mapping[str, list[Group]]) -> Clause:
-    choices = [one for do in ("go", "pick", "put", "bring", "find", "move") for one in groups.get(do, [])]
+    choices = [
+        one for do in ("go", "pick", "put", "bring", "find", "move") for one in groups.get(do, [])
+    ]
     commanding = [one for one in choices if one.imperative]
     group = random.choice(commanding)
     return make_clause(Group(group.fixed, group.imperative, ()), random, groups)

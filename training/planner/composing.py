@@ -97,7 +97,9 @@ class Composer:
             return [*_words(OPENINGS, random), *sentence]
         if chance < 0.085:
             dropped = self._imperative(random)
-            never = random.choice(("but don't", "and do not", "but do not", "but never", "don't", "without trying to"))
+            never = random.choice(
+                ("but don't", "and do not", "but do not", "but never", "don't", "without trying to")
+            )
             return [*sentence, *_unowned(never), *_plain(dropped)]
         return [*sentence, *_words(REASONS, random)] if chance < 0.11 else sentence
 
@@ -131,7 +133,11 @@ class Composer:
                 before += _words(ASKING, random)
         if random.random() < 0.35 * share:
             before = [*_words(CALLS, random), *before]
-        after = _words(ENDINGS, random) if random.random() < 0.4 * share and not _is_saying(clause) else []
+        after = (
+            _words(ENDINGS, random)
+            if random.random() < 0.4 * share and not _is_saying(clause)
+            else []
+        )
         return [*before, *words, *after]
 
 
@@ -181,5 +187,3 @@ def _plain(clause: Clause) -> list[Said]:
 
 def _unowned(text: str) -> list[Said]:
     return [Said(word, None) for word in text.split()]
-
-

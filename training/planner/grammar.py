@@ -1,8 +1,8 @@
 """Expand patterns of phrases: "(pick|lift) [up] {what}" gives words and slots by chance.
 
-    (a|b)    one of them, also nothing
-    [a|b]    one of them or nothing
-    {name}   a slot; {field:source} fills a field of the plan from a source of words
+(a|b)    one of them, also nothing
+[a|b]    one of them or nothing
+{name}   a slot; {field:source} fills a field of the plan from a source of words
 """
 
 import re

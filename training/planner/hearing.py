@@ -27,10 +27,39 @@ MISHEARD: Final[Mapping[str, tuple[str, ...]]] = {
     "one": ("won",), "two": ("to", "too"), "four": ("for",), "eight": ("ate",), "room": ("rome", "rum"),
 }  # fmt: skip
 SHORTENED: Final[Mapping[str, str]] = {
-    "going to": "gonna", "want to": "wanna", "give me": "gimme", "let me": "lemme", "got to": "gotta",
-    "because": "cause", "please": "pls", "you": "u", "them": "em", "do not": "dont",
+    "going to": "gonna",
+    "want to": "wanna",
+    "give me": "gimme",
+    "let me": "lemme",
+    "got to": "gotta",
+    "because": "cause",
+    "please": "pls",
+    "you": "u",
+    "them": "em",
+    "do not": "dont",
 }
-_DROPPED: Final = frozenset({"the", "a", "an", "to", "up", "of", "your", "my", "is", "it", "and", "me", "on", "in", "that", "at", "for", "you"})
+_DROPPED: Final = frozenset(
+    {
+        "the",
+        "a",
+        "an",
+        "to",
+        "up",
+        "of",
+        "your",
+        "my",
+        "is",
+        "it",
+        "and",
+        "me",
+        "on",
+        "in",
+        "that",
+        "at",
+        "for",
+        "you",
+    }
+)
 
 
 def misheard(sentence: list[Said], random: Random) -> list[Said]:

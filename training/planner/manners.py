@@ -76,7 +76,22 @@ CLAUSE_SLIPS: Final = parse(
     "(no wait|no|actually|actually no|never mind that|forget that|scratch that|no sorry|wait no|on second thought"
     "|no don't|oh wait|instead|or better|no better|cancel that|sorry i meant|i mean|no i meant|better) [just|please|]"
 )
-FILLERS: Final = ("uh", "um", "er", "erm", "hmm", "well", "like", "you know", "ah", "eh", "so", "uhm", "mm", "okay")
+FILLERS: Final = (
+    "uh",
+    "um",
+    "er",
+    "erm",
+    "hmm",
+    "well",
+    "like",
+    "you know",
+    "ah",
+    "eh",
+    "so",
+    "uhm",
+    "mm",
+    "okay",
+)
 ALL_MANNERS: Final[tuple[Sequence, ...]] = (
     CALLS, ASKING, GERUND_ASKING, ENDINGS, REASONS, OPENINGS, JOINTS, SLIPS, CLAUSE_SLIPS,
 )  # fmt: skip

@@ -13,7 +13,19 @@ from training.planner.amounts import angle, duration, length
 Word = tuple[str, bool]
 Source = Callable[[Random], list[Word]]
 
-ARTICLES: Final = ("the",) * 9 + ("a", "my", "my", "your", "that", "this", "some", "our", "his", "her", "")
+ARTICLES: Final = ("the",) * 9 + (
+    "a",
+    "my",
+    "my",
+    "your",
+    "that",
+    "this",
+    "some",
+    "our",
+    "his",
+    "her",
+    "",
+)
 _NEAR: Final = ("on", "on", "on", "in", "in", "next to", "near", "beside", "by", "under", "behind",
                 "in front of", "left of", "right of", "on top of", "inside", "close to", "below",
                 "to the left of", "to the right of", "from", "at", "underneath", "against")  # fmt: skip
@@ -58,7 +70,12 @@ def what(random: Random) -> list[Word]:
     if chance < 0.21:
         noun = _noun(random)
         plural = noun if noun.endswith("s") else noun + "s"
-        return [*_quantity(random), *_maybe_colour(random), *said(plural), *_maybe_place(random, 0.2)]
+        return [
+            *_quantity(random),
+            *_maybe_colour(random),
+            *said(plural),
+            *_maybe_place(random, 0.2),
+        ]
     if chance < 0.25:
         return [*unmeant(random.choice(ARTICLES)), *_description(random, depth=1), *said("and"),
                 *unmeant(random.choice(ARTICLES)), *_description(random, depth=1)]  # fmt: skip
@@ -77,12 +94,17 @@ def place(random: Random) -> list[Word]:
     """Return a place: "the kitchen", "room 12", "anna's desk"."""
     chance = random.random()
     if chance < 0.80:
-        return [*unmeant(random.choice(("the",) * 6 + ("", "my", "our"))), *said(random.choice(words.PLACES))]
+        return [
+            *unmeant(random.choice(("the",) * 6 + ("", "my", "our"))),
+            *said(random.choice(words.PLACES)),
+        ]
     if chance < 0.88:
         owner = random.choice(words.NAMES) + "'s"
         return said(f"{owner} {random.choice(('room', 'desk', 'office', 'bed', 'place', 'table'))}")
     if chance < 0.93:
-        return said(f"{random.choice(('room', 'station', 'dock', 'office', 'point', 'area'))} {random.randint(1, 40)}")
+        return said(
+            f"{random.choice(('room', 'station', 'dock', 'office', 'point', 'area'))} {random.randint(1, 40)}"
+        )
     return [*unmeant("the"), *said(words.invented(random))]
 
 
@@ -90,14 +112,24 @@ def target(random: Random) -> list[Word]:
     """Return where something may be put: furniture, a container, a thing, a place."""
     chance = random.random()
     if chance < 0.35:
-        return [*unmeant(random.choice(("the", "the", "the", "that", "my", ""))), *said(random.choice(words.SURFACES))]
+        return [
+            *unmeant(random.choice(("the", "the", "the", "that", "my", ""))),
+            *said(random.choice(words.SURFACES)),
+        ]
     if chance < 0.50:
         return place(random)
     if chance < 0.56:
         return said(random.choice(("it", "there", "here", "that", "them")))
     if chance < 0.75:
-        container = random.choice(("box", "bowl", "basket", "crate", "bin", "container", "drawer", "bag", "cup"))
-        return [*unmeant(random.choice(ARTICLES)), *_maybe_size(random), *_maybe_colour(random), *said(container)]
+        container = random.choice(
+            ("box", "bowl", "basket", "crate", "bin", "container", "drawer", "bag", "cup")
+        )
+        return [
+            *unmeant(random.choice(ARTICLES)),
+            *_maybe_size(random),
+            *_maybe_colour(random),
+            *said(container),
+        ]
     return thing(random)
 
 
@@ -115,7 +147,9 @@ def saying(random: Random) -> list[Word]:
         return said(f"{random.choice(words.SAYINGS)} {random.choice(words.NAMES)}")
     subject = " ".join(word for word, _ in thing(random))
     if chance < 0.85:
-        return said(f"{subject} is {random.choice(('here', 'gone', 'ready', 'red', 'on the table', 'lost'))}")
+        return said(
+            f"{subject} is {random.choice(('here', 'gone', 'ready', 'red', 'on the table', 'lost'))}"
+        )
     return said(" ".join(words.invented(random) for _ in range(random.randint(1, 5))))
 
 

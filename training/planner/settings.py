@@ -19,7 +19,7 @@ class Settings:
     budget_s: float
     shape: Shape = field(default_factory=Shape)
     seed: int = 6
-    batch: int = 128
+    batch: int = 64
     pool: int = 8192
     rate: float = 2e-3
     matrix_rate: float = 0.015
@@ -39,9 +39,7 @@ SIZES: Final[Mapping[str, Settings]] = {
         judged=20,
     ),
     "trial": Settings(name="trial", budget_s=180.0),
-    "full": Settings(
-        name="full", budget_s=2700.0
-    ),
+    "full": Settings(name="full", budget_s=2700.0),
     "long": Settings(
         name="long", budget_s=14_400.0, shape=Shape(width=256, layers=5, heads=4, inner=688)
     ),

@@ -100,7 +100,26 @@ SAYINGS: Final = (
 _ONSETS: Final = ("b", "br", "c", "ch", "d", "dr", "f", "fl", "g", "gr", "h", "j", "k", "l", "m", "n", "p",
                   "pl", "qu", "r", "s", "sh", "sk", "sl", "st", "t", "tr", "v", "w", "z", "th", "")  # fmt: skip
 _VOWELS: Final = ("a", "e", "i", "o", "u", "ee", "oo", "ai", "ou", "ea", "y")
-_CODAS: Final = ("", "b", "ck", "d", "f", "g", "l", "m", "n", "nt", "p", "r", "rd", "s", "sh", "st", "t", "x")
+_CODAS: Final = (
+    "",
+    "b",
+    "ck",
+    "d",
+    "f",
+    "g",
+    "l",
+    "m",
+    "n",
+    "nt",
+    "p",
+    "r",
+    "rd",
+    "s",
+    "sh",
+    "st",
+    "t",
+    "x",
+)
 
 
 def invented(random: Random) -> str:

@@ -135,6 +135,41 @@ class Whisper:
     calibration: Calibration | None = None
 
 
+class Use(StrEnum):
+    """Say what a language model is asked: anything in words, or plain commands alone."""
+
+    CHAT = "chat"
+    COMMAND_PARSER = "command_parser"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certainty:
+    """Declare how sure a command parser's answers are: the weights of a logistic function.
+
+    Of the log-probability of the least sure token, of their mean, and of the number of words that
+    the model was never shown; `read_back_below` and `decline_below` are the bounds to act by.
+    """
+
+    bias: float
+    least: float
+    mean: float
+    strange: float
+    read_back_below: float
+    decline_below: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Language:
+    """Declare a language model in the layout of onnxruntime-genai.
+
+    An answer has `most_tokens` at most. `certainty` is None where nobody has measured it.
+    """
+
+    use: Use
+    most_tokens: int
+    certainty: Certainty | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpottingMeasured:
     """Declare how good a spotter was at its normal threshold, on voices that it had not learnt.
@@ -169,7 +204,8 @@ class Manifest:
     """Declare one model; `card` where there is one.
 
     A graph has tensors and `files`, one for each variant, detectors a `detection` too, spotters
-    `key_words`; a Whisper has `parts`, which are all needed, and `whisper`.
+    `key_words`; a Whisper and a language model have `parts`, which are all needed, and `whisper` or
+    `language`.
     """
 
     name: str
@@ -184,3 +220,4 @@ class Manifest:
     key_words: KeyWords | None = None
     parts: tuple[ModelFile, ...] = ()
     whisper: Whisper | None = None
+    language: Language | None = None

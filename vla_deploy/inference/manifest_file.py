@@ -10,17 +10,20 @@ from typing import Any, Final
 from vla_deploy.inference.errors import ManifestInvalid
 from vla_deploy.inference.manifest import (
     Calibration,
+    Certainty,
     Context,
     Detection,
     Fit,
     ImageInput,
     KeyWords,
+    Language,
     Layout,
     Manifest,
     Measured,
     ModelFile,
     SpottingMeasured,
     Tensor,
+    Use,
     Variant,
     Whisper,
 )
@@ -62,6 +65,7 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 def _build(document: Document) -> Manifest:
     detection, whisper = document.get("detection"), document.get("whisper")
     key_words = document.get("key_words")
+    language = document.get("language")
     return Manifest(
         name=document["name"],
         role=document["role"],
@@ -77,6 +81,7 @@ def _build(document: Document) -> Manifest:
         key_words=None if key_words is None else _key_words(key_words),
         parts=tuple(ModelFile(**part) for part in document.get("parts", [])),
         whisper=None if whisper is None else _whisper(whisper),
+        language=None if language is None else _language(language),
     )
 
 
@@ -122,6 +127,15 @@ def _whisper(table: Document) -> Whisper:
         context=Context(table["context"]),
         hot_words=table["hot_words"],
         calibration=None if calibration is None else Calibration(**calibration),
+    )
+
+
+def _language(table: Document) -> Language:
+    certainty = table.get("certainty")
+    return Language(
+        use=Use(table["use"]),
+        most_tokens=table["most_tokens"],
+        certainty=None if certainty is None else Certainty(**certainty),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from platforms.profile_schema import ROLES
 from vla_deploy.inference.key_words_schema import key_words_cross_faults, key_words_faults
+from vla_deploy.inference.language_schema import language_cross_faults, language_faults
 from vla_deploy.inference.manifest import Fit, Layout, Variant
 from vla_deploy.inference.whisper_schema import whisper_cross_faults, whisper_faults
 from vla_deploy.robots.schema import (
@@ -91,6 +92,7 @@ _GRAPH: Shape = {
     "key_words": OPTIONAL_TABLE,
 }
 _WHISPER: Shape = {**_HEAD, "parts": TABLES, "whisper": TABLE}
+_LANGUAGE: Shape = {**_HEAD, "parts": TABLES, "language": TABLE}
 _TENSOR: Shape = {
     "name": TEXT,
     "shape": Check(
@@ -140,13 +142,21 @@ def manifest_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[F
 
 
 def _key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
-    if "whisper" not in document:
+    if "whisper" in document:
+        yield from _part_faults(document, _WHISPER)
+        yield from whisper_faults(_table(document["whisper"]))
+    elif "language" in document:
+        yield from _part_faults(document, _LANGUAGE)
+        yield from language_faults(_table(document["language"]))
+    else:
         yield from _graph_key_faults(document)
-        return
-    yield from check_record(document, "", _WHISPER)
+
+
+def _part_faults(document: Mapping[str, Any], shape: Shape) -> Iterator[Fault]:
+    """Check a model that has several files, all of them needed."""
+    yield from check_record(document, "", shape)
     for number, record in enumerate(_rows(document.get("parts"))):
         yield from check_record(record, f"parts[{number}]", _FILE)
-    yield from whisper_faults(_table(document["whisper"]))
 
 
 def _graph_key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
@@ -177,6 +187,9 @@ def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fau
         yield Fault(key="name", got=repr(document["name"]), expected=expected)
     if "whisper" in document:
         yield from whisper_cross_faults(document)
+        return
+    if "language" in document:
+        yield from language_cross_faults(document)
         return
     for group in ("inputs", "outputs", "files"):
         if not document[group]:

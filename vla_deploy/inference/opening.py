@@ -101,7 +101,35 @@ def open_with_choice(
             provider=provider,
             notices=(*refusals, *opened.notices),
         )
-    raise ProviderUnavailable(_no_provider(model, choice, refusals))
+    raise ProviderUnavailable(_no_provider(model.manifest.name, choice, refusals))
+
+
+def open_graph(
+    path: Path, choice: ModelChoice, available: tuple[str, ...]
+) -> tuple[Any, str, tuple[str, ...]]:
+    """Return a session of one file, its provider, and where that is not what was asked.
+
+    TensorRT is passed over: it would build an engine for every length of the tensors.
+
+    Raises:
+        ModelFileSpoiled: it is no ONNX graph that a CPU can run.
+        ProviderUnavailable: no provider that the choice allows runs it.
+    """
+    refusals: list[str] = []
+    for provider in candidates(choice):
+        if provider == TENSORRT:
+            continue
+        if provider not in available:
+            refusals.append(
+                f"{provider}: this onnxruntime {VERSION} has only {', '.join(available)}"
+            )
+            continue
+        try:
+            session = _create(path, provider, [(provider, {})], session_options(choice))
+            return session, provider, (*refusals, *_verified(session, provider))
+        except _Refused as refusal:
+            refusals.append(f"{provider}: {refusal}")
+    raise ProviderUnavailable(_no_provider(path.parent.name, choice, refusals))
 
 
 def read_graph(path: Path) -> Graph:
@@ -207,10 +235,10 @@ def _make_folder(engines: Path) -> list[str]:
     return []
 
 
-def _no_provider(model: Model, choice: ModelChoice, refusals: list[str]) -> str:
+def _no_provider(name: str, choice: ModelChoice, refusals: list[str]) -> str:
     hint = (
         "correct the installation of onnxruntime"
         if choice.cpu_fallback or CPU in choice.providers
         else "install an onnxruntime that has one of them, or set cpu_fallback in the profile"
     )
-    return f"{model.manifest.name}: no provider runs it: {'; '.join(refusals)}; {hint}"
+    return f"{name}: no provider runs it: {'; '.join(refusals)}; {hint}"

@@ -1,0 +1,91 @@
+"""Write the trained decoder as a folder that the robot loads: graph, configuration, tokenizer."""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+
+from training.planner.graph import Sizes, decoder_graph, genai_config
+from training.planner.network import Decoder, Shape
+from training.planner.tokens import ANSWER, COMMAND, END, PAD, load_tokenizer
+from training.planner.training import STATE, TOKENIZER, WEIGHTS
+
+GRAPH: Final = "model.onnx"
+CONFIG: Final = "genai_config.json"
+TOKENIZER_CONFIG: Final = "tokenizer_config.json"
+CONTEXT_TOKENS: Final = 384
+# Plain words with a space before each, as the tokenizer was trained on them.
+TEMPLATE: Final = COMMAND + " {{ messages[-1]['content'] }}" + ANSWER
+_LINES: Final = ("query", "key", "value", "out", "gate", "up", "down")
+_NORMS: Final = ("attention_norm", "inner_norm")
+
+
+def export(out: Path, models: Path, shape: Shape) -> None:
+    """Write the folder.
+
+    Raises:
+        FileNotFoundError: nothing has been trained.
+    """
+    models.mkdir(parents=True, exist_ok=True)
+    tokenizer = load_tokenizer(out / TOKENIZER)
+    sizes = sizes_of(shape)
+    onnx.save(decoder_graph(weights_of(_trained(out, shape)), sizes), models / GRAPH)
+    tokenizer.save(str(models / TOKENIZER))
+    config = genai_config(
+        sizes, kind="llama", end_id=tokenizer.token_to_id(END), pad_id=tokenizer.token_to_id(PAD)
+    )
+    _write(models / CONFIG, config)
+    _write(
+        models / TOKENIZER_CONFIG,
+        {
+            "tokenizer_class": "PreTrainedTokenizerFast",
+            "eos_token": END,
+            "pad_token": PAD,
+            "chat_template": TEMPLATE,
+        },
+    )
+
+
+def sizes_of(shape: Shape) -> Sizes:
+    """Return the sizes of the graph for a network."""
+    return Sizes(
+        vocabulary=shape.vocabulary,
+        width=shape.width,
+        layers=shape.layers,
+        heads=shape.heads,
+        kv_heads=shape.heads,
+        head_size=shape.head_width,
+        context_tokens=CONTEXT_TOKENS,
+        rope_theta=shape.rope_theta,
+        epsilon=shape.epsilon,
+    )
+
+
+def weights_of(network: Decoder) -> dict[str, NDArray[np.float32]]:
+    """Return a network's weights as the graph names them, matrices as inputs x outputs."""
+    state = {name: values.detach().float().numpy() for name, values in network.state_dict().items()}
+    weights = {"embedding": state["embedding.weight"], "norm": state["norm.weight"]}
+    for layer in range(network.shape.layers):
+        for name in _LINES:
+            weights[f"{layer}.{name}"] = state[f"layers.{layer}.{name}.weight"].T
+        for name in _NORMS:
+            weights[f"{layer}.{name}"] = state[f"layers.{layer}.{name}.weight"]
+    return weights
+
+
+def _trained(out: Path, shape: Shape) -> Decoder:
+    """Return the finished network, or where there is none yet the state of the training."""
+    network = Decoder(shape)
+    if (out / WEIGHTS).exists():
+        network.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
+    else:
+        network.load_state_dict(torch.load(out / STATE, weights_only=True)["network"])
+    return network
+
+
+def _write(file: Path, document: dict[str, Any]) -> None:
+    file.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")

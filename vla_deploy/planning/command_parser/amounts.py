@@ -1,0 +1,125 @@
+"""Read amounts as people say them: "half a meter", "one hundred twenty degrees", "a bit"."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+_ONES: Final = (
+    "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
+    "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen",
+)  # fmt: skip
+_TENS: Final = ("twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety")
+_NUMBERS: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        **{word: float(value) for value, word in enumerate(_ONES)},
+        **{word: 10.0 * value for value, word in enumerate(_TENS, start=2)},
+        "fourty": 40.0, "couple": 2.0, "few": 3.0, "half": 0.5, "quarter": 0.25, "a": 1.0, "an": 1.0,
+    }
+)  # fmt: skip
+_SHARES: Final = frozenset({"half", "quarter"})
+_SILENT: Final = frozenset({"of", "the", "about", "around", "by", "for", "exactly", "and", "full"})
+_DEGREE: Final = math.pi / 180.0
+METRES: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01,
+        "mm": 0.001, "millimeter": 0.001, "millimetre": 0.001, "foot": 0.3048, "feet": 0.3048,
+        "inch": 0.0254, "inche": 0.0254, "yard": 0.9144, "step": 0.3, "pace": 0.5, "hand": 0.1,
+        "bit": 0.2, "little": 0.2, "tiny": 0.1, "touch": 0.1, "slightly": 0.1, "some": 0.3,
+        "further": 0.3, "more": 0.3,
+    }
+)  # fmt: skip
+RADIANS: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "degree": _DEGREE, "deg": _DEGREE, "radian": 1.0, "rad": 1.0, "turn": 2 * math.pi,
+        "circle": 2 * math.pi, "rotation": 2 * math.pi, "way": 2 * math.pi, "halfway": math.pi,
+        "angle": 0.5 * math.pi, "bit": 20 * _DEGREE, "little": 20 * _DEGREE, "tiny": 10 * _DEGREE,
+        "slightly": 15 * _DEGREE, "completely": 2 * math.pi, "once": 2 * math.pi,
+    }
+)  # fmt: skip
+SECONDS: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "s": 1.0, "sec": 1.0, "second": 1.0, "min": 60.0, "minute": 60.0, "h": 3600.0,
+        "hour": 3600.0, "moment": 3.0, "bit": 5.0, "little": 5.0, "while": 10.0, "short": 5.0,
+    }
+)  # fmt: skip
+
+
+def amount_of(words: Sequence[str], units: Mapping[str, float], bare: str = "") -> float | None:
+    """Return an amount in SI units, or None where the words are none.
+
+    `bare` is the unit of a number that stands alone; without it such a number is no amount.
+    """
+    heard = [word for word in words if word not in _SILENT]
+    numbers: list[str] = []
+    factors: list[float] = []
+    for word in heard:
+        factor = units.get(word, units.get(word.removesuffix("s")))
+        if factor is not None:
+            factors.append(factor)
+        elif word == "right":  # a right angle
+            continue
+        elif _is_number(word):
+            numbers.append(word)
+        elif word != "width":  # a hand's width
+            hand = units.get(word.removesuffix("'s"))
+            if hand is None:
+                return None
+            factors.append(hand)
+    value = number_of(numbers) if numbers else 1.0
+    if value is None:
+        return None
+    if factors:
+        return value * min(factors)
+    alone = units.get(bare)
+    if alone is not None and numbers:
+        return value * alone
+    # "a quarter" and "half" of nothing else are of a whole turn.
+    whole = units.get("turn")
+    return value * whole if whole is not None and numbers and numbers[-1] in _SHARES else None
+
+
+def number_of(words: Sequence[str]) -> float | None:
+    """Return the value of a number in figures or in words, or None."""
+    if not words:
+        return None
+    if "point" in words:
+        return _decimal(list(words))
+    total, part, is_counted = 0.0, 0.0, False
+    for word in words:
+        if word == "hundred":
+            part = (part if is_counted else 1.0) * 100.0
+        elif word == "thousand":
+            total, part = total + (part if is_counted else 1.0) * 1000.0, 0.0
+        elif word in ("a", "an"):
+            # "half a meter" and "a half" leave the value to the other word.
+            part = part if is_counted else 0.0
+            continue
+        elif word in _NUMBERS:
+            part += _NUMBERS[word]
+        elif re.fullmatch(r"\d+(?:\.\d+)?", word):
+            part += float(word)
+        else:
+            return None
+        is_counted = True
+    return total + part if is_counted else 1.0
+
+
+def _decimal(words: list[str]) -> float | None:
+    """Return "two point five": digits behind the point, one a word."""
+    at = words.index("point")
+    whole = number_of(words[:at]) if at else 0.0
+    digits = [_ONES.index(one) if one in _ONES[:10] else one for one in words[at + 1 :]]
+    text = "".join(map(str, digits))
+    if whole is None or not text.isdecimal():
+        return None
+    return whole + float(f"0.{text}")
+
+
+def _is_number(word: str) -> bool:
+    return (
+        word in _NUMBERS
+        or word in ("hundred", "thousand", "point")
+        or re.fullmatch(r"\d+(?:\.\d+)?", word) is not None
+    )

@@ -1,0 +1,84 @@
+"""Say how sure an answer is: by the model's own doubt, and by what is odd about it."""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from vla_deploy.inference.manifest import Certainty
+from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, IMPLIED_WORDS, Step
+from vla_deploy.planning.command_parser.spans import find_span
+from vla_deploy.world.vocabulary import COLOURS, OBJECT_CLASSES, SYNONYMS
+
+# Said before the right words: what was said before them does not count any more.
+_TAKEN_BACK: Final = frozenset(
+    {
+        "no", "not", "don't", "dont", "never", "actually", "sorry", "wait", "mean", "meant",
+        "rather", "scratch", "instead", "correction", "forget", "without", "better", "never",
+    }
+)  # fmt: skip
+# Kinds of things that mean something else as often.
+_OFTEN_OTHER: Final = frozenset({"can", "object", "book", "something", "thing"})
+_TELLING: Final = frozenset({*OBJECT_CLASSES, *SYNONYMS, *COLOURS}) - _OFTEN_OTHER
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Oddities:
+    """Count what is odd: words never shown and not copied, words left out, words put together.
+
+    `left_out` are colours and kinds of things that were said and are in no step, `jumps` words
+    between those that were copied as one.
+    """
+
+    strange: int = 0
+    left_out: int = 0
+    jumps: int = 0
+
+    @property
+    def count(self) -> int:
+        """Return them all together."""
+        return self.strange + self.left_out + self.jumps
+
+
+def oddities_of(steps: Sequence[Step], command: Sequence[str], known: Collection[str]) -> Oddities:
+    """Compare an answer with the words that it was made of."""
+    used: set[int] = set()
+    copied: set[str] = set()
+    jumps = 0
+    for step in steps:
+        for field in COPIED_FIELDS & step.keys():
+            words = step[field].split()
+            span = find_span(words, command)
+            copied.update(words)
+            used.update(() if span is None else span.places)
+            implied = all(word in IMPLIED_WORDS for word in words)
+            jumps += span.jumps if span is not None else int(not implied) * len(words)
+    rest = [word for at, word in enumerate(command) if at not in used]
+    is_corrected = any(word in _TAKEN_BACK for word in rest)
+    return Oddities(
+        strange=sum(word not in known and not word.isdecimal() for word in rest),
+        left_out=0
+        if is_corrected
+        else sum(word in _TELLING and word not in copied for word in rest),
+        jumps=0 if is_corrected else jumps,
+    )
+
+
+def features_of(chosen: Sequence[float], oddities: Oddities) -> Mapping[str, float]:
+    """Return what confidence is made of: doubt of the least sure token, mean doubt, oddities."""
+    return {
+        "least": min(chosen, default=0.0),
+        "mean": sum(chosen) / len(chosen) if chosen else 0.0,
+        "strange": float(oddities.count),
+    }
+
+
+def confidence_of(features: Mapping[str, float], weights: Certainty) -> float:
+    """Return how likely an answer is right, 0 to 1."""
+    score = (
+        weights.bias
+        + weights.least * features["least"]
+        + weights.mean * features["mean"]
+        + weights.strange * features["strange"]
+    )
+    return 1.0 / (1.0 + math.exp(-max(-50.0, min(50.0, score))))

@@ -1,0 +1,160 @@
+"""Plan by the embedded command parser: the rung between rules and larger models.
+
+Its mistakes do not show in their form, so each answer is weighed: what is unsure is read back and
+waits for a yes, what is very unsure is left to the next rung.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from platforms import ModelChoice
+from vla_deploy.inference.errors import InferenceError, ModelMismatch
+from vla_deploy.inference.manifest import Certainty, Use
+from vla_deploy.inference.store import Model
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.one_line import one_line
+from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.command_parser.certainty import (
+    Oddities,
+    confidence_of,
+    features_of,
+    oddities_of,
+)
+from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
+from vla_deploy.planning.command_parser.planning import Steps
+from vla_deploy.planning.command_parser.read_back import question
+from vla_deploy.planning.command_parser.wording import (
+    MOST_COMMAND_WORDS,
+    foreign_share,
+    plain_words,
+)
+from vla_deploy.planning.errors import Declined
+from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
+from vla_deploy.planning.plan import Plan
+
+NAME: Final = "command_parser"
+KNOWN_WORDS: Final = "known_words.txt"
+MOST_FOREIGN: Final = 0.2
+# A model that nobody has measured is asked back about everything.
+UNMEASURED: Final = Certainty(
+    bias=0.0, least=0.0, mean=0.0, strange=0.0, read_back_below=1.0, decline_below=0.0
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parsed:
+    """Hold what the model made of a command, and how sure that is."""
+
+    words: tuple[str, ...]
+    steps: tuple[Step, ...]
+    confidence: float
+    features: dict[str, float]
+    oddities: Oddities
+
+
+class CommandParser:
+    """Hold the model and the words that it was shown."""
+
+    name: Final = NAME
+
+    def __init__(self, model: LanguageModel, known_words: frozenset[str]) -> None:
+        """Take an open model.
+
+        Raises:
+            ModelMismatch: it is no command parser.
+        """
+        if model.language.use is not Use.COMMAND_PARSER:
+            raise ModelMismatch(NAME, (f"language.use: expected {Use.COMMAND_PARSER}",))
+        self.model = model
+        self._known = known_words
+        self._weights = model.language.certainty or UNMEASURED
+
+    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+        """Return the plan that a command means, with what to read back where that is unsure.
+
+        Raises:
+            Declined: it is no command, none that can be planned, or too unsure.
+            PlanningError: what it asks for cannot be done; says why.
+        """
+        try:
+            parsed = self.parse(request.text, deadline)
+        except InferenceError as error:
+            raise Declined(one_line(error)) from error
+        heard = 1.0 if request.heard_confidence is None else request.heard_confidence
+        confidence = min(parsed.confidence, heard)
+        actions = Steps(parsed.words, request).actions(parsed.steps)
+        if confidence < self._weights.decline_below:
+            raise Declined(f"I am not sure of it ({confidence:.2f})")
+        asked = question(parsed.steps)
+        plan = Plan(
+            goal=request.text.strip(),
+            summary=asked.removeprefix("Shall I ").removesuffix("?"),
+            actions=actions,
+        )
+        is_unsure = confidence < self._weights.read_back_below
+        return Proposal(
+            plan=plan,
+            rung=self.name,
+            confidence=round(confidence, 3),
+            read_back=asked if is_unsure else "",
+        )
+
+    def parse(self, text: str, deadline: Deadline) -> Parsed:
+        """Return the steps that a text means, and how sure that is.
+
+        Raises:
+            Declined: the text is none that the model could know.
+            InferenceError: there is no whole answer.
+        """
+        words = plain_words(text)
+        if not words or foreign_share(text) > MOST_FOREIGN:
+            raise Declined("no words that I know")
+        if len(words) > MOST_COMMAND_WORDS:
+            raise Declined(f"{len(words)} words, more than the {MOST_COMMAND_WORDS} of a command")
+        bounds = Bounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
+        message = {"role": "user", "content": " ".join(words)}
+        answer = self.model.answer([message], bounds, answer_schema(words))
+        steps = tuple(map(_stripped, json.loads(answer.text)["steps"]))
+        oddities = oddities_of(steps, words, self._known)
+        features = dict(features_of(answer.chosen, oddities))
+        return Parsed(
+            words=tuple(words),
+            steps=steps,
+            confidence=confidence_of(features, self._weights),
+            features=features,
+            oddities=oddities,
+        )
+
+    def close(self) -> None:
+        """Release the memory."""
+        self.model.close()
+
+
+def open_command_parser(model: Model, choice: ModelChoice) -> CommandParser:
+    """Open the command parser of a model's folder.
+
+    Raises:
+        InferenceError: it cannot be opened, or is none; each kind says why.
+    """
+    opened = open_language_model(model, choice)
+    return CommandParser(opened, known_words(model.folder))
+
+
+def known_words(folder: Path) -> frozenset[str]:
+    """Return the words that a model was shown.
+
+    Raises:
+        ModelMismatch: the folder has no such list.
+    """
+    file = folder / KNOWN_WORDS
+    try:
+        return frozenset(file.read_text(encoding="utf-8").split())
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelMismatch(folder.name, (f"{KNOWN_WORDS}: {error}",)) from error
+
+
+def _stripped(step: Step) -> Step:
+    """Return a step without the space before what was copied."""
+    return {name: value.strip() if name in COPIED_FIELDS else value for name, value in step.items()}

@@ -1,0 +1,62 @@
+"""Find where in a command the words of a field were copied from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from vla_deploy.world.vocabulary import ARTICLES
+
+# Said between the words of one expression, they change nothing; the articles tell how many.
+SILENT: Final = frozenset(
+    {
+        *ARTICLES, "is", "are", "which", "that's", "of", "his", "her", "their", "its", "these",
+        "those", "uh", "um", "er", "erm", "hmm", "uhm", "mm", "ah", "eh", "well", "like", "you",
+        "know", "so", "okay", "lying", "sitting", "standing", "located", "placed", "stands", "lies",
+        "over", "there", "see",
+    }
+)  # fmt: skip
+_KEPT: Final = frozenset({*ARTICLES, "of", "his", "her"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """Hold where words stand, in order; `spoken` are they with the articles said among them.
+
+    `jumps` counts the words passed over that do mean something: copied like that, they may belong
+    to different things.
+    """
+
+    places: tuple[int, ...]
+    spoken: tuple[str, ...]
+    jumps: int
+
+
+def find_span(words: Sequence[str], command: Sequence[str]) -> Span | None:
+    """Return the tightest place of words in a command in their order, None where they are not."""
+    ends = [at for at, word in enumerate(command) if words and word == words[-1]]
+    found = [span for end in ends if (span := _ending_at(words, command, end)) is not None]
+    return min(found, key=lambda span: (span.jumps, len(span.places)), default=None)
+
+
+def _ending_at(words: Sequence[str], command: Sequence[str], end: int) -> Span | None:
+    places = [end]
+    for word in reversed(words[:-1]):
+        before = [at for at in range(places[0]) if command[at] == word]
+        if not before:
+            return None
+        places.insert(0, before[-1])
+    passed = [command[at] for at in range(places[0], end) if at not in places]
+    return Span(
+        places=tuple(places),
+        spoken=tuple(_spoken(places, command)),
+        jumps=sum(word not in SILENT for word in passed),
+    )
+
+
+def _spoken(places: list[int], command: Sequence[str]) -> list[str]:
+    first = places[0]
+    while first > 0 and command[first - 1] in _KEPT:
+        first -= 1
+    return [
+        command[at] for at in range(first, places[-1] + 1) if at in places or command[at] in _KEPT
+    ]

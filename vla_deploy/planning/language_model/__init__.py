@@ -1,0 +1,27 @@
+"""Run language models on board: one path for the embedded one and those that a person adds."""
+
+from vla_deploy.planning.language_model.errors import (
+    AnswerCut,
+    AnswerLate,
+    LanguageModelError,
+    ModelFolderInvalid,
+    PromptTooLong,
+    SchemaUnusable,
+)
+from vla_deploy.planning.language_model.generating import Answer, Bounds, Token
+from vla_deploy.planning.language_model.model import LanguageModel, Message, open_language_model
+
+__all__ = [
+    "Answer",
+    "AnswerCut",
+    "AnswerLate",
+    "Bounds",
+    "LanguageModel",
+    "LanguageModelError",
+    "Message",
+    "ModelFolderInvalid",
+    "PromptTooLong",
+    "SchemaUnusable",
+    "Token",
+    "open_language_model",
+]
