@@ -68,15 +68,19 @@ def _faults(document: Any) -> Iterator[str]:
     for table, where, names in ((model, "model", _NUMBERS), (decoder, "decoder", _DECODER_NUMBERS)):
         for name in names:
             if not _is_count(table.get(name)):
-                yield f"{GENAI_CONFIG}: {where}.{name}: expected an integer above 0, got {table.get(name)!r}"
+                yield _fault(f"{where}.{name}", "an integer above 0", table.get(name))
     if not isinstance(decoder.get("filename"), str):
-        yield f"{GENAI_CONFIG}: decoder.filename: expected a name, got {decoder.get('filename')!r}"
+        yield _fault("decoder.filename", "a name", decoder.get("filename"))
     if not _end_ids(model):
-        yield f"{GENAI_CONFIG}: model.eos_token_id: expected a token, or a list of them"
+        yield _fault("model.eos_token_id", "a token, or a list of them", model.get("eos_token_id"))
     for group, name in _PATTERNS:
         pattern = _table(decoder, group).get(name)
         if not isinstance(pattern, str) or "%d" not in pattern:
-            yield f"{GENAI_CONFIG}: decoder.{group}.{name}: expected a name with %d, got {pattern!r}"
+            yield _fault(f"decoder.{group}.{name}", "a name with %d", pattern)
+
+
+def _fault(key: str, expected: str, got: object) -> str:
+    return f"{GENAI_CONFIG}: {key}: expected {expected}, got {got!r}"
 
 
 def _build(model: Mapping[str, Any]) -> GenaiConfig:

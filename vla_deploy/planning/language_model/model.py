@@ -40,10 +40,10 @@ class LanguageModel:
         """
         self.language = language
         self.config = read_genai_config(folder)
-        self.tokenizer, self._guide = _tokenizers(folder, self.config)
+        self.tokenizer, self.guide = _tokenizers(folder, self.config)
         self._prompter = Prompter(folder)
         self._session = GraphSession(folder / self.config.file_name, choice)
-        self._decoder = Decoder(self._session, self.config)
+        self.decoder = Decoder(self._session, self.config)
         self.notices = self._session.notices
         self.provider = self._session.provider
         self._one_at_a_time = Lock()
@@ -60,9 +60,9 @@ class LanguageModel:
         prompt = self.tokenizer.encode(
             self._prompter.prompt(messages), add_special_tokens=False
         ).ids
-        constraint = None if schema is None else Constraint(self._guide, grammar_of(schema))
+        constraint = None if schema is None else Constraint(self.guide, grammar_of(schema))
         with self._one_at_a_time:
-            done = generate(self._decoder, prompt, constraint, self.config.end_ids, bounds)
+            done = generate(self.decoder, prompt, constraint, self.config.end_ids, bounds)
         numbers = [token.number for token in done.tokens]
         return Answer(
             text=self.tokenizer.decode(numbers),
@@ -71,6 +71,14 @@ class LanguageModel:
             reused_tokens=done.reused_tokens,
             runs=done.runs,
         )
+
+    def prompt(self, messages: Sequence[Message]) -> str:
+        """Return the text that the model is given for messages.
+
+        Raises:
+            ModelFolderInvalid: its chat template does not take them.
+        """
+        return self._prompter.prompt(messages)
 
     def close(self) -> None:
         """Release the memory; an answer after that fails."""
@@ -110,12 +118,12 @@ def _tokenizers(folder: Path, config: GenaiConfig) -> tuple[Tokenizer, LLTokeniz
 
 
 def _vocabulary_faults(size: int, config: GenaiConfig) -> list[str]:
-    """Compare the tokenizer with the decoder: another model's would give nonsense without a word."""
+    """Compare the tokenizer with the decoder: another model's would give nonsense, unnoticed."""
     faults = []
     if size > config.vocabulary or config.vocabulary - size > _MOST_PADDING:
         faults.append(
-            f"{TOKENIZER} has {size} tokens, expected {config.vocabulary} as genai_config.json says: "
-            "it is another model's"
+            f"{TOKENIZER} has {size} tokens, expected {config.vocabulary} as genai_config.json "
+            "says: it is another model's"
         )
     beyond = [one for one in config.end_ids if one >= size]
     if beyond:
