@@ -4,7 +4,8 @@ from random import Random
 from typing import Final
 
 Word = tuple[str, bool]
-_ONES: Final = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
+_ONES: Final = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine",
+    "ten",
                 "eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen",
                 "eighteen", "nineteen")  # fmt: skip
 _TENS: Final = (
@@ -24,7 +25,8 @@ _CENTIMETRES: Final = ("centimeters", "centimetres", "centimeter", "cm", "centim
 _ODD_LENGTHS: Final = (
     "a bit", "a little", "a little bit", "a few centimeters", "half a meter", "half a metre",
     "a meter", "a metre", "one and a half meters", "a quarter of a meter", "a step", "two steps",
-    "a few steps", "a foot", "two feet", "three feet", "ten inches", "a couple of meters", "some more",
+    "a few steps", "a foot", "two feet", "three feet", "ten inches", "a couple of meters",
+    "some more",
     "a tiny bit", "a hand's width", "a meter and a half", "half meter", "quarter meter", "an inch",
     "two and a half meters", "a yard", "a few inches", "a couple of steps", "half a foot",
 )  # fmt: skip
@@ -37,7 +39,8 @@ _ODD_TIMES: Final = (
     "a moment", "a second", "a minute", "half a minute", "a while", "a bit", "a few seconds",
     "a couple of seconds", "a couple of minutes", "a little while", "one minute", "half a second",
     "a minute and a half", "a few minutes", "a sec", "a little", "an hour", "a quarter of an hour",
-    "a quarter of a minute", "a little bit", "one and a half minutes", "half an hour", "a short while",
+    "a quarter of a minute", "a little bit", "one and a half minutes", "half an hour",
+    "a short while",
 )  # fmt: skip
 
 

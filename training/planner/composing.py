@@ -29,8 +29,10 @@ WEIGHTS: Final[Mapping[str, float]] = {
 }  # fmt: skip
 _LATER: Final = frozenset(WEIGHTS) - {"where", "stop"}
 _ALONE: Final[Mapping[str, float]] = {"unknown": 12, "impossible": 7, "nothing": 3}
-_DOUBLING: Final = frozenset({"get", "put", "grab", "set", "stop", "spin", "run", "drop", "pop", "let", "shut",
-                              "slip", "zip", "step", "sit", "swim", "hop", "hit", "cut", "dig", "trot"})  # fmt: skip
+_DOUBLING: Final = frozenset({"get", "put", "grab", "set", "stop", "spin", "run", "drop", "pop",
+    "let", "shut",
+                              "slip", "zip", "step", "sit", "swim", "hop", "hit", "cut", "dig",
+                              "trot"})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

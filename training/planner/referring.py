@@ -28,19 +28,27 @@ ARTICLES: Final = ("the",) * 9 + (
 )
 _NEAR: Final = ("on", "on", "on", "in", "in", "next to", "near", "beside", "by", "under", "behind",
                 "in front of", "left of", "right of", "on top of", "inside", "close to", "below",
-                "to the left of", "to the right of", "from", "at", "underneath", "against")  # fmt: skip
+                "to the left of", "to the right of", "from", "at", "underneath",
+                "against")  # fmt: skip
 _CLAUSES: Final = ("that is", "which is", "that's", "lying", "sitting", "standing", "over there",
-                   "that stands", "that lies", "that you see", "located", "placed", "which you see")  # fmt: skip
+                   "that stands", "that lies", "that you see", "located", "placed",
+                   "which you see")  # fmt: skip
 _SIDES: Final = ("on the left", "on the right", "in the middle", "to the left", "to the right",
-                 "on your left", "on your right", "in the back", "in the front", "at the front")  # fmt: skip
-_TAILS: Final = ("over there", "there", "here", "in front of you", "that i like", "you see", "i mentioned",
-                 "from before", "right there", "that fell down", "that i dropped", "we talked about")  # fmt: skip
+                 "on your left", "on your right", "in the back", "in the front",
+                 "at the front")  # fmt: skip
+_TAILS: Final = ("over there", "there", "here", "in front of you", "that i like", "you see",
+    "i mentioned",
+                 "from before", "right there", "that fell down", "that i dropped",
+                 "we talked about")  # fmt: skip
 _PRONOUNS: Final = ("it",) * 8 + ("that", "this", "them", "that one", "this one", "those", "these",
                     "that thing", "the thing", "the object", "everything", "something")  # fmt: skip
 _QUANTITIES: Final = ("all the", "every", "both", "all", "each", "all of the", "both of the", "any",
-                      "two", "three", "the two", "another", "one of the", "most of the")  # fmt: skip
-_DROPPED: Final = frozenset({"the", "a", "an", "my", "your", "our", "his", "her", "some", "their", "its",
-                             "that", "this", "these", "those", "which", "is", "that's", "of"})  # fmt: skip
+                      "two", "three", "the two", "another", "one of the",
+                      "most of the")  # fmt: skip
+_DROPPED: Final = frozenset({"the", "a", "an", "my", "your", "our", "his", "her", "some",
+    "their", "its",
+                             "that", "this", "these", "those", "which", "is", "that's",
+                             "of"})  # fmt: skip
 
 
 def said(text: str) -> list[Word]:
@@ -102,9 +110,8 @@ def place(random: Random) -> list[Word]:
         owner = random.choice(words.NAMES) + "'s"
         return said(f"{owner} {random.choice(('room', 'desk', 'office', 'bed', 'place', 'table'))}")
     if chance < 0.93:
-        return said(
-            f"{random.choice(('room', 'station', 'dock', 'office', 'point', 'area'))} {random.randint(1, 40)}"
-        )
+        numbered = random.choice(("room", "station", "dock", "office", "point", "area"))
+        return said(f"{numbered} {random.randint(1, 40)}")
     return [*unmeant("the"), *said(words.invented(random))]
 
 
@@ -147,9 +154,8 @@ def saying(random: Random) -> list[Word]:
         return said(f"{random.choice(words.SAYINGS)} {random.choice(words.NAMES)}")
     subject = " ".join(word for word, _ in thing(random))
     if chance < 0.85:
-        return said(
-            f"{subject} is {random.choice(('here', 'gone', 'ready', 'red', 'on the table', 'lost'))}"
-        )
+        state = random.choice(("here", "gone", "ready", "red", "on the table", "lost"))
+        return said(f"{subject} is {state}")
     return said(" ".join(words.invented(random) for _ in range(random.randint(1, 5))))
 
 

@@ -15,7 +15,8 @@ _NUMBERS: Final[Mapping[str, float]] = MappingProxyType(
     {
         **{word: float(value) for value, word in enumerate(_ONES)},
         **{word: 10.0 * value for value, word in enumerate(_TENS, start=2)},
-        "fourty": 40.0, "couple": 2.0, "few": 3.0, "half": 0.5, "quarter": 0.25, "a": 1.0, "an": 1.0,
+        "fourty": 40.0, "couple": 2.0, "few": 3.0, "half": 0.5, "quarter": 0.25, "a": 1.0,
+        "an": 1.0,
     }
 )  # fmt: skip
 _SHARES: Final = frozenset({"half", "quarter"})

@@ -14,7 +14,7 @@ from vla_deploy.world.vocabulary import COLOURS, OBJECT_CLASSES, SYNONYMS
 _TAKEN_BACK: Final = frozenset(
     {
         "no", "not", "don't", "dont", "never", "actually", "sorry", "wait", "mean", "meant",
-        "rather", "scratch", "instead", "correction", "forget", "without", "better", "never",
+        "rather", "scratch", "instead", "correction", "forget", "without", "better",
     }
 )  # fmt: skip
 # Kinds of things that mean something else as often.

@@ -92,10 +92,6 @@ class Decoder:
         given = {tensor.name for tensor in self._session.outputs}
         missing += [one for one in (config.logits, *config.present_names) if one not in given]
         if missing:
-            named = ", ".join(missing[:4])
-            raise ModelFolderInvalid(
-                self._session.path.parent,
-                (
-                    f"{self._session.path.name} has no tensors {named}, which genai_config.json names",
-                ),
-            )
+            path, named = self._session.path, ", ".join(missing[:4])
+            fault = f"{path.name} has no tensors {named}, which genai_config.json names"
+            raise ModelFolderInvalid(path.parent, (fault,))

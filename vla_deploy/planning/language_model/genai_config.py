@@ -110,7 +110,7 @@ def _build(model: Mapping[str, Any]) -> GenaiConfig:
 
 def _end_ids(model: Mapping[str, Any]) -> tuple[int, ...]:
     given = model.get("eos_token_id")
-    listed = given if isinstance(given, list) else [given]
+    listed: list[Any] = given if isinstance(given, list) else [given]
     return tuple(listed) if all(isinstance(one, int) and one >= 0 for one in listed) else ()
 
 

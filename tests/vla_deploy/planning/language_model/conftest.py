@@ -47,7 +47,7 @@ class Family:
 
 LLAMA = Family("llama", 4, 4, False, HEADERS, False)
 QWEN = Family("qwen2", 4, 2, True, CHATML, True)
-Make = Callable[..., Path]
+Open = Callable[[Path], LanguageModel]
 
 
 def tokenizer() -> Tokenizer:
@@ -128,9 +128,11 @@ def folder(request: pytest.FixtureRequest, folders: dict[str, Path]) -> Path:
 
 
 @pytest.fixture
-def model(folder: Path) -> LanguageModel:
+def opened() -> Open:
+    language = Language(use=Use.CHAT, most_tokens=64)
+    return lambda folder: LanguageModel(folder, language, PLAIN_CHOICE)
+
+
+@pytest.fixture
+def model(folder: Path, opened: Open) -> LanguageModel:
     return opened(folder)
-
-
-def opened(folder: Path) -> LanguageModel:
-    return LanguageModel(folder, Language(use=Use.CHAT, most_tokens=64), PLAIN_CHOICE)

@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from drivers.clock import MonotonicClock
-from tests.vla_deploy.planning.language_model.conftest import opened
 from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.language_model import (
@@ -32,6 +31,7 @@ SCHEMA = {
     "required": ["do", "seconds"],
     "additionalProperties": False,
 }
+Open = Callable[[Path], LanguageModel]
 ASKED = [{"role": "user", "content": "go to the kitchen"}]
 
 
@@ -153,7 +153,7 @@ def test_no_blank_may_stand_between_the_parts(model: LanguageModel) -> None:
         assert not allowed[prompt_of(model, blank)[0]]
 
 
-def test_templates_speak_as_the_families_do(folders: dict[str, Path]) -> None:
+def test_templates_speak_as_the_families_do(opened: Open, folders: dict[str, Path]) -> None:
     chat = [{"role": "system", "content": "be brief"}, {"role": "user", "content": " hi "}]
     llama = opened(folders["llama"]).prompt(chat)
     qwen = opened(folders["qwen2"]).prompt(chat)
@@ -180,20 +180,20 @@ def rewrite(file: Path, change: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["genai_config.json", "tokenizer.json", "tokenizer_config.json"])
-def test_a_missing_file_is_named(copied: Path, name: str) -> None:
+def test_a_missing_file_is_named(opened: Open, copied: Path, name: str) -> None:
     (copied / name).unlink()
     with pytest.raises(ModelFolderInvalid, match=name):
         opened(copied)
 
 
-def test_a_half_written_graph_is_named(copied: Path) -> None:
+def test_a_half_written_graph_is_named(opened: Open, copied: Path) -> None:
     file = copied / "model.onnx"
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     with pytest.raises(ModelFileSpoiled, match=r"model\.onnx"):
         opened(copied)
 
 
-def test_every_fault_of_the_configuration_is_told(copied: Path) -> None:
+def test_every_fault_of_the_configuration_is_told(opened: Open, copied: Path) -> None:
     def spoil(document: Any) -> None:
         del document["model"]["vocab_size"], document["model"]["decoder"]["head_size"]
         document["model"]["decoder"]["inputs"]["past_key_names"] = "past"
@@ -204,7 +204,7 @@ def test_every_fault_of_the_configuration_is_told(copied: Path) -> None:
     assert len(refused.value.faults) == 3
 
 
-def test_the_tokenizer_of_another_model_is_refused(copied: Path) -> None:
+def test_the_tokenizer_of_another_model_is_refused(opened: Open, copied: Path) -> None:
     def grow(document: Any) -> None:
         document["model"]["vocab_size"] = 32_000
 
@@ -213,7 +213,7 @@ def test_the_tokenizer_of_another_model_is_refused(copied: Path) -> None:
         opened(copied)
 
 
-def test_tensors_that_the_graph_lacks_are_named(copied: Path) -> None:
+def test_tensors_that_the_graph_lacks_are_named(opened: Open, copied: Path) -> None:
     def rename(document: Any) -> None:
         document["model"]["decoder"]["inputs"]["past_key_names"] = "cache.%d.key"
 
@@ -222,7 +222,7 @@ def test_tensors_that_the_graph_lacks_are_named(copied: Path) -> None:
         opened(copied)
 
 
-def test_a_template_cannot_reach_beyond_its_sandbox(copied: Path) -> None:
+def test_a_template_cannot_reach_beyond_its_sandbox(opened: Open, copied: Path) -> None:
     def plot(document: Any) -> None:
         document["chat_template"] = "{{ messages.__class__.__mro__[1].__subclasses__() }}"
 
@@ -231,7 +231,7 @@ def test_a_template_cannot_reach_beyond_its_sandbox(copied: Path) -> None:
         opened(copied).answer(ASKED, bounds(), SCHEMA)
 
 
-def test_a_model_without_a_template_is_no_chat_model(copied: Path) -> None:
+def test_a_model_without_a_template_is_no_chat_model(opened: Open, copied: Path) -> None:
     rewrite(copied / "tokenizer_config.json", lambda document: document.pop("chat_template"))
     with pytest.raises(ModelFolderInvalid, match="instruct form"):
         opened(copied)
