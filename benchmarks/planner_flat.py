@@ -24,7 +24,7 @@ SUPPORTS: Final = frozenset({"book"})
 SIZES_M: Final[Mapping[str, tuple[float, float, float]]] = MappingProxyType({
     "cup": (0.066, 0.066, 0.095), "ball": (0.05, 0.05, 0.05), "book": (0.15, 0.065, 0.04),
     "bottle": (0.06, 0.06, 0.18), "phone": (0.13, 0.065, 0.012), "keys": (0.07, 0.04, 0.016),
-    "box": (0.232, 0.232, 0.128), "bowl": (0.08, 0.08, 0.05), "can": (0.066, 0.066, 0.115),
+    "box": (0.232, 0.232, 0.128), "bowl": (0.07, 0.07, 0.05), "can": (0.066, 0.066, 0.115),
     "remote": (0.16, 0.045, 0.02),
 })  # fmt: skip
 
