@@ -95,13 +95,29 @@ class Desk:
             doubt=0,
         )  # fmt: skip
 
+    def show(self, topic: str, document: Mapping[str, Any]) -> None:
+        """Tell a document of any form as one of the topics that the planner reads."""
+        self._cells[topic].put_document(document)
+
     def say(self, text: str) -> tuple[str, Answer]:
         """Give a command in words; return its id and what came of it."""
-        return self._give(text=text)
+        return self.give(text=text)
 
     def hand_in(self, plan: object) -> tuple[str, Answer]:
         """Give a whole plan; return its id and what came of it."""
-        return self._give(plan=plan)
+        return self.give(plan=plan)
+
+    def give(self, **utterance: object) -> tuple[str, Answer]:
+        """Publish an utterance of any form; return its id and what came of it."""
+        command_id = f"judge-{next(self._numbers)}"
+        self._events.drain()
+        self._plans.drain()
+        try:
+            message = {"command_id": command_id, "source": "judge", **utterance}
+            self._utterances.publish(message)
+        except IpcError as error:
+            return command_id, _answer("refuse", text=f"it cannot be said: {error}")
+        return command_id, self._await(command_id)
 
     def carried_out(self, command_id: str, plan: Mapping[str, Any], error: str) -> None:
         """Tell what the executor would: each action, and the end."""
@@ -129,17 +145,6 @@ class Desk:
         self.node.stop()
         self.node = build(self._context)
         self.node.start()
-
-    def _give(self, **utterance: object) -> tuple[str, Answer]:
-        command_id = f"judge-{next(self._numbers)}"
-        self._events.drain()
-        self._plans.drain()
-        try:
-            message = {"command_id": command_id, "source": "judge", **utterance}
-            self._utterances.publish(message)
-        except IpcError as error:
-            return command_id, _answer("refuse", text=f"too long to be said: {error}")
-        return command_id, self._await(command_id)
 
     def _await(self, command_id: str) -> Answer:
         began_ns = time.perf_counter_ns()

@@ -20,9 +20,9 @@ def encode(document: object, topic: Topic, limit_bytes: int) -> bytes:
         raise BadPayload(f"topic {topic.name}: expected a JSON object, got {kind}")
     try:
         text = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+        payload = text.encode()
     except (TypeError, ValueError) as error:
         raise BadPayload(f"topic {topic.name}: not JSON: {error}") from error
-    payload = text.encode()
     if len(payload) > limit_bytes:
         raise BadPayload(
             f"topic {topic.name}: document of {len(payload)} bytes, limit {limit_bytes}; "

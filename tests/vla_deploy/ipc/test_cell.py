@@ -97,7 +97,7 @@ def test_a_document_beyond_its_bound_names_topic_size_and_limit(space):
         space.cell_writer("note").put_document({"text": "x" * 298})
 
 
-@pytest.mark.parametrize("value", [float("nan"), object(), np.float64("inf")])
+@pytest.mark.parametrize("value", [float("nan"), object(), np.float64("inf"), "\ud800"])
 def test_what_json_cannot_say_is_refused(space, value):
     with pytest.raises(BadPayload, match="topic note: not JSON"):
         space.cell_writer("note").put_document({"value": value})
