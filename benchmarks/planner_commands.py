@@ -30,7 +30,8 @@ def measure(kinds: Sequence[str] = (), misses: bool = False) -> dict[str, Any]:
 
 def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     """Return the figures of cases that have been played."""
-    aimed = [one for one in verdicts if PLAN in one.case.turns[-1].must]
+    refusable = [one for one in verdicts if one.case.turns[-1].must[0] == REFUSE]
+    aimed = [one for one in verdicts if one not in refusable and one.case.turns[-1].goal]
     judged = [turn for one in verdicts for turn in one.judged]
     plans = [turn.answer for turn in judged if turn.answer.outcome == PLAN]
     return {
@@ -42,10 +43,7 @@ def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
             [one for one in aimed if one.judged[-1].answer.outcome == PLAN], lambda one: one.rung
         ),
         "asked_ratio": _share(list(_turns(verdicts, ASK)), lambda turn: not turn.wrong),
-        "refused_ratio": _share(
-            [one for one in verdicts if one.case.turns[-1].must[0] == REFUSE],
-            lambda one: not one.wrong,
-        ),
+        "refused_ratio": _share(refusable, lambda one: not one.wrong),
         "moved_wrongly_ratio": _share(verdicts, _moved_wrongly),
         "confirmed_ratio": _share(judged, lambda turn: turn.confirmed),
         "schema_valid_ratio": _share(plans, is_schema_valid),
