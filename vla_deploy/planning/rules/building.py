@@ -9,10 +9,12 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.errors import NotUnderstood
-from vla_deploy.planning.references import words_of
-from vla_deploy.planning.understanding.phrases import PRONOUNS
+from vla_deploy.planning.errors import NotUnderstood, UnknownObject
+from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.understanding.expressions import read_expression
+from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
 from vla_deploy.planning.understanding.quantities import quantity_of
+from vla_deploy.planning.understanding.setting import Setting
 
 Groups = Mapping[str, str]
 Step = tuple[str, dict[str, Any]]
@@ -20,8 +22,18 @@ Builder = Callable[[Groups, Request], list[Step]]
 
 DRIVE_M: Final = 0.5
 TURN_RAD: Final = math.pi / 2
+LITTLE_M: Final = 0.2
+LITTLE_RAD: Final = math.radians(20.0)
+# "Go back" alone is about the command before; in a longer one it is about where that began.
+MOST_WORDS_ALONE: Final = 4
 # What "put it away" means where nothing else is said.
 STORE: Final = "box"
+_NEAR: Final = re.compile(
+    r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
+)
+_PUT_RELATION: Final = re.compile(
+    r"(?:^| )(?:back )?(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
+)
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 
 
@@ -31,8 +43,25 @@ def parts_of(text: str) -> list[str]:
 
 
 def go(groups: Groups, _: Request) -> list[Step]:
-    """Drive to each place or thing in turn."""
-    return [("navigate_to", {"place": part}) for part in parts_of(groups["place"])]
+    """Drive to each place or thing in turn; "near the box" is where the box can be reached."""
+    named = (_NEAR.sub("", part) for part in parts_of(groups["place"]))
+    return [("navigate_to", {"place": part}) for part in named]
+
+
+def dock(_: Groups, __: Request) -> list[Step]:
+    """Drive to where the battery is charged."""
+    return [("navigate_to", {"place": "charging station"})]
+
+
+def go_back(_: Groups, request: Request) -> list[Step]:
+    """Return to where the command was given, or, as a command of its own, the one before it."""
+    if len(words_of(request.text)) > MOST_WORDS_ALONE:
+        return [("navigate_to", {"place": "here"})]
+    before = [one.here for one in request.conversation.turns if one.here is not None]
+    if not before:
+        raise NotUnderstood(request.text)
+    x_m, y_m, yaw_rad = (round(value, 3) for value in before[-1])
+    return [("navigate_to", {"x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad})]
 
 
 def pick(groups: Groups, _: Request) -> list[Step]:
@@ -41,16 +70,51 @@ def pick(groups: Groups, _: Request) -> list[Step]:
     return [("pick_up", {"object": part, **arm}) for part in parts_of(groups["object"])]
 
 
-def put(groups: Groups, _: Request) -> list[Step]:
+def put(groups: Groups, request: Request) -> list[Step]:
     """Put each thing somewhere, fetching it first."""
-    relation = "in" if groups["relation"].removeprefix("back ") in _INTO else "on"
-    where = {"destination": groups["destination"], "relation": relation, **_arm(groups)}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+    moved, said, destination = split_put(
+        f"{groups['object']} {groups['relation']} {groups['destination']}", request
+    )
+    relation = "in" if said.removeprefix("back ") in _INTO else "on"
+    where = {"destination": destination, "relation": relation, **_arm(groups)}
+    return [("place", {"object": part, **where}) for part in parts_of(moved)]
 
 
-def put_down(groups: Groups, _: Request) -> list[Step]:
-    """Put down what is held."""
-    return [("place", {"object": groups.get("object", "it"), **_arm(groups)})]
+def split_put(text: str, request: Request) -> tuple[str, str, str]:
+    """Return what is put, how, and where to: "the cup on the table | into | the box".
+
+    Of several ways to read it the last is meant of which both sides are known.
+    """
+    ways = [
+        (text[: found.start()].strip(), found[0].strip(), text[found.end() :].strip())
+        for found in _PUT_RELATION.finditer(text)
+        if text[: found.start()].strip() and text[found.end() :].strip()
+    ]
+    known = [
+        way
+        for way in ways
+        if all(is_one(part, request) for part in parts_of(way[0])) and is_one(way[2], request)
+    ]
+    return (known or ways[:1] or [(text, "on", "")])[-1]
+
+
+def is_one(text: str, request: Request) -> bool:
+    """Tell whether a text is the name of a place or refers to things that the robot can know."""
+    if match_place(text, request.world.places):
+        return True
+    try:
+        read_expression(text, Setting(request).furniture)
+    except UnknownObject:
+        return False
+    return True
+
+
+def put_down(groups: Groups, request: Request) -> list[Step]:
+    """Put down what is held; with one thing in hand, or none, "it" tells nothing more."""
+    said = groups.get("object", "it")
+    held = [kind for kind in request.world.holding.values() if kind]
+    named = {"object": said} if len(held) > 1 or PRONOUNS.get(said) != IT else {}
+    return [("place", {**named, **_arm(groups)})]
 
 
 def put_away(groups: Groups, _: Request) -> list[Step]:
@@ -75,7 +139,7 @@ def find(groups: Groups, _: Request) -> list[Step]:
 
 def look(groups: Groups, _: Request) -> list[Step]:
     """Turn the head to a direction or a thing."""
-    direction = _DIRECTIONS.get(groups["what"].removeprefix("to the ").removeprefix("the "))
+    direction = _DIRECTIONS.get(re.sub(r"^(?:over )?(?:to )?(?:the |your )?", "", groups["what"]))
     if direction is not None:
         return [("look_at", {"direction": direction})]
     return [("look_at", {"object": groups["what"]})]
@@ -90,15 +154,22 @@ def look_around(groups: Groups, _: Request) -> list[Step]:
 def drive(groups: Groups, _: Request) -> list[Step]:
     """Drive straight."""
     sign = -1.0 if groups["way"].startswith(("back", "reverse")) else 1.0
-    return [("move", {"distance_m": sign * _quantity(groups, "m", DRIVE_M)})]
+    default = LITTLE_M if "little" in groups else DRIVE_M
+    return [("move", {"distance_m": sign * _quantity(groups, "m", default)})]
 
 
 def turn(groups: Groups, _: Request) -> list[Step]:
     """Turn on the spot."""
     way = groups.get("way", "around")
     default = math.pi if way == "around" else TURN_RAD
+    default = LITTLE_RAD if "little" in groups else 2 * math.pi if "whole" in groups else default
     sign = -1.0 if way in ("right", "clockwise") else 1.0
     return [("turn", {"angle_rad": sign * _quantity(groups, "rad", default)})]
+
+
+def turn_whole(groups: Groups, request: Request) -> list[Step]:
+    """Turn all the way round."""
+    return turn({**groups, "whole": "yes"}, request)
 
 
 def gripper(groups: Groups, _: Request) -> list[Step]:

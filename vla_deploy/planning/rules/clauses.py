@@ -23,8 +23,10 @@ _POLITE: Final = re.compile(
     r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
     r"i would like you to|i'd like you to|i need you to|you should|you need to|you have to|you can|"
     r"let's|lets|let us|go ahead and|first|would you mind|do me a favour and|do me a favor and|"
-    r"be so kind and|so|well|um|uh|quickly|maybe|perhaps)\b[, ]*"
-    r"|[, ]*\b(?:please|for me|thanks|thank you|now|right now|if you can|if you could|will you|"
+    r"be so kind and|so|well|um|uh|quickly|maybe|perhaps|"
+    r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait)\b)|"
+    r"try to|try and|start to|next|finally)\b[, ]*"
+    r"|[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
     r"would you|could you|butler|robot|quickly|immediately|at once)$|[.!?, ]+$"
 )
 _SPLIT: Final = re.compile(

@@ -8,13 +8,14 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
-from vla_deploy.planning.errors import NotAble
-from vla_deploy.planning.references import match_place
+from vla_deploy.planning.errors import NotAble, UnknownPlace
+from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.rules.building import STORE, Groups, Step, look_around
-from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.world import Thing
 
 MOST_THINGS: Final = 6
+EVERYWHERE: Final = frozenset({"", "up", "mess", "room", "place", "house", "flat", "home",
+                               "everything", "things", "apartment", "here"})  # fmt: skip
 # Half the side of the square around a place, and how far apart the rows are.
 REACH_M: Final = 1.0
 ROW_M: Final = 0.5
@@ -23,7 +24,7 @@ MOST_POINTS: Final = 20
 
 def tidy(groups: Groups, request: Request) -> list[Step]:
     """Put away what lies on a piece of furniture, or everywhere; look first where none is known."""
-    lying = _lying(groups.get("place"), request)
+    lying = _lying(groups.get("place", ""), request)
     if not lying:
         there = {"place": groups["place"]} if "place" in groups else {}
         said = "I know of nothing there to put away. I look around."
@@ -37,19 +38,34 @@ def tidy(groups: Groups, request: Request) -> list[Step]:
     return [*steps, ("speak", {"text": said})]
 
 
-def _lying(place: str | None, request: Request) -> list[Thing]:
-    """Return what can be put away: not what is in a box already, nor what a hand cannot take."""
+def _lying(place: str, request: Request) -> list[Thing]:
+    """Return what can be put away: not what is in a box already, nor what a hand cannot take.
+
+    Raises:
+        UnknownPlace: the place is none that the robot knows.
+    """
     things = () if request.scene is None else request.scene.things
-    at = None if place is None else match_place(place, request.world.places)
-    surface = None if at is None else surface_of(at, request.world)
+    surfaces = _surfaces(place, request)
     return [
         one
         for one in things
         if one.kind in GRASPABLE_CLASSES
         and not one.held_by
         and (one.rests is None or one.rests.relation != "in")
-        and (surface is None or (one.rests is not None and one.rests.of == surface))
+        and (not surfaces or (one.rests is not None and one.rests.of in surfaces))
     ]
+
+
+def _surfaces(place: str, request: Request) -> frozenset[str]:
+    """Return the furniture of a place, or nothing where everywhere is meant."""
+    if " ".join(words_of(place)) in EVERYWHERE:
+        return frozenset()
+    world = request.world
+    name = match_place(place, world.places)
+    if name is None:
+        raise UnknownPlace(place, set(world.places.values()))
+    views = world.sites[name].viewpoints if name in world.sites else ()
+    return frozenset({name, *(one for one, site in world.sites.items() if site.pose in views)})
 
 
 def patrol(groups: Groups, request: Request) -> list[Step]:

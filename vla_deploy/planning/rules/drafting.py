@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.errors import NotUnderstood, UnknownObject
+from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.references import match_place
-from vla_deploy.planning.rules.building import Groups, Step, parts_of
+from vla_deploy.planning.rules.building import Groups, Step, is_one, parts_of, split_put
 from vla_deploy.planning.rules.clauses import MOST_CLAUSES, MOST_LETTERS, polite_off, segments
 from vla_deploy.planning.rules.intents import PRIORITIES, Intent
 from vla_deploy.planning.rules.refusals import refuse_unable
 from vla_deploy.planning.rules.table import RULES, Rule
-from vla_deploy.planning.understanding.expressions import read_expression
 
 # Which hand to take: said at the end of a clause, whatever it is about.
 _WITH_HAND: Final = re.compile(
@@ -74,17 +72,42 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     clause = parts[0]
     refuse_unable(clause)
     fit = _fit(clause)
-    if fit is None and draft.thing and _is_one(clause, draft.request):
-        # "pick up the cup, then the ball": the clause before says what to do.
-        clause = draft.clause.replace(draft.thing, clause, 1)
-        fit = _fit(clause)
+    if fit is None and draft.thing:
+        clause, fit = _with_verb(clause, draft)
     if fit is None:
         raise NotUnderstood(parts[0])
     _build(clause, fit, draft)
     return 1
 
 
+def _with_verb(clause: str, draft: _Draft) -> tuple[str, _Fit | None]:
+    """Let the clause before say what to do: "pick up the cup, then the ball"."""
+    verb = draft.clause[: draft.clause.index(draft.thing)] if draft.thing in draft.clause else ""
+    for whole in (f"{verb}{clause}", draft.clause.replace(draft.thing, clause, 1)):
+        fit = _fit(whole) if verb and clause.split()[:1] != ["to"] else None
+        if fit is not None and _is_known(fit, draft.request):
+            return whole, fit
+    return clause, None
+
+
+def _is_known(fit: _Fit, request: Request) -> bool:
+    """Tell whether what a clause names is known, so that it is no accident that it fits."""
+    if "destination" in fit.groups:
+        moved, _, destination = split_put(
+            " ".join(fit.groups[name] for name in ("object", "relation", "destination")), request
+        )
+        return is_one(moved, request) and is_one(destination, request)
+    return all(
+        is_one(fit.groups[name], request) for name in ("object", "place") if name in fit.groups
+    )
+
+
 def _fit(clause: str) -> _Fit | None:
+    """Return the first rule that fits; what is "for me" may as well not be said."""
+    return _fit_whole(clause) or _fit_whole(clause.removesuffix(" for me"))
+
+
+def _fit_whole(clause: str) -> _Fit | None:
     hand = _WITH_HAND.fullmatch(clause)
     own = clause if hand is None else hand["own"]
     for rule in RULES:
@@ -105,18 +128,8 @@ def _is_whole(fit: _Fit, request: Request) -> bool:
     listed = [name for name in ("object", "place") if " and " in fit.groups.get(name, "")]
     others = [name for name in fit.groups if name not in listed and " and " in fit.groups[name]]
     return bool(listed) and not others and all(
-        _is_one(part, request) for name in listed for part in parts_of(fit.groups[name])
+        is_one(part, request) for name in listed for part in parts_of(fit.groups[name])
     )  # fmt: skip
-
-
-def _is_one(text: str, request: Request) -> bool:
-    if match_place(text, request.world.places):
-        return True
-    try:
-        read_expression(text)
-    except UnknownObject:
-        return False
-    return True
 
 
 def _build(clause: str, fit: _Fit, draft: _Draft) -> None:

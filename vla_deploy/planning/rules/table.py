@@ -30,6 +30,7 @@ _SECONDS: Final = (
     rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment))"
 )
 _WAY: Final = r"(?P<way>forwards?|ahead|straight(?: ahead| on)?|backwards?|back(?: up)?|in reverse)"
+_LITTLE: Final = r"(?:a (?:little|bit|tad)|slightly)"
 _SIDE: Final = r"(?P<way>left|right|around|clockwise|counter-?clockwise|anti-?clockwise)"
 _HAND: Final = r"(?:the |your |a )?(?:(?P<arm>left|right) )?(?:grippers?|hands?|fingers|claws?)"
 _INTO: Final = (
@@ -50,9 +51,14 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.QUESTION, r"where are you|where am i|which room (?:are you|is this)(?: in)?",
      telling.tell_place),
     (Intent.QUESTION, rf"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
-     rf"have you seen|do you know where) {_OBJECT}(?: is| are)?", telling.tell_or_find),
+     rf"have you seen|do you know where) {_OBJECT}(?: is| are)?(?: anywhere| somewhere)?",
+     telling.tell_or_find),
     (Intent.QUESTION, rf"(?:do you see|is there|are there|see) (?:any |an? )?{_OBJECT}"
      r"(?: there| here| anywhere)?", telling.tell_whether),
+    (Intent.QUESTION, rf"how many {_OBJECT}(?: are there| do you see| can you see| are here)?"
+     r"(?: here| there)?", telling.tell_number),
+    (Intent.QUESTION, r"(?:is|are) (?P<object>(?:the|my|your|a) .+ (?:on|in) .+)",
+     telling.tell_whether),
     # --- assist
     (Intent.ASSIST, r"help(?: me)?|i need (?:some |your )?help|assist(?: me)?|help out|"
      r"what (?:can|could) you do(?: for me)?|who are you|what are you|how can you help(?: me)?",
@@ -62,7 +68,20 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:bring|fetch|get|give|hand|pass) me {_OBJECT}", building.bring),
     (Intent.MANIPULATION, rf"(?:bring|carry|take|fetch|get|hand|give|deliver|pass) {_OBJECT} "
      r"(?:over )?(?:here|(?:back )?to me)", building.bring),
+    (Intent.MANIPULATION, rf"(?:get|fetch|grab|take|pick up|bring) {_OBJECT} for me|"
+     r"i (?:need|want|would like|'d like) (?P<object2>(?:the|my|a|an|that|this) .+)",
+     building.bring),
     (Intent.MANIPULATION, rf"fetch {_OBJECT}", building.bring),
+    # --- go to
+    (Intent.NAVIGATION, r"(?:go|come|drive) back(?: here| to (?:me|where you (?:were|are)))?|"
+     r"return", building.go_back),
+    (Intent.NAVIGATION, r"(?:go|drive|come|move|navigate|return|walk|head|travel|roll|proceed|get|"
+     rf"run)(?: back| over| on|)?(?: over)? (?:to|towards?|into|for) {_PLACE}", building.go),
+    (Intent.NAVIGATION, rf"(?:take|bring|get) yourself (?:back )?to {_PLACE}|"
+     r"to (?P<place2>the .+)", building.go),
+    # --- wait
+    (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay)(?: here| there)?(?: (?:for )?{_SECONDS})?",
+     building.wait),
     # --- put
     (Intent.MANIPULATION, rf"(?:put|set|lay) {_OBJECT} down|(?:put|set|lay) down (?P<object2>.+?)",
      building.put_down),
@@ -71,15 +90,20 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
      r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", building.put_away),
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|take|stow|store|"
-     rf"leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} (?:down )?{_INTO} "
-     r"(?P<destination>.+)", building.put),
+     rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} (?:down )?"
+     rf"{_INTO} (?P<destination>.+)", building.put),
     # --- straight and turning
-    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come|back) {_WAY}"
-     rf"(?: (?:by |for )?{_METRES})?", building.drive),
+    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come) (?P<little>{_LITTLE} )?{_WAY}"
+     rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", building.drive),
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step)(?: by)? {_METRES} {_WAY}", building.drive),
-    (Intent.NAVIGATION, rf"(?P<way>back up|reverse)(?: (?:by )?{_METRES})?", building.drive),
-    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|face|swivel)(?: to)?(?: the| your)? ?{_SIDE}"
-     rf"(?: (?:by )?{_ANGLE})?", building.turn),
+    (Intent.NAVIGATION, rf"(?P<way>back up|reverse)(?: (?:by )?{_METRES})?"
+     rf"(?P<little> {_LITTLE})?", building.drive),
+    (Intent.NAVIGATION, r"(?:turn|spin|rotate) (?:around once|all the way (?:a)?round|"
+     r"(?:a |in a )?full (?:circle|turn))|do a full turn", building.turn_whole),
+    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|face|swivel)(?P<little> {_LITTLE})?"
+     rf"(?: to)?(?: the| your)? ?{_SIDE}(?: (?:by )?{_ANGLE})?(?P<little2> {_LITTLE})?",
+     building.turn),
+    (Intent.SEARCH, r"turn your head (?P<what>.+)", building.look),
     (Intent.NAVIGATION, rf"(?:turn|rotate|spin|swivel)(?: by)? {_ANGLE}"
      rf"(?: (?:to )?(?:the )?{_SIDE})?", building.turn),
     (Intent.NAVIGATION, r"(?:make|take|do) an? (?P<way>left|right)(?: turn)?|do a u-?turn",
@@ -91,13 +115,11 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, r"(?:move|bring|put) (?:your |the )?(?:(?P<arm>left|right) )?arms? "
      r"(?:to|into|in) (?:the )?(?P<pose>[a-z_ ]+?)(?: pose| position)?", building.pose),
     # --- go
-    (Intent.NAVIGATION, r"(?:go|drive|come|move|navigate|return|walk|head|travel|roll|proceed|get|"
-     rf"run)(?: back| over| on)? (?:to|towards?|into) {_PLACE}", building.go),
     (Intent.NAVIGATION, rf"(?:go|come|return|drive|head|walk|navigate|move)(?: back)? {_PLACE}",
      building.go),
     (Intent.NAVIGATION, rf"(?:visit|approach|make your way to|find your way to|park at|dock at|"
      rf"wait at|position yourself at|take yourself to) {_PLACE}", building.go),
-    (Intent.NAVIGATION, r"(?P<place>dock|charge)(?: yourself)?", building.go),
+    (Intent.NAVIGATION, r"(?:go )?(?:dock|charge|recharge)(?: yourself)?", building.dock),
     # --- search
     (Intent.SEARCH, rf"(?:search|check|look (?:in|on|around|through)|scan) {_PLACE} for {_OBJECT}",
      building.find),
@@ -113,19 +135,17 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.CLEANING, r"(?:clean|tidy|clear)(?: things)?(?: up)?|clear (?:things )?away",
      cleaning.tidy),
     (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", cleaning.tidy),
-    (Intent.CLEANING, rf"(?:patrol|inspect|sweep(?: through)?|cover(?: the floor (?:of|in))?|"
-     rf"drive (?:all )?over(?: the floor (?:of|in))?) {_PLACE}", cleaning.patrol),
+    (Intent.CLEANING, r"(?:patrol|inspect|sweep(?: through)?|cover(?: the floor (?:of|in))?|"
+     r"drive (?:all )?over(?: the floor (?:of|in))?) (?P<place>.+?)(?: floor)?", cleaning.patrol),
     # --- pick
     (Intent.MANIPULATION, rf"(?:pick|lift)(?: up)? {_OBJECT}(?: up)?", building.pick),
     (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove)"
      rf"(?: hold of)? {_OBJECT}", building.pick),
     # --- the rest
-    (Intent.ASSIST, r"(?:say|announce|repeat after me)[:,]? (?P<text>.+)",
-     building.speak),
+    (Intent.ASSIST, r"(?:(?:say|announce|repeat after me)[:,]?|tell [a-z]+(?= that))(?: that)? "
+     r"(?P<text>.+)", building.speak),
     (Intent.ASSIST, r"(?P<text>hello|hi|good morning|good evening|good night)(?: there)?",
      building.speak),
-    (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay(?: here| there)?)(?: (?:for )?{_SECONDS})?",
-     building.wait),
 )  # fmt: skip
 
 RULES: Final[tuple[Rule, ...]] = tuple(

@@ -8,9 +8,9 @@ from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.building import Groups, Step, find
 from vla_deploy.planning.understanding.expressions import read_expression
+from vla_deploy.planning.understanding.fitting import Use, fitting
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
-from vla_deploy.world import find as find_things
 from vla_deploy.world.memory import place_of, seen_words
 
 MOST_TOLD = 6
@@ -75,10 +75,15 @@ def tell_or_find(groups: Groups, request: Request) -> list[Step]:
 def tell_whether(groups: Groups, request: Request) -> list[Step]:
     """Say whether a thing is in sight."""
     found = _known(groups["object"], request)
-    words = read_expression(groups["object"]).query
     if not found:
-        return _say(f"No, I do not see {_a(str(words))}.")
+        return _say("No, I do not see that.")
     return _say(f"Yes, I see {listed(found)}.")
+
+
+def tell_number(groups: Groups, request: Request) -> list[Step]:
+    """Say how many such things are known."""
+    count = len(_known(groups["object"], request))
+    return _say(f"I see {count or 'none'}.")
 
 
 def listed(things: Sequence[Thing]) -> str:
@@ -92,8 +97,7 @@ def _known(text: str, request: Request) -> list[Thing]:
     if request.scene is None:
         return []
     setting = Setting(request)
-    query = read_expression(text, setting.furniture).query
-    return find_things(query, request.scene, setting.view)
+    return fitting(read_expression(text, setting.furniture), Use.SEE, setting)
 
 
 def _where(thing: Thing, place: str, request: Request) -> str:

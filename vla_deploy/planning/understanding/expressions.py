@@ -63,6 +63,12 @@ _SIDE_BEHIND: Final = re.compile(
     r"(?P<own>.*?) ?(?:that is )?(?:on|to|at) (?P<whose>the|your|my|its) (?P<side>left|right)"
     r"(?: hand)?(?: side)?"
 )
+_TO_WHOM: Final = re.compile(
+    r"\b(nearest|closest|nearer|closer|farthest|furthest) to (you|yourself|robot|the robot|me)\b"
+)
+# Where one takes a thing from is where it is.
+_FROM: Final = ((re.compile(r"\b(?:from|off(?: of)?) (?!me\b)"), "on "),
+                (re.compile(r"\bout of "), "in "))  # fmt: skip
 _MIDDLE_BEHIND: Final = re.compile(r"(?P<own>.+?) (?:in|at) the (?P<side>middle|centre|center)")
 _EVERYTHING: Final = re.compile(r"^(?:everything|anything)(?: else)?\b")
 _QUANTITY: Final[tuple[tuple[re.Pattern[str], Scope], ...]] = tuple(
@@ -86,26 +92,48 @@ def read_expression(text: str, furniture: Mapping[str, str] | None = None) -> Ex
     if len(text) > MOST_LETTERS:
         raise UnknownObject(f"{text[:40]}...", OBJECT_CLASSES)
     said = " ".join(_TOKEN.findall(text.lower().replace("'s", "").replace("-", "")))
+    said, by_speaker = _order_by_whom(said)
     key = " ".join(word for word in said.split() if word not in ARTICLES) or said
     pronoun = phrases.PRONOUNS.get(said) or phrases.PRONOUNS.get(key, "")
     if pronoun:
         return Expression(said=key, query=Query(), pronoun=pronoun)
     rest, scope, count = _quantity(said)
-    rest, side, by_speaker = _side_behind(rest)
+    rest, side, my_side = _side_behind(rest)
     words = _compounds(rest).split()
     read = Expression(
-        said=key, query=Query(), scope=scope, count=count, side=side, by_speaker=by_speaker
+        said=key,
+        query=Query(),
+        scope=scope,
+        count=count,
+        side=side,
+        by_speaker=by_speaker or my_side,
     )
     read = _pointing(words, read)
     read = _generic_support(read, furniture or {})
     read = _known_words(read, furniture or {})
-    if not (read.words or read.side or read.extreme or read.is_other):
-        raise UnknownObject(text.strip(), OBJECT_CLASSES)
     try:
         query = parse_query(" ".join(read.words), furniture)
     except UnknownWord as error:
         raise UnknownObject(text.strip(), OBJECT_CLASSES) from error
+    if not _means_things(query, said):
+        raise UnknownObject(text.strip(), OBJECT_CLASSES)
     return replace(read, query=query)
+
+
+def _means_things(query: Query, said: str) -> bool:
+    """Tell whether it is about things: "a little closer" is not, "the closer one" is."""
+    if query.is_named or query.colour:
+        return True
+    words = said.split()
+    return "one" in words or "ones" in words or (words[:1] == ["the"] and len(words) > 1)
+
+
+def _order_by_whom(said: str) -> tuple[str, bool]:
+    """Return "closest to you" without "to you", and whether it is "to me"."""
+    found = _TO_WHOM.search(said)
+    if found is None:
+        return said, False
+    return _TO_WHOM.sub(r"\1", said), found[2] == "me"
 
 
 def _quantity(said: str) -> tuple[str, Scope, int]:
@@ -129,6 +157,8 @@ def _side_behind(rest: str) -> tuple[str, str, bool]:
 
 
 def _compounds(rest: str) -> str:
+    for pattern, word in _FROM:
+        rest = pattern.sub(word, rest)
     for spoken, word in phrases.COMPOUNDS.items():
         rest = re.sub(rf"\b{spoken}\b", word, rest)
     return rest
@@ -166,7 +196,7 @@ def _generic_support(read: Expression, furniture: Mapping[str, str]) -> Expressi
     words = [word for word in read.words if word not in ARTICLES]
     for at in range(len(words) - 1, 0, -1):
         spoken = " ".join(words[at:])
-        if words[at - 1] not in ("on", "from", "off") or spoken in furniture:
+        if words[at - 1] != "on" or spoken in furniture:
             continue
         named = {place for name, place in furniture.items() if name.split()[-1:] == words[at:]}
         if named:

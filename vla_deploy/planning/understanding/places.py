@@ -9,6 +9,7 @@ from vla_deploy.planning.errors import UnknownPlace
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
+from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.names import Match, closest
 from vla_deploy.planning.understanding.questions import did_you_mean, which_place
 from vla_deploy.planning.understanding.resolver import MISSPELT, Resolver
@@ -81,8 +82,12 @@ def _by_part(text: str, key: str, resolver: Resolver) -> str:
 
 
 def _one_of(text: str, key: str, named: tuple[str, ...], resolver: Resolver) -> str:
-    """Choose among places with a common name: where the robot is, then what was spoken of."""
+    """Choose among places with a common name: in the room named before, here, or spoken of."""
     request, view = resolver.setting.request, resolver.setting.view
+    for one in reversed(resolver.setting.mentions):
+        if surface_of(one.means, request.world) in named:
+            table = surface_of(one.means, request.world)
+            return _noted(resolver, text, table, f"at the {one.means}")
     for name in named:
         site = request.world.sites.get(name)
         if site is None or view is None:

@@ -12,6 +12,7 @@ from vla_deploy.planning.symbolic.state import Held, State
 from vla_deploy.planning.symbolic.subjects import subject_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Role
+from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.insertions import (
     Step,
@@ -113,6 +114,7 @@ def _pick(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[St
 def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
     put = {name: value for name, value in given.items() if name != "object"}
     things: tuple[Referent | None, ...] = (None,)
+    _check_readable(given.get("destination"), resolver)
     if isinstance(given.get("object"), str):
         things = resolver.things(given["object"], Use.PUT)
     destination = _destination(given, resolver, state)
@@ -125,6 +127,18 @@ def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[S
             {"arm": held.hand} if held is not None and held.hand and len(state().held) > 1 else {}
         )
         yield "place", {**put, **destination, **hand}
+
+
+def _check_readable(text: Any, resolver: Resolver) -> None:
+    """Refuse an unknown destination before asking which thing shall go there.
+
+    Raises:
+        UnknownObject: it names nothing known.
+    """
+    if not isinstance(text, str) or phrases.PRONOUNS.get(_spoken(text)):
+        return
+    if not is_like_place(text, resolver):
+        read_expression(text, resolver.setting.furniture)
 
 
 def _arm(given: Parameters) -> Parameters:

@@ -1,0 +1,90 @@
+"""A flat in which commands are given: cups, a ball and a book on the coffee table, and a box."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.planner import checked
+from vla_deploy.planning.rules import draft_plan
+from vla_deploy.planning.understanding.grounding import PUT_IN
+from vla_deploy.robots import load_robot
+from vla_deploy.world import Snapshot, Thing, Viewpoint
+from vla_deploy.world.thing import Rest
+
+HERE = (2.15, 2.05, -1.5708)
+SIZES = {
+    "cup": (0.066, 0.066, 0.095),
+    "ball": (0.05, 0.05, 0.05),
+    "book": (0.15, 0.065, 0.04),
+    "box": (0.24, 0.24, 0.13),
+}
+ON = (
+    ("cup_1", "red", 2.0, 1.5, "coffee_table"),
+    ("cup_2", "blue", 2.4, 1.55, "coffee_table"),
+    ("ball_1", "green", 2.2, 1.5, "coffee_table"),
+    ("book_1", "purple", 2.6, 1.5, "coffee_table"),
+    ("box_1", "orange", 4.2, 0.46, "side_table"),
+)
+
+
+def _thing(name: str, colour: str, x_m: float, y_m: float, on: str) -> Thing:
+    size_m = SIZES[name.partition("_")[0]]
+    return Thing(
+        thing_id=name,
+        kind=name.partition("_")[0],
+        colour=colour,
+        position_m=(x_m, y_m, 0.45 + 0.5 * size_m[2]),
+        size_m=size_m,
+        rests=Rest("on", on),
+    )
+
+
+class Flat:
+    """Give commands in the flat and see what they would do."""
+
+    def __init__(self) -> None:
+        self.robot = load_robot("butler")
+        self.things = tuple(_thing(*row) for row in ON)
+
+    def request(
+        self, text: str, holding: Mapping[str, str] | None = None, **changes: Any
+    ) -> Request:
+        robot = Viewpoint(x_m=HERE[0], y_m=HERE[1], yaw_rad=HERE[2])
+        fields: dict[str, Any] = {
+            "command_id": "c1",
+            "text": text,
+            "world": world_of(
+                self.robot, {"left": None, "right": None} | dict(holding or {}), lambda *_: True
+            ),
+            "scene": Snapshot(stamp_ns=0, things=self.things, robot=robot),
+            "here": HERE,
+        }
+        return Request(**(fields | changes))
+
+    def plan(self, text: str, **changes: Any) -> Plan:
+        request = self.request(text, **changes)
+        return checked(draft_plan(request), request)
+
+    def does(self, text: str, **changes: Any) -> str:
+        """Return the steps of a command in short, without what grounding puts in."""
+        return "; ".join(
+            " ".join([one.skill, *(str(value) for value in one.parameters.values())])
+            for one in self.plan(text, **changes).actions
+            if one.description != PUT_IN
+        )
+
+
+@pytest.fixture(scope="session")
+def flat() -> Flat:
+    """Return the flat."""
+    return Flat()
+
+
+@pytest.fixture(scope="session")
+def does(flat: Flat) -> Callable[..., str]:
+    """Return what a command does."""
+    return flat.does

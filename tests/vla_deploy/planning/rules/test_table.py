@@ -1,0 +1,212 @@
+"""Commands as people give them, and what each does; the way there is left out."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vla_deploy.planning.errors import (
+    Ambiguous,
+    NotAble,
+    NotUnderstood,
+    PlanInvalid,
+    PlanningError,
+    UnknownObject,
+    UnknownPlace,
+)
+from vla_deploy.planning.rules import is_stop
+from vla_deploy.planning.understanding import Conversation, Turn
+from vla_deploy.planning.validator import plan_faults
+
+if TYPE_CHECKING:
+    from conftest import Flat
+
+Does = Callable[..., str]
+BOX = "place box in"
+BACK = "navigate_to 2.15 2.05 -1.571"
+
+COMMANDS = {
+    "going": {
+        "could you please go to the kitchen?": "navigate_to kitchen",
+        "I'd like you to drive over to the bedroom": "navigate_to bedroom",
+        "head for the kitchen": "navigate_to kitchen",
+        "move over to the side table": "navigate_to side_table",
+        "go back to your charging station": "navigate_to charging_station",
+        "charge yourself": "navigate_to charging_station",
+        "take yourself to the hallway": "navigate_to entrance",
+        "go and wait at the front door": "navigate_to entrance",
+        "to the living room please": "navigate_to living_room",
+        "go near the box": "navigate_to box",
+        "go to the kitchen and the bedroom": "navigate_to kitchen; navigate_to bedroom",
+        "go to the kitchen, wait five seconds and come back":
+            f"navigate_to kitchen; wait 5.0; {BACK}",
+    },
+    "moving": {
+        "go forward one meter": "move 1.0",
+        "move ahead by 50 centimeters": "move 0.5",
+        "back up a bit": "move -0.2",
+        "drive backwards half a meter": "move -0.5",
+        "turn a little to the left": "turn 0.3490658503988659",
+        "rotate 45 degrees clockwise": "turn -0.7853981633974483",
+        "spin around once": "turn 6.283185307179586",
+        "turn your head to the right": "look_at right",
+        "look straight ahead": "look_at ahead",
+    },
+    "taking": {
+        "grab the ball": "pick_up ball",
+        "could you pick the blue cup up": "pick_up blue cup",
+        "take the red cup from the coffee table": "pick_up cup_1",
+        "pick up the leftmost cup": "pick_up cup_2",
+        "pick up the cup closest to you": "pick_up cup_2",
+        "pick up the red cup with your left hand": "pick_up red cup left",
+        "pick up the red cup and the ball": "pick_up red cup; pick_up ball",
+        "pick up the red cup, then the ball": "pick_up red cup; pick_up ball",
+    },
+    "bringing": {
+        "get me the ball": f"pick_up ball; {BACK}; speak Here is the ball.",
+        "can you fetch the book for me": f"pick_up book; {BACK}; speak Here is the book.",
+        "I need the ball": f"pick_up ball; {BACK}; speak Here is the ball.",
+        "bring me the red one": f"pick_up cup_1; {BACK}; speak Here is the red one.",
+    },
+    "putting": {
+        "put the green ball inside the box": BOX,
+        "move the red cup from the coffee table to the side table": "place side_table on",
+        "put the red cup in the box and the ball on the side table": f"{BOX}; place side_table on",
+        "put all cups in the box": f"{BOX}; {BOX}",
+        "put everything on the coffee table into the box": f"{BOX}; {BOX}; {BOX}; {BOX}",
+        "take the ball to the bedroom": "place bedside_table on",
+        "put away the ball": BOX,
+        "stack the book on the box": "place box on",
+        "pick up the red cup, go to the kitchen, and put it on the table":
+            "pick_up red cup; navigate_to kitchen; place kitchen_table on",
+    },
+    "searching": {
+        "find the keys": "find_object keys",
+        "where did I leave my keys?": "find_object keys",
+        "search the bedroom for my phone": "navigate_to bedroom; find_object phone",
+        "look for the bottle in the kitchen": "find_object bottle",
+        "help me find my keys": "find_object keys",
+        "look around": "look_at left; look_at ahead; look_at right; look_at down",
+    },
+    "asking": {
+        "where is the ball": "speak The green ball is on the coffee table, in view.",
+        "what do you see?": "speak I see a red cup, a blue cup, a green ball, a purple book and "
+                            "an orange box.",
+        "what is on the side table": "speak I see an orange box on the side table.",
+        "is the ball on the table?": "speak Yes, I see a green ball.",
+        "is there a bottle?": "speak No, I do not see that.",
+        "how many cups are there?": "speak I see 2.",
+        "what are you holding?": "speak My hands are empty.",
+        "where are you": "speak I am near the coffee table.",
+    },
+    "cleaning": {
+        "tidy up": f"{BOX}; {BOX}; {BOX}; {BOX}; speak That is put away.",
+        "tidy up the living room please": f"{BOX}; {BOX}; {BOX}; {BOX}; speak That is put away.",
+        "clear the bedside table": "speak I know of nothing there to put away. I look around.; "
+            "navigate_to bedside_table; look_at left; look_at ahead; look_at right; look_at down",
+    },
+    "the rest": {
+        "open your left hand": "open_gripper left",
+        "tuck in your arms": "move_arm tuck",
+        "tell Anna that dinner is ready": "speak dinner is ready",
+        "hold on a second": "wait 1.0",
+        "hold this": "open_gripper; speak Put it between my fingers.; wait 4.0; close_gripper",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [pair for kind in COMMANDS.values() for pair in kind.items()],
+)
+def test_a_command_does_what_it_says(does: Does, text: str, expected: str) -> None:
+    assert does(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("don't pick up the cup", NotUnderstood),
+        ("if you see the ball, pick it up", NotUnderstood),
+        ("sing a song", NotUnderstood),
+        ("come a little closer", UnknownPlace),
+        ("pick up the elephant", UnknownObject),
+        ("put the cup on the shelf", UnknownObject),
+        ("tidy up the garage", UnknownPlace),
+        ("pick up the cup", Ambiguous),
+        ("pick up the red cap", Ambiguous),
+        ("turn on the light", NotAble),
+        ("wipe the table", NotAble),
+        ("follow me", NotAble),
+        ("open the fridge", NotAble),
+        ("place the book next to the box", NotAble),
+        ("throw the ball at the dog", NotAble),
+        ("put the ball in the red cup", PlanInvalid),
+        ("put it down", PlanInvalid),
+        ("go back", NotUnderstood),
+        ("repeat forever turn left", NotUnderstood),
+    ],
+)
+def test_what_it_cannot_do_or_know_is_refused(
+    does: Does, text: str, error: type[PlanningError]
+) -> None:
+    with pytest.raises(error):
+        does(text)
+
+
+def test_what_is_held_is_put_down_and_never_dropped(does: Does) -> None:
+    holding = {"left": "cup"}
+    assert does("put it down", holding=holding) == "place coffee_table on"
+    assert does("let go of it", holding=holding) == "place coffee_table on"
+    assert does("what do you have in your hands", holding=holding) == (
+        "speak I hold a cup in my left hand."
+    )
+    with pytest.raises(PlanInvalid, match="would drop what is held"):
+        does("open your left hand", holding=holding)
+
+
+def test_go_back_leads_to_where_the_robot_was_before(does: Does) -> None:
+    talk = Conversation().after(Turn(said="go to the kitchen", here=(1.0, 2.0, 0.0)))
+    assert does("go back", conversation=talk) == "navigate_to 1.0 2.0 0.0"
+
+
+def test_an_area_is_driven_over_in_rows(flat: "Flat") -> None:
+    steps = flat.plan("sweep the living room floor").actions
+    points = [(one.parameters["x_m"], one.parameters["y_m"]) for one in steps]
+    assert points[:3] == [(1.8, 1.5), (3.8, 1.5), (3.8, 2.0)]
+    assert len(points) == 10
+
+
+def test_what_is_urgent_ranks_before_what_is_not(flat: "Flat") -> None:
+    assert {one.priority.value for one in flat.plan("tidy up").actions} == {"low"}
+    assert flat.plan("stop and go to the kitchen").actions[0].priority.value == "high"
+    assert flat.plan("go to the kitchen").summary == "navigation: navigate to the kitchen"
+
+
+@pytest.mark.parametrize(
+    "text", ["stop moving", "please don't move", "Stop that right now!", "hold it", "cancel that"]
+)
+def test_ways_to_say_stop(text: str) -> None:
+    assert is_stop(text)
+
+
+VOCABULARY = (
+    "go to the kitchen pick up red cup and then put it in box left one other turn right 5 metres "
+    "bring me them table look find keys where is all both on say hello tidy closer a my not"
+)
+WORDS = st.sampled_from(sorted(set(VOCABULARY.split())))
+SENTENCES = st.one_of(st.text(max_size=80), st.lists(WORDS, max_size=14).map(" ".join))
+
+
+@settings(max_examples=200, deadline=None)
+@given(SENTENCES)
+def test_any_words_are_refused_by_name_or_make_a_valid_plan(flat: "Flat", text: str) -> None:
+    request = flat.request(text)
+    try:
+        plan = flat.plan(text)
+    except PlanningError as error:
+        assert str(error)
+        return
+    assert plan_faults(plan, request.world, request.scene, request.here) == []
