@@ -1,0 +1,1 @@
+"""Make the embedded command recogniser: draw sentences, speak them, train, export, judge."""

@@ -1,0 +1,144 @@
+"""Draw sentences: commands in many wordings, questions, answers, other talk, strings of words.
+
+A quarter of all are words strung together at random, so that the recogniser learns to hear words
+and not to guess them from what usually follows.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+Random = np.random.Generator
+
+_FOLDER: Final = Path(__file__).parent
+_HOLE: Final = re.compile(r"<(\w+)>")
+_CHOICE: Final = re.compile(r"\(([^()]*)\)")
+_SPLIT: Final = re.compile(r"[^a-z' ]+")
+HELD_OUT: Final = _FOLDER / "held_out"
+# In strings at random nothing tells these from words that sound alike.
+_SOUND_ALIKE: Final = frozenset(
+    "to too two for four their there they're know no read red write right hear here been bin buy by "
+    "wait weight see sea our hour son sun week weak meet meat one won eight ate new knew blue blew "
+    "flower flour whole hole would wood which witch wear where mail male peace piece plane plain "
+    "break brake pair pear road rode sail sale so sew some sum tail tale threw through way weigh "
+    "you're your its it's bored board days daisy an and a the her of or are in is us cent scent".split()
+)
+
+
+def read_tables(path: Path) -> dict[str, list[str]]:
+    """Read a file of sections; an entry is a line, or in words.txt a part between commas."""
+    tables: dict[str, list[str]] = {}
+    entries: list[str] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            entries = tables.setdefault(line.strip("[]"), [])
+        elif line and not line.startswith("#"):
+            entries += [line] if path.name == "sentences.txt" else line.split(", ")
+    return tables
+
+
+@cache
+def tables() -> Mapping[str, list[str]]:
+    """Return all words and patterns by kind."""
+    return read_tables(_FOLDER / "words.txt") | read_tables(_FOLDER / "sentences.txt")
+
+
+@cache
+def held_out() -> frozenset[str]:
+    """Return the sentences that are for judging alone."""
+    return frozenset(
+        normal(line)
+        for path in HELD_OUT.glob("*.txt")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if line and not line.startswith("#")
+    )
+
+
+def normal(text: str) -> str:
+    """Return a text as the recogniser writes it: small letters and apostrophes alone."""
+    return " ".join(_SPLIT.sub(" ", text.lower()).split())
+
+
+def fill(pattern: str, random: Random) -> str:
+    """Replace choices and kinds in a pattern until only words are left."""
+    while True:
+        if found := _CHOICE.search(pattern):
+            options = found[1].split("|")
+        elif found := _HOLE.search(pattern):
+            options = tables()[found[1]]
+        else:
+            return " ".join(pattern.split())
+        chosen = options[int(random.integers(len(options)))]
+        pattern = pattern[: found.start()] + chosen + pattern[found.end() :]
+
+
+def _command(random: Random) -> str:
+    clauses = [fill("<clause>", random)]
+    while len(clauses) < 3 and random.random() < 0.22:
+        joint = fill("(and|and then|then|and|after that|and after that|but first|or|so)", random)
+        clauses += [joint, fill("<clause>", random)]
+    if random.random() < 0.3:
+        clauses.insert(0, fill("<polite>", random))
+    if random.random() < 0.12:
+        clauses.insert(0, fill("<name>", random))
+    if random.random() < 0.12:
+        clauses.append(fill("<after>", random))
+    return " ".join(clauses)
+
+
+def _question(random: Random) -> str:
+    return fill("<name> <question>" if random.random() < 0.1 else "<question>", random)
+
+
+def _answer(random: Random) -> str:
+    return fill("<answer>", random)
+
+
+def _talk(random: Random) -> str:
+    return fill("<talk>", random)
+
+
+_COMMAND_KINDS: Final = (
+    "thing", "container", "colour", "size", "place", "count", "degrees", "direction", "verb",
+    "person", "after", "polite", "fast", "look", "surface", "answer", "pose", "things", "doing",
+)  # fmt: skip
+_TALK_KINDS: Final = ("verb", "noun", "noun", "adjective", "little", "doing", "done", "things")
+
+
+def _string(kinds: tuple[str, ...]) -> Callable[[Random], str]:
+    """Return a drawer of words in no order that makes sense."""
+
+    def draw(random: Random) -> str:
+        words: list[str] = []
+        count = int(random.integers(1, 8))
+        while len(words) < count:
+            kind = kinds[int(random.integers(len(kinds)))]
+            words += fill(f"<{kind}>", random).split()
+        told = [word for word in words if word not in _SOUND_ALIKE]
+        return " ".join(told) or _answer(random)
+
+    return draw
+
+
+SHARES: Final[Mapping[Callable[[Random], str], float]] = {
+    _command: 0.43,
+    _question: 0.1,
+    _answer: 0.07,
+    _talk: 0.17,
+    _string(_COMMAND_KINDS): 0.13,
+    _string(_TALK_KINDS): 0.1,
+}
+
+
+def draw_sentence(random: Random) -> str:
+    """Draw one sentence that is not among the held-out ones, at most 16 words long."""
+    drawers = list(SHARES)
+    while True:
+        drawer = drawers[int(random.choice(len(drawers), p=list(SHARES.values())))]
+        text = drawer(random)
+        if len(text.split()) <= 16 and text not in held_out():
+            return text

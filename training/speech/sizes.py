@@ -1,0 +1,34 @@
+"""Say how large the recogniser is and how it learns, by name."""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Size:
+    """Hold the sizes of a training; `batch_s` is sound per step, padding counted."""
+
+    name: str
+    width: int
+    heads: int
+    encoder_layers: int
+    decoder_layers: int
+    shards: int
+    clips_per_shard: int = 1000
+    text_tokens: int = 640
+    batch_s: float = 120.0
+    seed: int = 7
+
+
+SIZES: Final = {
+    size.name: size
+    for size in (
+        Size(
+            name="full", width=128, heads=4, encoder_layers=4, decoder_layers=2, shards=30
+        ),
+        Size(
+            name="smoke", width=32, heads=2, encoder_layers=1, decoder_layers=1, shards=1,
+            clips_per_shard=24, text_tokens=300, batch_s=20.0,
+        ),
+    )
+}  # fmt: skip

@@ -1,0 +1,192 @@
+"""Train by the clock: rise, stay, fall to nothing at the end of the time that is given.
+
+What was learnt before the fall is kept, so that a longer training goes on from there.
+"""
+
+import json
+import logging
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from training.speech.batches import IGNORED, Batch, Clips, Maker
+from training.speech.network import Recogniser
+from training.speech.sentences import draw_sentence, tables
+from training.speech.sizes import Size
+from training.speech.spoiling import Spoiler
+from training.speech.tokens import TOKENIZER, Coder, make_tokenizer
+
+STATE: Final = "state.pt"
+BEFORE_FALL: Final = "before_fall.pt"
+WEIGHTS: Final = "weights.pt"
+RATE_MATRICES: Final = 0.02
+RATE_OTHERS: Final = 2.5e-3
+WARM_STEPS: Final = 200
+FALL_FROM: Final = 0.55
+"""Share of the time after which the rate of learning falls."""
+SHORT_UNTIL: Final = 0.1
+"""Share of the time in which only the shorter clips are learnt from."""
+SMOOTHING: Final = 0.05
+_SAVE_EVERY_STEPS: Final = 200
+_TELL_EVERY_STEPS: Final = 50
+_TALKERS: Final = 400
+_LOG = logging.getLogger(__name__)
+
+
+def train(out: Path, size: Size, budget_s: float) -> None:
+    """Train on the clips under `out` for that long in all; go on where it was broken off.
+
+    Raises:
+        FileNotFoundError: there are no clips yet.
+    """
+    torch.manual_seed(size.seed)
+    torch.set_num_threads(1)
+    clips = Clips(out / "clips")
+    if not clips.refresh():
+        raise FileNotFoundError(f"{out / 'clips'}: no clips; make them by the step data")
+    random = np.random.default_rng([size.seed, time.time_ns()])
+    coder = _coder(out / TOKENIZER, size)
+    talk = [clips.clips[int(n)].samples for n in random.integers(len(clips.clips), size=_TALKERS)]
+    words = [word for kind in ("thing", "place", "colour") for word in tables()[kind]]
+    maker = Maker(coder, Spoiler(talk, random), words)
+    run = _Run(out, size, coder.count, budget_s)
+    while run.progress() < 1.0:
+        clips.refresh()
+        early = run.progress() < SHORT_UNTIL
+        for group in clips.groups(size.batch_s, random, 0.5 if early else 1.0):
+            run.step(maker.make(group, random))
+            if run.progress() >= 1.0 or (early and run.progress() >= SHORT_UNTIL):
+                break
+    run.finish()
+
+
+def _coder(path: Path, size: Size) -> Coder:
+    if not path.exists():
+        random = np.random.default_rng(size.seed)
+        texts = [draw_sentence(random) for _ in range(30_000)]
+        make_tokenizer(texts, size.text_tokens).save(str(path))
+    return Coder.load(path)
+
+
+class _Run:
+    """Hold what a training changes, and its clock."""
+
+    def __init__(self, out: Path, size: Size, tokens: int, budget_s: float) -> None:
+        self._out = out
+        self._budget_s = budget_s
+        self.model = Recogniser(size, tokens)
+        self._optimisers = _optimisers(self.model)
+        self._steps, self._spent_s, self._heard_s, self._fell = 0, 0.0, 0.0, False
+        self._resume()
+        self._began_s = time.monotonic()
+
+    def progress(self) -> float:
+        """Return the share of the time that has gone."""
+        return (self._spent_s + time.monotonic() - self._began_s) / self._budget_s
+
+    def _resume(self) -> None:
+        paths = [self._out / STATE, self._out / BEFORE_FALL]
+        for path in (path for path in paths if path.exists()):
+            state = torch.load(path, weights_only=True)
+            if state["spent_s"] / self._budget_s > FALL_FROM and path.name == STATE and state["fell"] != self._budget_s:
+                continue
+            self.model.load_state_dict(state["model"])
+            for optimiser, values in zip(self._optimisers, state["optimisers"], strict=True):
+                optimiser.load_state_dict(values)
+            self._steps, self._spent_s = state["steps"], state["spent_s"]
+            self._heard_s = state["heard_s"]
+            _LOG.info("goes on after %d steps, %.0f s", self._steps, self._spent_s)
+            return
+
+    def _save(self, name: str) -> None:
+        state = {
+            "model": self.model.state_dict(),
+            "optimisers": [optimiser.state_dict() for optimiser in self._optimisers],
+            "steps": self._steps,
+            "spent_s": self.progress() * self._budget_s,
+            "heard_s": self._heard_s,
+            "fell": self._budget_s if self._fell else 0.0,
+        }
+        _write(state, self._out / name)
+
+    def step(self, batch: Batch) -> None:
+        """Learn from one batch."""
+        if self.progress() >= FALL_FROM and not self._fell:
+            self._save(BEFORE_FALL)
+            self._fell = True
+        text, sounds, right = _losses(self.model, batch)
+        rate = self._rate()
+        for optimiser in self._optimisers:
+            for group in optimiser.param_groups:
+                group["lr"] = group["highest"] * rate
+            optimiser.zero_grad(set_to_none=True)
+        sound_weight = 1.0 if self.progress() < 0.4 else 0.3
+        (text + sound_weight * sounds).backward()  # type: ignore[no-untyped-call]
+        nn.utils.clip_grad_norm_(self.model.parameters(), 2.0)
+        for optimiser in self._optimisers:
+            optimiser.step()
+        self._steps += 1
+        self._heard_s += batch.duration_s
+        if self._steps % _TELL_EVERY_STEPS == 0:
+            _LOG.info(
+                "step %d, %.3f: text %.3f, right %.3f, sounds %.3f, %.1f h heard, CPU %.0f s",
+                self._steps, self.progress(), text.item(), right, sounds.item(),
+                self._heard_s / 3600, time.process_time(),
+            )  # fmt: skip
+        if self._steps % _SAVE_EVERY_STEPS == 0:
+            self._save(STATE)
+
+    def _rate(self) -> float:
+        """Return the share of the highest rate of learning."""
+        fall = max(0.0, (self.progress() - FALL_FROM) / (1.0 - FALL_FROM))
+        return min(1.0, (self._steps + 1) / WARM_STEPS) * max(0.0, 1.0 - fall)
+
+    def finish(self) -> None:
+        """Write the weights and what they cost."""
+        _write(self.model.state_dict(), self._out / WEIGHTS)
+        told = {"steps": self._steps, "budget_s": self._budget_s, "heard_s": self._heard_s}
+        (self._out / "training.json").write_text(json.dumps(told), encoding="utf-8")
+        _LOG.info("done: %s", told)
+
+
+def _losses(model: Recogniser, batch: Batch) -> tuple[Tensor, Tensor, float]:
+    """Return the losses of text and sounds, and the share of tokens that are right."""
+    with torch.autocast("cpu", torch.bfloat16):
+        tokens, sounds = model(batch.frames, batch.tokens)
+    targets = batch.targets.flatten()
+    learnt = targets != IGNORED
+    picked = tokens.flatten(0, 1)[learnt].float()
+    text = functional.cross_entropy(picked, targets[learnt], label_smoothing=SMOOTHING)
+    heard = sounds.shape[1]
+    sound = functional.cross_entropy(
+        sounds.flatten(0, 1).float(), batch.sounds[:, :heard].flatten(), ignore_index=IGNORED
+    )
+    right = float((picked.argmax(1) == targets[learnt]).float().mean())
+    return text, sound, right
+
+
+def _optimisers(model: nn.Module) -> list[torch.optim.Optimizer]:
+    """Return Muon for the layers' matrices, AdamW for all else."""
+    matrices, others = [], []
+    for name, value in model.named_parameters():
+        if value.requires_grad:
+            (matrices if value.ndim == 2 and ".layers." in name else others).append(value)
+    muon = torch.optim.Muon(
+        [{"params": matrices, "highest": RATE_MATRICES}], lr=RATE_MATRICES, weight_decay=0.02
+    )
+    adam = torch.optim.AdamW(
+        [{"params": others, "highest": RATE_OTHERS}],
+        lr=RATE_OTHERS, betas=(0.9, 0.98), weight_decay=0.01,
+    )  # fmt: skip
+    return [muon, adam]
+
+
+def _write(values: dict[str, Any], path: Path) -> None:
+    partial = path.with_suffix(".part")
+    torch.save(values, partial)
+    partial.rename(path)
