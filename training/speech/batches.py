@@ -11,6 +11,7 @@ from torch import Tensor
 
 from training.speech.features import HOP, WARPS, frames
 from training.speech.network import FRAMES_PER_STATE, LARGEST_FRAMES, MELS
+from training.speech.sentences import fill
 from training.speech.spoiling import Spoiler, draw_gains
 from training.speech.tokens import Coder
 from training.voices.clip import RATE_HZ, Wave
@@ -21,12 +22,13 @@ IGNORED: Final = -100
 _LARGEST_CLIP_S: Final = 9.0
 _EMPTY_SHARE: Final = 0.04
 """Of clips without speech, from which the model learns to write nothing."""
-_HINT_SHARE: Final = 0.2
-"""Of clips that come with words which may be said, as hot words come."""
+_HINT_SHARE: Final = 0.12
+"""Of batches whose clips come with names that may be said, as hot words come."""
 _WIDE_SHARE: Final = 0.01
 """Of batches padded to Whisper's whole half minute."""
 _WIDE_CLIPS: Final = 4
-_EARLY_PADDING_FRAMES: Final = (20, 60)
+_NAMES: Final = ("<colour> <thing>", "<colour> <thing>", "<thing>", "<place>")
+_PADDING_FRAMES: Final = (20, 60)
 
 Random = np.random.Generator
 
@@ -59,7 +61,9 @@ class Clips:
                 self.clips += fitting
         return len(self.clips)
 
-    def groups(self, batch_s: float, random: Random, short_share: float) -> Iterator[list[StoredClip]]:
+    def groups(
+        self, batch_s: float, random: Random, short_share: float
+    ) -> Iterator[list[StoredClip]]:
         """Yield all clips once in groups of like length, or the shorter share of them alone."""
         lengths = np.array([len(clip.data) for clip in self.clips]) / RATE_HZ
         order = np.argsort(lengths * random.uniform(0.92, 1.08, len(lengths)))
@@ -77,10 +81,9 @@ class Clips:
 class Maker:
     """Make batches of clips."""
 
-    def __init__(self, coder: Coder, spoiler: Spoiler, words: Sequence[str]) -> None:
+    def __init__(self, coder: Coder, spoiler: Spoiler) -> None:
         self._coder = coder
         self._spoiler = spoiler
-        self._words = words
 
     def make(self, clips: Sequence[StoredClip], random: Random) -> Batch:
         """Return the batch; the same clips come out differently each time."""
@@ -125,7 +128,7 @@ class Maker:
         gains = torch.from_numpy(draw_gains(len(waves), MELS, random))
         made = frames(stacked, counts, hop, warps, gains)
         _mask(made, random)
-        low, high = _EARLY_PADDING_FRAMES
+        low, high = _PADDING_FRAMES
         length = LARGEST_FRAMES if wide else made.shape[2] + int(random.integers(low, high))
         length += length % FRAMES_PER_STATE
         return torch.nn.functional.pad(made, (0, length - made.shape[2]))
@@ -136,8 +139,9 @@ class Maker:
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         coder = self._coder
         rows: list[tuple[list[int], list[int]]] = []
+        hinted = random.random() < _HINT_SHARE
         for clip, bare in zip(clips, empty, strict=True):
-            hint = self._hint(clip.text, random) if random.random() < _HINT_SHARE else []
+            hint = self._hint(clip.text, random) if hinted else []
             text = [] if bare else coder.text(clip.text)
             first = coder.no_speech if bare else coder.bare
             unlearnt = [IGNORED] * len(hint)
@@ -154,17 +158,22 @@ class Maker:
         return tokens, targets
 
     def _hint(self, text: str, random: Random) -> list[int]:
-        """Return words before the start, as hot words come: some are said, most are not."""
-        said = [word for word in text.split() if len(word) > 2 and random.random() < 0.35]
-        count = int(random.integers(1, 9))
-        others = [self._words[int(n)] for n in random.integers(len(self._words), size=count)]
-        words = [*said, *others]
-        order = random.permutation(len(words))
-        joint = ", " if random.random() < 0.5 else " "
-        return [self._coder.previous, *self._coder.text(joint.join(words[int(n)] for n in order))]
+        """Return names before the start, as hot words come: some are said, most are not."""
+        words = text.split()
+        starts = np.flatnonzero(random.random(len(words)) < 0.25)
+        said = [" ".join(words[n : n + int(random.integers(1, 3))]) for n in starts]
+        count = int(random.integers(1, 26 if random.random() < 0.3 else 9))
+        names = [*said, *(self._name(random) for _ in range(count))]
+        told = ", ".join(names[int(n)] for n in random.permutation(len(names)))
+        return [self._coder.previous, *self._coder.text(told)]
+
+    def _name(self, random: Random) -> str:
+        return fill(str(random.choice(_NAMES)), random)
 
 
-def _sounds(clip: StoredClip, lead_s: float, hop: int, count: int) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+def _sounds(
+    clip: StoredClip, lead_s: float, hop: int, count: int
+) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
     """Return the sound in the middle of each frame."""
     if not clip.sounds:
         return np.full(count, IGNORED)

@@ -2,8 +2,6 @@
 
 import logging
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
@@ -25,15 +23,8 @@ def generate(folder: Path, shards: int, seed: int, clips: int = CLIPS_PER_SHARD)
         EngineMissing: eSpeak NG or flite is not installed.
     """
     for number in range(shards):
-        if not (folder / f"{number:04d}").exists():
-            # flite's library breaks down after some thousand texts: a process for each shard.
-            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
-                process.submit(_write, folder, number, seed, clips).result()
+        write_shard(folder / f"{number:04d}", _clips(number, seed, clips))
         _LOG.info("shard %d of %d", number + 1, shards)
-
-
-def _write(folder: Path, number: int, seed: int, clips: int) -> None:
-    write_shard(folder / f"{number:04d}", _clips(number, seed, clips))
 
 
 def _clips(number: int, seed: int, count: int) -> Iterator[Clip]:

@@ -22,7 +22,9 @@ class Spoiler:
 
     def __init__(self, talk: Sequence[Wave], random: Random) -> None:
         count = _PIECE_S * RATE_HZ
-        self._pieces = [noise(kind, count, random) for kind in KINDS for _ in range(_PIECES_PER_KIND)]
+        self._pieces = [
+            noise(kind, count, random) for kind in KINDS for _ in range(_PIECES_PER_KIND)
+        ]
         self._babble = [
             babble([talk[int(n)] for n in random.integers(len(talk), size=16)], count, random)
             for _ in range(_PIECES_PER_KIND)

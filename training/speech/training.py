@@ -16,7 +16,7 @@ from torch.nn import functional
 
 from training.speech.batches import IGNORED, Batch, Clips, Maker
 from training.speech.network import Recogniser
-from training.speech.sentences import draw_sentence, tables
+from training.speech.sentences import draw_sentence
 from training.speech.sizes import Size
 from training.speech.spoiling import Spoiler
 from training.speech.tokens import TOKENIZER, Coder, make_tokenizer
@@ -52,8 +52,7 @@ def train(out: Path, size: Size, budget_s: float) -> None:
     random = np.random.default_rng([size.seed, time.time_ns()])
     coder = _coder(out / TOKENIZER, size)
     talk = [clips.clips[int(n)].samples for n in random.integers(len(clips.clips), size=_TALKERS)]
-    words = [word for kind in ("thing", "place", "colour") for word in tables()[kind]]
-    maker = Maker(coder, Spoiler(talk, random), words)
+    maker = Maker(coder, Spoiler(talk, random))
     run = _Run(out, size, coder.count, budget_s)
     while run.progress() < 1.0:
         clips.refresh()
@@ -93,7 +92,11 @@ class _Run:
         paths = [self._out / STATE, self._out / BEFORE_FALL]
         for path in (path for path in paths if path.exists()):
             state = torch.load(path, weights_only=True)
-            if state["spent_s"] / self._budget_s > FALL_FROM and path.name == STATE and state["fell"] != self._budget_s:
+            if (
+                state["spent_s"] / self._budget_s > FALL_FROM
+                and path.name == STATE
+                and state["fell"] != self._budget_s
+            ):
                 continue
             self.model.load_state_dict(state["model"])
             for optimiser, values in zip(self._optimisers, state["optimisers"], strict=True):

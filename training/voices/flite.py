@@ -12,6 +12,10 @@ from training.voices.phones import SILENCE, from_dictionary
 
 ENGINE: Final = "flite"
 _PACKAGES: Final = "flite"
+# flite keeps the pointers to names of features: they must live as long as the library.
+_STRETCH, _PITCH, _SPREAD, _SHIFT = (
+    b"duration_stretch", b"int_f0_target_mean", b"int_f0_target_stddev", b"f0_shift",
+)  # fmt: skip
 # Mean pitch of each speaker: what a pitch ratio of one asks for.
 PITCH_HZ: Final = {"kal": 95.0, "kal16": 95.0, "awb": 126.0, "rms": 100.0, "slt": 167.0}
 
@@ -85,12 +89,12 @@ def speak(text: str, voice: str, style: Style) -> Clip:
     library, address = _library(), _voice(voice)
     features = ctypes.cast(address, ctypes.POINTER(_Voice)).contents.features
     for name, value in (
-        ("duration_stretch", 1.0 / style.rate_ratio),
-        ("int_f0_target_mean", PITCH_HZ[voice] * style.pitch_ratio),
-        ("int_f0_target_stddev", 30.0 * style.lively),
-        ("f0_shift", 1.0 if voice.startswith("kal") else style.pitch_ratio),
+        (_STRETCH, 1.0 / style.rate_ratio),
+        (_PITCH, PITCH_HZ[voice] * style.pitch_ratio),
+        (_SPREAD, 30.0 * style.lively),
+        (_SHIFT, 1.0 if voice.startswith("kal") else style.pitch_ratio),
     ):
-        library.feat_set_float(features, name.encode(), value)
+        library.feat_set_float(features, name, value)
     spoken = library.flite_synth_text(text.encode(), address)
     if not spoken:
         raise SynthesisFailed(ENGINE, voice, text, "no sound")
