@@ -1,4 +1,4 @@
-"""Be a small Whisper: the same layers under the same names, so that its weights convert as they are.
+"""Be a small Whisper: the same layers under the same names, so that its weights convert at once.
 
 A head beside it names the sound of speech of each 20 ms while it learns; it is not shipped.
 """
