@@ -31,6 +31,11 @@ class Deadline:
         end_ns = self.clock.now_ns() + round(given_s * NS_PER_S)
         return replace(self, end_ns=end_ns, given_s=given_s)
 
+    def call_in(self) -> None:
+        """Let nobody wait for the answer any more, where that can still be said."""
+        if self.recall is not None:
+            self.recall.set()
+
     @property
     def is_recalled(self) -> bool:
         """Tell whether nobody waits for the answer any more."""

@@ -12,28 +12,22 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.confirmation import confirmation_of
+from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
-from vla_deploy.planning.phrasing import Says
+from vla_deploy.planning.phrasing import Says, spoken_refusal
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
-from vla_deploy.planning.understanding import (
-    Conversation,
-    Outcome,
-    Question,
-    Reply,
-    Turn,
-    Verdict,
-    reply,
-)
+from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict
 from vla_deploy.planning.understanding.mentioned import mentions_of
 
 MOST_WAITING: Final = 8
-_MOST_ASKED: Final = 3
 CANCELLED: Final = "cancelled on request"
+# Whoever speaks to the robot hears by then that it has heard.
+_PATIENCE_S: Final = 1.5
 _log = logging.getLogger(__name__)
 
 
@@ -43,18 +37,10 @@ class _Work:
 
     command: Command
     request: Request
-    recall: Event
+    deadline: Deadline
+    patience: Deadline
     future: "Future[Answer]"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Waiting:
-    """Hold the command that waits for an answer; `plan` is what a yes lets run."""
-
-    command: Command
-    answer: Answer
-    plan: Plan | None
-    times_asked: int = 1
+    is_announced: bool = False
 
 
 class Desk:
@@ -70,20 +56,20 @@ class Desk:
     ) -> None:
         self.planner = planner
         self.accounts = Accounts()
+        self.dialogue = Dialogue(clock)
         self._situation = situation
         self._telling = telling
         self._aside = aside
         self._clock = clock
         self._queue: deque[Command] = deque()
         self._work: _Work | None = None
-        self._waiting: _Waiting | None = None
-        self._talk = Conversation()
 
     # --- what comes in --------------------------------------------------------------------------
 
     def take(self, command: Command) -> None:
         """Take an utterance: the answer to what was asked, or a command of its own."""
-        if self._waiting is not None and self._is_answer(command, self._waiting):
+        waiting = self.dialogue.waiting
+        if waiting is not None and self._is_answer(command, waiting):
             return
         if command.is_answer:
             self._refuse(command, Says.NOTHING_ASKED)
@@ -94,77 +80,77 @@ class Desk:
             if self._work is not None:
                 self._telling.queued(command, len(self._queue))
 
-    def is_declined_by(self, text: object) -> bool:
-        """Tell whether words such as "never mind" mean what was asked, and not all that goes on."""
-        if self._waiting is None or not isinstance(text, str):
-            return False
-        said = reply(self._talk, text, self._clock.now_ns())
-        return said.verdict is Verdict.NO
-
     def stop_all(self, command_id: str) -> None:
         """Let go of every command, and let the executor end what it does."""
         self._telling.cancelled_all(command_id)
-        dropped = [*self._queue]
+        dropped = list(self._queue)
         self._queue.clear()
-        if self._work is not None:
-            self._work.recall.set()
-            dropped.insert(0, self._work.command)
-            self._work = None
-        if self._waiting is not None:
-            dropped.insert(0, self._waiting.command)
-            self._waiting, self._talk = None, self._talk.settled()
+        work, self._work = self._work, None
+        if work is not None:
+            work.deadline.call_in()
+            dropped.insert(0, work.command)
+        waiting = self.dialogue.settle()
+        if waiting is not None:
+            dropped.insert(0, waiting.command)
         for command in dropped:
             self._refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command; a plan that failed is not given again."""
-        turn = next((one for one in self._talk.turns if one.command_id == command_id), None)
-        if turn is None:
-            return
-        outcome = Outcome.SUCCEEDED if success else Outcome.FAILED
-        self._talk = self._talk.ended(command_id, outcome, error)
-        if not success:
+        turn = self.dialogue.ended(command_id, success, error)
+        self._telling.ended(command_id, success, error)
+        if turn is not None and not success:
             self.planner.cache.forget(turn.said)
 
     # --- what goes on ---------------------------------------------------------------------------
 
     def advance(self) -> None:
         """Go on with what has become possible."""
-        self._end_old_question()
-        self._end_work()
-        while self._queue and self._work is None and self._waiting is None:
+        if self.dialogue.is_overdue:
+            self._leave(Says.NO_ANSWER)
+        self._look_after_work()
+        while self._queue and self._work is None and self.dialogue.waiting is None:
             self._begin(self._queue.popleft())
-            self._end_work()
+            self._look_after_work()
 
     def document(self) -> dict[str, Any]:
         """Return which commands are in work, what was asked, and how it has been going."""
-        held = [one.command.command_id for one in (self._work, self._waiting) if one is not None]
-        question = self._talk.question
+        waiting = self.dialogue.waiting
+        held = [one.command for one in (self._work, waiting) if one is not None]
         return {
             **self.accounts.document(),
-            "commands": [*held, *(one.command_id for one in self._queue)],
-            "question": None if question is None else question.text,
+            "commands": [one.command_id for one in (*held, *self._queue)],
+            "question": None if waiting is None else waiting.question.text,
             **self.planner.document(),
         }
 
     def _begin(self, command: Command) -> None:
-        request = self._situation.request(command, self._talk, self.planner.sees)
+        request = self._request(command)
         if command.plan is not None:
             self._conclude(command, request, self.planner.check_given(command.plan, request))
             return
-        recall = Event()
-        deadline = Deadline.within(self._clock, self.planner.within_s, recall)
+        deadline = Deadline.within(self._clock, self.planner.within_s, Event())
         answer = self.planner.plan_at_once(request, deadline)
         if answer.is_final or not self.planner.slow_rungs:
             self._conclude(command, request, answer)
             return
         self._telling.planning(command, self.planner.slow_rungs)
-        future = self._aside.submit(self.planner.plan_slowly, request, deadline, answer)
-        self._work = _Work(command=command, request=request, recall=recall, future=future)
+        self._work = _Work(
+            command=command,
+            request=request,
+            deadline=deadline,
+            patience=Deadline.within(self._clock, _PATIENCE_S),
+            future=self._aside.submit(self.planner.plan_slowly, request, deadline, answer),
+        )
 
-    def _end_work(self) -> None:
+    def _look_after_work(self) -> None:
         work = self._work
-        if work is None or not work.future.done():
+        if work is None:
+            return
+        if not work.future.done():
+            if work.patience.left_s <= 0.0 and not work.is_announced:
+                self._telling.aloud(work.command, Says.WORKING)
+                self._work = replace(work, is_announced=True)
             return
         self._work = None
         error = work.future.exception()
@@ -176,7 +162,7 @@ class Desk:
 
     def _conclude(self, command: Command, request: Request, answer: Answer) -> None:
         self.accounts.note(answer.attempts)
-        self._talk = self._talk.settled()  # what was chosen concerned this command alone
+        self.dialogue.settle()  # what was chosen concerned this command alone
         try:
             if answer.is_final:
                 self._situation.check_ready()
@@ -186,16 +172,18 @@ class Desk:
             if question:
                 raise Ambiguous(question)
             self._hand_on(command, request, answer, answer.plan)
-        except Ambiguous as error:
-            self._ask(command, request, answer, error)
+        except Ambiguous as unclear:
+            self.accounts.asked += 1
+            waiting = self.dialogue.ask(command, request, answer, unclear)
+            self._telling.asked(command, waiting.question, waiting.plan)
         except PlanningError as error:
-            self._refuse(command, str(error), answer)
+            self._refuse(command, error, answer)
 
     def _hand_on(self, command: Command, request: Request, answer: Answer, plan: Plan) -> None:
         self._telling.handed_on(command, plan, answer)
         self.accounts.planned += 1
         self.planner.accepted(request, answer)
-        self._talk = self._talk.after(
+        self.dialogue.remember(
             Turn(
                 said=command.text,
                 command_id=command.command_id,
@@ -210,98 +198,90 @@ class Desk:
     def _refuse(
         self,
         command: Command,
-        reason: str,
+        reason: PlanningError | str,
         answer: Answer | None = None,
         outcome: Outcome = Outcome.REFUSED,
     ) -> None:
         self.accounts.refused += 1
-        self._telling.refused(command, reason, answer)
+        self._telling.refused(command, str(reason), answer)
+        if outcome is not Outcome.CANCELLED or isinstance(reason, Says):
+            self._telling.aloud(command, spoken_refusal(reason))
         turn = Turn(
             said=command.text,
             command_id=command.command_id,
             told_ns=command.told_ns,
             outcome=outcome,
-            answer=reason,
+            answer=str(reason),
         )
-        self._talk = self._talk.after(turn)
+        self.dialogue.remember(turn)
 
-    # --- questions ------------------------------------------------------------------------------
+    def _request(self, command: Command) -> Request:
+        return self._situation.request(command, self.dialogue.talk, self.planner.sees)
 
-    def _ask(self, command: Command, request: Request, answer: Answer, error: Ambiguous) -> None:
-        question = Question(
-            text=error.question,
-            asked_ns=self._clock.now_ns(),
-            command_id=command.command_id,
-            command_text=command.text,
-            expression=error.expression,
-            candidates=error.candidates,
-            choices=request.conversation.choices,
-        )
-        self.accounts.asked += 1
-        self._talk = self._talk.asks(question)
-        self._waiting = _Waiting(command=command, answer=answer, plan=answer.plan)
-        self._telling.asked(command, question, answer.plan)
+    # --- answers --------------------------------------------------------------------------------
 
-    def _is_answer(self, command: Command, waiting: _Waiting) -> bool:
+    def _is_answer(self, command: Command, waiting: Waiting) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
-        said = reply(self._talk, command.text, self._clock.now_ns())
-        if command.plan is not None or said.verdict is Verdict.ANEW:
-            if not command.is_answer:
-                self._leave(Says.REPLACED)
-                return False
-            self._refuse(command, f"that does not answer: {self._question.text}")
-            return True
-        self._telling.answered(command, waiting.command)
-        self._go_on(waiting, said)
+        said = self.dialogue.read(command.text)
+        if command.plan is None and said.verdict is not Verdict.ANEW:
+            self._telling.answered(command, waiting.command)
+            self._go_on(waiting, said)
+        elif waiting.is_open and not self._is_command(command):
+            self._telling.answered(command, waiting.command)
+            self._complete(waiting, command.text)
+        elif command.is_answer:
+            self._refuse(command, f"that does not answer: {waiting.question.text}")
+        else:
+            self._leave(Says.REPLACED)
+            return False
         return True
 
-    def _go_on(self, waiting: _Waiting, said: Reply) -> None:
-        self._talk = said.conversation
+    def _go_on(self, waiting: Waiting, said: Reply) -> None:
         if said.verdict is Verdict.NO:
             self._leave(Says.LEFT)
         elif said.verdict is Verdict.UNCLEAR:
             self._ask_again(waiting)
         elif waiting.plan is not None:
-            self._waiting = None
+            self.dialogue.settle(said)
             self._run_confirmed(waiting, waiting.plan)
         else:
-            self._waiting = None
+            self.dialogue.settle(said)
             self._queue.appendleft(waiting.command)
 
-    def _ask_again(self, waiting: _Waiting) -> None:
-        if waiting.times_asked >= _MOST_ASKED:
+    def _is_command(self, command: Command) -> bool:
+        """Tell whether words that could answer anything are a command to whoever takes no time."""
+        if command.plan is not None:
+            return True
+        deadline = Deadline.within(self._clock, self.planner.within_s)
+        return self.planner.plan_at_once(self._request(command), deadline).is_final
+
+    def _complete(self, waiting: Waiting, text: str) -> None:
+        """Plan a command anew together with what answers a question that a model has asked."""
+        self.dialogue.settle()
+        asked = waiting.command
+        self._queue.appendleft(replace(asked, text=f"{asked.text}: {text}"))
+
+    def _ask_again(self, waiting: Waiting) -> None:
+        question = self.dialogue.ask_again()
+        if question is None:
             self._leave(Says.STILL_UNCLEAR)
             return
-        self._waiting = replace(waiting, times_asked=waiting.times_asked + 1)
-        again = Says.NOT_CLEAR.format(question=self._question.text)
-        question = replace(self._question, text=again)
         self._telling.asked(waiting.command, question, waiting.plan)
 
-    def _run_confirmed(self, waiting: _Waiting, plan: Plan) -> None:
+    def _run_confirmed(self, waiting: Waiting, plan: Plan) -> None:
         """Check a plan once more: the world may have changed while the person thought."""
         command = waiting.command
-        request = self._situation.request(command, self._talk)
+        request = self._request(command)
         try:
             self._situation.check_ready()
             self._hand_on(command, request, waiting.answer, self.planner.check(plan, request))
         except PlanningError as error:
-            self._refuse(command, str(error), waiting.answer)
-
-    def _end_old_question(self) -> None:
-        if self._waiting is not None and not self._question.is_open(self._clock.now_ns()):
-            self._leave(Says.NO_ANSWER)
+            self._refuse(command, error, waiting.answer)
 
     def _leave(self, why: Says) -> None:
-        waiting, self._waiting = self._waiting, None
-        self._talk = self._talk.settled()
+        waiting = self.dialogue.settle()
         if waiting is not None:
             self._refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
-
-    @property
-    def _question(self) -> Question:
-        question = self._talk.question
-        assert question is not None, "whoever waits has asked"
-        return question
 
 
 def _read_back(answer: Answer) -> str:

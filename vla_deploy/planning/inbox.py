@@ -35,8 +35,8 @@ class Command:
 
 
 def asks_to_stop(event: Event) -> bool:
-    """Tell whether an utterance wants what is under way to end, whatever else it holds."""
-    return bool(event.payload.get("cancel")) or is_stop(str(event.payload.get("text", "")))
+    """Tell whether the words of an utterance want what is under way to end."""
+    return is_stop(str(event.payload.get("text", "")))
 
 
 def command_id_of(event: Event) -> str:

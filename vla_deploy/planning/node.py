@@ -57,7 +57,7 @@ class PlannerNode:
         self._events = self._space.ring_reader("task_event", from_start=True)
         plans = self._space.ring_reader("plan", from_start=True)
         before = left_over(self._utterances.drain(), self._events.drain(), plans.drain())
-        self._telling = Telling(self._space)
+        self._telling = Telling(self._space, self._clock)
         situation = Situation(self._space, self._clock, self._robot)
         self._desk = Desk(self._planner, situation, self._telling, self._aside, self._clock)
         self._status = self._space.cell_writer("planner_status")
@@ -102,7 +102,7 @@ class PlannerNode:
     def _hear(self, event: Event) -> None:
         self._desk.accounts.heard += 1
         command_id = command_id_of(event)
-        if asks_to_stop(event) and not self._desk.is_declined_by(event.payload.get("text")):
+        if self._stops_all(event):
             self._desk.stop_all(command_id)
             return
         try:
@@ -111,6 +111,12 @@ class PlannerNode:
         except PlanningError as error:
             self._desk.accounts.refused += 1
             self._telling.refused(Command(command_id=command_id, told_ns=0), str(error))
+
+    def _stops_all(self, event: Event) -> bool:
+        """Tell whether all is to end; "never mind" to a question ends the question alone."""
+        if event.payload.get("cancel"):
+            return True
+        return asks_to_stop(event) and not self._desk.dialogue.declines(event.payload.get("text"))
 
     def _note(self, event: Event) -> None:
         told = event.payload

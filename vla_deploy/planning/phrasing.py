@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, Final
 
+from vla_deploy.planning.errors import NotReady, NotUnderstood, PlanningError
 from vla_deploy.planning.plan import Plan
 
 _MOST_STEPS: Final = 6
+_MOST_SPOKEN_CHARACTERS: Final = 160
 
 
 class Says(StrEnum):
@@ -24,12 +26,18 @@ class Says(StrEnum):
     NOTHING_ASKED = "Sorry, I am not waiting for an answer."
     STILL_UNCLEAR = "Sorry, I still do not know what you mean, so I leave it."
     NOT_UNDERSTOOD = "Sorry, I did not understand that."
+    NOT_READY = "Sorry, I may not move now."
     REFUSED = "Sorry, I cannot do that: {reason}."
     MANY_WAIT = "Sorry, too many commands wait already."
     DONE = "Done."
     FAILED = "Sorry, that did not work: {reason}."
 
 
+# What a person hears of errors whose message is for reading.
+_SPOKEN: Final[Mapping[type[PlanningError], Says]] = {
+    NotUnderstood: Says.NOT_UNDERSTOOD,
+    NotReady: Says.NOT_READY,
+}
 Parameters = Mapping[str, Any]
 # What each skill is called when it is proposed; what only leads up to it is left out.
 _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
@@ -47,6 +55,21 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "wait": lambda given: f"wait {float(given['duration_s']):g} seconds",
     "stop": lambda given: "stop",
 }
+
+
+def spoken_refusal(reason: PlanningError | str) -> str:
+    """Return what is said aloud of a refusal: one sentence, the rest is to be read."""
+    if isinstance(reason, Says):
+        return reason
+    for kind, sentence in _SPOKEN.items():
+        if isinstance(reason, kind):
+            return sentence
+    return Says.REFUSED.format(reason=first_part(str(reason)))
+
+
+def first_part(reason: str) -> str:
+    """Return of a reason what fits into a spoken sentence."""
+    return reason.split(";")[0].strip(" .")[:_MOST_SPOKEN_CHARACTERS]
 
 
 def steps_in_words(plan: Plan) -> str:

@@ -1,29 +1,53 @@
 """Tell what becomes of commands: to whoever follows them, to the executor, and aloud."""
 
 import json
+from collections import OrderedDict
 from typing import Any, Final
 
+from drivers.clock import Clock
 from vla_deploy.ipc import RingWriter, SharedSpace
+from vla_deploy.ipc.announcer import Announcer
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.phrasing import Says, first_part
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import Question
 
 # What a slot of the topic holds, less what is told beside the plan.
 MOST_PLAN_CHARACTERS: Final = 12_000
 _MOST_REASON_CHARACTERS: Final = 2_000
+_MOST_SPOKEN: Final = 16
 
 
 class Telling:
     """Publish the planner's side of every command."""
 
-    def __init__(self, space: SharedSpace) -> None:
+    def __init__(self, space: SharedSpace, clock: Clock) -> None:
         self._plans: RingWriter = space.ring_writer("plan")
         self._events: RingWriter = space.ring_writer("task_event")
+        self._voice = Announcer(space, "planner", clock)
+        # Commands that came by voice and are carried out now, and whether their plan ends aloud.
+        self._spoken: OrderedDict[str, tuple[Command, bool]] = OrderedDict()
+
+    def aloud(self, command: Command, text: str) -> None:
+        """Say something to whoever gave a command by voice; others read it."""
+        if command.is_spoken:
+            self._voice.say(text)
+
+    def ended(self, command_id: str, success: bool, error: str) -> None:
+        """Tell aloud how a command ended that was given by voice."""
+        command, says_so = self._spoken.pop(command_id, (None, False))
+        if command is None:
+            return
+        if not success:
+            self.aloud(command, Says.FAILED.format(reason=first_part(error) or "I cannot say why"))
+        elif not says_so:
+            self.aloud(command, Says.DONE)
 
     def cancelled_all(self, command_id: str) -> None:
-        """Let the executor end what it does."""
+        """Let the executor end what it does; whoever wanted that need not be told aloud."""
+        self._spoken.clear()
         self._plans.publish({"command_id": command_id, "cancel": True})
 
     def planning(self, command: Command, rungs: tuple[str, ...]) -> None:
@@ -44,6 +68,7 @@ class Telling:
             answer_within_s=question.limit_s,
             plan=None if plan is None else plan.model_dump(mode="json"),
         )
+        self.aloud(command, question.text)
 
     def answered(self, answer: Command, asked: Command) -> None:
         """Tell that an utterance answers a question; what comes of it is told of the command."""
@@ -69,6 +94,10 @@ class Telling:
         self._tell(command, "accepted")
         self._events.publish(told | _maker(answer) | _attempts(answer))
         self._plans.publish({"command_id": command.command_id, "plan": document})
+        if command.is_spoken:
+            self._spoken[command.command_id] = command, plan.actions[-1].skill == "speak"
+            while len(self._spoken) > _MOST_SPOKEN:
+                self._spoken.popitem(last=False)
 
     def _tell(self, command: Command, event: str, **details: Any) -> None:
         self._events.publish({"command_id": command.command_id, "event": event} | details)

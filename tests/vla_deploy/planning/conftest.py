@@ -89,6 +89,7 @@ class Desk:
         self._status = self._space.cell_reader("planner_status")
         self._scene = self._space.cell_writer("scene")
         self._executor = self._space.ring_writer("task_event")
+        self._voice = self._space.ring_reader("say", from_start=True)
         self.planner = self.start()
 
     def start(self) -> PlannerNode:
@@ -123,6 +124,9 @@ class Desk:
 
     def told(self) -> list[dict[str, Any]]:
         return [event.payload for event in self._events.drain()]
+
+    def said_aloud(self) -> list[str]:
+        return [event.payload["text"] for event in self._voice.drain()]
 
     def plans(self) -> list[dict[str, Any]]:
         return [event.payload for event in self._plans.drain()]

@@ -203,3 +203,86 @@ class TestReadingBack:
         desk.give(command_id="c3", text="kitchen, like, you know")
         desk.answers()
         assert desk.status()["cache"]["hits"] == 0
+
+
+class TestAQuestionOfAModel:
+    @pytest.fixture
+    def model(self, rung, propose):
+        return rung("model", Ambiguous("Where shall I put it?"), propose(GO))
+
+    @pytest.fixture
+    def desk(self, open_desk, model):
+        desk = open_desk(model)
+        desk.give(text="clear away that thing")
+        desk.answers()
+        return desk
+
+    def test_any_words_may_answer_it(self, desk, model):
+        desk.give(command_id="c2", text="somewhere warm")
+        assert events(desk.answers())[-1] == ("c1", "plan")
+        assert model.asked[1].text == "clear away that thing: somewhere warm"
+
+    def test_but_a_command_is_a_command(self, desk, model):
+        desk.give(command_id="c2", text="go to the kitchen")
+        assert events(desk.answers())[0] == ("c1", "rejected")
+        assert len(model.asked) == 1
+
+
+class TestSpokenCommands:
+    def test_what_was_typed_is_not_answered_aloud(self, open_desk):
+        desk = open_desk()
+        desk.give(text="sing a sea shanty")
+        desk.answers()
+        assert desk.said_aloud() == []
+
+    def test_a_refusal_is_told_aloud_in_a_sentence(self, open_desk):
+        desk = open_desk()
+        desk.give(text="sing a sea shanty", source="voice")
+        desk.give(text="go to narnia", source="voice")
+        desk.answers()
+        first, second = desk.said_aloud()
+        assert first == Says.NOT_UNDERSTOOD
+        assert second == 'Sorry, I cannot do that: I do not know the place "narnia".'
+
+    def test_a_question_is_asked_aloud_and_no_is_acknowledged(self, open_desk, rung):
+        desk = open_desk(rung("model", WHICH))
+        desk.give(text="hand it over", source="voice")
+        desk.answers()
+        desk.give(command_id="c2", text="no", source="voice")
+        desk.answers()
+        assert desk.said_aloud() == [str(WHICH), Says.LEFT]
+
+    def test_a_long_wait_is_announced_once(self, open_desk, later, rung, propose):
+        desk = open_desk(rung("model", propose(GO)), aside=later)
+        desk.give(text="sing one", source="voice")
+        desk.answers()
+        assert desk.said_aloud() == []
+        for _ in range(3):
+            desk.clock.pass_s(1.0)
+            desk.answers()
+        assert desk.said_aloud() == [Says.WORKING]
+
+    @pytest.mark.parametrize(
+        ("end", "said"),
+        [
+            ({"success": True, "error": None}, [Says.DONE]),
+            ({"success": False, "error": "no way; try again"},
+             ["Sorry, that did not work: no way."]),
+        ],
+    )  # fmt: skip
+    def test_the_end_is_told_aloud(self, open_desk, end, said):
+        desk = open_desk()
+        desk.give(text="go to the kitchen", source="voice")
+        desk.answers()
+        desk.executor_tells(command_id="c1", event="finished", **end)
+        desk.answers()
+        assert desk.said_aloud() == said
+
+    def test_whoever_says_stop_is_not_told_that_it_failed(self, open_desk):
+        desk = open_desk()
+        desk.give(text="go to the kitchen", source="voice")
+        desk.give(command_id="c2", text="stop", source="voice")
+        desk.answers()
+        desk.executor_tells(command_id="c1", event="finished", success=False, error="cancelled")
+        desk.answers()
+        assert desk.said_aloud() == []
