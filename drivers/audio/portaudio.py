@@ -5,7 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import Any, Final
+from weakref import WeakSet
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from drivers.audio.base import AudioBlock, AudioCounters, AudioFormat, Samples, 
 from drivers.clock import NS_PER_S, Clock
 from drivers.device_clock import DeviceClock
 from drivers.errors import DeviceMissing, LinkLost
+
+IDLE_S: Final = 1.0
+_DEVICES: "Final[WeakSet[PortAudioInput | PortAudioOutput]]" = WeakSet()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +64,12 @@ class PortAudioInput:
         self._rows = 0
         self._row_clock = DeviceClock()
         self._last_stamp_ns = 0
+        _DEVICES.add(self)
+
+    @property
+    def may_pause(self) -> bool:
+        """Tell whether the device may be opened anew now: never one that listens."""
+        return bool(self._stream.closed)
 
     def poll(self) -> AudioBlock | None:
         """Return the samples since the last call as one block, or None; never waits.
@@ -87,7 +97,8 @@ class PortAudioInput:
 
     def close(self) -> None:
         """Release the device; closing twice is allowed."""
-        self._stream.close()
+        if not self._stream.closed:
+            self._stream.close()
 
     def _stamp(self, count: int, latency_ns: int) -> int:
         """Return when the first of `count` rows was taken: the rows themselves are the clock."""
@@ -114,6 +125,13 @@ class PortAudioOutput:
         self.counters = AudioCounters()
         self._name = name
         self._stream = _open(name, format_, "OutputStream", "outputs")
+        self._silent_at_s = 0.0
+        _DEVICES.add(self)
+
+    @property
+    def may_pause(self) -> bool:
+        """Tell whether the device may be opened anew now: nothing sounds."""
+        return bool(self._stream.closed or self._stream.time > self._silent_at_s + IDLE_S)
 
     def write(self, samples: Samples) -> int:
         """Hand over what there is room for and return how many rows that was; never waits.
@@ -127,13 +145,16 @@ class PortAudioOutput:
             taken = samples[: max(0, self._stream.write_available)]
             if len(taken):
                 self._stream.write(np.ascontiguousarray(taken))
+                starts_s = max(self._stream.time, self._silent_at_s)
+                self._silent_at_s = starts_s + len(taken) / self.format.rate_hz
         self.counters.blocks += bool(len(taken))
         self.counters.samples += len(taken)
         return len(taken)
 
     def close(self) -> None:
         """Release the device; closing twice is allowed."""
-        self._stream.close()
+        if not self._stream.closed:
+            self._stream.close()
 
 
 def _library() -> ModuleType:
@@ -152,16 +173,39 @@ def _library() -> ModuleType:
 def _open(name: str, format_: AudioFormat, kind: str, way: str) -> Any:
     library = _library()
     try:
-        stream = getattr(library, kind)(
-            device=name, samplerate=format_.rate_hz, channels=format_.channels, dtype="int16"
-        )
-        stream.start()
+        stream = _started(library, name, format_, kind)
     except (ValueError, library.PortAudioError) as error:
         known = [repr(device.name) for device in sound_devices() if getattr(device, way)]
-        listed = ", ".join(known) or "there is none: plug one in, then start again"
+        listed = ", ".join(known) or "there is none: plug one in"
         raise DeviceMissing(
             f"sound device {name!r} with {format_}: {error}; devices with {way}: {listed}"
         ) from error
+    return stream
+
+
+def _started(library: Any, name: str, format_: AudioFormat, kind: str) -> Any:
+    """Return a running stream; a device that is not known may have been plugged in since.
+
+    PortAudio lists devices once. Making the list anew closes every stream, so it is done only
+    while none listens and nothing sounds; the owner of a silent speaker opens it again.
+    """
+    try:
+        return _start(library, name, format_, kind)
+    except (ValueError, library.PortAudioError):
+        if not all(device.may_pause for device in _DEVICES):
+            raise
+        for device in _DEVICES:
+            device.close()
+        library._terminate()
+        library._initialize()
+        return _start(library, name, format_, kind)
+
+
+def _start(library: Any, name: str, format_: AudioFormat, kind: str) -> Any:
+    stream = getattr(library, kind)(
+        device=name, samplerate=format_.rate_hz, channels=format_.channels, dtype="int16"
+    )
+    stream.start()
     return stream
 
 

@@ -56,12 +56,14 @@ class Stream:
         self.rows = 160
         self.overflowed = False
         self.gone = False
+        self.closed = False
+        self.time = 1.0
 
     def start(self) -> None:
         pass
 
     def close(self) -> None:
-        pass
+        self.closed = True
 
     @property
     def read_available(self) -> int:
