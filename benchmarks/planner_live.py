@@ -27,6 +27,7 @@ from vla_deploy.cli.session import Session
 from vla_deploy.ipc import RingReader, SharedSpace
 
 PROFILE: Final = "jetson_orin_nano"
+ACCOUNTED: Final = ("planner", "speech")
 COMMANDS: Final = (
     "turn left thirty degrees", "look to the left", "turn right thirty degrees",
     "look to the right", "go to the kitchen", "find the red cup", "move forward ten centimetres",
@@ -157,14 +158,17 @@ def _spread(name: str, values_s: Sequence[float]) -> dict[str, float | None]:
 
 
 def _cost(stack: ProcessStack, path: Path, named: str) -> dict[str, Any]:
+    """Return memory and CPU of speech and planner as the supervisor accounts them, at the end."""
     budgets = load_profile(path).budgets
     report: dict[str, Any] = {"profile": named}
-    for name in ("planner", "speech"):
-        usage = {row["name"]: row for row in stack.document("process_table")["processes"]}
-        memory_mb = float((usage.get(name) or {}).get("memory_mb") or 0.0)
-        report[f"{name}_memory_mb"] = memory_mb
-        if name in budgets:
-            report[f"{name}_memory_used_of_budget"] = memory_mb / budgets[name].memory_mb
+    for name in ACCOUNTED:
+        usage = stack.row(name)
+        for key, budget in (
+            ("memory_mb", budgets[name].memory_mb),
+            ("cpu_ratio", budgets[name].cpu_ratio),
+        ):
+            report[f"{name}_{key}"] = usage[key]
+            report[f"{name}_{key}_of_budget"] = usage[key] and usage[key] / budget
     return report
 
 

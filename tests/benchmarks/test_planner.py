@@ -11,6 +11,7 @@ from benchmarks.planner_bounds import broken_bounds, moves
 from benchmarks.planner_commands import measure
 from benchmarks.planner_corpus import Case, Turn, home
 from benchmarks.planner_goals import parse_goal
+from benchmarks.planner_live import measure as measure_live
 from benchmarks.planner_play import Verdict, play_afresh
 
 
@@ -87,6 +88,16 @@ def test_the_judge_has_bounds_of_its_own(action: dict[str, Any], is_safe: bool) 
 def test_only_speaking_and_waiting_move_nothing() -> None:
     assert not moves({"actions": [{"skill": "speak"}, {"skill": "wait"}]})
     assert moves({"actions": [{"skill": "speak"}, {"skill": "turn"}]})
+
+
+@pytest.mark.slow
+@pytest.mark.stack
+@pytest.mark.timeout(300)
+def test_the_way_from_a_typed_command_to_motion_is_timed_in_the_real_processes() -> None:
+    report = measure_live(spoken=False)
+    assert report["typed_moved"] >= report["typed_commands"] - 2
+    assert 0.0 < report["typed_to_plan_p50_s"] < report["typed_to_motion_p95_s"] < 5.0
+    assert 0.0 < report["planner_memory_mb_of_budget"] < 1.0
 
 
 @pytest.mark.parametrize("part", PARTS)
