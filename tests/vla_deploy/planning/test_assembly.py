@@ -1,0 +1,90 @@
+"""The profile names who plans; what is not there is done without, and told."""
+
+import json
+
+import pytest
+
+from drivers.clock import MonotonicClock
+from platforms import load_profile
+from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.robots import load_robot
+
+SERVERS = """
+[servers.bench]
+api = "openai_compatible"
+url = "{url}"
+model = "tiny"
+location = "local"
+max_attempts = 1
+
+[servers.cloud]
+api = "openai"
+url = "https://example.com/v1"
+model = "large"
+location = "remote"
+credential = "no_such_key_anywhere"
+"""
+GO = {"skill": "navigate_to", "place": "kitchen", "yaw_rad": None}
+ANSWER = {"reasoning": "", "question": None, "feasible": True, "steps": [GO], "confidence": 0.9}
+
+
+@pytest.fixture
+def open_with(tmp_path, loopback):
+    """Open the planner of a profile with this table."""
+
+    def open_with(planning: str):
+        config = tmp_path / "base-config"
+        config.mkdir(exist_ok=True)
+        (config / "servers.toml").write_text(SERVERS.format(url=loopback.url))
+        profile = tmp_path / "mine.toml"
+        profile.write_text(f'inherits = "desktop"\n[planning]\n{planning}\n')
+        settings = load_profile(profile).planning
+        return open_planner(load_robot("butler"), settings, MonotonicClock(), tmp_path / "base")
+
+    return open_with
+
+
+def test_nobody_else_is_asked_unless_configured(open_with):
+    planner = open_with("within_s = 5.0")
+    assert planner.rungs == ("rules", "cache")
+    assert not planner.sees
+
+
+def test_servers_are_asked_after_rules_and_cache(open_with, loopback, ask):
+    planner = open_with('servers = ["bench"]')
+    assert planner.rungs == ("rules", "cache", "server bench")
+    loopback.then(loopback.says(json.dumps(ANSWER)))
+    answer = planner.plan(ask("make it nice in here"))
+    assert answer.plan.actions[0].parameters == {"place": "kitchen"}
+    assert [one.outcome for one in answer.attempts] == ["declined", "declined", "planned"]
+    planner.accepted(ask("make it nice in here"), answer)
+    again = planner.plan(ask("make it nice in here"))
+    assert (again.proposal.rung, again.proposal.origin) == ("cache", "server bench")
+    assert len(loopback.heard) == 1
+    assert planner.document()["servers"][0]["answers"] == 1
+
+
+def test_a_command_of_the_rules_asks_no_server(open_with, loopback, ask):
+    planner = open_with('servers = ["bench"]')
+    assert planner.plan(ask("go to the kitchen")).proposal.rung == "rules"
+    assert loopback.heard == []
+
+
+def test_servers_that_are_not_there_are_told_and_done_without(open_with):
+    planner = open_with('servers = ["nobody", "cloud", "bench"]')
+    assert planner.slow_rungs == ("server bench",)
+    assert set(planner.document()["away"]) == {"nobody", "cloud"}
+    assert "NO_SUCH_KEY_ANYWHERE" in planner.away["cloud"]
+
+
+def test_no_more_rungs_are_asked_than_the_profile_allows(open_with):
+    assert open_with('servers = ["bench"]\nmax_rungs = 0').slow_rungs == ()
+
+
+def test_the_world_of_the_robot_names_the_places_that_a_server_may_choose(open_with, loopback, ask):
+    loopback.then(loopback.says(json.dumps(ANSWER)))
+    open_with('servers = ["bench"]').plan(ask("make it nice in here"))
+    schema = json.dumps(loopback.heard[0].body["response_format"])
+    for place in set(world_of(load_robot("butler"), {}).places.values()):
+        assert f'"{place}"' in schema
