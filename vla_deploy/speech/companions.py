@@ -14,16 +14,18 @@ class Playing:
     """Describe what sounds from the speaker at a moment.
 
     The robot knows its own words by `text` when it hears them; `level_db` is how loud the speaker
-    is: RMS of what it plays against full scale.
+    is: RMS of what it plays against full scale. `echo_db` is how loud the microphone may hear it at
+    this moment, after its echo was taken out; None where the voice cannot tell.
     """
 
     say_id: str
     text: str
     level_db: float
+    echo_db: float | None = None
 
 
 class StreamListener(Protocol):
-    """Hear every block as it comes, before anything is cut or judged, also while the robot speaks.
+    """Hear every block, before anything is cut or judged, also while the robot speaks.
 
     `feed` runs within the node's step and takes a small part of it: what takes longer goes beside.
     """
@@ -69,6 +71,10 @@ class Voice(Protocol):
 
     def step(self) -> None:
         """Take what is to be said, and hand the speaker what it has room for."""
+        ...
+
+    def cleaned(self, block: SoundBlock) -> SoundBlock | None:
+        """Return a block without what the robot says itself; None while it waits for the next."""
         ...
 
     def barge_in(self, stamp_ns: int) -> None:

@@ -2,10 +2,11 @@
 
 The rule, while the robot speaks and until its sound has died away:
 
-- A frame counts as a person's only if the voice network is sure of it, and if it is louder by a
-  margin than the robot's own voice is at the microphone. Everything else is dropped.
-- How loud the robot is at its microphone is learnt while it speaks: quickly when it is less loud
-  than thought, slowly when it is louder, since that may be a person.
+- A frame counts as a person's only if the voice network is sure of it, and if it is louder than the
+  robot's own voice may be at the microphone. Everything else is dropped.
+- The voice tells how loud the robot may be at its microphone, once its echo is taken out. Where it
+  cannot, that is learnt while it speaks, and a margin added: quickly when it is less loud than
+  thought, slowly when it is louder, since that may be a person.
 - Enough such frames within a short time are a person who barges in: the voice is told to fall
   silent, and from then on everything is heard until the robot speaks again.
 - The listeners to the raw stream, such as the stop words, are not touched by any of this.
@@ -38,6 +39,7 @@ class EchoGate:
         self._taken_db: deque[float] = deque(maxlen=_DELAY_FRAMES)
         self._persons: deque[bool] = deque(maxlen=WITHIN_FRAMES)
         self._speaking = False
+        self._told_db: float | None = None
         self._opened = False
 
     @property
@@ -47,13 +49,16 @@ class EchoGate:
 
     @property
     def echo_db(self) -> float:
-        """Return how loud the robot's own voice is at the microphone at most."""
-        return max(self._played_db, default=SILENCE_DB) + self.coupling_db
+        """Return how loud the robot's own voice may be at the microphone."""
+        if self._told_db is not None:
+            return self._told_db
+        return max(self._played_db, default=SILENCE_DB) + self.coupling_db + MARGIN_DB
 
     def follow(self, playing: Playing | None) -> None:
         """Take what sounds, and what of it still hangs in the room, as the next frame is judged."""
         self._played_db.append(SILENCE_DB if playing is None else playing.level_db)
         self._speaking = playing is not None
+        self._told_db = None if playing is None else playing.echo_db
         if playing is None:
             self._opened = False
             self._persons.clear()
@@ -62,7 +67,7 @@ class EchoGate:
     def is_person(self, level_db: float, voice: float) -> bool:
         """Judge one frame of the microphone while the gate is shut."""
         self._learn(level_db)
-        is_person = voice >= SURE and level_db >= self.echo_db + MARGIN_DB
+        is_person = voice >= SURE and level_db >= self.echo_db
         self._persons.append(is_person)
         return is_person
 

@@ -92,6 +92,8 @@ class SpeechNode:
         if self._voice is not None:
             self._voice.step()
         block = self._poll()
+        if block is not None and self._voice is not None:
+            block = self._voice.cleaned(block)
         if block is not None:
             self._hear(block)
         self._take_loaded()

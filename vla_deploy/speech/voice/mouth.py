@@ -1,21 +1,40 @@
-"""Play one sound at a time on a speaker that may come and go, and know when it still sounds."""
+"""Play one sound at a time on a speaker that may come and go, and know what sounds when."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from drivers.audio.base import AudioFormat, AudioOutput, Samples
 from drivers.clock import Clock
 from drivers.reopening import Reopening
+from vla_deploy.speech.voice.clip import Wave
 from vla_deploy.speech.voice.playback import Playback
 
 OpenOutput = Callable[[], AudioOutput]
 
 
-class Mouth:
-    """Hold the speaker and what it plays; `format` is the speaker's, None before it was opened."""
+Note = Callable[[Wave, int, int], None]
+"""Take a wave at 16 kHz, the time at which its first sample sounds, and until when it does."""
 
-    def __init__(self, open_output: OpenOutput, clock: Clock) -> None:
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prepared:
+    """Hold a sound as the speaker takes it, (n, channels), and as a wave at 16 kHz."""
+
+    samples: Samples
+    wave: Wave
+
+
+class Mouth:
+    """Hold the speaker and what it plays; `format` is the speaker's, None before it was opened.
+
+    `note` is told what was handed over.
+    """
+
+    def __init__(self, open_output: OpenOutput, clock: Clock, note: Note) -> None:
         self.format: AudioFormat | None = None
         self.sounds_until_ns = 0
+        self._note = note
+        self._wave: Wave
         self._clock = clock
         self._open_output = open_output
         self._speaker: Reopening[AudioOutput] = Reopening("speaker", self._connect, clock)
@@ -39,9 +58,10 @@ class Mouth:
             playback.is_handed_over and self._clock.now_ns() >= playback.ends_ns
         )
 
-    def play(self, samples: Samples) -> None:
-        """Play samples of the speaker's format from the next step on."""
-        self._playback = Playback(samples, self.sounds_until_ns)
+    def play(self, sound: Prepared) -> None:
+        """Play a sound from the next step on."""
+        self._playback = Playback(sound.samples, self.sounds_until_ns)
+        self._wave = sound.wave
 
     def step(self) -> None:
         """Hand the speaker what is due; open it where it is away. `away` tells of a loss."""
@@ -50,7 +70,7 @@ class Mouth:
         if playback is None:
             self._speaker.poll(lambda _: 0, 0)
         elif self._speaker.poll(lambda output: playback.feed(output, now_ns), 0):
-            self.sounds_until_ns = playback.ends_ns
+            self._told(playback)
 
     def cut(self) -> None:
         """Play no more of the present sound."""
@@ -59,11 +79,17 @@ class Mouth:
             return
         now_ns = self._clock.now_ns()
         if self._speaker.poll(lambda output: playback.fade_out(output, now_ns), 0):
-            self.sounds_until_ns = playback.ends_ns
+            self._told(playback)
 
     def close(self) -> None:
         """Release the speaker; closing twice is allowed."""
         self._speaker.close()
+
+    def _told(self, playback: Playback) -> None:
+        assert self.format is not None, "rows were handed to an open speaker"
+        self.sounds_until_ns = playback.ends_ns
+        zero_ns = playback.ends_ns - self.format.duration_ns(playback.rows)
+        self._note(self._wave, zero_ns, playback.ends_ns)
 
     def _connect(self) -> AudioOutput:
         output = self._open_output()

@@ -30,6 +30,11 @@ class Playback:
         return self._at > 0
 
     @property
+    def rows(self) -> int:
+        """Return how many rows the speaker has got."""
+        return self._at
+
+    @property
     def is_handed_over(self) -> bool:
         """Tell whether the speaker has got everything."""
         return self._at == len(self._samples)

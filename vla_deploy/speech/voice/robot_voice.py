@@ -3,21 +3,22 @@
 import logging
 from collections import Counter
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
+from drivers.audio.base import AudioFormat
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import RingReader, RingWriter, SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.speech.companions import Playing
-from vla_deploy.speech.sound import level_db
+from vla_deploy.speech.sound import RATE_HZ, SoundBlock, level_db
 from vla_deploy.speech.voice.engine import Engine
 from vla_deploy.speech.voice.errors import EngineMissing, OrderRefused, VoiceError
-from vla_deploy.speech.voice.mouth import Mouth, OpenOutput
+from vla_deploy.speech.voice.mouth import Mouth, OpenOutput, Prepared
 from vla_deploy.speech.voice.orders import LONGEST_ID, Order, Withdrawal, read_order
+from vla_deploy.speech.voice.own_echo import OwnEcho
 from vla_deploy.speech.voice.waiting import LONGEST_WAIT_NS, WaitingLine
 
 TAIL_NS: Final = 7 * NS_PER_S // 20
@@ -29,11 +30,11 @@ _log = logging.getLogger(__name__)
 
 @dataclass(slots=True, kw_only=True)
 class _Saying:
-    """Hold what is being said: it is in preparation first, and `samples` come with its end."""
+    """Hold what is being said: it is in preparation first, and `sound` comes with its end."""
 
     order: Order
-    prepared: "Future[Samples]"
-    samples: Samples | None = None
+    prepared: "Future[Prepared]"
+    sound: Prepared | None = None
     has_begun: bool = False
 
 
@@ -57,7 +58,8 @@ class RobotVoice:
         self._aside = aside
         self._clock = clock
         self._volume_ratio = volume_ratio
-        self._mouth = Mouth(open_output, clock)
+        self._echo = OwnEcho()
+        self._mouth = Mouth(open_output, clock, self._echo.note)
         self._waiting = WaitingLine()
         self._saying: _Saying | None = None
         self._sounding: Playing | None = None
@@ -70,8 +72,9 @@ class RobotVoice:
     @property
     def playing(self) -> Playing | None:
         """Return what sounds at this moment, the room's answer to it included."""
-        silent_ns = self._mouth.sounds_until_ns + TAIL_NS
-        return self._sounding if self._clock.now_ns() < silent_ns else None
+        if self._sounding is None or self._clock.now_ns() >= self._mouth.sounds_until_ns + TAIL_NS:
+            return None
+        return replace(self._sounding, echo_db=self._echo.left_db)
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics, and try the engine for the first time."""
@@ -95,6 +98,10 @@ class RobotVoice:
         if self._saying is not None:
             self._advance(self._saying)
 
+    def cleaned(self, block: SoundBlock) -> SoundBlock | None:
+        """Return what the microphone heard without what the robot says; None while that waits."""
+        return self._echo.clean(block)
+
     def barge_in(self, stamp_ns: int) -> None:
         """Fall silent: a person has spoken into what the robot says, from `stamp_ns` on."""
         late_s = (self._clock.now_ns() - stamp_ns) / NS_PER_S
@@ -116,6 +123,7 @@ class RobotVoice:
             "engine": self._engine.name,
             "volume": self._volume_ratio,
             "waiting": len(self._waiting),
+            "echo_reduction_db": round(self._echo.reduction_db, 1),
             "counts": dict(self._counts),
         }
 
@@ -164,18 +172,20 @@ class RobotVoice:
             order=order, prepared=self._aside.submit(self._prepare, order.text, format_)
         )
 
-    def _prepare(self, text: str, format_: AudioFormat) -> Samples:
-        return self._engine.synthesise(text).samples(format_, self._volume_ratio)
+    def _prepare(self, text: str, format_: AudioFormat) -> Prepared:
+        clip = self._engine.synthesise(text)
+        wave = clip.at_rate(RATE_HZ).wave * np.float32(self._volume_ratio)
+        return Prepared(samples=clip.samples(format_, self._volume_ratio), wave=wave)
 
     def _advance(self, saying: _Saying) -> None:
-        if saying.samples is None:
+        if saying.sound is None:
             self._play_once_prepared(saying)
             return
         if self._mouth.away:
             self._end(saying, "failed", self._mouth.away)
         elif not saying.has_begun and self._mouth.has_begun:
             saying.has_begun = True
-            self._sounding = _playing(saying.order, saying.samples)
+            self._sounding = _playing(saying.order, saying.sound)
             self._tell(saying.order, "began", "")
         elif self._mouth.is_done:
             cut = f"only its first {len(saying.order.text)} letters" if saying.order.is_cut else ""
@@ -185,13 +195,13 @@ class RobotVoice:
         if not saying.prepared.done():
             return
         try:
-            saying.samples = saying.prepared.result()
+            saying.sound = saying.prepared.result()
         except VoiceError as error:
             self._missing = str(error) if isinstance(error, EngineMissing) else self._missing
             self._end(saying, "failed", str(error))
             return
         self._missing = ""
-        self._mouth.play(saying.samples)
+        self._mouth.play(saying.sound)
         self._mouth.step()
 
     def _break_off(self, reason: str) -> None:
@@ -221,6 +231,5 @@ class RobotVoice:
         self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
 
 
-def _playing(order: Order, samples: Samples) -> Playing:
-    ratio = samples.mean(axis=1, dtype=np.float32) / np.float32(FULL_SCALE)
-    return Playing(say_id=order.say_id, text=order.text, level_db=level_db(ratio))
+def _playing(order: Order, sound: Prepared) -> Playing:
+    return Playing(say_id=order.say_id, text=order.text, level_db=level_db(sound.wave))

@@ -123,7 +123,7 @@ def test_while_it_speaks_and_rings_out_it_says_what_sounds(rig: VoiceRig) -> Non
     assert (playing.say_id, playing.text) == ("a", "I am on my way")
     assert -40.0 < playing.level_db < -3.0
     rig.run_until("a", "finished")
-    assert rig.voice.playing is playing
+    assert rig.voice.playing == playing
     rig.run(TAIL_NS / NS_PER_S)
     assert rig.voice.playing is None
 

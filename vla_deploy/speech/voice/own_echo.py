@@ -1,0 +1,189 @@
+"""Take the robot's own voice out of what its microphone hears, block by block.
+
+What is handed to the speaker is noted with the time at which it will sound; the filter learns what
+arrives of it, takes it out, and says how much may be left. What is no louder than that is the rest
+of the echo, and is turned down; what is louder is somebody else.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from drivers.clock import NS_PER_S
+from vla_deploy.speech.sound import RATE_HZ, SoundBlock, duration_ns
+from vla_deploy.speech.voice.clip import Wave
+from vla_deploy.speech.voice.echo_filter import BLOCK, PARTITIONS, EchoFilter
+
+HEAD_START_NS: Final = NS_PER_S // 200
+"""The reference comes this much early, in case stamps of speaker and microphone disagree."""
+RINGS_NS: Final = duration_ns(BLOCK * PARTITIONS)
+LEAST_GAIN: Final = 0.1
+_GAIN_FALLS: Final = 0.6  # with each block: a word's end is not cut
+_FRAME_BLOCKS: Final = 5  # as many as may be under way to the judge of one frame
+_MEMORY: Final = 0.02  # of each block in the mean: a second
+_FITS_RATIO: Final = 8.0  # of powers, 9 dB
+_FITS_AFTER_BLOCKS: Final = 8
+_AUDIBLE_POWER: Final = 1e-6
+_SILENT_POWER: Final = 1e-10
+_SAME_NS: Final = NS_PER_S // 10_000
+
+
+@dataclass(slots=True, kw_only=True)
+class _Played:
+    """Hold a sound at 16 kHz whose first sample sounds, or would have, at `zero_ns`."""
+
+    wave: Wave
+    zero_ns: int
+    from_ns: int
+    until_ns: int
+
+
+@dataclass(slots=True)
+class _Trial:
+    """Add up how much of what is heard the filter takes out since the robot began to speak."""
+
+    blocks: int = 0
+    heard_power: float = 0.0
+    rest_power: float = 0.0
+
+    @property
+    def fits(self) -> bool:
+        return (
+            self.blocks >= _FITS_AFTER_BLOCKS and self.heard_power > _FITS_RATIO * self.rest_power
+        )
+
+    def add(self, heard_power: float, rest_power: float) -> None:
+        self.blocks += 1
+        self.heard_power += heard_power
+        self.rest_power += rest_power
+
+
+class OwnEcho:
+    """Follow speaker and microphone."""
+
+    def __init__(self) -> None:
+        self._filter = EchoFilter()
+        self._played: deque[_Played] = deque()
+        self._pending = np.zeros(0, np.float32)
+        self._pending_ns = 0
+        self._is_active = False
+        self._follows = False
+        self._is_confirmed = False
+        self._trial = _Trial()
+        self._gain = 1.0
+        self._left: deque[float] = deque(maxlen=_FRAME_BLOCKS)
+        self._heard_power = 0.0
+        self._rest_power = 0.0
+
+    @property
+    def reduction_db(self) -> float:
+        """Return by how much what was heard while the robot spoke has become less by it."""
+        return _db(self._heard_power) - _db(self._rest_power)
+
+    @property
+    def left_db(self) -> float:
+        """Return how loud what is left of the echo may be now, RMS against full scale."""
+        return _db(max(self._left, default=0.0))
+
+    def note(self, wave: Wave, zero_ns: int, until_ns: int) -> None:
+        """Take what was handed to the speaker: `wave` at 16 kHz, from `zero_ns` to `until_ns`."""
+        last = self._played[-1] if self._played else None
+        if last is not None and last.wave is wave and abs(last.zero_ns - zero_ns) < _SAME_NS:
+            last.until_ns = until_ns
+            return
+        from_ns = zero_ns if last is None else max(zero_ns, last.until_ns)
+        self._played.append(_Played(wave=wave, zero_ns=zero_ns, from_ns=from_ns, until_ns=until_ns))
+
+    def clean(self, block: SoundBlock) -> SoundBlock | None:
+        """Return what remains of the stream; None while less than a block waits for the rest.
+
+        Samples are neither lost nor moved: while the robot is silent they pass at once, while it
+        speaks they come in blocks of 16 ms.
+        """
+        self._forget_before(block.stamp_ns - RINGS_NS)
+        if not self._played:
+            return self._pass_on(block)
+        if not self._is_active or not block.follows:
+            self._begin(block)
+        pending = np.concatenate((self._pending, block.samples))
+        whole = len(pending) - len(pending) % BLOCK
+        starts_ns, self._pending = self._pending_ns, pending[whole:]
+        if not whole:
+            return None
+        self._pending_ns += duration_ns(whole)
+        parts = [
+            self._clean(pending[at : at + BLOCK], starts_ns + duration_ns(at))
+            for at in range(0, whole, BLOCK)
+        ]
+        follows, self._follows = self._follows, True
+        return SoundBlock(stamp_ns=starts_ns, samples=np.concatenate(parts), follows=follows)
+
+    def _begin(self, block: SoundBlock) -> None:
+        self._filter.begin()
+        self._pending, self._pending_ns = self._pending[:0], block.stamp_ns
+        self._follows = block.follows
+        self._is_active, self._gain = True, 1.0
+        self._is_confirmed, self._trial = False, _Trial()
+
+    def _pass_on(self, block: SoundBlock) -> SoundBlock:
+        """Return a block as it is, behind what still waits."""
+        waiting, self._pending = self._pending, self._pending[:0]
+        self._is_active = False
+        self._left.clear()
+        if not len(waiting) or not block.follows:
+            return block
+        return SoundBlock(
+            stamp_ns=self._pending_ns, samples=np.concatenate((waiting, block.samples))
+        )
+
+    def _clean(self, heard: Wave, stamp_ns: int) -> Wave:
+        known = self._known(stamp_ns + HEAD_START_NS)
+        rest = self._filter.feed(known, heard)
+        powers = [float(np.mean(wave**2)) for wave in (known, heard, rest)]
+        if powers[0] > _AUDIBLE_POWER:
+            self._heard_power += _MEMORY * (powers[1] - self._heard_power)
+            self._rest_power += _MEMORY * (powers[2] - self._rest_power)
+            self._try(powers[1], powers[2])
+        self._left.append(self._filter.left_power)
+        return self._turned_down(rest, powers[2])
+
+    def _try(self, heard_power: float, rest_power: float) -> None:
+        """Find out whether the path still holds: the speaker may have begun later than before."""
+        self._trial.add(heard_power, rest_power)
+        if not self._is_confirmed and self._trial.fits:
+            self._is_confirmed = True
+            self._filter.confirm()
+
+    def _turned_down(self, rest: Wave, power: float) -> Wave:
+        """Return a block at the share of it that is no echo; the gain changes within it."""
+        left = self._filter.left_power
+        other_ratio = max(0.0, 1.0 - left / power) if power > _SILENT_POWER else 0.0
+        wanted = max(LEAST_GAIN, other_ratio**0.5, _GAIN_FALLS * self._gain)
+        gains = np.linspace(self._gain, wanted, len(rest), dtype=np.float32)
+        self._gain = wanted
+        turned: Wave = rest * gains
+        return turned
+
+    def _known(self, stamp_ns: int) -> Wave:
+        """Return what the speaker was given for the 256 samples from `stamp_ns` on."""
+        known = np.zeros(BLOCK, np.float32)
+        for played in self._played:
+            first, end = (
+                round((at_ns - stamp_ns) * RATE_HZ / NS_PER_S)
+                for at_ns in (played.from_ns, played.until_ns)
+            )
+            zero = round((played.zero_ns - stamp_ns) * RATE_HZ / NS_PER_S)
+            low, high = max(0, first, zero), min(BLOCK, end, zero + len(played.wave))
+            if low < high:
+                known[low:high] = played.wave[low - zero : high - zero]
+        return known
+
+    def _forget_before(self, oldest_ns: int) -> None:
+        while self._played and self._played[0].until_ns < oldest_ns:
+            self._played.popleft()
+
+
+def _db(power: float) -> float:
+    return float(10.0 * np.log10(max(power, _SILENT_POWER)))
