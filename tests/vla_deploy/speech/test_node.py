@@ -70,6 +70,9 @@ class RobotVoice:
     def step(self) -> None:
         """Nothing is to be done: `playing` is what the test sets."""
 
+    def cleaned(self, block: SoundBlock) -> SoundBlock:
+        return block
+
     def barge_in(self, stamp_ns: int) -> None:
         self.barged.append(stamp_ns)
 
