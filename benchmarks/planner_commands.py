@@ -53,22 +53,25 @@ def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
 
 
 def latencies(answers: Sequence[Answer]) -> dict[str, Any]:
-    """Return the time from utterance to plan, of all and by rung."""
-    by_rung: dict[str, list[float]] = defaultdict(list)
+    """Return the time from utterance to plan, and the process' CPU time, of all and by rung."""
+    by_rung: dict[str, list[Answer]] = defaultdict(list)
     for one in answers:
-        by_rung[one.rung].append(one.busy_s)
-    every = [one.busy_s for one in answers]
+        by_rung[one.rung].append(one)
     return {
-        "plan_p50_s": _percentile(every, 50),
-        "plan_p95_s": _percentile(every, 95),
+        **{f"plan_{name}": value for name, value in _times(answers).items()},
         "plan_by_rung": {
-            rung: {
-                "plans": len(times_s),
-                "p50_s": _percentile(times_s, 50),
-                "p95_s": _percentile(times_s, 95),
-            }
-            for rung, times_s in sorted(by_rung.items())
+            rung: {"plans": len(some), **_times(some)} for rung, some in sorted(by_rung.items())
         },
+    }
+
+
+def _times(answers: Sequence[Answer]) -> dict[str, float | None]:
+    wall_s, cpu_s = [one.busy_s for one in answers], [one.cpu_s for one in answers]
+    return {
+        "p50_s": _percentile(wall_s, 50),
+        "p95_s": _percentile(wall_s, 95),
+        "cpu_p50_s": _percentile(cpu_s, 50),
+        "cpu_p95_s": _percentile(cpu_s, 95),
     }
 
 

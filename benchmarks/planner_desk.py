@@ -4,7 +4,7 @@ import itertools
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -29,7 +29,7 @@ class Answer:
 
     `outcome` is "plan", "ask", "refuse", "stop"; "silence" where nothing came in time, "crash"
     where the planner's step failed. `plan` is what the executor got; of a question, what a yes
-    would let run. `busy_s` is the time from the utterance to the outcome.
+    would let run. `busy_s` is the time from the utterance to the outcome, `cpu_s` this process'.
     """
 
     outcome: str
@@ -37,7 +37,8 @@ class Answer:
     text: str
     rung: str
     said: tuple[str, ...]
-    busy_s: float
+    busy_s: float = 0.0
+    cpu_s: float = 0.0
 
     @property
     def reads_back(self) -> bool:
@@ -147,7 +148,7 @@ class Desk:
         self.node.start()
 
     def _await(self, command_id: str) -> Answer:
-        began_ns = time.perf_counter_ns()
+        began_ns, began_cpu_ns = time.perf_counter_ns(), time.process_time_ns()
         told: list[Mapping[str, Any]] = []
         while time.perf_counter_ns() - began_ns < ANSWER_LIMIT_S * NS_PER_S:
             try:
@@ -155,34 +156,32 @@ class Desk:
             except Exception as error:  # whatever ends the planner's process ends it here
                 self._start_anew()
                 return _answer("crash", text=repr(error))
-            busy_s = (time.perf_counter_ns() - began_ns) / NS_PER_S
+            busy_ns = time.perf_counter_ns() - began_ns
+            cpu_ns = time.process_time_ns() - began_cpu_ns
             told += [event.payload for event in self._events.drain()]
-            answer = _outcome(self._plans.drain(), told, busy_s)
+            answer = _outcome(self._plans.drain(), told)
             if answer is not None:
-                return answer
+                return replace(answer, busy_s=busy_ns / NS_PER_S, cpu_s=cpu_ns / NS_PER_S)
             self._clock.sleep_until(self._clock.now_ns() + _LOOK_NS)
-        return _answer("silence", text=f"nothing came of {command_id}", busy_s=ANSWER_LIMIT_S)
+        return _answer("silence", text=f"nothing came of {command_id}")
 
 
-def _outcome(plans: list[Event], told: list[Mapping[str, Any]], busy_s: float) -> Answer | None:
+def _outcome(plans: list[Event], told: list[Mapping[str, Any]]) -> Answer | None:
     said = tuple(str(one["text"]) for one in told if one["event"] == "said")
     rung = next((str(one["rung"]) for one in told if "rung" in one), FIRST_RUNG)
     for event in plans:
-        message = event.payload
-        outcome = "stop" if message.get("cancel") else "plan"
-        return _answer(outcome, plan=message.get("plan"), rung=rung, said=said, busy_s=busy_s)
+        outcome = "stop" if event.payload.get("cancel") else "plan"
+        return _answer(outcome, plan=event.payload.get("plan"), rung=rung, said=said)
     for one in told:
         if one["event"] == "rejected":
-            return _answer("refuse", text=str(one["reason"]), said=said, busy_s=busy_s)
+            return _answer("refuse", text=str(one["reason"]), said=said)
         if one["event"] == "asked":
-            return _answer(
-                "ask", plan=one.get("plan"), text=str(one["question"]), said=said, busy_s=busy_s
-            )
+            return _answer("ask", plan=one.get("plan"), text=str(one["question"]), said=said)
     return None
 
 
 def _answer(
     outcome: str, *, plan: Mapping[str, Any] | None = None, text: str = "", rung: str = "",
-    said: tuple[str, ...] = (), busy_s: float = 0.0,
+    said: tuple[str, ...] = (),
 ) -> Answer:  # fmt: skip
-    return Answer(outcome=outcome, plan=plan, text=text, rung=rung, said=said, busy_s=busy_s)
+    return Answer(outcome=outcome, plan=plan, text=text, rung=rung, said=said)

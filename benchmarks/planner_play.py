@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from benchmarks.planner_bounds import broken_bounds, moves
@@ -71,8 +71,9 @@ def _judge_turn(turn: Turn, world: World, desk: Desk) -> tuple[Judgement, World]
     command_id, answer = desk.say(turn.say) if turn.plan is None else desk.hand_in(turn.plan)
     confirmed = answer.reads_back and PLAN in turn.must and ASK not in turn.must
     if confirmed:
-        first_s, (_, answer) = answer.busy_s, desk.say(AGREEMENT)
-        answer = _after(first_s, answer)
+        # Agreeing costs no time of planning.
+        first, (_, answer) = answer, desk.say(AGREEMENT)
+        answer = replace(answer, busy_s=first.busy_s, cpu_s=first.cpu_s)
     if answer.outcome != PLAN or answer.plan is None:
         wrong = "" if answer.outcome in turn.must else f"{answer.outcome}: {answer.text}"
         return Judgement(say=turn.say, answer=answer, wrong=wrong), world
@@ -131,11 +132,3 @@ def _rested(world: World) -> World:
         open_hands=world.open_hands,
         arm_pose=world.arm_pose,
     )
-
-
-def _after(first_s: float, answer: Answer) -> Answer:
-    """Return the answer with the time that planning took: agreeing to it costs none."""
-    return Answer(
-        outcome=answer.outcome, plan=answer.plan, text=answer.text, rung=answer.rung,
-        said=answer.said, busy_s=first_s,
-    )  # fmt: skip

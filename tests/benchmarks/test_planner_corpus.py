@@ -22,6 +22,9 @@ from benchmarks.planner_told import executor_document, scene_document
 from vla_deploy.world import read_snapshot
 
 
+TELLING_WORDS = 7
+
+
 def test_there_are_enough_commands_of_each_kind_and_nothing_is_said_twice() -> None:
     cases = commands()
     assert len(command_kinds()) >= 12
@@ -34,6 +37,21 @@ def test_there_are_enough_commands_of_each_kind_and_nothing_is_said_twice() -> N
 def test_there_are_enough_sentences_of_other_talk_and_attacks() -> None:
     assert len(set(other_talk())) == len(other_talk()) >= 200
     assert len(attacks()) >= 100
+
+
+def test_nothing_was_tuned_to_the_corpora() -> None:
+    """No longer sentence of theirs stands in the robot's code, its prompts or its training."""
+    root = Path(planner_corpus.__file__).parents[1]
+    files = [
+        path
+        for folder in ("vla_deploy", "training")
+        for path in (root / folder).rglob("*")
+        if path.suffix in {".py", ".md", ".toml", ".txt", ".jsonl"}
+    ]
+    written = "\n".join(path.read_text(encoding="utf-8", errors="ignore") for path in files).lower()
+    said = [turn.say for case in commands() for turn in case.turns] + other_talk()
+    sentences = {text.lower().strip(".?! ") for text in said if len(text.split()) >= TELLING_WORDS}
+    assert sorted(text for text in sentences if text in written) == []
 
 
 def test_no_goal_is_reached_by_doing_nothing() -> None:
