@@ -21,7 +21,6 @@ from benchmarks.planner_corpus import (
 from benchmarks.planner_told import executor_document, scene_document
 from vla_deploy.world import read_snapshot
 
-
 TELLING_WORDS = 7
 
 
