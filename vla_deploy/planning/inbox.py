@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy.ipc import Event
-from vla_deploy.planning.errors import CommandUnreadable
+from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.rules import is_stop
 
 VOICE: Final = "voice"
@@ -49,25 +49,33 @@ def read_command(event: Event) -> Command:
 
     Raises:
         CommandUnreadable: it holds none, or one that is too long.
+        NotUnderstood: there are no words in it.
     """
     given = event.payload
-    text, plan = given.get("text", ""), given.get("plan")
-    if plan is None and not (isinstance(text, str) and text.strip()):
-        raise CommandUnreadable(f"expected a command in words or a plan, got {given!r:.120}")
-    if plan is None and len(text) > MOST_CHARACTERS:
-        raise CommandUnreadable(
-            f"expected a command of at most {MOST_CHARACTERS} characters, got {len(text)}; "
-            "say less at a time"
-        )
+    plan = given.get("plan")
     return Command(
         command_id=command_id_of(event),
         told_ns=event.stamp_ns,
         source=str(given.get("source", "")),
-        text=text.strip() if plan is None else "",
+        text=_words(given) if plan is None else "",
         plan=plan,
         heard_confidence=_confidence(given.get("heard")),
         is_answer=bool(given.get("answer")),
     )
+
+
+def _words(given: Mapping[str, Any]) -> str:
+    text = given.get("text")
+    if not isinstance(text, str):
+        raise CommandUnreadable(f"expected a command in words or a plan, got {dict(given)!r:.120}")
+    if not text.strip():
+        raise NotUnderstood(text)
+    if len(text) > MOST_CHARACTERS:
+        raise CommandUnreadable(
+            f"expected a command of at most {MOST_CHARACTERS} characters, got {len(text)}; "
+            "say less at a time"
+        )
+    return text.strip()
 
 
 def _confidence(heard: Any) -> float | None:

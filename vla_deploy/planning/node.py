@@ -29,7 +29,7 @@ class PlannerNode:
     What takes time is done in `aside`; a step never waits for it.
     """
 
-    period_s = 0.05
+    period_s = 0.02
 
     def __init__(
         self,

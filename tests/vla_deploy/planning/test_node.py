@@ -71,9 +71,7 @@ def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
     assert 'I do not know the place "narnia"' in refused["reason"]
 
 
-@pytest.mark.parametrize(
-    "utterance", [{}, {"text": ""}, {"text": 7}, {"text": None}, {"text": "go " * 1000}]
-)
+@pytest.mark.parametrize("utterance", [{}, {"text": 7}, {"text": None}, {"text": "go " * 1000}])
 def test_an_utterance_that_is_no_command_is_refused_with_what_was_expected(desk, utterance):
     desk.give(**utterance)
     (answer,) = desk.answers()
