@@ -39,6 +39,7 @@ def collect(session: Session) -> dict[str, Any]:
         "run_dir": str(session.run_dir),
         "process_table": session.document("process_table", age_limit_s=3.0),
         "control": session.document("control_status", age_limit_s=1.0),
+        "planner": session.document("planner_status", age_limit_s=2.0),
         "executor": session.document("executor_status", age_limit_s=2.0),
         "pose": None if pose is None else _pose_document(pose),
         "scene": session.document("scene", age_limit_s=5.0),
@@ -67,6 +68,7 @@ def as_text(status: dict[str, Any]) -> str:
             _profile(status),
             _control(status),
             _pose(status),
+            *_planner(status),
             _task(status),
             _ears(status),
             _scene(status),
@@ -134,6 +136,18 @@ def _pose(status: dict[str, Any]) -> str:
     if pose["state"] == "tracking":
         return where
     return f"{where}, {pose['state']}: {DOUBT_TEXT[Doubt[pose['doubt'].upper()]]}"
+
+
+def _planner(status: dict[str, Any]) -> list[str]:
+    """Say who plans, what was asked, and who should plan and cannot."""
+    planner = status["planner"]
+    if planner is None:
+        return ["plans: nothing, the planner is silent"]
+    made = {name: rung.get("planned", 0) for name, rung in planner["by_rung"].items()}
+    counts = [f"{name} {made.get(name, 0)}" for name in planner["rungs"]]
+    lines = [f"plans by: {', '.join(counts)}; refused {planner['refused']}"]
+    lines += [f"  without {name}: {why}" for name, why in planner["away"].items()]
+    return [*lines, f"asks: {planner['question']}"] if planner["question"] else lines
 
 
 def _task(status: dict[str, Any]) -> str:

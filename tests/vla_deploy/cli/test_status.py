@@ -6,7 +6,7 @@ import pytest
 
 from vla_deploy.cli.status import as_text
 
-SILENT = ("process_table", "profile", "control", "pose", "executor", "speech")
+SILENT = ("process_table", "profile", "control", "pose", "planner", "executor", "speech")
 MODEL = {
     "model": "detector",
     "variant": "int8_u8s8",
@@ -51,3 +51,17 @@ def test_whether_spoken_words_are_understood_is_told_and_why_not() -> None:
     heard = {"accepted": 3, "rejected": 1}
     well = {"state": "listening", "why": "", "model": {"name": "whisper-small.en"}, "heard": heard}
     assert ears(well) == "hears: listening by whisper-small.en, 3 accepted, 1 rejected"
+
+
+def test_who_plans_what_is_asked_and_who_is_away_is_told() -> None:
+    planner = {
+        "rungs": ["rules", "cache", "server bench"],
+        "by_rung": {"rules": {"planned": 3}, "server bench": {"declined": 2}},
+        "refused": 1,
+        "away": {"cloud": "no key"},
+        "question": "Which cup?",
+    }
+    text = as_text({**dict.fromkeys(SILENT), "scene": None, "planner": planner})
+    assert "plans by: rules 3, cache 0, server bench 0; refused 1" in text
+    assert "  without cloud: no key" in text
+    assert "asks: Which cup?" in text
