@@ -217,3 +217,9 @@ def test_words_of_control_in_a_reason_are_not_passed_on(desk: Desk, loopback: An
     assert answer.outcome == "refuse"
     assert answer.text.isprintable()
     assert len(answer.text) < 2000
+
+
+@pytest.mark.parametrize("text", ["yes", "yes please", "do it", "ok", "confirm", "sure"])
+def test_a_yes_to_nothing_moves_nothing(desk: Desk, loopback: Any, text: str) -> None:
+    loopback.then(loopback.sends(503, {}))
+    assert asked(desk, text).outcome in ("refuse", "ask")
