@@ -6,7 +6,8 @@
 - `lockstep`, `make_lockstep`: a twin without nodes, for tests of single parts
 - `hardware`: the devices of a real robot, where `--hardware` names its file
 
-`@pytest.mark.twin(seed=7)` chooses robot, world, seed and profile of the first two.
+`@pytest.mark.twin(seed=7)` chooses robot, world, seed and profile of the first two;
+`@pytest.mark.twin(speech=True)` lets `twin` hear and speak, which `twin_stack` always does.
 `pytest --hardware robot.toml` alone runs the device contracts on that robot.
 """
 
@@ -29,10 +30,11 @@ if TYPE_CHECKING:
     from sim_twin.stack import LockstepStack
 
 MARKERS = (
-    "twin(robot, world, seed, profile): choose what `twin` and `twin_stack` start with",
+    "twin(robot, world, seed, profile): choose what `twin` and `twin_stack` start with; "
+    "speech=True lets `twin` hear and speak",
     "energises: switches motors of a real robot on; runs only with --energise",
 )
-_CHOICES = ("robot", "world", "seed", "profile")
+_CHOICES = ("robot", "world", "seed", "profile", "speech")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -134,7 +136,9 @@ def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
     """Give the real processes on the wall clock, armed."""
     from sim_twin.process_stack import ProcessStack
 
-    options = (f"--{name}={value}" for name, value in _chosen(request).items())
+    chosen = _chosen(request)
+    chosen.pop("speech", None)  # the processes always have it
+    options = (f"--{name}={value}" for name, value in chosen.items())
     # Sockets want a short path, which pytest's own folders are not.
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         stack = ProcessStack(Path(folder) / "base", *options)

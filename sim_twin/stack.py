@@ -11,12 +11,16 @@ from sim_twin.lidar_node import LidarNode
 from sim_twin.lockstep import Lockstep
 from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.talker import Talker, arrival
+from vla_deploy.aside import AtOnce
 from vla_deploy.control.node import ControlNode
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import Node
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.skills.node import ExecutorNode
+from vla_deploy.speech.devices import streamed_microphone, streamed_speaker
+from vla_deploy.speech.node import SpeechNode
+from vla_deploy.speech.voice.engines import build_voice
 
 READY_TIMEOUT_S = 10.0
 COMMAND_TIMEOUT_S = 300.0
@@ -119,7 +123,9 @@ class LockstepStack(LockstepControl):
         *,
         robot: str = "butler",
         world: str = "flat",
+        speech: bool = False,
     ) -> None:
+        """Start every node; with `speech` the robot hears and speaks too, which costs time."""
         super().__init__(tmp_path, seed, profile, robot=robot, world=world)
         self._utterances = self.space.ring_writer("utterance")
         self._events = self.space.ring_reader("task_event", from_start=True)
@@ -133,6 +139,19 @@ class LockstepStack(LockstepControl):
         self.executor: Node = ExecutorNode(context, self.robot, rate_hz)
         for node in (self.perception, self.planner, self.executor):
             self.lockstep.add(node)
+        if speech:
+            self.lockstep.add(self._speech())
+
+    def _speech(self) -> Node:
+        context, devices, robot = self.lockstep.context, self.lockstep.devices, self.robot
+        speaker = streamed_speaker(robot, devices, context.clock)
+        return SpeechNode(
+            context,
+            robot,
+            self._profile,
+            streamed_microphone(robot, devices, context.clock),
+            voice=build_voice(robot.voice, speaker, context.clock, AtOnce()),
+        )
 
     def give(self, **utterance: Any) -> str:
         """Give a command without waiting; return its id."""

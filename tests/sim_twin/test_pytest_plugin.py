@@ -74,7 +74,7 @@ def test_faults_reach_the_twin_that_the_test_uses(tmp_path: Path) -> None:
 def test_an_unknown_choice_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "test_mine.py").write_text(MISTAKEN)
     done = run_pytest(tmp_path)
-    assert "expected robot, world, seed, profile by name, got 'sed'" in done.stdout
+    assert "expected robot, world, seed, profile, speech by name, got 'sed'" in done.stdout
 
 
 @pytest.fixture

@@ -1,0 +1,31 @@
+"""The whole robot in lock-step with ears and a mouth."""
+
+import numpy as np
+import pytest
+
+from sim_twin.stack import LockstepStack
+
+
+@pytest.mark.twin(speech=True)
+def test_the_robot_speaks_in_its_room_and_does_not_heed_itself(twin: LockstepStack) -> None:
+    heard = twin.space.ring_reader("heard", from_start=True)
+    outcome = twin.say("say stop the music, please")
+    (action,) = outcome["actions"]
+    assert (action["status"], action["note"]) == ("succeeded", None)
+    said = twin.said()
+    assert len(said) / 16_000 == pytest.approx(action["execution_time_s"], abs=0.5)
+    assert np.abs(said).max() > 3_000
+    twin.lockstep.run_for(1.5)
+    assert heard.drain() == []
+    assert not twin.status()["estop_latched"]
+
+
+@pytest.mark.twin(speech=True)
+def test_somebody_who_speaks_is_heard_as_a_phrase(twin: LockstepStack) -> None:
+    heard = twin.space.ring_reader("heard", from_start=True)
+    spoken = twin.speak("go to the kitchen", snr_db=20.0)
+    twin.lockstep.run_for(4.0)
+    phrases = [event.payload for event in heard.drain()]
+    assert len(phrases) == 1
+    assert phrases[0]["began_ns"] == pytest.approx(spoken.begins_ns, abs=300_000_000)
+    assert phrases[0]["ended_ns"] == pytest.approx(spoken.ends_ns, abs=300_000_000)
