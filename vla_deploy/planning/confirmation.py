@@ -38,8 +38,26 @@ def confirmation_of(plan: Plan, request: Request) -> str:
     reasons = [reason for risk in (*_DOUBTS, *risks) if (reason := risk(plan, request))]
     if not reasons and wanted is not Confirm.ALWAYS:
         return ""
-    question = Says.CONFIRM.format(steps=steps_in_words(plan))
+    question = Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
     return " ".join([question, *(f"{reason}." for reason in reasons)])
+
+
+def _called_by_words(plan: Plan, request: Request) -> Plan:
+    """Return the plan with "red cup" where it says cup_1: a person knows no ids."""
+    things = () if request.scene is None else request.scene.things
+    words = {one.thing_id: str(one) for one in things}
+    actions = tuple(
+        action.model_copy(
+            update={
+                "parameters": {
+                    name: words.get(value, value) if isinstance(value, str) else value
+                    for name, value in action.parameters.items()
+                }
+            }
+        )
+        for action in plan.actions
+    )
+    return plan.model_copy(update={"actions": actions})
 
 
 def _is_unsure(plan: Plan, _: Request) -> str:

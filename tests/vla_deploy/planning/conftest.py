@@ -110,7 +110,12 @@ class Desk:
              "last_seen_ns": self.clock.now_ns()}
             for number, (colour, name) in enumerate(one.split() for one in names)
         ]  # fmt: skip
-        self._scene.put_document({"stamp_ns": self.clock.now_ns(), "objects": objects})
+        self.shows(*objects)
+
+    def shows(self, *objects: dict[str, Any], **rest: Any) -> None:
+        """Let perception tell of things as they are in its document."""
+        now_ns = self.clock.now_ns()
+        self._scene.put_document({"stamp_ns": now_ns, "objects": list(objects)} | rest)
 
     def give(self, **utterance: object) -> None:
         self._utterances.publish({"command_id": "c1", "source": "test"} | utterance)

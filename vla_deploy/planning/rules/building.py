@@ -12,8 +12,11 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding.expressions import read_expression
+from vla_deploy.planning.understanding.fitting import Use, fitting
 from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
+from vla_deploy.planning.understanding.places import is_like_place
 from vla_deploy.planning.understanding.quantities import quantity_of
+from vla_deploy.planning.understanding.referring import pose_parameters
 from vla_deploy.planning.understanding.setting import Setting
 
 Groups = Mapping[str, str]
@@ -60,8 +63,7 @@ def go_back(_: Groups, request: Request) -> list[Step]:
     before = [one.here for one in request.conversation.turns if one.here is not None]
     if not before:
         raise NotUnderstood(request.text)
-    x_m, y_m, yaw_rad = (round(value, 3) for value in before[-1])
-    return [("navigate_to", {"x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad})]
+    return [("navigate_to", pose_parameters(before[-1]))]
 
 
 def pick(groups: Groups, _: Request) -> list[Step]:
@@ -75,9 +77,19 @@ def put(groups: Groups, request: Request) -> list[Step]:
     moved, said, destination = split_put(
         f"{groups['object']} {groups['relation']} {groups['destination']}", request
     )
+    bare = match_place(destination, request.world.places)
+    if said in _TOWARDS and bare is not None and bare not in request.world.furniture:
+        return [*pick({**groups, "object": moved}, request), ("navigate_to", {"place": bare})]
     relation = "in" if said.removeprefix("back ") in _INTO else "on"
     where = {"destination": destination, "relation": relation, **_arm(groups)}
     return [("place", {"object": part, **where}) for part in parts_of(moved)]
+
+
+def put_there(groups: Groups, request: Request) -> list[Step]:
+    """Put each thing where was spoken of."""
+    del request
+    where = {"destination": "there", **_arm(groups)}
+    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
 
 
 def split_put(text: str, request: Request) -> tuple[str, str, str]:
@@ -95,15 +107,23 @@ def split_put(text: str, request: Request) -> tuple[str, str, str]:
         for way in ways
         if all(is_one(part, request) for part in parts_of(way[0])) and is_one(way[2], request)
     ]
-    return (known or ways[:1] or [(text, "on", "")])[-1]
+    seen = [way for way in known if all(_is_seen(part, request) for part in parts_of(way[0]))]
+    return (seen or known or ways[:1] or [(text, "on", "")])[-1]
+
+
+def _is_seen(text: str, request: Request) -> bool:
+    """Tell whether something in the scene fits what shall be put."""
+    setting = Setting(request)
+    read = read_expression(text, setting.furniture)
+    return bool(read.pronoun or fitting(read, Use.PUT, setting))
 
 
 def is_one(text: str, request: Request) -> bool:
     """Tell whether a text is the name of a place or refers to things that the robot can know."""
-    if match_place(text, request.world.places):
+    if is_like_place(_NEAR.sub("", text), request.world.places):
         return True
     try:
-        read_expression(text, Setting(request).furniture)
+        read_expression(_NEAR.sub("", text), Setting(request).furniture)
     except UnknownObject:
         return False
     return True
@@ -229,6 +249,7 @@ def _arm(groups: Groups) -> dict[str, Any]:
     return {"arm": groups["arm"]} if groups.get("arm") in ("left", "right") else {}
 
 
+_TOWARDS: Final = frozenset({"to", "over to", "back to", "at"})
 _INTO: Final = frozenset({"in", "into", "inside", "inside of"})
 _DIRECTIONS: Final = {
     "ahead": "ahead", "forward": "ahead", "forwards": "ahead", "straight": "ahead",

@@ -25,9 +25,10 @@ _POLITE: Final = re.compile(
     r"let's|lets|let us|go ahead and|first|would you mind|do me a favour and|do me a favor and|"
     r"be so kind and|so|well|um|uh|quickly|maybe|perhaps|"
     r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait)\b)|"
-    r"try to|try and|start to|next|finally)\b[, ]*"
+    r"see if you can|go (?:and )?(?=(?:stand|park)\b)|try to|try and|start to|next|finally)\b[, ]*"
     r"|[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
-    r"would you|could you|butler|robot|quickly|immediately|at once)$|[.!?, ]+$"
+    r"would you|could you|butler|robot|quickly|immediately|at once|again|too|also|as well|instead|"
+    r"somewhere|anywhere|once more|for us)$|[.!?, ]+$"
 )
 _SPLIT: Final = re.compile(
     r"\s*(?:[,;.]?\s*\b(?:and then|and after that|after that|afterwards|then|and)\b|[,;]|\.\s)\s*"

@@ -1,7 +1,7 @@
 """Draft a plan from the table of rules: clause by clause, in the speaker's own words."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -65,13 +65,13 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     """Build the longest clause that the parts begin with; return how many parts it took."""
     for count in range(len(parts), 1, -1):
         clause = " and ".join(parts[:count])
-        fit = _fit(clause)
+        fit = _fit(clause, draft.request)
         if fit is not None and _is_whole(fit, draft.request):
             _build(clause, fit, draft)
             return count
     clause = parts[0]
     refuse_unable(clause)
-    fit = _fit(clause)
+    fit = _fit(clause, draft.request)
     if fit is None and draft.thing:
         clause, fit = _with_verb(clause, draft)
     if fit is None:
@@ -84,7 +84,7 @@ def _with_verb(clause: str, draft: _Draft) -> tuple[str, _Fit | None]:
     """Let the clause before say what to do: "pick up the cup, then the ball"."""
     verb = draft.clause[: draft.clause.index(draft.thing)] if draft.thing in draft.clause else ""
     for whole in (f"{verb}{clause}", draft.clause.replace(draft.thing, clause, 1)):
-        fit = _fit(whole) if verb and clause.split()[:1] != ["to"] else None
+        fit = _fit(whole, draft.request) if verb and clause.split()[:1] != ["to"] else None
         if fit is not None and _is_known(fit, draft.request):
             return whole, fit
     return clause, None
@@ -96,18 +96,21 @@ def _is_known(fit: _Fit, request: Request) -> bool:
         moved, _, destination = split_put(
             " ".join(fit.groups[name] for name in ("object", "relation", "destination")), request
         )
-        return is_one(moved, request) and is_one(destination, request)
-    return all(
-        is_one(fit.groups[name], request) for name in ("object", "place") if name in fit.groups
-    )
+        return all(is_one(one, request) for one in (*parts_of(moved), destination))
+    named = (fit.groups[name] for name in ("object", "place") if name in fit.groups)
+    return all(is_one(part, request) for text in named for part in parts_of(text))
 
 
-def _fit(clause: str) -> _Fit | None:
-    """Return the first rule that fits; what is "for me" may as well not be said."""
-    return _fit_whole(clause) or _fit_whole(clause.removesuffix(" for me"))
+def _fit(clause: str, request: Request) -> _Fit | None:
+    """Return the first rule that fits and names only what is known, else the first that fits.
+
+    What is "for me" may as well not be said.
+    """
+    fits = [*_fits(clause), *_fits(clause.removesuffix(" for me"))]
+    return next((fit for fit in fits if _is_known(fit, request)), fits[0] if fits else None)
 
 
-def _fit_whole(clause: str) -> _Fit | None:
+def _fits(clause: str) -> Iterator[_Fit]:
     hand = _WITH_HAND.fullmatch(clause)
     own = clause if hand is None else hand["own"]
     for rule in RULES:
@@ -119,8 +122,7 @@ def _fit_whole(clause: str) -> _Fit | None:
             for name, value in found.groupdict().items()
             if value is not None
         }
-        return _Fit(rule, groups | ({"arm": hand["arm"]} if hand is not None else {}))
-    return None
+        yield _Fit(rule, groups | ({"arm": hand["arm"]} if hand is not None else {}))
 
 
 def _is_whole(fit: _Fit, request: Request) -> bool:

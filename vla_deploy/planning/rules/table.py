@@ -87,11 +87,15 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      building.put_down),
     (Intent.MANIPULATION, r"(?:let go(?: of)?|drop|release|let loose)(?: of)?(?: (?P<object>it|"
      r"that|this|them))?", building.put_down),
+    (Intent.MANIPULATION, rf"(?:tidy|clear|pack) {_OBJECT} (?:away|up) {_INTO} (?P<destination>.+)",
+     building.put),
     (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
      r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", building.put_away),
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|take|stow|store|"
-     rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} (?:down )?"
-     rf"{_INTO} (?P<destination>.+)", building.put),
+     rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
+     rf"(?:down |away )?{_INTO} (?P<destination>.+)", building.put),
+    (Intent.MANIPULATION, rf"(?:put|place|take|bring|carry|move) {_OBJECT} "
+     r"(?P<destination>(?:over |back )?there)", building.put_there),
     # --- straight and turning
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come) (?P<little>{_LITTLE} )?{_WAY}"
      rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", building.drive),
@@ -118,13 +122,15 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.NAVIGATION, rf"(?:go|come|return|drive|head|walk|navigate|move)(?: back)? {_PLACE}",
      building.go),
     (Intent.NAVIGATION, rf"(?:visit|approach|make your way to|find your way to|park at|dock at|"
-     rf"wait at|position yourself at|take yourself to) {_PLACE}", building.go),
+     rf"wait at|stand (?:by|at|before)|park (?:yourself )?(?:at|on|in|by)|"
+     rf"position yourself at) {_PLACE}", building.go),
     (Intent.NAVIGATION, r"(?:go )?(?:dock|charge|recharge)(?: yourself)?", building.dock),
     # --- search
     (Intent.SEARCH, rf"(?:search|check|look (?:in|on|around|through)|scan) {_PLACE} for {_OBJECT}",
      building.find),
-    (Intent.SEARCH, rf"(?:find|search for|locate|look for|seek|hunt for|try to find|track down|"
-     rf"spot|detect|show me|point out|go (?:and )?find|look around for) {_OBJECT}", building.find),
+    (Intent.SEARCH, rf"(?:find out|find me|find|search for|locate|look for|seek|hunt for|"
+     rf"track down|spot|detect|show me|point out|go (?:and )?find|(?:have a )?look around for|"
+     rf"check) {_OBJECT}(?: to me)?", building.find),
     (Intent.SEARCH, r"look around|have a look around|scan (?:the )?(?:room|area|surroundings)",
      building.look_around),
     (Intent.SEARCH, rf"(?:look around|scan|check(?: on)?) (?:in |at |on )?{_PLACE}",

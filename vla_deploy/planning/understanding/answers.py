@@ -66,6 +66,8 @@ _SILENT: Final = frozenset(
         "from", "yes", "no", "not", "rather",
     }
 )  # fmt: skip
+# Words of the questions themselves.
+_FILL: Final = frozenset({"the", "one", "on", "in", "a", "an"})
 _WORD: Final = re.compile(r"[a-z0-9_']+")
 
 
@@ -101,30 +103,24 @@ def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | No
         return (Verdict.YES if YES_WORDS.fullmatch(said) else Verdict.ANEW), None
     if ANY_WORDS.fullmatch(said):
         return Verdict.CHOSEN, question.candidates[0]
-    picked = _picked(question.candidates, said)
-    # "right" is the one on the right where there is one, and else a yes.
-    if picked[0] is Verdict.ANEW and YES_WORDS.fullmatch(said):
-        return _agreed(question.candidates)
-    return picked
-
-
-def _agreed(candidates: tuple[Candidate, ...]) -> tuple[Verdict, Candidate | None]:
-    """Take a yes for the only candidate; of several it picks none."""
-    if len(candidates) == 1:
-        return Verdict.CHOSEN, candidates[0]
-    return Verdict.UNCLEAR, None
+    agrees = YES_WORDS.fullmatch(said) is not None
+    if agrees and len(question.candidates) == 1:
+        return Verdict.CHOSEN, question.candidates[0]
+    verdict, chosen = _picked(question.candidates, said)
+    # "right" is the one on the right where there is one; of several a yes picks none.
+    return (Verdict.UNCLEAR if agrees and verdict is Verdict.ANEW else verdict), chosen
 
 
 def _picked(candidates: tuple[Candidate, ...], said: str) -> tuple[Verdict, Candidate | None]:
     by_name = [one for one in candidates if said == one.name]
     if len(by_name) == 1:
         return Verdict.CHOSEN, by_name[0]
-    words = [word for word in said.split() if word not in _SILENT]
+    known = frozenset[str]().union(*(one.features for one in candidates))
+    words = [word for word in said.split() if word not in _SILENT or word in known - _FILL]
     place = _place_of(said, words)
     if place is not None:
         in_row = place < len(candidates)
         return (Verdict.CHOSEN, candidates[place]) if in_row else (Verdict.UNCLEAR, None)
-    known = frozenset[str]().union(*(one.features for one in candidates))
     if not words:
         return Verdict.UNCLEAR, None
     if any(word not in known for word in words):

@@ -45,6 +45,7 @@ class Expression:
     pronoun: str = ""
     scope: Scope = Scope.ONE
     count: int = 0
+    hand: str = ""
     side: str = ""
     by_speaker: bool = False
     extreme: str = ""
@@ -70,6 +71,12 @@ _TO_WHOM: Final = re.compile(
 _FROM: Final = ((re.compile(r"\b(?:from|off(?: of)?) (?!me\b)"), "on "),
                 (re.compile(r"\bout of "), "in "))  # fmt: skip
 _MIDDLE_BEHIND: Final = re.compile(r"(?P<own>.+?) (?:in|at) the (?P<side>middle|centre|center)")
+_IN_HAND: Final = re.compile(
+    r"(?:what|whatever|the thing|the one|the object|everything)(?: that)?"
+    r"(?: you (?:are holding|hold|have|have got|carry|are carrying)"
+    r"|(?: is|s| you have)? in (?:your|the) (?:(?P<hand>left|right) )?hands?)"
+)
+_WHERE_IT_IS: Final = re.compile(r"^where (.+) (?:is|are|stands?|lies?)$")
 _EVERYTHING: Final = re.compile(r"^(?:everything|anything)(?: else)?\b")
 _QUANTITY: Final[tuple[tuple[re.Pattern[str], Scope], ...]] = tuple(
     (re.compile(pattern), scope)
@@ -97,6 +104,10 @@ def read_expression(text: str, furniture: Mapping[str, str] | None = None) -> Ex
     pronoun = phrases.PRONOUNS.get(said) or phrases.PRONOUNS.get(key, "")
     if pronoun:
         return Expression(said=key, query=Query(), pronoun=pronoun)
+    in_hand = _IN_HAND.fullmatch(said)
+    if in_hand:
+        return Expression(said=key, query=Query(), pronoun=phrases.HELD, hand=in_hand["hand"] or "")
+    said = _WHERE_IT_IS.sub(r"\1", said)
     rest, scope, count = _quantity(said)
     rest, side, my_side = _side_behind(rest)
     words = _compounds(rest).split()

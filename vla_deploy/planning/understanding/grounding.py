@@ -4,7 +4,7 @@ One function for every planner: rules, the command parser, models behind servers
 JSON. Each may say "pick up it" and leave the way there out; what they say too much is left out.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from vla_deploy.planning.asking import Request
@@ -104,9 +104,31 @@ class _Grounder:
             step = _made(action, skill, parameters)
             if own:
                 step = action.model_copy(update={"parameters": dict(parameters)})
-            step = self._as_sure(step)
+            step = self._with_hand(self._as_sure(step))
             needed = self._append(step, self._prepared(step, needed), inserted=not own)
         self._last[action.id] = needed
+
+    def _with_hand(self, step: Action) -> Action:
+        """Name the hands when a second thing is taken: who puts down must know which is where."""
+        held = self._state.held
+        if step.skill != "pick_up" or len(held) != 1 or len(self._state.hands) < 2:
+            return step
+        arm = held[0].hand
+        if not arm:
+            arm = next(one for one in self._state.hands if one != step.parameters.get("arm"))
+            self._name_hand(arm)
+        other = next(one for one in self._state.hands if one != arm)
+        arm = step.parameters.get("arm", other)
+        return step.model_copy(update={"parameters": {**step.parameters, "arm": arm}})
+
+    def _name_hand(self, arm: str) -> None:
+        """Let the latest thing taken be in that hand."""
+        at = max(n for n, one in enumerate(self.done) if one.skill == "pick_up")
+        taken = self.done[at]
+        parameters = {**taken.parameters, "arm": arm}
+        self.done[at] = taken.model_copy(update={"parameters": parameters})
+        held = tuple(replace(one, hand=arm) for one in self._state.held)
+        self._state = replace(self._state, held=held)
 
     def _as_sure(self, step: Action) -> Action:
         """Let a step be as feasible as its words, read since the step before, are sure."""

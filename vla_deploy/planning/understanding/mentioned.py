@@ -5,10 +5,13 @@ from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.planning.references import words_of
+from vla_deploy.planning.symbolic.subjects import Subject, subject_of
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.world import Snapshot
+from vla_deploy.world.vocabulary import ANY_CLASS, COLOURS, OBJECT_CLASSES, SYNONYMS
 
+MOST_LETTERS: Final = 400
 _ROLES: Final = {"object": Role.OBJECT, "destination": Role.DESTINATION, "place": Role.PLACE}
 
 
@@ -18,7 +21,18 @@ def mentions_of(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
     for action in plan.actions:
         for mention in _mentions(action, plan, scene):
             found.setdefault((mention.means, mention.thing_id), mention)
-    return tuple(found.values())
+    return tuple(found.values()) or tuple(_spoken(plan.goal, scene))
+
+
+def _spoken(goal: str, scene: Snapshot | None) -> Iterator[Mention]:
+    """Yield the things that a command names whose plan only answers it: "where is my phone?"."""
+    colour = ""
+    for word in words_of(goal[:MOST_LETTERS]):
+        name = SYNONYMS.get(word, word)
+        if name in OBJECT_CLASSES and name != ANY_CLASS:
+            subject = subject_of(f"{colour} {name}", scene)
+            yield _mention(word, subject, Role.OBJECT)
+        colour = name if name in COLOURS else ""
 
 
 def _mentions(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Mention]:
@@ -32,15 +46,19 @@ def _mentions(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Me
         except UnknownObject:
             yield Mention(said=value, means=value, role=Role.PLACE)
             continue
-        thing = subject.thing
-        yield Mention(
-            said=value,
-            means=subject.words if thing is None else str(thing),
-            role=role,
-            thing_id="" if thing is None else thing.thing_id,
-            kind=subject.kind,
-            colour="" if thing is None else thing.colour,
-        )
+        yield _mention(value, subject, role)
+
+
+def _mention(said: str, subject: Subject, role: Role) -> Mention:
+    thing = subject.thing
+    return Mention(
+        said=said,
+        means=subject.words if thing is None else str(thing),
+        role=role,
+        thing_id="" if thing is None else thing.thing_id,
+        kind=subject.kind,
+        colour="" if thing is None else thing.colour,
+    )
 
 
 def _role(value: str, role: Role, plan: Plan) -> Role:

@@ -22,6 +22,7 @@ IT: Final = "it"
 THEM: Final = "them"
 THERE: Final = "there"
 HERE: Final = "here"
+HELD: Final = "held"
 SIDES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "left": "left", "leftmost": "left", "left-most": "left", "lefthand": "left",

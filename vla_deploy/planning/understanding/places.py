@@ -11,7 +11,7 @@ from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.names import Match, closest
-from vla_deploy.planning.understanding.questions import did_you_mean, which_place
+from vla_deploy.planning.understanding.questions import did_you_mean, where, which_place
 from vla_deploy.planning.understanding.resolver import MISSPELT, Resolver
 
 # That near to where one stands for a place, one is there.
@@ -39,16 +39,19 @@ def resolve_place(text: str, resolver: Resolver) -> str:
     return _by_part(text, key, resolver)
 
 
-def is_like_place(text: str, resolver: Resolver) -> bool:
+def is_like_place(text: str, places: Mapping[str, str]) -> bool:
     """Tell whether a text is the name of a place, a part of one, or like one."""
-    places = resolver.setting.request.world.places
     key = _key(text)
-    spoken = phrases.PRONOUNS.get(key) == phrases.THERE
+    spoken = phrases.PRONOUNS.get(key) in (phrases.THERE, phrases.HERE)
     return bool(key) and (spoken or bool(_named(key, places)) or closest(key, places) is not None)
 
 
 def _key(text: str) -> str:
-    return " ".join(words_of(text.replace("_", " ")[:MOST_LETTERS]))
+    words = words_of(text.replace("_", " ")[:MOST_LETTERS])
+    # "The table here" is a table.
+    while len(words) > 1 and words[-1] in ("here", "there", "over"):
+        words = words[:-1]
+    return " ".join(words)
 
 
 def _named(key: str, places: Mapping[str, str]) -> tuple[str, ...]:
@@ -61,7 +64,7 @@ def _there(text: str, resolver: Resolver) -> str:
     for one in resolver.setting.spoken_of():
         if one.role is Role.PLACE:
             return _noted(resolver, text, one.means, "spoken of last")
-    raise UnknownPlace(text, resolver.setting.request.world.places.values())
+    raise where(tuple(sorted(set(resolver.setting.request.world.places.values()))), _key(text))
 
 
 def _by_part(text: str, key: str, resolver: Resolver) -> str:

@@ -27,6 +27,13 @@ def which_thing(things: Sequence[Thing], view: Viewpoint | None, expression: str
         Candidate(name=thing.thing_id, words=said, features=_features(thing, said, asked, view))
         for thing, said in zip(asked, words, strict=True)
     ]
+    # What the question has no room for may be the answer all the same.
+    candidates += [
+        Candidate(
+            name=thing.thing_id, words=f"the {thing}", features=_features(thing, "", [], None)
+        )
+        for thing in things[MOST_CHOICES:]
+    ]
     kinds = {thing.kind for thing in asked}
     noun = next(iter(kinds)) if len(kinds) == 1 else "one"
     return Ambiguous(f"Which {noun}, {_either(words)}?", candidates, expression)
@@ -34,12 +41,23 @@ def which_thing(things: Sequence[Thing], view: Viewpoint | None, expression: str
 
 def which_place(places: Sequence[str], expression: str) -> Ambiguous:
     """Return the question which of these places was meant."""
-    words = [f"the {name.replace('_', ' ')}" for name in places]
-    candidates = [
-        Candidate(name=name, words=said, features=frozenset(name.split("_")))
-        for name, said in zip(places, words, strict=True)
+    candidates = _places(places)
+    words = [one.words for one in candidates[:MOST_CHOICES]]
+    return Ambiguous(f"Which one, {_either(words)}?", candidates, expression)
+
+
+def where(places: Sequence[str], expression: str) -> Ambiguous:
+    """Return the question where "there" is when nobody has spoken of a place."""
+    return Ambiguous("Where do you mean?", _places(places), expression)
+
+
+def _places(names: Sequence[str]) -> list[Candidate]:
+    return [
+        Candidate(
+            name=name, words=f"the {name.replace('_', ' ')}", features=frozenset(name.split("_"))
+        )
+        for name in names
     ]
-    return Ambiguous(f"Which one, {_either(words[:MOST_CHOICES])}?", candidates, expression)
 
 
 def did_you_mean(match: Match, expression: str) -> Ambiguous:

@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
-from vla_deploy.planning.errors import UnknownObject, UnknownPlace
+from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.symbolic.conditions import PUT_INTO
-from vla_deploy.planning.symbolic.state import Held, State
+from vla_deploy.planning.symbolic.state import Held, Pose, State
 from vla_deploy.planning.symbolic.subjects import subject_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Role
@@ -66,9 +66,17 @@ def _here(text: str, resolver: Resolver) -> Parameters:
     here = resolver.setting.request.here
     if here is None:
         raise UnknownPlace(text, set(resolver.setting.request.world.places.values()))
-    x_m, y_m, yaw_rad = (round(value, 3) for value in here)
-    resolver.note(text, Role.PLACE, f"{x_m}, {y_m}", "where the command was given")
-    return {"x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad}
+    pose = pose_parameters(here)
+    resolver.note(text, Role.PLACE, f"{here[0]:.2f}, {here[1]:.2f}", "where the command was given")
+    return pose
+
+
+def pose_parameters(pose: Pose) -> dict[str, float]:
+    """Return a pose as parameters of a drive, to the millimetre and the milliradian."""
+    x_m, y_m, yaw_rad = pose
+    # Rounding must not make half a turn more than that.
+    yaw_rad = min(max(round(math.remainder(yaw_rad, math.tau), 3), -3.141), 3.141)
+    return {"x_m": round(x_m, 3), "y_m": round(y_m, 3), "yaw_rad": yaw_rad}
 
 
 def _thing_unless_place(text: str, resolver: Resolver, use: Use) -> Referent | None:
@@ -83,7 +91,7 @@ def _thing_unless_place(text: str, resolver: Resolver, use: Use) -> Referent | N
     try:
         return resolver.thing(text, use)
     except UnknownObject:
-        if use is Use.ONTO and not is_like_place(text, resolver):
+        if use is Use.ONTO and not is_like_place(text, resolver.setting.request.world.places):
             raise
         return None
 
@@ -118,6 +126,8 @@ def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[S
     if isinstance(given.get("object"), str):
         things = resolver.things(given["object"], Use.PUT)
     destination = _destination(given, resolver, state)
+    if given.get("destination") is None:
+        things = _to_put_down(things, state(), resolver)
     for thing in things:
         if thing is not None and _held(thing, state(), resolver) is None:
             yield from _on_furniture(thing)
@@ -129,6 +139,24 @@ def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[S
         yield "place", {**put, **destination, **hand}
 
 
+def _to_put_down(
+    things: tuple[Referent | None, ...], state: State, resolver: Resolver
+) -> tuple[Referent | None, ...]:
+    """Return what of things is in a hand; nothing where the plan has put them down already.
+
+    Raises:
+        PlanInvalid: none of them is, and the plan has not had it.
+    """
+    in_hand = {_held(one, state, resolver) if one else None: one for one in things}
+    held = tuple(one for where, one in in_hand.items() if one is None or where is not None)
+    if things == (None,) and state.hands and not state.held and state.rests:
+        return ()
+    keys = [subject_of(one.name, resolver.setting.request.scene).key for one in things if one]
+    if not held and not any(key in state.rests for key in keys):
+        raise PlanInvalid([f"no hand holds the {things[0].words}" if things[0] else "nothing"])
+    return held
+
+
 def _check_readable(text: Any, resolver: Resolver) -> None:
     """Refuse an unknown destination before asking which thing shall go there.
 
@@ -137,7 +165,7 @@ def _check_readable(text: Any, resolver: Resolver) -> None:
     """
     if not isinstance(text, str) or phrases.PRONOUNS.get(_spoken(text)):
         return
-    if not is_like_place(text, resolver):
+    if not is_like_place(text, resolver.setting.request.world.places):
         read_expression(text, resolver.setting.furniture)
 
 

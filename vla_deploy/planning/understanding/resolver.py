@@ -176,6 +176,8 @@ class Resolver:
             several = [one for one in self.setting.latest_group() if _can_move(one, use)]
             if several:
                 return tuple(self._again(read, one, use, "you spoke of them") for one in several)
+        if read.pronoun == phrases.HELD:
+            return self._in_hand(read, use)
         held = self.setting.held()
         if use is Use.PUT and held is not None:
             return (self._again(read, held, use, "it is in my hand"),)
@@ -185,6 +187,13 @@ class Resolver:
         if held is not None and use is not Use.ONTO:
             return (self._again(read, held, use, "it is in my hand"),)
         return (self._only_thing(read, use),)
+
+    def _in_hand(self, read: Expression, use: Use) -> tuple[Referent, ...]:
+        """Return what the hands hold, or the hand that is named."""
+        holding = [one for hand, one in self.setting.holding() if read.hand in ("", hand)]
+        if not holding:
+            raise UnknownObject(read.said, OBJECT_CLASSES)
+        return tuple(self._again(read, one, use, "it is in my hand") for one in holding)
 
     def _can_be(self, one: Mention, use: Use) -> bool:
         """Tell whether what was mentioned can be meant: nothing is put upon itself."""

@@ -63,16 +63,17 @@ class Setting:
 
     def held(self) -> Mention | None:
         """Return what a hand holds, None where that is nothing or more than one thing."""
-        found = list(self._held())
-        return found[0] if len(found) == 1 else None
+        found = list(self.holding())
+        return found[0][1] if len(found) == 1 else None
 
-    def _held(self) -> Iterator[Mention]:
+    def holding(self) -> Iterator[tuple[str, Mention]]:
+        """Yield each hand that holds something, with what it holds."""
         seen = [one for one in self.scene.things if one.held_by]
         for thing in seen:
-            yield mention_of(thing)
+            yield thing.held_by, mention_of(thing)
         for hand, kind in self.request.world.holding.items():
             if kind and not any(one.held_by == hand for one in seen):
-                yield Mention(said=kind, means=kind, kind=kind)
+                yield hand, Mention(said=kind, means=kind, kind=kind)
 
 
 def mention_of(thing: Thing) -> Mention:

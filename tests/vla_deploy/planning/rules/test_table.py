@@ -32,6 +32,8 @@ COMMANDS = {
         "could you please go to the kitchen?": "navigate_to kitchen",
         "I'd like you to drive over to the bedroom": "navigate_to bedroom",
         "head for the kitchen": "navigate_to kitchen",
+        "go to where the red cup is": "navigate_to red cup",
+        "go and stand by the side table": "navigate_to side_table",
         "move over to the side table": "navigate_to side_table",
         "go back to your charging station": "navigate_to charging_station",
         "charge yourself": "navigate_to charging_station",
@@ -61,8 +63,8 @@ COMMANDS = {
         "pick up the leftmost cup": "pick_up cup_2",
         "pick up the cup closest to you": "pick_up cup_2",
         "pick up the red cup with your left hand": "pick_up red cup left",
-        "pick up the red cup and the ball": "pick_up red cup; pick_up ball",
-        "pick up the red cup, then the ball": "pick_up red cup; pick_up ball",
+        "pick up the red cup and the ball": "pick_up red cup left; pick_up ball right",
+        "pick up the red cup, then the ball": "pick_up red cup left; pick_up ball right",
     },
     "bringing": {
         "get me the ball": f"pick_up ball; {BACK}; speak Here is the ball.",
@@ -78,6 +80,14 @@ COMMANDS = {
         "put everything on the coffee table into the box": f"{BOX}; {BOX}; {BOX}; {BOX}",
         "take the ball to the bedroom": "place bedside_table on",
         "put away the ball": BOX,
+        "tidy the ball away into the box": BOX,
+        "put the red cup on the coffee table in the box": BOX,
+        "deliver the ball to the front door": "pick_up ball; navigate_to entrance",
+        "take the ball to the kitchen table, put it down, then go home":
+            "place kitchen_table on; navigate_to charging_station",
+        "take the red cup and the ball and put both on the side table":
+            "pick_up red cup left; pick_up ball right; place side_table on left; "
+            "place side_table on",
         "stack the book on the box": "place box on",
         "pick up the red cup, go to the kitchen, and put it on the table":
             "pick_up red cup; navigate_to kitchen; place kitchen_table on",
@@ -88,6 +98,8 @@ COMMANDS = {
         "search the bedroom for my phone": "navigate_to bedroom; find_object phone",
         "look for the bottle in the kitchen": "find_object bottle",
         "help me find my keys": "find_object keys",
+        "find out where my keys are": "find_object keys",
+        "have a look around for the bottle": "find_object bottle",
         "look around": "look_at left; look_at ahead; look_at right; look_at down",
     },
     "asking": {
@@ -110,6 +122,7 @@ COMMANDS = {
     "the rest": {
         "open your left hand": "open_gripper left",
         "tuck in your arms": "move_arm tuck",
+        "move your arms to the rest position": "move_arm rest",
         "tell Anna that dinner is ready": "speak dinner is ready",
         "hold on a second": "wait 1.0",
         "hold this": "open_gripper; speak Put it between my fingers.; wait 4.0; close_gripper",
@@ -146,6 +159,7 @@ def test_a_command_does_what_it_says(does: Does, text: str, expected: str) -> No
         ("put the ball in the red cup", PlanInvalid),
         ("put it down", PlanInvalid),
         ("go back", NotUnderstood),
+        ("go there", Ambiguous),
         ("repeat forever turn left", NotUnderstood),
     ],
 )
@@ -160,6 +174,10 @@ def test_what_is_held_is_put_down_and_never_dropped(does: Does) -> None:
     holding = {"left": "cup"}
     assert does("put it down", holding=holding) == "place coffee_table on"
     assert does("let go of it", holding=holding) == "place coffee_table on"
+    assert does("put what you are holding into the box", holding=holding) == BOX
+    assert does("put everything down", holding=holding) == "place coffee_table on"
+    with pytest.raises(PlanInvalid, match="no hand holds the green ball"):
+        does("put the ball down", holding=holding)
     assert does("what do you have in your hands", holding=holding) == (
         "speak I hold a cup in my left hand."
     )
@@ -170,6 +188,10 @@ def test_what_is_held_is_put_down_and_never_dropped(does: Does) -> None:
 def test_go_back_leads_to_where_the_robot_was_before(does: Does) -> None:
     talk = Conversation().after(Turn(said="go to the kitchen", here=(1.0, 2.0, 0.0)))
     assert does("go back", conversation=talk) == "navigate_to 1.0 2.0 0.0"
+
+
+def test_half_a_turn_is_no_more_than_half_a_turn_when_rounded(does: Does) -> None:
+    assert "3.141" in does("bring me the ball", here=(2.2, 2.05, 3.14159))
 
 
 def test_an_area_is_driven_over_in_rows(flat: "Flat") -> None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from drivers.clock import NS_PER_S
@@ -57,6 +59,13 @@ def test_an_answer_to_which_one(said: str, verdict: Verdict, chosen: Candidate |
 )
 def test_an_answer_to_yes_or_no(said: str, verdict: Verdict) -> None:
     assert reply(Conversation(question=SURE), said, now_ns=NS_PER_S).verdict is verdict
+
+
+@pytest.mark.parametrize("said", ["yes", "right", "Yes, please.", "the red one"])
+def test_a_yes_picks_the_only_candidate(said: str) -> None:
+    question = replace(WHICH, candidates=(RED,))
+    got = reply(Conversation(question=question), said, now_ns=NS_PER_S)
+    assert (got.verdict, got.chosen) == (Verdict.CHOSEN, RED)
 
 
 def test_a_choice_goes_on_with_the_waiting_command_and_all_that_was_chosen() -> None:

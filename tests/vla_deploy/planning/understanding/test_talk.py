@@ -1,0 +1,83 @@
+"""Talk with the planner over several turns, by its own topics."""
+
+import pytest
+
+RED = {
+    "id": "cup_1",
+    "class": "cup",
+    "colour": "red",
+    "position_m": [2.0, 1.5, 0.5],
+    "size_m": [0.066, 0.066, 0.095],
+    "rests": {"relation": "on", "of": "coffee_table"},
+}
+BLUE = RED | {"id": "cup_2", "colour": "blue", "position_m": [2.4, 1.5, 0.5]}
+BALL = RED | {"id": "ball_1", "class": "ball", "colour": "green", "position_m": [2.2, 1.5, 0.475],
+              "size_m": [0.05, 0.05, 0.05]}  # fmt: skip
+
+
+# Before the coffee table, looking at it: the blue cup is on the left.
+ROBOT = {"x_m": 2.15, "y_m": 2.05, "yaw_rad": -1.5708}
+
+
+@pytest.fixture
+def talk(open_desk):
+    """Give one command after the other in a scene; return what the planner made of the last."""
+    desk = open_desk()
+    told = iter(range(100))
+
+    def talk(text: str) -> str:
+        desk.clock.pass_s(1.0)
+        desk.control("armed")
+        seen = [one | {"last_seen_ns": desk.clock.now_ns()} for one in (RED, BLUE, BALL)]
+        desk.shows(*seen, robot=ROBOT)
+        desk.give(text=text, command_id=f"c{next(told)}")
+        answers = desk.answers()
+        plans = desk.plans()
+        if plans:
+            return in_short(plans[-1]["plan"])
+        last = answers[-1]
+        return f"{last['event']}: {last.get('question') or last.get('reason')}"
+
+    return talk
+
+
+def in_short(plan: dict) -> str:
+    """Return the last step of a plan and its parameters."""
+    last = plan["actions"][-1]
+    return " ".join([last["skill"], *(str(value) for value in last["parameters"].values())])
+
+
+def test_a_question_is_answered_and_the_command_goes_on(talk) -> None:
+    assert talk("pick up the cup") == "asked: Which cup, the red one or the blue one?"
+    assert talk("the blue one") == "pick_up cup_2"
+
+
+def test_never_mind_drops_the_command_that_waits(talk) -> None:
+    talk("pick up the cup")
+    assert talk("never mind").startswith("rejected: ")
+
+
+def test_it_and_the_other_one_are_what_was_spoken_of_before(talk) -> None:
+    assert talk("look at the left cup") == "look_at cup_2"
+    assert talk("pick it up") == "pick_up cup_2"
+    assert talk("look at the other one") == "look_at cup_1"
+
+
+def test_a_question_about_a_thing_mentions_it(talk) -> None:
+    assert talk("where is the ball?") == "speak The green ball is on the coffee table, in view."
+    assert talk("pick it up") == "pick_up ball_1"
+
+
+def test_what_is_not_sure_waits_for_a_yes(talk) -> None:
+    question = "Shall I pick up the red cup? I am not sure that I understood you."
+    assert talk("pick up the cup on my left") == f"asked: {question}"
+    assert talk("yes please") == "pick_up cup_1"
+
+
+def test_the_map_is_asked_before_a_straight_way(talk) -> None:
+    assert "the map shows 1.1 m of room" in talk("drive backwards 1.5 m")
+
+
+def test_a_misheard_name_is_asked(talk) -> None:
+    assert talk("pick up the red cap") == "asked: Did you mean the cup?"
+    assert talk("yes") == "pick_up red cup"
