@@ -1,4 +1,4 @@
-"""Hold the sound drivers to every fault of microphone and speaker: no process opens them yet."""
+"""Hold the sound drivers to every fault of microphone and speaker."""
 
 from collections.abc import Iterator
 from pathlib import Path
