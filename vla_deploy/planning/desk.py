@@ -168,6 +168,7 @@ class Desk:
                 self._situation.check_ready()
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["nobody was asked for a plan"])
+            self._telling.check_length(answer.plan)
             question = _read_back(answer) or confirmation_of(answer.plan, request)
             if question:
                 raise Ambiguous(question)

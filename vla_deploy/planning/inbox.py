@@ -10,6 +10,7 @@ from vla_deploy.planning.rules import is_stop
 
 VOICE: Final = "voice"
 MOST_CHARACTERS: Final = 1000
+_ID_CHARACTERS: Final = 128
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,8 +41,8 @@ def asks_to_stop(event: Event) -> bool:
 
 
 def command_id_of(event: Event) -> str:
-    """Return the id that answers to an utterance carry."""
-    return str(event.payload.get("command_id", ""))
+    """Return the id that answers to an utterance carry; one that is too long is cut."""
+    return str(event.payload.get("command_id", ""))[:_ID_CHARACTERS]
 
 
 def read_command(event: Event) -> Command:

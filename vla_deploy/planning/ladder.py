@@ -19,7 +19,7 @@ from vla_deploy.planning.errors import (
 )
 from vla_deploy.planning.plan import Plan
 
-_REASON_CHARACTERS: Final = 240
+_REASON_CHARACTERS: Final = 200
 
 
 class Check(Protocol):

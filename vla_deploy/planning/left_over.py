@@ -23,7 +23,7 @@ def left_over(
     utterances: Sequence[Event], events: Sequence[Event], plans: Sequence[Event]
 ) -> LeftOver:
     """Return what the topics tell of the time before; nothing in a run that has just begun."""
-    last = {command_id_of(event): str(event.payload["event"]) for event in events}
+    last = {command_id_of(event): str(event.payload.get("event", "")) for event in events}
     answered = last.keys() | {command_id_of(event) for event in plans}
     return LeftOver(
         unheard=tuple(one for one in utterances if command_id_of(one) not in answered),

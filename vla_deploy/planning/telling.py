@@ -1,6 +1,5 @@
 """Tell what becomes of commands: to whoever follows them, to the executor, and aloud."""
 
-import json
 from collections import OrderedDict
 from typing import Any, Final
 
@@ -15,8 +14,8 @@ from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import Question
 
 # What a slot of the topic holds, less what is told beside the plan.
-MOST_PLAN_CHARACTERS: Final = 12_000
-_MOST_REASON_CHARACTERS: Final = 2_000
+MOST_PLAN_BYTES: Final = 12_000
+_MOST_REASON_CHARACTERS: Final = 1_500  # of up to four bytes each
 _MOST_SPOKEN: Final = 16
 
 
@@ -63,7 +62,7 @@ class Telling:
         self._tell(
             command,
             "asked",
-            question=question.text,
+            question=_bounded(question.text),
             choices=[one.words for one in question.candidates],
             answer_within_s=question.limit_s,
             plan=None if plan is None else plan.model_dump(mode="json"),
@@ -78,18 +77,19 @@ class Telling:
         """Tell why nothing is done, and what every rung said."""
         self._tell(command, "rejected", reason=_bounded(reason), **_attempts(answer))
 
-    def handed_on(self, command: Command, plan: Plan, answer: Answer) -> None:
-        """Give a plan to the executor, and tell who made it.
+    def check_length(self, plan: Plan) -> None:
+        """Accept a plan that can be told whole.
 
         Raises:
-            PlanInvalid: it is too long to be told.
+            PlanInvalid: it is too long.
         """
+        length = len(plan.model_dump_json().encode())
+        if length > MOST_PLAN_BYTES:
+            raise PlanInvalid([f"expected at most {MOST_PLAN_BYTES} bytes of JSON, got {length}"])
+
+    def handed_on(self, command: Command, plan: Plan, answer: Answer) -> None:
+        """Give a plan to the executor, and tell who made it."""
         document = plan.model_dump(mode="json")
-        length = len(json.dumps(document))
-        if length > MOST_PLAN_CHARACTERS:
-            raise PlanInvalid(
-                [f"expected at most {MOST_PLAN_CHARACTERS} characters of JSON, got {length}"]
-            )
         told = {"command_id": command.command_id, "event": "plan", "plan": document}
         self._tell(command, "accepted")
         self._events.publish(told | _maker(answer) | _attempts(answer))

@@ -79,11 +79,37 @@ def test_an_utterance_that_is_no_command_is_refused_with_what_was_expected(desk,
     assert answer["reason"].startswith("expected a command")
 
 
-def test_a_plan_too_long_to_be_told_is_refused(desk):
-    says = [{"skill": "speak", "parameters": {"text": "x" * 500}} for _ in range(60)]
-    desk.give(plan={"goal": "talk", "actions": says})
+GO_ALL_OVER = [{"skill": "navigate_to", "parameters": {"place": "kitchen"}}]
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        {"actions": [{"skill": "speak", "parameters": {"text": "x" * 500}}] * 60},
+        {"actions": [{"skill": "speak", "parameters": {"text": "\U0001f600" * 499}}] * 9},
+        {"actions": GO_ALL_OVER, "safety_concerns": ["\U0001f600" * 10_000]},
+        {"actions": GO_ALL_OVER, "goal": "g" * 60_000},
+    ],
+)
+def test_a_plan_too_long_to_be_told_is_refused(desk, plan):
+    desk.give(plan={"goal": "talk"} | plan)
     assert [(one["event"]) for one in desk.answers()] == ["rejected"]
     assert desk.plans() == []
+
+
+@pytest.mark.parametrize("text", ["\\ud800", "\\u0000\\u001b[2J", "\U0001f600" * 2_000])
+def test_no_text_of_a_plan_can_end_the_planner(desk, text):
+    go = '{"skill": "navigate_to", "parameters": {"place": "kitchen"}}'
+    desk.give(plan=f'{{"goal": "{text}", "safety_concerns": ["{text}"], "actions": [{go}]}}')
+    assert desk.answers()[-1]["event"] in ("asked", "rejected")
+    desk.give(command_id="c2", text="go to the kitchen")
+    assert desk.answers()[-1]["event"] == "plan"
+
+
+def test_an_id_without_end_is_cut(desk):
+    desk.give(command_id="x" * 60_000, text="sing a sea shanty")
+    (refused,) = desk.answers()
+    assert refused["command_id"] == "x" * 128
 
 
 def test_a_plan_with_very_many_faults_is_refused_in_a_bounded_answer(desk):
