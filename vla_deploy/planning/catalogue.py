@@ -56,6 +56,14 @@ class SkillSpec:
 _ARM = Parameter(type=Type.CHOICE, required=False, choices=ARMS)
 _OBJECT = Parameter(type=Type.OBJECT)
 
+# What older tools call for and this robot has nothing for.
+NOT_SKILLS: MappingProxyType[str, str] = MappingProxyType(
+    dict.fromkeys(
+        ("turn_on", "turn_off", "switch_on", "switch_off", "activate", "deactivate"),
+        "this robot declares no device that it could switch",
+    )
+)
+
 SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
     {
         "navigate_to": SkillSpec(

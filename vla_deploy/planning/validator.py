@@ -3,7 +3,14 @@
 import math
 from typing import Any
 
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, SKILLS, Parameter, SkillSpec, Type
+from vla_deploy.planning.catalogue import (
+    GRASPABLE_CLASSES,
+    NOT_SKILLS,
+    SKILLS,
+    Parameter,
+    SkillSpec,
+    Type,
+)
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
 from vla_deploy.planning.graph import dependency_faults
 from vla_deploy.planning.knowledge import World, spoken_places
@@ -59,6 +66,8 @@ def action_faults(action: Action, world: World) -> list[str]:
     """Return what is wrong with one action by itself: skill, parameters, types, ranges, names."""
     spec = SKILLS.get(action.skill)
     if spec is None:
+        if action.skill in NOT_SKILLS:
+            return [f"{action.skill}: {NOT_SKILLS[action.skill]}"]
         return [f'unknown skill "{action.skill}"; known: {", ".join(SKILLS)}']
     taken = ", ".join(spec.parameters) or "none"
     faults = [

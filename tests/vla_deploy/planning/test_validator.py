@@ -23,6 +23,7 @@ def faults(*actions: Action) -> list[str]:
     ("bad", "said"),
     [
         (action("fly"), 'unknown skill "fly"'),
+        (action("turn_on"), "turn_on: this robot declares no device"),
         (action("pick_up"), 'needs "object"'),
         (action("pick_up", object="red cup", speed=3), 'no parameter "speed"'),
         (action("pick_up", object="dinosaur"), 'do not know the object "dinosaur"'),
