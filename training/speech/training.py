@@ -3,8 +3,10 @@
 What was learnt before the fall is kept, so that a longer training goes on from there.
 """
 
+import copy
 import json
 import logging
+import signal
 import time
 from pathlib import Path
 from typing import Any, Final
@@ -27,6 +29,8 @@ WEIGHTS: Final = "weights.pt"
 RATE_MATRICES: Final = 0.02
 RATE_OTHERS: Final = 2.5e-3
 WARM_STEPS: Final = 200
+AVERAGE_DECAY: Final = 0.99
+"""Of the averaged weights: what is written as a model at any time, while the rate is still high."""
 FALL_FROM: Final = 0.55
 """Share of the time after which the rate of learning falls."""
 SHORT_UNTIL: Final = 0.1
@@ -54,11 +58,15 @@ def train(out: Path, size: Size, budget_s: float) -> None:
     talk = [clips.clips[int(n)].samples for n in random.integers(len(clips.clips), size=_TALKERS)]
     maker = Maker(coder, Spoiler(talk, random))
     run = _Run(out, size, coder.count, budget_s)
+    stopping = _Stopping()
     while run.progress() < 1.0:
         clips.refresh()
         early = run.progress() < SHORT_UNTIL
         for group in clips.groups(size.batch_s, random, 0.5 if early else 1.0):
             run.step(maker.make(group, random))
+            if stopping.told:
+                run.save(STATE)
+                return
             if run.progress() >= 1.0 or (early and run.progress() >= SHORT_UNTIL):
                 break
     run.finish()
@@ -72,6 +80,18 @@ def _coder(path: Path, size: Size) -> Coder:
     return Coder.load(path)
 
 
+class _Stopping:
+    """Know when the process is asked to end: what was learnt is saved first."""
+
+    def __init__(self) -> None:
+        self.told = False
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._tell)
+
+    def _tell(self, _number: int, _frame: object) -> None:
+        self.told = True
+
+
 class _Run:
     """Hold what a training changes, and its clock."""
 
@@ -79,6 +99,7 @@ class _Run:
         self._out = out
         self._budget_s = budget_s
         self.model = Recogniser(size, tokens)
+        self.average = copy.deepcopy(self.model)
         self._optimisers = _optimisers(self.model)
         self._steps, self._spent_s, self._heard_s, self._fell = 0, 0.0, 0.0, False
         self._resume()
@@ -99,6 +120,7 @@ class _Run:
             ):
                 continue
             self.model.load_state_dict(state["model"])
+            self.average.load_state_dict(state.get("average", state["model"]))
             for optimiser, values in zip(self._optimisers, state["optimisers"], strict=True):
                 optimiser.load_state_dict(values)
             self._steps, self._spent_s = state["steps"], state["spent_s"]
@@ -106,9 +128,11 @@ class _Run:
             _LOG.info("goes on after %d steps, %.0f s", self._steps, self._spent_s)
             return
 
-    def _save(self, name: str) -> None:
+    def save(self, name: str) -> None:
+        """Write all that going on needs."""
         state = {
             "model": self.model.state_dict(),
+            "average": self.average.state_dict(),
             "optimisers": [optimiser.state_dict() for optimiser in self._optimisers],
             "steps": self._steps,
             "spent_s": self.progress() * self._budget_s,
@@ -120,7 +144,7 @@ class _Run:
     def step(self, batch: Batch) -> None:
         """Learn from one batch."""
         if self.progress() >= FALL_FROM and not self._fell:
-            self._save(BEFORE_FALL)
+            self.save(BEFORE_FALL)
             self._fell = True
         text, sounds, right = _losses(self.model, batch)
         rate = self._rate()
@@ -133,6 +157,7 @@ class _Run:
         nn.utils.clip_grad_norm_(self.model.parameters(), 2.0)
         for optimiser in self._optimisers:
             optimiser.step()
+        self._follow()
         self._steps += 1
         self._heard_s += batch.duration_s
         if self._steps % _TELL_EVERY_STEPS == 0:
@@ -142,7 +167,14 @@ class _Run:
                 self._heard_s / 3600, time.process_time(),
             )  # fmt: skip
         if self._steps % _SAVE_EVERY_STEPS == 0:
-            self._save(STATE)
+            self.save(STATE)
+
+    @torch.no_grad()
+    def _follow(self) -> None:
+        kept, new = list(self.average.parameters()), list(self.model.parameters())
+        torch._foreach_lerp_(
+            kept, new, 1.0 - min(AVERAGE_DECAY, (1 + self._steps) / (10 + self._steps))
+        )
 
     def _rate(self) -> float:
         """Return the share of the highest rate of learning."""
@@ -151,7 +183,7 @@ class _Run:
 
     def finish(self) -> None:
         """Write the weights and what they cost."""
-        _write(self.model.state_dict(), self._out / WEIGHTS)
+        _write(self.average.state_dict(), self._out / WEIGHTS)
         told = {"steps": self._steps, "budget_s": self._budget_s, "heard_s": self._heard_s}
         (self._out / "training.json").write_text(json.dumps(told), encoding="utf-8")
         _LOG.info("done: %s", told)

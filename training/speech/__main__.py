@@ -1,0 +1,97 @@
+"""Run one step, or all: python -m training.speech all --minutes 180 --out /data/speech."""
+
+import argparse
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from training.speech.sizes import SIZES, Size
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """Hold what a step is told."""
+
+    out: Path
+    size: Size
+    budget_s: float
+
+
+def main() -> None:
+    """Parse the command line and run the steps."""
+    # Threads that wait for each other at barriers cost more than they bring on a busy computer.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    parser = argparse.ArgumentParser(
+        prog="python -m training.speech",
+        description=__doc__,
+        epilog="example: nice python -m training.speech all --minutes 180 --out /data/speech",
+    )
+    parser.add_argument("step", choices=[*STEPS, "ship", "all"])
+    parser.add_argument("--out", type=Path, required=True, help="folder for clips and models")
+    parser.add_argument("--size", choices=SIZES, default="full")
+    parser.add_argument(
+        "--minutes", type=float, default=180.0,
+        help="of training in all; a longer one goes on from a shorter one (default: 180)",
+    )  # fmt: skip
+    given = parser.parse_args()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
+    if given.step == "all":
+        options = ["--out", str(given.out), "--size", given.size, "--minutes", str(given.minutes)]
+        for step in STEPS:
+            subprocess.run([sys.executable, "-m", "training.speech", step, *options], check=True)
+        return
+    given.out.mkdir(parents=True, exist_ok=True)
+    job = Job(out=given.out, size=SIZES[given.size], budget_s=60.0 * given.minutes)
+    {**STEPS, "ship": _ship}[given.step](job)
+
+
+# What a step needs beyond numpy is imported by that step alone.
+def _data(job: Job) -> None:
+    from training.speech.data import generate
+
+    generate(job.out / "clips", job.size.shards, job.size.seed, job.size.clips_per_shard)
+
+
+def _train(job: Job) -> None:
+    from training.speech.training import train
+
+    train(job.out, job.size, job.budget_s)
+
+
+def _export(job: Job) -> None:
+    from training.speech.export import export
+    from training.speech.shipping import MODEL
+    from training.speech.tokens import TOKENIZER
+    from training.speech.training import WEIGHTS
+
+    export(job.out / WEIGHTS, job.out / TOKENIZER, job.size, job.out / MODEL)
+
+
+def _judge(job: Job) -> None:
+    from training.speech.shipping import judge
+
+    judge(job.out, job.size)
+
+
+def _ship(job: Job) -> None:
+    from training.speech.shipping import ship
+
+    ship(job.out)
+
+
+STEPS: Final[dict[str, Callable[[Job], None]]] = {
+    "data": _data,
+    "train": _train,
+    "export": _export,
+    "judge": _judge,
+}
+"""What `all` does, in this order; shipping is a decision of its own."""
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""Write the model's card from what was measured."""
+
+import json
+from pathlib import Path
+from string import Template
+from typing import Any, Final
+
+from training.speech.sizes import Size
+from training.voices.cast import (
+    ACCENTS,
+    HELD_OUT_ACCENT,
+    HELD_OUT_VARIANTS,
+    ROBOTIC_VARIANTS,
+    VARIANTS,
+)
+
+TEMPLATE: Final = Path(__file__).with_name("card_template.md")
+AIMS: Final = {
+    "wer_held_out_voices": 0.02,
+    "wer_held_out_voices_10db": 0.05,
+    "wer_unseen_engine": 0.10,
+}
+TITLES: Final = {
+    "known_voices": "eSpeak, voices of training",
+    "known_flite": "flite, voices of training",
+    "held_out_voices": "eSpeak, voices never heard",
+    "unseen_engine": "festival, an engine never heard",
+}
+
+
+def verdict(metrics: dict[str, Any]) -> str:
+    """Return a sentence on whether the model does what is asked of it."""
+    told = {name: metrics.get(name) for name in AIMS}
+    figures = ", ".join(
+        f"{name} {'not measured' if value is None else f'{value:.1%}'} (at most {AIMS[name]:.0%})"
+        for name, value in told.items()
+    )
+    if all(value is not None and value <= AIMS[name] for name, value in told.items()):
+        return f"It reaches its aims: {figures}."
+    return f"**It does not reach its aims: {figures}.** Train it longer."
+
+
+def card(metrics: dict[str, Any], model: Path, size: Size) -> str:
+    """Return the model card."""
+    values = {
+        "verdict": verdict(metrics),
+        "size_kib": sum(path.stat().st_size for path in model.glob("*.bin")) // 1024,
+        "encoder_layers": size.encoder_layers,
+        "decoder_layers": size.decoder_layers,
+        "width": size.width,
+        "text_tokens": size.text_tokens,
+        "accents": len(ACCENTS),
+        "variants": len(VARIANTS) + len(ROBOTIC_VARIANTS),
+        "held_out_accent": HELD_OUT_ACCENT,
+        "held_out_variants": ", ".join(HELD_OUT_VARIANTS),
+        "clips": metrics["training"]["clips"],
+        "heard_h": f"{metrics['training']['heard_s'] / 3600:.0f}",
+        "steps": metrics["training"]["steps"],
+        "minutes": f"{metrics['training']['budget_s'] / 60:.0f}",
+        "name": size.name,
+        "sentences": metrics["sentences"],
+        "table": table(metrics),
+        "voices": voices(metrics),
+        "talk": metrics["other_sounds"]["count"],
+        "least_confidence": metrics["least_confidence"],
+        **{
+            f"{name}_unsure": _share(metrics["other_sounds"][f"{name}_unsure_ratio"])
+            for name in ("talk", "foreign", "noise")
+        },
+        "accepted_right": _share(metrics["sureness"]["accepted_right_ratio"]),
+        "right_accepted": _share(metrics["sureness"]["right_accepted_ratio"]),
+    }
+    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
+
+
+def table(metrics: dict[str, Any]) -> str:
+    """Return error rates by who speaks, quiet and in noise."""
+    lines = [
+        "| who speaks | word errors | exact | word errors at 10 dB | exact at 10 dB |",
+        "|---|---|---|---|---|",
+    ]
+    for name, title in TITLES.items():
+        cells = [
+            _share(metrics[f"{figure}_{name}{suffix}"])
+            for suffix in ("", "_10db")
+            for figure in ("wer", "exact")
+        ]
+        lines.append(f"| {title} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def voices(metrics: dict[str, Any]) -> str:
+    """Return error rates of the voices that training never heard, one by one."""
+    told = {**metrics["by_voice_held_out_voices"], **metrics["by_voice_unseen_engine"]}
+    listed = ", ".join(f"{voice} {_share(ratio)}" for voice, ratio in told.items())
+    return f"By voice, quiet: {listed}."
+
+
+def _share(ratio: float | None) -> str:
+    return "not measured" if ratio is None else f"{ratio:.1%}"
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Return the figures of a model.
+
+    Raises:
+        FileNotFoundError: it was not judged.
+    """
+    metrics: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return metrics

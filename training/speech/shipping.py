@@ -1,0 +1,105 @@
+"""Judge a converted model, describe it, and put it into the software unless the one there is better."""
+
+import json
+import logging
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from drivers.clock import MonotonicClock
+from training.speech import calibration, judging
+from training.speech.card import card, read_metrics
+from training.speech.sizes import Size
+from training.speech.trials import sentences
+from training.voices.clip_store import shards
+from vla_deploy.inference.manifest import Context, Manifest, Whisper
+from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.store import Model
+from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, describe
+from vla_deploy.speech.recogniser import Recogniser, open_recogniser
+
+SHIPPED: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "commands-whisper"
+CARD, METRICS, MODEL = "card.md", "metrics.json", "model"
+LEAST_CONFIDENCE: Final = 0.5
+_SUMMARY: Final = "Spoken commands in the English of synthetic voices; never heard a person"
+_CALIBRATION_CLIPS: Final = 300
+_OTHER_SOUNDS: Final = 66
+_LOG = logging.getLogger(__name__)
+
+
+def judge(out: Path, size: Size) -> None:
+    """Calibrate and judge the model under `out`; write manifest, figures and card beside it.
+
+    Raises:
+        InferenceError: it cannot be opened.
+        EngineMissing: eSpeak NG or flite is not installed.
+    """
+    folder = out / MODEL
+    plain = Whisper(languages=("en",), context=Context.TRIMMED, hot_words=True)
+    draft = _open(_manifest(folder, plain), folder)
+    fitted = calibration.fit(calibration.readings(draft, _CALIBRATION_CLIPS, size.seed))
+    draft.close()
+    manifest = _manifest(folder, replace(plain, calibration=fitted))
+    recogniser = _open(manifest, folder)
+    metrics = _measure(recogniser, out, size)
+    recogniser.close()
+    (folder / METRICS).write_text(json.dumps(metrics, indent=1), encoding="utf-8")
+    (folder / CARD).write_text(card(metrics, folder, size), encoding="utf-8")
+    write_manifest(folder, manifest)
+
+
+def _measure(recogniser: Recogniser, out: Path, size: Size) -> dict[str, Any]:
+    seed = size.seed + 1
+    figures, reads = judging.word_errors(recogniser, 1000, seed)
+    others = judging.other_sounds(recogniser, LEAST_CONFIDENCE, _OTHER_SOUNDS, seed)
+    training = json.loads((out / "training.json").read_text(encoding="utf-8"))
+    return {
+        **figures,
+        "sureness": judging.sureness(recogniser, reads, LEAST_CONFIDENCE),
+        "least_confidence": LEAST_CONFIDENCE,
+        "other_sounds": {**others, "count": len(sentences("talk")[:_OTHER_SOUNDS])},
+        "training": {**training, "clips": size.clips_per_shard * len(list(shards(out / "clips")))},
+    }
+
+
+def _open(manifest: Manifest, folder: Path) -> Recogniser:
+    model = Model(manifest=manifest, folder=folder, is_embedded=False)
+    return open_recogniser(model, PLAIN_CHOICE, beam=1, clock=MonotonicClock())
+
+
+def _manifest(folder: Path, whisper: Whisper) -> Manifest:
+    request = Request(
+        name="commands-whisper",
+        folder=folder,
+        whisper=whisper,
+        summary=_SUMMARY,
+        licence="Apache-2.0",
+        card=folder / CARD,
+    )
+    return describe(request)
+
+
+def ship(out: Path, place: Path = SHIPPED) -> bool:
+    """Copy the judged model; return whether it was done.
+
+    Raises:
+        FileNotFoundError: it is not complete.
+    """
+    folder = out / MODEL
+    new = _errors(read_metrics(folder / METRICS))
+    old = _errors(read_metrics(place / METRICS)) if (place / METRICS).exists() else float("inf")
+    if new >= old:
+        _LOG.warning("not shipped: word errors %.4f, those of %s are %.4f", new, place, old)
+        return False
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(folder, place)
+    _LOG.info("shipped to %s: word errors %.4f, before %.4f", place, new, old)
+    return True
+
+
+def _errors(metrics: dict[str, Any]) -> float:
+    """Return the mean word error rate over the voices that were never heard, quiet and in noise."""
+    names = ("held_out_voices", "held_out_voices_10db", "unseen_engine", "unseen_engine_10db")
+    told = [metrics[f"wer_{name}"] for name in names]
+    return sum(value for value in told if value is not None) / len(told)
