@@ -1,4 +1,4 @@
-"""Judge a converted model, describe it, and put it into the software unless the one there is better."""
+"""Judge a converted model, describe it, ship it if it is better than the one that is there."""
 
 import json
 import logging

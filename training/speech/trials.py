@@ -1,4 +1,4 @@
-"""Speak what a recogniser is judged by: held-out sentences, voices, an engine, noise, other talk."""
+"""Speak what a recogniser is judged by: held-out sentences and voices, noise, other talk."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -16,6 +16,7 @@ BENCHMARKS = {
     "perception": "how well, how fast and at what cost the robot sees; int8 beside fp32; --part",
     "planner": "commands understood, other talk left alone, attacks refused, time to plan; --part",
     "recorder": "what the flight recorder costs: per control tick, per look, per flight",
+    "speech": "words understood by voice and noise, from speech to text, what it costs; --part",
     "ticks": "late control ticks, idle and under load, with and without SCHED_FIFO",
     "twin": "twin steps against raw mj_step, and the lock-step real-time factor",
 }
@@ -32,7 +33,7 @@ def register(commands: Any) -> None:
     bench.add_argument("benchmark", choices=sorted(BENCHMARKS), help=listed)
     bench.add_argument("--json", action="store_true", help="print the figures as JSON")
     bench.add_argument(
-        "--part", action="append", help="of perception, planner: only this, repeatable"
+        "--part", action="append", help="of perception, planner, speech: only this, repeatable"
     )
     bench.set_defaults(run=run)
 

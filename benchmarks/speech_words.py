@@ -1,0 +1,77 @@
+"""Measure the shipped recogniser: word errors, sureness, what it makes of other sound, its time.
+
+Sentences and the names of the voices lie in `training/speech/held_out` and `training/voices`; they
+are spoken on the spot by eSpeak NG, flite and festival. `missing` says which engine is not
+installed: its figures are None then. `with_names` is read with names of things and places as hot
+words, as the robot reads.
+"""
+
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from typing import Any, Final
+
+from benchmarks.command import parser, show
+from drivers.clock import MonotonicClock
+from platforms import load_profile
+from training.speech.judging import other_sounds, speed, sureness, word_errors
+from vla_deploy.inference.roles import ModelShelf, choice_for
+from vla_deploy.inference.whisper_schema import SPEECH_TO_TEXT
+from vla_deploy.robots import load_robot
+from vla_deploy.speech.hot_words import joined
+from vla_deploy.speech.recogniser import open_recogniser
+from vla_deploy.state_dir import user_base
+
+MODEL: Final = "commands-whisper"
+_THINGS: Final = (
+    "red cup", "blue ball", "green bottle", "white bowl", "brown box", "black phone", "grey remote",
+    "yellow can", "red book",
+)  # fmt: skip
+_OTHER_SOUNDS: Final = 66
+
+
+def measure(sentences: int = 150, seed: int = 0, profile: str = "desktop") -> dict[str, Any]:
+    """Return the figures.
+
+    Raises:
+        InferenceError: the model cannot be opened.
+        EngineMissing: eSpeak NG or flite is not installed.
+    """
+    clock = MonotonicClock()
+    loaded = load_profile(profile)
+    model = ModelShelf.of_base(user_base(), clock).store.load(MODEL)
+    choice = choice_for(SPEECH_TO_TEXT, loaded)
+    beam, least = loaded.speech.beam, loaded.speech.least_confidence
+    with closing(open_recogniser(model, choice, beam=beam, clock=clock)) as recogniser:
+        figures, reads = word_errors(recogniser, sentences, seed)
+        named, _ = word_errors(recogniser, sentences, seed, hot_words=_names())
+        return {
+            "model": MODEL,
+            **figures,
+            "wer_10db": figures["wer_held_out_voices_10db"],
+            "with_names": {name: named[name] for name in named if name.startswith("wer")},
+            **speed(reads),
+            **sureness(recogniser, reads, least),
+            **other_sounds(recogniser, least, _OTHER_SOUNDS, seed),
+            "memory_mb": recogniser.memory_mb,
+        }
+
+
+def _names() -> str:
+    """Return hot words as the robot has them: things that it sees, its places."""
+    places = (name.replace("_", " ") for name in load_robot("butler").home.places)
+    return joined((*_THINGS, *places))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the figures."""
+    arguments = parser("speech --part words", __doc__)
+    arguments.add_argument("--sentences", type=int, default=150)
+    arguments.add_argument("--seed", type=int, default=0)
+    given = arguments.parse_args(argv)
+    show(measure(given.sentences, given.seed), as_json=given.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
