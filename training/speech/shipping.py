@@ -101,5 +101,5 @@ def ship(out: Path, place: Path = SHIPPED) -> bool:
 def _errors(metrics: dict[str, Any]) -> float:
     """Return the mean word error rate over the voices that were never heard, quiet and in noise."""
     names = ("held_out_voices", "held_out_voices_10db", "unseen_engine", "unseen_engine_10db")
-    told = [metrics[f"wer_{name}"] for name in names]
-    return sum(value for value in told if value is not None) / len(told)
+    told = [float(metrics[f"wer_{name}"]) for name in names if metrics[f"wer_{name}"] is not None]
+    return sum(told) / len(told)

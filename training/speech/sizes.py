@@ -16,6 +16,7 @@ class Size:
     shards: int
     clips_per_shard: int = 1000
     text_tokens: int = 640
+    texts_for_tokens: int = 30_000
     batch_s: float = 120.0
     seed: int = 7
 
@@ -28,7 +29,8 @@ SIZES: Final = {
         ),
         Size(
             name="smoke", width=32, heads=2, encoder_layers=1, decoder_layers=1, shards=1,
-            clips_per_shard=24, text_tokens=300, batch_s=20.0,
+            clips_per_shard=24, text_tokens=300, texts_for_tokens=300,
+            batch_s=20.0,
         ),
     )
 }  # fmt: skip

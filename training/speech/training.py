@@ -75,7 +75,7 @@ def train(out: Path, size: Size, budget_s: float) -> None:
 def _coder(path: Path, size: Size) -> Coder:
     if not path.exists():
         random = np.random.default_rng(size.seed)
-        texts = [draw_sentence(random) for _ in range(30_000)]
+        texts = [draw_sentence(random) for _ in range(size.texts_for_tokens)]
         make_tokenizer(texts, size.text_tokens).save(str(path))
     return Coder.load(path)
 
@@ -207,7 +207,8 @@ def _losses(model: Recogniser, batch: Batch) -> tuple[Tensor, Tensor, float]:
 
 def _optimisers(model: nn.Module) -> list[torch.optim.Optimizer]:
     """Return Muon for the layers' matrices, AdamW for all else."""
-    matrices, others = [], []
+    matrices: list[nn.Parameter] = []
+    others: list[nn.Parameter] = []
     for name, value in model.named_parameters():
         if value.requires_grad:
             (matrices if value.ndim == 2 and ".layers." in name else others).append(value)

@@ -25,7 +25,8 @@ def draw_room(random: np.random.Generator) -> Wave:
     direct_ratio_db = random.uniform(-4.0, 12.0)
     response = tail * np.sqrt(10.0 ** (-direct_ratio_db / 10.0) / max(power, 1e-9))
     response[0] = 1.0
-    return response.astype(np.float32)
+    made: Wave = response.astype(np.float32)
+    return made
 
 
 def in_room(samples: Wave, response: Wave) -> Wave:
