@@ -13,8 +13,8 @@ class VoicesError(Exception):
 class EngineMissing(VoicesError):
     """Say which part of an engine is missing, and what to install."""
 
-    def __init__(self, engine: str, part: str, packages: str) -> None:
-        super().__init__(f"{engine}: {part} is not installed; try: apt-get install {packages}")
+    def __init__(self, engine: str, part: str, packages: str, by: str = "apt-get install") -> None:
+        super().__init__(f"{engine}: {part} is not installed; try: {by} {packages}")
         self.engine = engine
 
 

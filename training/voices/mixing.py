@@ -44,5 +44,5 @@ def at_level(samples: Wave, level_db: float) -> Wave:
     if power == 0.0:
         return samples
     gain = np.float32(10.0 ** (level_db / 20.0) / np.sqrt(power))
-    made: Wave = np.clip(samples * gain, -1.0, 1.0).astype(np.float32)
-    return made
+    scaled: Wave = np.clip(samples * gain, -1.0, 1.0).astype(np.float32)
+    return scaled

@@ -33,4 +33,5 @@ def in_room(samples: Wave, response: Wave) -> Wave:
     """Return what is heard in the room, as long as the samples, at the same moments."""
     length = 1 << (len(samples) + len(response) - 1).bit_length()
     spectrum = np.fft.rfft(samples, length) * np.fft.rfft(response, length)
-    return np.fft.irfft(spectrum, length)[: len(samples)].astype(np.float32)
+    heard: Wave = np.fft.irfft(spectrum, length)[: len(samples)].astype(np.float32)
+    return heard

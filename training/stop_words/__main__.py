@@ -1,0 +1,74 @@
+"""Run one step, or all: python -m training.stop_words all --out /data/stop_words."""
+
+import argparse
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+from training.stop_words.corpus import speak
+from training.stop_words.settings import SIZES, Settings
+from training.stop_words.shipping import ship
+
+
+def main() -> None:
+    """Parse the command line and run the steps."""
+    parser = argparse.ArgumentParser(
+        prog="python -m training.stop_words",
+        description=__doc__,
+        epilog="example: nice python -m training.stop_words all --out /data/stop_words",
+    )
+    parser.add_argument("step", choices=[*STEPS, "ship", "all"])
+    parser.add_argument("--out", type=Path, required=True, help="folder for clips and models")
+    parser.add_argument("--size", choices=SIZES, default="full")
+    arguments = parser.parse_args()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
+    steps = {**STEPS, "ship": _ship}
+    for name in STEPS if arguments.step == "all" else [arguments.step]:
+        steps[name](arguments.out, SIZES[arguments.size])
+
+
+def _speak(out: Path, settings: Settings) -> None:
+    speak(out / "clips", settings.seed, settings.scale)
+
+
+# The steps below import torch, which the first does not need.
+def _train(out: Path, settings: Settings) -> None:
+    from training.stop_words.training import train
+
+    train(out, settings)
+
+
+def _export(out: Path, _settings: Settings) -> None:
+    from training.stop_words.export import export
+
+    export(out, out / MODELS)
+
+
+def _evaluate(out: Path, settings: Settings) -> None:
+    from training.stop_words.evaluation import evaluate
+
+    evaluate(out, out / MODELS, settings)
+
+
+def _card(out: Path, settings: Settings) -> None:
+    from training.stop_words.card import describe
+
+    describe(out / MODELS, settings)
+
+
+def _ship(out: Path, _settings: Settings) -> None:
+    ship(out / MODELS)
+
+
+MODELS = "models"
+STEPS: dict[str, Callable[[Path, Settings], None]] = {
+    "speak": _speak,
+    "train": _train,
+    "export": _export,
+    "evaluate": _evaluate,
+    "card": _card,
+}
+"""What `all` does, in this order; each goes on where it was broken off."""
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,158 @@
+"""Write the model's card and manifest from what was measured."""
+
+import hashlib
+import json
+import time
+from pathlib import Path
+from string import Template
+from typing import Any, Final
+
+import numpy as np
+
+from training.stop_words.cast import PARTS
+from training.stop_words.evaluation import METRICS, REFRACTORY_S, SNRS_DB
+from training.stop_words.export import FILE, FRAMES, INPUT, MOMENTS, OUTPUT
+from training.stop_words.network import REACH, StopNet
+from training.stop_words.settings import Settings
+from training.stop_words.texts import WORDS
+from vla_deploy.inference.manifest import (
+    KeyWords,
+    Manifest,
+    ModelFile,
+    SpottingMeasured,
+    Tensor,
+    Variant,
+)
+from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.runtime import InferenceSession, SessionOptions
+from vla_deploy.speech.sound import RATE_HZ
+from vla_deploy.speech.stop_words.features import BANDS, HOP, NAME
+
+CARD: Final = "card.md"
+TEMPLATE: Final = Path(__file__).with_name("card_template.md")
+AIM_MISSED, AIM_ALARMS, AIM_DELAY_S = 0.02, 1.0, 0.5
+_RUNS: Final = 200
+
+
+def describe(models: Path, settings: Settings) -> None:
+    """Write `card.md` and `model.toml` beside the file that they describe.
+
+    Raises:
+        FileNotFoundError: the model or its metrics are not there.
+    """
+    metrics = json.loads((models / METRICS).read_text(encoding="utf-8"))
+    (models / CARD).write_text(card(metrics, models, settings), encoding="utf-8")
+    place = models / "stop_words"
+    place.mkdir(exist_ok=True)
+    write_manifest(place, manifest(metrics, models))
+    (place / "model.toml").rename(models / "model.toml")
+    place.rmdir()
+
+
+def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
+    """Return the model card."""
+    counts = ", ".join(
+        f"{part.engine} ({part.stops} and {part.others})" for part in PARTS if part.stops
+    )
+    values = {
+        "reach_s": f"{REACH * HOP / RATE_HZ:.2f}",
+        "verdict": verdict(metrics),
+        "bands": BANDS,
+        "frames": FRAMES,
+        "moments": MOMENTS,
+        "words": ", ".join(WORDS),
+        "parameters": sum(p.numel() for p in StopNet(len(WORDS)).parameters()),
+        "size_kib": (models / FILE).stat().st_size // 1024,
+        "run_ms": f"{_run_ms(models / FILE):.1f}",
+        "engines": f"{counts}: clips with a stop word, and without",
+        "cpu_minutes": f"{settings.cpu_minutes:g}",
+        "seed": settings.seed,
+        "tables": tables(metrics),
+    }
+    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
+
+
+def verdict(metrics: dict[str, Any]) -> str:
+    """Return a sentence on whether it does what is asked of it."""
+    told = metrics["at"]["normal"]
+    missed, alarms = told["missed_ratio"]["10"]["all"], told["false_alarms_per_hour"]
+    figures = (
+        f"{missed:.1%} of the stops missed in noise at 10 dB, {alarms:.1f} false alarms per hour "
+        f"of talk, told within {told['delay_p95_s']:.2f} s of the word's end (95 of 100)"
+    )
+    if missed <= AIM_MISSED and alarms <= AIM_ALARMS and told["delay_p95_s"] <= AIM_DELAY_S:
+        return f"It reaches its aim on voices that it has not learnt: {figures}."
+    aim = f"{AIM_MISSED:.0%}, {AIM_ALARMS:g}, {AIM_DELAY_S:g} s"
+    return f"**It does not reach its aim ({aim}) on voices that it has not learnt: {figures}.**"
+
+
+def tables(metrics: dict[str, Any]) -> str:
+    """Return misses by noise and voice, then what each threshold costs."""
+    missed = metrics["at"]["normal"]["missed_ratio"]
+    groups = sorted(next(iter(missed.values())))
+    lines = [
+        f"| missed at the threshold `normal` | {' | '.join(groups)} |",
+        f"|---|{'---|' * len(groups)}",
+    ]
+    for snr, told in missed.items():
+        name = snr if SNRS_DB[snr] is None else f"{snr} dB"
+        lines.append(f"| {name} | {' | '.join(f'{told[group]:.1%}' for group in groups)} |")
+    lines += [
+        "",
+        "| threshold | | false alarms per hour | missed clean | missed at 10 dB | delay p95 |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, told in metrics["at"].items():
+        missed = told["missed_ratio"]
+        lines.append(
+            f"| `{name}` | {told['threshold']} | {told['false_alarms_per_hour']:.1f} "
+            f"| {missed['clean']['all']:.1%} | {missed['10']['all']:.1%} "
+            f"| {told['delay_p95_s']:.2f} s |"
+        )
+    words = ", ".join(f"word_{number + 1} is {word!r}" for number, word in enumerate(WORDS))
+    return "\n".join([*lines, "", f"{metrics['hours']:.1f} h of talk; {words}."])
+
+
+def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
+    """Return what the software is told of the model."""
+    told = metrics["at"]["normal"]
+    return Manifest(
+        name="stop_words",
+        role="key_words",
+        summary="Hears stop, halt and freeze; trained on synthetic voices alone",
+        licence="Apache-2.0",
+        card=CARD,
+        inputs=(Tensor(name=INPUT, shape=(1, BANDS, FRAMES), dtype="float32"),),
+        outputs=(Tensor(name=OUTPUT, shape=(1, 1 + len(WORDS), MOMENTS), dtype="float32"),),
+        files={
+            Variant.FP32: ModelFile(
+                path=FILE, sha256=hashlib.sha256((models / FILE).read_bytes()).hexdigest()
+            )
+        },
+        key_words=KeyWords(
+            features=NAME,
+            words=WORDS,
+            smoothing_frames=metrics["smoothing"],
+            refractory_s=REFRACTORY_S,
+            thresholds=metrics["thresholds"],
+            measured=SpottingMeasured(
+                missed_ratio=round(told["missed_ratio"]["10"]["all"], 4),
+                false_alarms_per_hour=round(told["false_alarms_per_hour"], 2),
+                delay_p95_s=round(told["delay_p95_s"], 3),
+            ),
+        ),
+    )
+
+
+def _run_ms(path: Path) -> float:
+    """Return how long one run takes on one thread, the median."""
+    options = SessionOptions()
+    options.intra_op_num_threads = 1
+    session = InferenceSession(str(path), options)
+    inputs = {INPUT: np.zeros((1, BANDS, FRAMES), np.float32)}
+    took = []
+    for _ in range(_RUNS):
+        began = time.perf_counter()
+        session.run(None, inputs)
+        took.append(time.perf_counter() - began)
+    return 1_000.0 * float(np.median(took))

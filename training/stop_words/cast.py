@@ -1,0 +1,118 @@
+"""List how much each synthesiser says, and which of its voices are kept to judge by."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from training.voices import espeak, festival, flite, hibari, pico, piper
+from training.voices.cast import (
+    ACCENTS,
+    HELD_OUT_ACCENT,
+    HELD_OUT_VARIANTS,
+    ROBOTIC_VARIANTS,
+    VARIANTS,
+)
+from training.voices.clip import Clip, Style
+
+Speak = Callable[[str, str, Style], Clip]
+
+
+def _festival(text: str, voice: str, style: Style) -> Clip:
+    return festival.speak_all([(text, voice, style)])[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """Say how many clips one engine speaks, with stop words and without, to train and to judge.
+
+    `tells_times` is false where only words that come last can be used.
+    """
+
+    engine: str
+    speak: Speak
+    tells_times: bool
+    voices: tuple[str, ...] = ()
+    stops: int = 0
+    others: int = 0
+    held_voices: tuple[str, ...] = ()
+    held_stops: int = 0
+    held_others: int = 0
+
+
+PARTS: Final = (
+    Part(
+        engine=espeak.ENGINE,
+        speak=espeak.speak,
+        tells_times=True,
+        voices=tuple(f"{a}+{v}" for a in ACCENTS for v in (*VARIANTS, *ROBOTIC_VARIANTS)),
+        stops=6000,
+        others=8000,
+        held_voices=(
+            *(f"{accent}+{variant}" for accent in ACCENTS for variant in HELD_OUT_VARIANTS),
+            *(f"{HELD_OUT_ACCENT}+{variant}" for variant in VARIANTS),
+        ),
+        held_stops=400,
+        held_others=900,
+    ),
+    Part(
+        engine=flite.ENGINE,
+        speak=flite.speak,
+        tells_times=True,
+        voices=("kal", "kal16", "awb", "rms"),
+        stops=1600,
+        others=3000,
+        held_voices=("slt",),
+        held_stops=120,
+        held_others=300,
+    ),
+    Part(
+        engine=pico.ENGINE,
+        speak=pico.speak,
+        tells_times=False,
+        voices=("en-US",),
+        stops=1000,
+        others=2500,
+        held_voices=("en-GB",),
+        held_stops=120,
+        held_others=300,
+    ),
+    Part(
+        engine=hibari.ENGINE,
+        speak=hibari.speak,
+        tells_times=False,
+        voices=hibari.VOICES,
+        stops=700,
+        others=1200,
+    ),
+    Part(
+        engine=piper.ENGINE,
+        speak=piper.speak,
+        tells_times=False,
+        voices=piper.VOICES,
+        stops=1200,
+        others=1500,
+    ),
+    Part(
+        engine=festival.ENGINE,
+        speak=_festival,
+        tells_times=True,
+        held_voices=tuple(festival.VOICES),
+        held_stops=150,
+        held_others=200,
+    ),
+)
+"""Festival is judged by and never learnt from."""
+
+
+def draw_style(random: np.random.Generator) -> Style:
+    """Draw how somebody speaks who may be in a hurry to stop a robot, or drawl."""
+    return Style(
+        rate_ratio=float(random.uniform(0.7, 1.4)),
+        pitch_ratio=float(random.uniform(0.75, 1.35)),
+        lively=float(random.uniform(0.15, 0.95)),
+    )
+
+
+BY_ENGINE: Final[Mapping[str, Part]] = {part.engine: part for part in PARTS}

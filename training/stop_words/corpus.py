@@ -1,0 +1,171 @@
+"""Speak the clips of the training and of the judging, and keep them on disk."""
+
+import gzip
+import json
+import logging
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.stop_words.cast import PARTS, Part, draw_style
+from training.stop_words.texts import WORDS, other_talk, stop_phrases
+from training.stop_words.timing import sounding, word_times
+from training.voices.clip import RATE_HZ, Clip
+from training.voices.errors import SynthesisFailed
+
+TRAIN, HELD = "train", "held"
+Samples = NDArray[np.int16]
+_MARGIN: Final = RATE_HZ // 30
+_FULL_SCALE: Final = 32_767.0
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Said:
+    """Hold one clip; `events` are rows of class (1 on), start and end in seconds."""
+
+    samples: Samples
+    voice: str
+    events: NDArray[np.float32]
+
+
+class Clips:
+    """Hold many clips without a copy of their sound in memory."""
+
+    def __init__(self, folder: Path, split: str, kind: str) -> None:
+        """Open what `speak` has written.
+
+        Raises:
+            FileNotFoundError: nothing was spoken yet.
+        """
+        self._parts = []
+        self._places: list[tuple[int, int]] = []
+        self.voices: list[str] = []
+        for part in sorted(folder.glob(f"{split}-{kind}-*.npy")):
+            index = json.loads(part.with_suffix(".json").read_text(encoding="utf-8"))
+            self._parts.append((np.load(part, mmap_mode="r"), index))
+            self._places += [(len(self._parts) - 1, k) for k in range(len(index["voices"]))]
+            self.voices += index["voices"]
+        if not self._places:
+            raise FileNotFoundError(f"{folder}: no clips of {split} {kind}; run the step speak")
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __getitem__(self, number: int) -> Said:
+        part, place = self._places[number]
+        sound, index = self._parts[part]
+        start, end = index["starts"][place], index["starts"][place + 1]
+        events = np.array(index["events"][place], np.float32).reshape(-1, 3)
+        return Said(samples=sound[start:end], voice=index["voices"][place], events=events)
+
+
+def speak(folder: Path, seed: int, scale: float = 1.0) -> None:
+    """Speak all clips; those of an engine that are on disk already stay.
+
+    Raises:
+        EngineMissing: an engine is not installed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, part in enumerate(PARTS):
+        for split, kind, wanted in (
+            (TRAIN, "stops", part.stops),
+            (TRAIN, "others", part.others),
+            (HELD, "stops", part.held_stops),
+            (HELD, "others", part.held_others),
+        ):
+            path = folder / f"{split}-{kind}-{part.engine}.npy"
+            count = round(wanted * scale)
+            if path.with_suffix(".json").exists() or not count:
+                continue
+            random = np.random.default_rng([seed, number, split == HELD, kind == "stops"])
+            _write(path, _clips(part, split, kind, count, random))
+            _LOG.info("%s: %d clips", path.name, count)
+
+
+def _clips(
+    part: Part, split: str, kind: str, count: int, random: np.random.Generator
+) -> list[Said]:
+    voices = part.held_voices if split == HELD else part.voices
+    texts = (
+        _stop_texts(random, count, part.tells_times)
+        if kind == "stops"
+        else _other_texts(random, count)
+    )
+    clips: list[Said] = []
+    for text, word, is_last in texts:
+        voice = voices[int(random.integers(len(voices)))]
+        try:
+            clip = part.speak(text, voice, draw_style(random))
+        except SynthesisFailed as error:
+            _LOG.warning("left out: %s", error)
+            continue
+        said = trimmed(clip, word, is_last=is_last)
+        if said is not None:
+            clips.append(said)
+    return clips
+
+
+def _stop_texts(
+    random: np.random.Generator, count: int, timed: bool
+) -> list[tuple[str, str, bool]]:
+    """Return texts, their word, and whether it comes last: without times only such can be used."""
+    phrases = {
+        word: [
+            (text, is_last)
+            for text, is_last in stop_phrases(word)
+            if timed or (is_last and text.count(word) == 1)
+        ]
+        for word in WORDS
+    }
+    texts = []
+    for number in range(count):
+        word = WORDS[number % len(WORDS)] if number % 2 else WORDS[0]
+        text, is_last = phrases[word][int(random.integers(len(phrases[word])))]
+        if random.random() < 0.3:
+            text, is_last = word, True
+        texts.append((text, word, is_last))
+    return texts
+
+
+def _other_texts(random: np.random.Generator, count: int) -> list[tuple[str, str, bool]]:
+    return [(text, "", False) for text in other_talk(count, random, _lexicon())]
+
+
+def _lexicon() -> list[str]:
+    """Return the words of English that the package of one engine can read."""
+    packed = files("hibari").joinpath("assets/lexicon_us_gold.json.gz").read_bytes()
+    words = json.loads(gzip.decompress(packed))
+    return [word for word in words if word.isalpha() and word.islower() and 2 < len(word) < 11]
+
+
+def trimmed(clip: Clip, word: str, *, is_last: bool) -> Said | None:
+    """Cut the silence at both ends; None where nobody knows when the word was said."""
+    first, last = sounding(clip.samples)
+    low, high = max(0, first - _MARGIN), min(len(clip.samples), last + _MARGIN)
+    times = word_times(clip, word, is_last=is_last) if word else []
+    if word and not times:
+        return None
+    number = WORDS.index(word) + 1 if word else 0
+    rows = np.array([(number, *each) for each in times], np.float32).reshape(-1, 3)
+    rows[:, 1:] = np.clip(rows[:, 1:], 0.0, last / RATE_HZ) - low / RATE_HZ
+    samples = np.rint(_FULL_SCALE * clip.samples[low:high]).astype(np.int16)
+    return Said(samples=samples, voice=f"{clip.engine}/{clip.voice}", events=rows)
+
+
+def _write(path: Path, clips: list[Said]) -> None:
+    """Write sound and index, the index last: it says that the part is whole."""
+    starts = np.cumsum([0, *(len(clip.samples) for clip in clips)])
+    np.save(path, np.concatenate([clip.samples for clip in clips]))
+    index: dict[str, Any] = {
+        "voices": [clip.voice for clip in clips],
+        "starts": starts.tolist(),
+        "events": [clip.events.tolist() for clip in clips],
+    }
+    partial = path.with_suffix(".part")
+    partial.write_text(json.dumps(index), encoding="utf-8")
+    partial.rename(path.with_suffix(".json"))

@@ -1,0 +1,31 @@
+"""Say how much is spoken and how long is learnt; the smallest size only checks that all works."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Hold what decides the result besides the code.
+
+    `scale` is the share of the clips that are spoken, `cpu_minutes` how long is learnt on one core.
+    A batch has `fresh` stretches and some that were `seen` before, varied.
+    """
+
+    name: str
+    seed: int = 0
+    scale: float = 1.0
+    cpu_minutes: float = 12.5
+    fresh: int = 4
+    seen: int = 12
+    stretch_s: float = 7.5
+    learning_rate: float = 3e-3
+    judged_hours: float = 1.0
+    judged_stops: int = 400
+
+
+FULL = Settings(name="full")
+"""What the shipped model was made by."""
+TINY = Settings(
+    name="tiny", scale=0.01, cpu_minutes=0.2, fresh=2, seen=2, judged_hours=0.02, judged_stops=8
+)
+SIZES = {settings.name: settings for settings in (FULL, TINY)}

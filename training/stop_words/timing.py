@@ -1,0 +1,49 @@
+"""Find when a stop word was said in a clip: by its sounds, or by where the clip falls silent."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import numpy as np
+
+from training.voices.clip import RATE_HZ, Clip, Wave
+
+_SOUNDS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
+    "stop": (("s", "t", "aa", "p"), ("s", "t", "ao", "p")),
+    "halt": (("hh", "ao", "l", "t"), ("hh", "aa", "l", "t")),
+    "freeze": (("f", "r", "iy", "z"),),
+}
+_QUIET_RATIO: Final = 0.03
+_WORD_S: Final = 0.45
+
+
+def word_times(clip: Clip, word: str, *, is_last: bool) -> list[tuple[float, float]]:
+    """Return start and end of each time that a word was said, in seconds; empty if unknown.
+
+    Where the engine tells no sounds, a word that comes last and once ends with the clip's sound.
+    """
+    count = clip.text.lower().count(word)
+    found = list(_by_sounds(clip, word))
+    if len(found) == count:
+        return found
+    if clip.sounds or not is_last or count != 1:
+        return []
+    end_s = sounding(clip.samples)[1] / RATE_HZ
+    return [(max(0.0, end_s - _WORD_S), end_s)]
+
+
+def sounding(samples: Wave) -> tuple[int, int]:
+    """Return where sound begins and ends, by its level in hundredths of a second."""
+    step = RATE_HZ // 100
+    whole = samples[: len(samples) // step * step].reshape(-1, step)
+    level = np.sqrt(np.mean(whole**2, axis=1))
+    loud = np.flatnonzero(level > _QUIET_RATIO * level.max(initial=1e-6))
+    return (int(loud[0]) * step, (int(loud[-1]) + 1) * step) if len(loud) else (0, len(samples))
+
+
+def _by_sounds(clip: Clip, word: str) -> Iterator[tuple[float, float]]:
+    phones = [sound.phone for sound in clip.sounds]
+    began_s = [*(sound.began_s for sound in clip.sounds), clip.duration_s]
+    for spelling in _SOUNDS[word]:
+        for k in range(len(phones) - len(spelling) + 1):
+            if tuple(phones[k : k + len(spelling)]) == spelling:
+                yield began_s[k], began_s[k + len(spelling)]
