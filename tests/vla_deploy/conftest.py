@@ -459,7 +459,7 @@ def _tokenizer(text: str) -> Any:
         show_progress=False,
     )
     tokenizer.train_from_iterator(5 * [" " + text], trainer)
-    words = ("endoftext", "startoftranscript", "en", "translate", "transcribe", "startoflm")
+    words = ("endoftext", "startoftranscript", "en", "fr", "translate", "transcribe", "startoflm")
     tokenizer.add_special_tokens(
         [f"<|{word}|>" for word in (*words, "startofprev", "nospeech", "notimestamps")]
         + [f"<|{0.02 * number:.2f}|>" for number in range(1501)]

@@ -42,8 +42,11 @@ def count_of(duration_s: float) -> int:
 
 
 def level_db(samples: Sound) -> float:
-    """Return how loud samples are: RMS against full scale, -100 dB at the least."""
+    """Return how loud samples are: RMS against full scale, -100 dB at the least.
+
+    A constant offset, as cheap microphones have one, is no sound.
+    """
     if not len(samples):
         return SILENCE_DB
-    power = float(np.mean(np.square(samples, dtype=np.float64)))
+    power = float(np.var(samples, dtype=np.float64))
     return max(SILENCE_DB, 10.0 * float(np.log10(power + 1e-12)))

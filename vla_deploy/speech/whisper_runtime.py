@@ -4,6 +4,7 @@ It loads the hub's client, which would look for what a model's folder lacks. Thr
 arithmetic that wait for work give their core away.
 """
 
+import logging
 import os
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
@@ -17,6 +18,8 @@ import faster_whisper
 import numpy as np
 from numpy.typing import NDArray
 
+# It tells the log of every phrase; what was heard is told in `heard`, and nowhere else.
+logging.getLogger("faster_whisper").setLevel(logging.WARNING)
 MODEL_ERRORS: tuple[type[Exception], ...] = (RuntimeError, ValueError, OSError, KeyError, TypeError)
 VERSION: str = f"faster-whisper {faster_whisper.__version__}"
 _MARGIN_FRAMES = 40

@@ -61,17 +61,47 @@ def test_trimmed_sound_costs_a_small_part_of_a_padded_window(scripted_whisper: A
             frames.append(features.shape[-1])
             return encode(features, to_cpu=to_cpu)
 
-        model.model = _Spied(model.model, spied)
+        model.model = _Spied(model.model, encode=spied)
         recogniser.read(SECOND)
     assert frames == [140, 3000]
 
 
 class _Spied:
-    def __init__(self, model: Any, encode: Any) -> None:
-        self._model, self.encode = model, encode
+    """Let a test see what a model is asked."""
+
+    def __init__(self, model: Any, **ways: Any) -> None:
+        self._model = model
+        vars(self).update(ways)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
+
+
+def test_a_model_of_many_languages_tells_which_one_was_spoken(scripted_whisper: Any) -> None:
+    recogniser = opened(scripted_whisper.model("ours", "tournez a gauche"))
+    model = recogniser._whisper
+    heard = [[("<|fr|>", 0.97), ("<|en|>", 0.03)]]
+    model.model = _Spied(model.model, is_multilingual=True, detect_language=lambda _: heard)
+    assert recogniser.read(SECOND).language == "fr"
+
+
+def test_hot_words_are_given_to_a_model_that_takes_them(scripted_whisper: Any) -> None:
+    prompts: dict[str, list[int]] = {}
+    for name, takes_them in (("takes", True), ("knows-none", False)):
+        recogniser = opened(scripted_whisper.model(name, "turn left", hot_words=takes_them))
+        model = recogniser._whisper
+        generate = model.model.generate
+
+        def spied(
+            features: Any, asked: Any, name: str = name, generate: Any = generate, **options: Any
+        ) -> Any:
+            prompts[name] = asked[0]
+            return generate(features, asked, **options)
+
+        model.model = _Spied(model.model, generate=spied)
+        recogniser.read(SECOND, "left, left")
+    assert len(prompts["knows-none"]) == 2
+    assert len(prompts["takes"]) > 2 + 2
 
 
 def test_an_unsure_model_has_a_low_log_probability(scripted_whisper: Any) -> None:

@@ -28,6 +28,12 @@ def test_the_floor_falls_at_once_and_rises_over_seconds() -> None:
     assert settle(floor, -45.0, 12.0) == pytest.approx(-45.0)
 
 
+def test_an_offset_of_the_microphone_is_no_sound() -> None:
+    noise = 0.001 * np.random.default_rng(1).standard_normal(FRAME).astype(np.float32)
+    assert level_db(noise + np.float32(0.1)) == pytest.approx(level_db(noise), abs=0.01)
+    assert level_db(noise) == pytest.approx(-60.0, abs=1.0)
+
+
 def test_a_voice_is_no_floor() -> None:
     floor = NoiseFloor()
     settle(floor, -70.0, 1.0)
