@@ -10,8 +10,9 @@ from typing import Any, Final
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.accounts import Accounts
-from vla_deploy.planning.asking import Request
+from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.confirmation import confirmation_of
+from vla_deploy.planning.correction import CORRECTED, corrected_by
 from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.inbox import Command
@@ -169,7 +170,7 @@ class Desk:
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["nobody was asked for a plan"])
             self._telling.check_length(answer.plan)
-            question = _read_back(answer) or confirmation_of(answer.plan, request)
+            question = answer.read_back or confirmation_of(answer.plan, request)
             if question:
                 raise Ambiguous(question)
             self._hand_on(command, request, answer, answer.plan)
@@ -230,6 +231,9 @@ class Desk:
         elif waiting.is_open and not self._is_command(command):
             self._telling.answered(command, waiting.command)
             self._complete(waiting, command.text)
+        elif plan := corrected_by(waiting.plan, command.text):
+            self._telling.answered(command, waiting.command)
+            self._correct(waiting, plan)
         elif command.is_answer:
             self._refuse(command, f"that does not answer: {waiting.question.text}")
         else:
@@ -262,6 +266,19 @@ class Desk:
         asked = waiting.command
         self._queue.appendleft(replace(asked, text=f"{asked.text}: {text}"))
 
+    def _correct(self, waiting: Waiting, plan: Plan) -> None:
+        """Go on with another plan in the place of the one that was read back."""
+        self.dialogue.settle()
+        command = waiting.command
+        request = self._request(command)
+        proposal = Proposal(plan=plan, rung=CORRECTED, confidence=1.0)
+        try:
+            checked = self.planner.check(plan, request)
+        except PlanningError as error:
+            self._conclude(command, request, Answer(error=error))
+            return
+        self._conclude(command, request, Answer(plan=checked, proposal=proposal))
+
     def _ask_again(self, waiting: Waiting) -> None:
         question = self.dialogue.ask_again()
         if question is None:
@@ -283,7 +300,3 @@ class Desk:
         waiting = self.dialogue.settle()
         if waiting is not None:
             self._refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
-
-
-def _read_back(answer: Answer) -> str:
-    return "" if answer.proposal is None else answer.proposal.read_back

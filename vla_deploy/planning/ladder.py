@@ -75,6 +75,11 @@ class Answer:
     error: PlanningError | None = None
 
     @property
+    def read_back(self) -> str:
+        """Return what the rung wants to be agreed to before anything moves, "" for nothing."""
+        return "" if self.proposal is None else self.proposal.read_back
+
+    @property
     def is_final(self) -> bool:
         """Tell whether nobody else needs to be asked."""
         return self.plan is not None or isinstance(self.error, Ambiguous | NotAble)

@@ -7,6 +7,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Proposal, Request, Rung
+from vla_deploy.planning.correction import CORRECTED
 from vla_deploy.planning.dialects import Json, parse_plan
 from vla_deploy.planning.errors import Declined, NotUnderstood
 from vla_deploy.planning.ladder import Answer, Check, Ladder
@@ -132,7 +133,7 @@ class _GivenPlan:
         return Proposal(plan=parse_plan(self.document), rung=self.name, confidence=1.0)
 
 
-_NOT_KEPT: Final = frozenset({RulesRung.name, PlanCache.name, "given"})
+_NOT_KEPT: Final = frozenset({RulesRung.name, PlanCache.name, "given", CORRECTED})
 
 
 def _worded(answer: Answer, request: Request) -> Answer:

@@ -103,11 +103,11 @@ class Desk:
         self._control.put_document({"state": state, "cause": "", "detail": ""})
 
     def sees(self, *names: str) -> None:
-        """Let perception tell of things such as "red cup_1", a metre apart on the floor."""
+        """Let perception tell of things such as "red cup_1", in a row on the coffee table."""
         objects = [
             {"id": name, "class": name.partition("_")[0], "colour": colour,
-             "position_m": [1.0 + number, 1.0, 0.05], "size_m": [0.07, 0.07, 0.1],
-             "last_seen_ns": self.clock.now_ns()}
+             "position_m": [2.0 + 0.2 * number, 1.5, 0.5], "size_m": [0.07, 0.07, 0.1],
+             "last_seen_ns": self.clock.now_ns(), "rests": {"relation": "on", "of": "coffee_table"}}
             for number, (colour, name) in enumerate(one.split() for one in names)
         ]  # fmt: skip
         self.shows(*objects)

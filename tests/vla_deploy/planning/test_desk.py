@@ -177,6 +177,20 @@ class TestReadingBack:
         assert events(desk.answers()) == [("c2", "answered"), ("c1", "accepted"), ("c1", "plan")]
         assert len(desk.plans()) == 1
 
+    def test_a_correction_changes_the_plan_that_was_read_back(self, open_desk, rung, propose):
+        take = propose(("pick_up", {"object": "red cup"}), read_back="Shall I take the red cup?")
+        desk = open_desk(rung("model", take))
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(text="cup, like, you know")
+        assert desk.answers()[-1]["event"] == "asked"
+        desk.give(command_id="c2", text="no, the blue one")
+        told = desk.answers()
+        assert events(told) == [("c2", "answered"), ("c1", "accepted"), ("c1", "plan")]
+        assert told[-1]["rung"] == "correction"
+        assert "blue cup" in [
+            one["parameters"].get("object") for one in told[-1]["plan"]["actions"]
+        ]
+
     def test_a_robot_that_was_disarmed_meanwhile_does_not_move(self, desk):
         desk.answers()
         desk.control("disarmed")
