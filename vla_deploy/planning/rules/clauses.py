@@ -23,7 +23,11 @@ _POLITE: Final = re.compile(
     r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
     r"i would like you to|i'd like you to|i need you to|you should|you need to|you have to|you can|"
     r"let's|lets|let us|go ahead and|first|would you mind|do me a favour and|do me a favor and|"
-    r"be so kind and|so|well|um|uh|quickly|maybe|perhaps|"
+    r"be so kind (?:and|as to)|be a dear and|how about you|how about|what about|"
+    r"i was wondering if you (?:could|would)|i wonder if you (?:could|would)|"
+    r"i'd (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
+    r"i would (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
+    r"what i (?:want|need) is for you to|possibly|so|well|quickly|maybe|perhaps|"
     r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait)\b)|"
     r"see if you can|go (?:and )?(?=(?:stand|park)\b)|try to|try and|start to|next|finally)\b[, ]*"
     r"|[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
@@ -31,7 +35,23 @@ _POLITE: Final = re.compile(
     r"somewhere|anywhere|once more|for us)$|[.!?, ]+$"
 )
 _SPLIT: Final = re.compile(
-    r"\s*(?:[,;.]?\s*\b(?:and then|and after that|after that|afterwards|then|and)\b|[,;]|\.\s)\s*"
+    r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|and)\b|[,;]|[.!?]\s)"
+    r"\s*"
+)
+# What people say while they think, and words said twice.
+_FILLER: Final = re.compile(r",?\s*\b(?:um+|uh+|er+m?|hmm+|you know|like,)(?=[\s,.!?]|$),?\s*")
+_TWICE: Final = re.compile(r"\b(\w+)(?: \1\b)+")
+# Whole parts of a sentence that ask for nothing.
+_COURTESY: Final = re.compile(
+    r"(?:hello|hi|hey|good (?:morning|day|afternoon|evening))(?: there| robot| butler)?|"
+    r"excuse me|pardon(?: me)?|thanks(?: .*)?|thank you(?: .*)?|cheers|please|"
+    r"(?:if|when|whenever) you(?: don't mind|'re ready| are ready| have (?:a|the) (?:\w+))|"
+    r"if it(?:'s| is) not too much trouble|if possible|right(?: then)?|you know what|listen|look"
+)
+# Before these the speaker has changed his mind about what he has just said.
+_REPAIR: Final = re.compile(
+    r"(?:no,? wait|wait,? no|oh no|no|sorry|i mean|or rather|rather|actually(?:,? no)?|correction|"
+    r"make that|that is)\b"
 )
 
 
@@ -47,12 +67,25 @@ _STOPS: Final = frozenset(" ".join(words_of(spoken)) for spoken in STOP_WORDS) |
 
 def polite_off(text: str) -> str:
     """Return a command in lower case without what only asks nicely."""
-    text = " ".join(text.lower().replace("\u2019", "'").split())
+    text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
+    text = _TWICE.sub(r"\1", text)
     while (shorter := _POLITE.sub("", text).strip()) != text and shorter:
         text = shorter
     return text
 
 
 def segments(text: str) -> list[str]:
-    """Return what stands between the conjunctions of a sentence."""
-    return [polite_off(part) for part in _SPLIT.split(text) if part.strip(" .!?,")]
+    """Return what stands between the conjunctions of a sentence, courtesies left out."""
+    parts = [polite_off(part) for part in _SPLIT.split(text) if part.strip(" .!?,")]
+    return [part for part in parts if not _COURTESY.fullmatch(part)] or parts
+
+
+def repaired(part: str) -> str | None:
+    """Return what a part says in the place of the one before ("" for what only begins to).
+
+    None where it says something of its own.
+    """
+    changed = False
+    while found := _REPAIR.match(part):
+        part, changed = part[found.end() :].strip(" ,"), True
+    return part if changed else None

@@ -9,7 +9,13 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.rules.building import Groups, Step, is_one, parts_of, split_put
-from vla_deploy.planning.rules.clauses import MOST_CLAUSES, MOST_LETTERS, polite_off, segments
+from vla_deploy.planning.rules.clauses import (
+    MOST_CLAUSES,
+    MOST_LETTERS,
+    polite_off,
+    repaired,
+    segments,
+)
 from vla_deploy.planning.rules.intents import PRIORITIES, Intent
 from vla_deploy.planning.rules.refusals import refuse_unable
 from vla_deploy.planning.rules.table import RULES, Rule
@@ -18,6 +24,8 @@ from vla_deploy.planning.rules.table import RULES, Rule
 _WITH_HAND: Final = re.compile(
     r"(?P<own>.+?),? (?:with|using|in) (?:the|your) (?P<arm>left|right) (?:hand|arm|gripper)"
 )
+# What of a clause can be corrected by a part alone.
+_CORRECTED: Final = frozenset({"object", "place", "destination", "quantity", "way", "what"})
 _HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
 
 
@@ -29,6 +37,7 @@ class _Draft:
     steps: list[tuple[Step, Intent]] = field(default_factory=list)
     clause: str = ""
     thing: str = ""
+    began: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +79,8 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
             _build(clause, fit, draft)
             return count
     clause = parts[0]
+    if repaired(clause) is not None:
+        return _take_back(parts, draft)
     refuse_unable(clause)
     fit = _fit(clause, draft.request)
     if fit is None and draft.thing:
@@ -78,6 +89,52 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
         raise NotUnderstood(parts[0])
     _build(clause, fit, draft)
     return 1
+
+
+def _take_back(parts: Sequence[str], draft: _Draft) -> int:
+    """Let "no wait, the blue one" and "I mean the bedroom" take the place of the last clause.
+
+    Raises:
+        NotUnderstood: there is nothing to take back, or what shall stand there fits no rule.
+    """
+    taken, said = 0, ""
+    for part in parts:
+        taken, instead = taken + 1, repaired(part)
+        said = part if instead is None else instead
+        if said:
+            break
+    if not draft.clause or not said:
+        raise NotUnderstood(parts[0])
+    del draft.steps[draft.began :]
+    whole = _in_place(said, draft)
+    fit = _fit(whole, draft.request)
+    if fit is None:
+        raise NotUnderstood(said)
+    _build(whole, fit, draft)
+    return taken
+
+
+def _in_place(said: str, draft: _Draft) -> str:
+    """Return the last clause with what was said in the place of what it corrects.
+
+    That is the last part of it of the same kind; a clause of its own stands for itself.
+    """
+    request = draft.request
+    own = _fit(said, request)
+    if own is not None and _is_known(own, request):
+        return said
+    before = _fit(draft.clause, request)
+    groups = {} if before is None else before.groups
+    named = [value for name, value in groups.items() if name in _CORRECTED and value]
+    if "relation" in groups:
+        named.append(f"{groups['relation']} {groups['destination']}")
+    for value in sorted(named, key=draft.clause.rfind, reverse=True):
+        at = draft.clause.rfind(value)
+        whole = draft.clause[:at] + said + draft.clause[at + len(value) :]
+        fit = _fit(whole, request)
+        if fit is not None and _is_known(fit, request):
+            return whole
+    return said
 
 
 def _with_verb(clause: str, draft: _Draft) -> tuple[str, _Fit | None]:
@@ -136,6 +193,7 @@ def _is_whole(fit: _Fit, request: Request) -> bool:
 
 def _build(clause: str, fit: _Fit, draft: _Draft) -> None:
     steps = fit.rule.build(fit.groups, draft.request)
+    draft.began = len(draft.steps)
     draft.steps += [(step, fit.rule.intent) for step in steps]
     draft.clause = clause
     draft.thing = fit.groups.get("object", fit.groups.get("place", ""))

@@ -119,6 +119,17 @@ COMMANDS = {
         "clear the bedside table": "speak I know of nothing there to put away. I look around.; "
             "navigate_to bedside_table; look_at left; look_at ahead; look_at right; look_at down",
     },
+    "hesitating": {
+        "um, could you, uh, get the, er, the ball please": "pick_up ball",
+        "Hello! Excuse me, go to the kitchen, thank you": "navigate_to kitchen",
+        "I was wondering if you could possibly find my keys": "find_object keys",
+        "pick up the red cup, no wait, the blue one": "pick_up cup_2",
+        "go to the kitchen, sorry, I mean the bedroom": "navigate_to bedroom",
+        "turn left, no, turn right": "turn -1.5707963267948966",
+        "move forward one metre, I mean half a metre": "move 0.5",
+        "put the ball on the side table, or rather in the box": BOX,
+        "find the keys. Actually no, find the phone": "find_object phone",
+    },
     "the rest": {
         "open your left hand": "open_gripper left",
         "tuck in your arms": "move_arm tuck",
@@ -159,6 +170,8 @@ def test_a_command_does_what_it_says(does: Does, text: str, expected: str) -> No
         ("put the ball in the red cup", PlanInvalid),
         ("put it down", PlanInvalid),
         ("go back", NotUnderstood),
+        ("no, the blue one", NotUnderstood),
+        ("pick up the red cup, no wait", NotUnderstood),
         ("go there", Ambiguous),
         ("repeat forever turn left", NotUnderstood),
     ],
