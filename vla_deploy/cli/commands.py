@@ -24,6 +24,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "plan": Command("plan", "tell what would be done for a command, and who planned it"),
     "status": Command("status", "tell what runs and how the robot is"),
     "scene": Command("scene", "tell what the robot knows of the things around it"),
+    "memory": Command("memory", "tell what the robot remembers, and have it forget"),
     "budget": Command(
         "budget", "tell what the robot uses of its budgets, and what is done about an excess"
     ),

@@ -24,6 +24,7 @@ USER_ERRORS: Final[Mapping[str, str]] = {
     "vla_deploy.install.errors": "InstallError",
     "vla_deploy.inference.errors": "InferenceError",
     "vla_deploy.ipc.errors": "IpcError",
+    "vla_deploy.memory.errors": "RecollectionError",
     "vla_deploy.model_servers.errors": "ModelServerError",
     "vla_deploy.navigation.errors": "NavigationError",
     "vla_deploy.perception.camera_tools.errors": "CalibrationError",

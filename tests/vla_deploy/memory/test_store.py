@@ -1,0 +1,173 @@
+"""What is remembered, found again, bounded, exported and erased."""
+
+import json
+import sqlite3
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from vla_deploy.memory import Episode, LastSeen, MemoryStore, MemoryUnusable, Outcome
+from vla_deploy.memory.errors import NoSuchEpisode
+
+DONE = Episode(told_s=1000.0, command="bring me the bottle", outcome=Outcome.SUCCEEDED)
+KEYS = LastSeen(
+    run_id="run-1",
+    thing_id="keys_1",
+    kind="keys",
+    colour="grey",
+    place="bedside_table",
+    position_m=(0.3, 3.8, 0.5),
+    seen_s=1000.0,
+)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> MemoryStore:
+    return MemoryStore(tmp_path / "memory" / "memory.sqlite3", most_episodes=8, most_things=4)
+
+
+def told(*commands: str) -> list[Episode]:
+    return [replace(DONE, command=command) for command in commands]
+
+
+def test_an_episode_comes_back_as_it_was_with_its_number(store: MemoryStore) -> None:
+    failed = Episode(
+        told_s=5.5,
+        command="fetch the cup",
+        outcome=Outcome.FAILED,
+        source="voice",
+        goal="the cup is with the person",
+        reasoning="it stands on the table",
+        plan={"actions": [{"skill": "pick_up"}]},
+        rung="rules",
+        error="it slipped out",
+        duration_s=12.5,
+    )
+    store.add([failed])
+    assert store.newest() == [replace(failed, number=1)]
+
+
+@pytest.mark.parametrize(
+    ("question", "found"),
+    [
+        ("where is the bottle", "bring me the bottle"),
+        ("BOTTLES!", "bring me the bottle"),  # the stem of a word
+        ("the botle", "bring me the bottle"),  # by letters
+        ('a "quoted" AND (odd) NEAR/3 question: cups*', "pick up the red cup"),
+        ("putting things into boxes", "put the ball in the box"),
+    ],
+)
+def test_words_and_letters_find_an_episode(store: MemoryStore, question: str, found: str) -> None:
+    store.add(told("go to the kitchen", "bring me the bottle", "pick up the red cup"))
+    store.add(told("put the ball in the box"))
+    assert store.recall(question)[0].episode.command == found
+
+
+@pytest.mark.parametrize("question", ["", "the", "?!", "quarterly taxes", "\x00", "' OR 1=1; --"])
+def test_what_fits_nothing_calls_nothing_up(store: MemoryStore, question: str) -> None:
+    store.add(told("bring me the bottle"))
+    assert store.recall(question) == []
+
+
+def test_an_error_is_found_by_its_words_too(store: MemoryStore) -> None:
+    store.add([replace(DONE, outcome=Outcome.FAILED, error="a chair stood in the doorway")])
+    assert store.recall("what was wrong with the doorway")[0].episode.error.startswith("a chair")
+
+
+def test_of_equals_the_newest_comes_first(store: MemoryStore) -> None:
+    store.add(told("bring me the bottle", "bring me the bottle"))
+    assert [one.episode.number for one in store.recall("the bottle")] == [2, 1]
+
+
+def test_beyond_its_bounds_the_oldest_are_forgotten(store: MemoryStore) -> None:
+    store.add(told(*(f"go to place {number}" for number in range(12))))
+    store.add([], [replace(KEYS, thing_id=f"keys_{n}", seen_s=float(n)) for n in range(9)])
+    assert [one.command for one in store.newest()] == [f"go to place {n}" for n in range(11, 3, -1)]
+    assert (
+        not store.recall("place 3") or store.recall("place 3")[0].episode.command != "go to place 3"
+    )
+    assert [one.seen_s for one in store.last_seen()] == [8.0, 7.0, 6.0, 5.0]
+
+
+def test_a_thing_is_remembered_where_it_was_last(store: MemoryStore) -> None:
+    store.add([], [KEYS])
+    store.add([], [replace(KEYS, place="kitchen_table", seen_s=2000.0)])
+    store.add([], [replace(KEYS, run_id="run-2", place="coffee_table", seen_s=1500.0)])
+    places = [one.place for one in store.last_seen("keys")]
+    assert places == ["kitchen_table", "coffee_table"]
+    assert store.last_seen("keys", "red") == []
+
+
+def test_it_outlives_the_process_and_only_its_owner_can_read_it(store: MemoryStore) -> None:
+    store.add(told("bring me the bottle"), [KEYS])
+    store.close()
+    again = MemoryStore(store.path)
+    assert again.newest()[0].command == "bring me the bottle"
+    assert again.last_seen() == [KEYS]
+    assert store.path.stat().st_mode & 0o077 == 0
+
+
+def test_what_is_erased_stands_nowhere_in_the_file(store: MemoryStore) -> None:
+    store.add(told("find the zebrawood casket", "go to the kitchen"), [KEYS])
+    store.erase(1)
+    assert [one.command for one in store.newest()] == ["go to the kitchen"]
+    assert store.recall("zebrawood casket") == []
+    assert all(b"zebrawood" not in file.read_bytes() for file in store.path.parent.iterdir())
+    store.erase_all()
+    assert list(store.export()) == []
+    assert all(b"bedside" not in file.read_bytes() for file in store.path.parent.iterdir())
+
+
+def test_what_is_not_there_cannot_be_erased(store: MemoryStore) -> None:
+    with pytest.raises(NoSuchEpisode, match="nothing number 7 is remembered"):
+        store.erase(7)
+
+
+def test_the_export_holds_everything_as_json(store: MemoryStore) -> None:
+    store.add(told("go to the kitchen", "bring me the bottle"), [KEYS])
+    lines = [json.loads(json.dumps(one)) for one in store.export()]
+    assert [one["kind"] for one in lines] == ["episode", "episode", "thing"]
+    assert [one["command"] for one in lines[:2]] == ["go to the kitchen", "bring me the bottle"]
+    assert lines[2]["thing_kind"] == "keys"
+
+
+def test_a_damaged_file_is_kept_aside_and_remembering_begins_anew(tmp_path: Path) -> None:
+    path = tmp_path / "memory.sqlite3"
+    path.write_bytes(b"this was a database once" * 100)
+    store = MemoryStore(path)
+    store.add(told("go to the kitchen"))
+    assert len(store.newest()) == 1
+    assert (tmp_path / "memory.sqlite3.damaged").read_bytes().startswith(b"this was")
+
+
+def test_a_file_of_a_later_release_is_left_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "memory.sqlite3"
+    MemoryStore(path).close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    with pytest.raises(MemoryUnusable, match="it has version 99, this release knows 1"):
+        MemoryStore(path)
+
+
+def test_a_place_where_no_file_can_be_is_told(tmp_path: Path) -> None:
+    (tmp_path / "memory").write_text("a file where a folder should be")
+    with pytest.raises(MemoryUnusable, match="cannot be used"):
+        MemoryStore(tmp_path / "memory" / "memory.sqlite3")
+
+
+def test_two_threads_may_write_and_read_at_once(store: MemoryStore) -> None:
+    roomy = MemoryStore(store.path)
+
+    def write(name: str) -> None:
+        for number in range(20):
+            roomy.add(told(f"{name} {number}"))
+            roomy.recall(name)
+
+    threads = [threading.Thread(target=write, args=(name,)) for name in ("left", "right")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(roomy.newest(100)) == 40

@@ -1,0 +1,128 @@
+"""`vla-deploy memory`: what the robot remembers, and how to have it forget."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from vla_deploy.cli.errors import UsageError
+from vla_deploy.cli.example import add_command, add_top_command
+from vla_deploy.memory import MemoryStore
+from vla_deploy.memory.episode import unix_s
+from vla_deploy.memory.wording import place_words, sentence_of
+from vla_deploy.supervisor.runtime import default_base
+
+EXAMPLES = """  vla-deploy memory list
+  vla-deploy memory search "where did the keys go"
+  vla-deploy memory things --kind keys
+  vla-deploy memory export memory.jsonl
+  vla-deploy memory erase 12
+  vla-deploy memory erase --all --yes
+"""
+
+
+def register(commands: Any) -> None:
+    """Add the command."""
+    acts = add_top_command(commands, "memory", EXAMPLES).add_subparsers(required=True)
+    listed = _act(acts, "list", "the last commands and what came of them", list_episodes)
+    listed.add_argument("--count", type=int, default=20, help="how many (default: 20)")
+    found = _act(acts, "search", "what is remembered that fits some words", find)
+    found.add_argument("text", help="such as a command or a thing")
+    found.add_argument("--count", type=int, default=5, help="how many (default: 5)")
+    things = _act(acts, "things", "where things were seen last", list_things)
+    things.add_argument("--kind", default="", help='such as "keys"')
+    things.add_argument("--colour", default="", help='such as "red"')
+    exported = _act(acts, "export", "write everything to a file, a JSON document a line", export)
+    exported.add_argument("file", type=Path, help="where to; it must not exist yet")
+    erased = _act(acts, "erase", "forget one command, or everything", erase)
+    erased.add_argument("number", type=int, nargs="?", help="its number in the list")
+    erased.add_argument("--all", action="store_true", help="everything, things too")
+    erased.add_argument("--yes", action="store_true", help="do not ask")
+
+
+def _act(acts: Any, name: str, summary: str, run: Any) -> argparse.ArgumentParser:
+    act = add_command(acts, name, summary, f"  vla-deploy memory {name} --help\n")
+    act.add_argument("--json", action="store_true", help="print JSON")
+    act.set_defaults(run=run)
+    return act
+
+
+def list_episodes(arguments: argparse.Namespace) -> int:
+    """Print the last commands, the newest first."""
+    episodes = _store(arguments).newest(arguments.count)
+    if arguments.json:
+        print(json.dumps([one.document() for one in episodes], indent=2))
+        return 0
+    now_s = unix_s()
+    lines = [f"{one.number:>5}  {sentence_of(one, now_s)}" for one in episodes]
+    print("\n".join(lines) or "nothing is remembered yet")
+    return 0
+
+
+def find(arguments: argparse.Namespace) -> int:
+    """Print what fits some words, the best first."""
+    found = _store(arguments).recall(arguments.text, arguments.count)
+    if arguments.json:
+        told = [{**one.episode.document(), "score": round(one.score, 5)} for one in found]
+        print(json.dumps(told, indent=2))
+        return 0
+    now_s = unix_s()
+    lines = [f"{one.episode.number:>5}  {sentence_of(one.episode, now_s)}" for one in found]
+    print("\n".join(lines) or "nothing like that is remembered")
+    return 0
+
+
+def list_things(arguments: argparse.Namespace) -> int:
+    """Print where things were seen last."""
+    things = _store(arguments).last_seen(arguments.kind, arguments.colour)
+    if arguments.json:
+        print(json.dumps([one.document() for one in things], indent=2))
+        return 0
+    now_s = unix_s()
+    print("\n".join(place_words(one, now_s) for one in things) or "no such thing is remembered")
+    return 0
+
+
+def export(arguments: argparse.Namespace) -> int:
+    """Write everything to a new file that only its owner can read."""
+    store, count = _store(arguments), 0
+    try:
+        with arguments.file.open("x", encoding="utf-8") as file:
+            arguments.file.chmod(0o600)
+            for document in store.export():
+                file.write(json.dumps(document) + "\n")
+                count += 1
+    except OSError as error:
+        raise UsageError(f"{arguments.file}: {error.strerror}; name another file") from error
+    told = {"file": str(arguments.file), "documents": count}
+    print(json.dumps(told) if arguments.json else f"{count} documents written to {arguments.file}")
+    return 0
+
+
+def erase(arguments: argparse.Namespace) -> int:
+    """Forget one command or everything, after asking."""
+    if arguments.all == (arguments.number is not None):
+        raise UsageError("give either the number of a command, or --all")
+    what = "everything" if arguments.all else f"number {arguments.number}"
+    _confirm(arguments, what)
+    store = _store(arguments)
+    if arguments.all:
+        store.erase_all()
+    else:
+        store.erase(arguments.number)
+    print(json.dumps({"erased": what}) if arguments.json else f"forgotten: {what}")
+    return 0
+
+
+def _confirm(arguments: argparse.Namespace, what: str) -> None:
+    if arguments.yes:
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(f"forgetting {what} cannot be undone: say so with --yes")
+    if input(f"Forget {what}? This cannot be undone. [y/N] ").strip().lower() not in ("y", "yes"):
+        raise UsageError("nothing was forgotten")
+
+
+def _store(arguments: argparse.Namespace) -> MemoryStore:
+    return MemoryStore.of_base(arguments.runtime_base or default_base())

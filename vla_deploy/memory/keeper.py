@@ -1,0 +1,213 @@
+"""Follow what the robot is told and what comes of it, and put that into the memory."""
+
+import logging
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.ipc import CellReader, Event, RingReader, SharedSpace
+from vla_deploy.memory.episode import Episode, LastSeen, Outcome
+from vla_deploy.memory.errors import MemoryUnusable
+from vla_deploy.memory.store import MemoryStore
+from vla_deploy.world import SceneUnreadable, Snapshot, Thing, read_snapshot
+from vla_deploy.world.memory import Point, place_of
+from vla_deploy.world.vocabulary import ANY_CLASS
+
+# What is under way is bounded: a command whose end is never told is dropped for newer ones.
+MOST_OPEN: Final = 32
+# A thing is written again where it has moved so far, or after so long.
+MOVED_M: Final = 0.2
+AGAIN_S: Final = 60.0
+LOOK_EVERY_NS: Final = 2 * NS_PER_S
+_RETRY_NS: Final = 30 * NS_PER_S
+_MOST_KEPT: Final = 200
+_log = logging.getLogger(__name__)
+
+
+class MemoryKeeper:
+    """Read the topics in steps; write beside them. `wall_s` gives seconds since 1970."""
+
+    def __init__(
+        self,
+        store: MemoryStore,
+        space: SharedSpace,
+        clock: Clock,
+        aside: Executor,
+        *,
+        run_id: str,
+        places: Mapping[str, Point],
+        wall_s: Callable[[], float],
+    ) -> None:
+        self._store = store
+        self._clock = clock
+        self._aside = aside
+        self._run_id = run_id
+        self._places = dict(places)
+        self._wall_s = wall_s
+        self._utterances: RingReader = space.ring_reader("utterance", from_start=False)
+        self._events: RingReader = space.ring_reader("task_event", from_start=False)
+        self._scene: CellReader = space.cell_reader("scene")
+        self._open: OrderedDict[str, Episode] = OrderedDict()
+        self._ended: list[Episode] = []
+        self._seen: dict[str, LastSeen] = {}
+        self._changed: dict[str, LastSeen] = {}
+        self._writing: Future[None] | None = None
+        self._batch: tuple[list[Episode], dict[str, LastSeen]] = ([], {})
+        self._look_due_ns = 0
+        self._write_due_ns = 0
+        self.trouble = ""
+
+    def step(self) -> None:
+        """Take note of what has come in, and write what is complete."""
+        for event in self._utterances.drain():
+            self._begin(event)
+        for event in self._events.drain():
+            self._follow(event.payload)
+        now_ns = self._clock.now_ns()
+        if now_ns >= self._look_due_ns:
+            self._look_due_ns = now_ns + LOOK_EVERY_NS
+            self._look(now_ns)
+        self._write(now_ns)
+
+    def document(self) -> dict[str, Any]:
+        """Return how remembering goes, for the status."""
+        waiting = len(self._ended) + len(self._changed)
+        return {"file": str(self._store.path), "waiting": waiting, "trouble": self.trouble}
+
+    # --- commands -------------------------------------------------------------------------------
+
+    def _begin(self, event: Event) -> None:
+        told = event.payload
+        command_id, text = str(told.get("command_id", "")), str(told.get("text") or "")
+        if not command_id or not text:  # a cancel, or a whole plan from a program
+            return
+        self._open[command_id] = Episode(
+            told_s=self._wall_s(),
+            command=text,
+            outcome=Outcome.REFUSED,
+            source=str(told.get("source", "")),
+        )
+        while len(self._open) > MOST_OPEN:
+            self._open.popitem(last=False)
+
+    def _follow(self, told: Mapping[str, Any]) -> None:
+        command_id = str(told.get("command_id", ""))
+        episode = self._open.get(command_id)
+        follow = _FOLLOW.get(str(told.get("event")))
+        if episode is None or follow is None:
+            return
+        episode, has_ended = follow(episode, told)
+        if not has_ended:
+            self._open[command_id] = episode
+            return
+        del self._open[command_id]
+        elapsed_s = max(0.0, self._wall_s() - episode.told_s)
+        self._ended.append(replace(episode, duration_s=round(elapsed_s, 1)))
+        del self._ended[:-_MOST_KEPT]
+
+    # --- things ---------------------------------------------------------------------------------
+
+    def _look(self, now_ns: int) -> None:
+        sample = self._scene.latest()
+        if sample is None:
+            return
+        try:
+            snapshot = read_snapshot(sample.document(), now_ns)
+        except SceneUnreadable as error:  # perception's fault; it is told there, too
+            _log.warning("%s", error)
+            return
+        for thing in snapshot.things:
+            if thing.kind != ANY_CLASS:
+                self._note(thing, snapshot)
+
+    def _note(self, thing: Thing, snapshot: Snapshot) -> None:
+        seen = LastSeen(
+            run_id=self._run_id,
+            thing_id=thing.thing_id,
+            kind=thing.kind,
+            colour=thing.colour,
+            place=place_of(thing, self._places),
+            position_m=thing.position_m,
+            seen_s=self._wall_s() - snapshot.unseen_s(thing),
+        )
+        before = self._seen.get(thing.thing_id)
+        if before is None or _is_news(before, seen):
+            self._seen[thing.thing_id] = self._changed[thing.thing_id] = seen
+
+    # --- writing --------------------------------------------------------------------------------
+
+    def _write(self, now_ns: int) -> None:
+        """Hand over what is new; what could not be written is tried again later."""
+        if self._writing is not None:
+            if not self._writing.done():
+                return
+            self._settle(self._writing, now_ns)
+        if now_ns < self._write_due_ns or not (self._ended or self._changed):
+            return
+        self._batch = self._ended, self._changed
+        self._ended, self._changed = [], {}
+        episodes, things = self._batch
+        self._writing = self._aside.submit(self._store.add, episodes, list(things.values()))
+
+    def _settle(self, writing: "Future[None]", now_ns: int) -> None:
+        self._writing = None
+        error = writing.exception()
+        if error is None:
+            self.trouble = ""
+            return
+        if not isinstance(error, MemoryUnusable):
+            raise error
+        if not self.trouble:
+            _log.warning("not remembered for now: %s", error)
+        self.trouble = str(error)
+        self._write_due_ns = now_ns + _RETRY_NS
+        episodes, things = self._batch
+        self._ended = [*episodes, *self._ended][-_MOST_KEPT:]
+        self._changed = {**things, **self._changed}
+
+
+def _is_news(before: LastSeen, now: LastSeen) -> bool:
+    return (
+        (before.kind, before.colour, before.place) != (now.kind, now.colour, now.place)
+        or math.dist(before.position_m, now.position_m) > MOVED_M
+        or now.seen_s - before.seen_s > AGAIN_S
+    )
+
+
+def _planned(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
+    plan = told.get("plan") or {}
+    planned = replace(
+        episode,
+        goal=str(plan.get("goal", "")),
+        reasoning=str(plan.get("reasoning", "")),
+        plan=plan,
+        rung=str(told.get("rung", "")),
+    )
+    return planned, False
+
+
+def _refused(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
+    return replace(episode, outcome=Outcome.REFUSED, error=str(told.get("reason") or "")), True
+
+
+def _finished(episode: Episode, told: Mapping[str, Any]) -> tuple[Episode, bool]:
+    outcome = Outcome.SUCCEEDED if told.get("success") else Outcome.FAILED
+    return replace(episode, outcome=outcome, error=str(told.get("error") or "")), True
+
+
+def _answered(episode: Episode, _: Mapping[str, Any]) -> tuple[Episode, bool]:
+    """End an utterance that answered a question: what came of it is told of the question."""
+    return replace(episode, outcome=Outcome.SUCCEEDED), True
+
+
+_Follow = Callable[[Episode, Mapping[str, Any]], tuple[Episode, bool]]
+_FOLLOW: Final[Mapping[str, _Follow]] = {
+    "plan": _planned,
+    "rejected": _refused,
+    "finished": _finished,
+    "answered": _answered,
+}
