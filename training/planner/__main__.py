@@ -4,16 +4,17 @@ import argparse
 import logging
 from collections.abc import Callable
 from pathlib import Path
-
-import torch
+from typing import Final
 
 from training.planner.chatter import read_chatter
 from training.planner.settings import SIZES, Settings
-from training.planner.training import train
 
-_EXAMPLE = (
+_EXAMPLE: Final = (
     "example: nice python -m training.planner all --out /data/planner --chatter data_full.json"
 )
+_JUDGED: Final = 600
+MODELS: Final = "models"
+_UNSEEN: Final = ("val", "oos_val", "oos_test", "test")
 Step = Callable[[argparse.Namespace, Settings], None]
 
 
@@ -22,7 +23,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m training.planner", description=__doc__, epilog=_EXAMPLE
     )
-    parser.add_argument("step", choices=[*STEPS, "all"])
+    parser.add_argument("step", choices=[*STEPS, "ship", "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for states and models")
     parser.add_argument("--size", choices=SIZES, default="full")
     parser.add_argument("--threads", type=int, default=1, help="of the training (default: 1)")
@@ -31,17 +32,59 @@ def main() -> None:
     )
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
-    torch.set_num_threads(arguments.threads)
     for name in STEPS if arguments.step == "all" else [arguments.step]:
-        STEPS[name](arguments, SIZES[arguments.size])
+        {**STEPS, "ship": _ship}[name](arguments, SIZES[arguments.size])
 
 
+def _talk(arguments: argparse.Namespace) -> tuple[str, ...]:
+    return read_chatter(arguments.chatter) if arguments.chatter else ()
+
+
+# The steps below import torch and onnx only where they need them.
 def _train(arguments: argparse.Namespace, settings: Settings) -> None:
-    chatter = read_chatter(arguments.chatter) if arguments.chatter else ()
-    train(arguments.out, settings, chatter)
+    import torch
+
+    from training.planner.training import train
+
+    torch.set_num_threads(arguments.threads)
+    train(arguments.out, settings, _talk(arguments))
 
 
-STEPS: dict[str, Step] = {"train": _train}
+def _export(arguments: argparse.Namespace, settings: Settings) -> None:
+    from training.planner.export import export
+
+    export(arguments.out, arguments.out / MODELS, settings.shape, _talk(arguments))
+
+
+def _evaluate(arguments: argparse.Namespace, _settings: Settings) -> None:
+    from random import Random
+
+    from training.planner.evaluation import evaluate
+
+    unseen = list(read_chatter(arguments.chatter, _UNSEEN)) if arguments.chatter else []
+    Random(1).shuffle(unseen)
+    evaluate(arguments.out / MODELS, _JUDGED, unseen)
+
+
+def _card(arguments: argparse.Namespace, settings: Settings) -> None:
+    from training.planner.card import describe
+
+    describe(arguments.out / MODELS, settings, arguments.chatter is not None)
+
+
+def _ship(arguments: argparse.Namespace, _settings: Settings) -> None:
+    from training.planner.shipping import ship
+
+    ship(arguments.out / MODELS)
+
+
+STEPS: dict[str, Step] = {
+    "train": _train,
+    "export": _export,
+    "evaluate": _evaluate,
+    "card": _card,
+}
+"""What `all` does, in this order; shipping is a decision of its own."""
 
 if __name__ == "__main__":
     main()

@@ -9,14 +9,15 @@ import onnx
 import torch
 from numpy.typing import NDArray
 
+from training.planner.composing import Composer
+from training.planner.files import CONFIG, GRAPH, KNOWN_WORDS, TOKENIZER, TOKENIZER_CONFIG
 from training.planner.graph import Sizes, decoder_graph, genai_config
-from training.planner.network import Decoder, Shape
+from training.planner.known_words import known_words
+from training.planner.network import Decoder
+from training.planner.shape import Shape
 from training.planner.tokens import ANSWER, COMMAND, END, PAD, load_tokenizer
-from training.planner.training import STATE, TOKENIZER, WEIGHTS
+from training.planner.training import STATE, WEIGHTS
 
-GRAPH: Final = "model.onnx"
-CONFIG: Final = "genai_config.json"
-TOKENIZER_CONFIG: Final = "tokenizer_config.json"
 CONTEXT_TOKENS: Final = 384
 # Plain words with a space before each, as the tokenizer was trained on them.
 TEMPLATE: Final = COMMAND + " {{ messages[-1]['content'] }}" + ANSWER
@@ -24,7 +25,7 @@ _LINES: Final = ("query", "key", "value", "out", "gate", "up", "down")
 _NORMS: Final = ("attention_norm", "inner_norm")
 
 
-def export(out: Path, models: Path, shape: Shape) -> None:
+def export(out: Path, models: Path, shape: Shape, chatter: tuple[str, ...] = ()) -> None:
     """Write the folder.
 
     Raises:
@@ -35,6 +36,8 @@ def export(out: Path, models: Path, shape: Shape) -> None:
     sizes = sizes_of(shape)
     onnx.save(decoder_graph(weights_of(_trained(out, shape)), sizes), models / GRAPH)
     tokenizer.save(str(models / TOKENIZER))
+    words = known_words(Composer(chatter=chatter))
+    (models / KNOWN_WORDS).write_text("\n".join(words) + "\n", encoding="utf-8")
     config = genai_config(
         sizes, kind="llama", end_id=tokenizer.token_to_id(END), pad_id=tokenizer.token_to_id(PAD)
     )

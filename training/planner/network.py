@@ -1,28 +1,10 @@
 """Define the decoder: a Llama of small size, with tied embeddings."""
 
-from dataclasses import dataclass
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shape:
-    """Hold the sizes of the network."""
-
-    vocabulary: int = 2048
-    width: int = 192
-    layers: int = 4
-    heads: int = 4
-    inner: int = 512
-    rope_theta: float = 10_000.0
-    epsilon: float = 1e-5
-
-    @property
-    def head_width(self) -> int:
-        """Return the width of one head."""
-        return self.width // self.heads
+from training.planner.shape import Shape
 
 
 class Norm(nn.Module):

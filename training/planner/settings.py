@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from training.planner.network import Shape
+from training.planner.shape import Shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

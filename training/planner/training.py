@@ -15,13 +15,13 @@ from torch.nn import functional
 
 from training.planner.batches import Batch, batches, pool_batches
 from training.planner.composing import Composer
+from training.planner.files import TOKENIZER
 from training.planner.network import Decoder
 from training.planner.settings import Settings
 from training.planner.tokens import load_tokenizer, train_tokenizer
 
 STATE: Final = "state.pt"
 WEIGHTS: Final = "weights.pt"
-TOKENIZER: Final = "tokenizer.json"
 _LOG = logging.getLogger(__name__)
 _JUDGE_SEED: Final = 999
 

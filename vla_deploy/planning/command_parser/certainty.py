@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.inference.manifest import Certainty
-from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, IMPLIED_WORDS, Step
+from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, IMPLIED, Step
 from vla_deploy.planning.command_parser.spans import find_span
 from vla_deploy.world.vocabulary import COLOURS, OBJECT_CLASSES, SYNONYMS
 
@@ -51,7 +51,7 @@ def oddities_of(steps: Sequence[Step], command: Sequence[str], known: Collection
             span = find_span(words, command)
             copied.update(words)
             used.update(() if span is None else span.places)
-            implied = all(word in IMPLIED_WORDS for word in words)
+            implied = step[field] in IMPLIED
             jumps += span.jumps if span is not None else int(not implied) * len(words)
     rest = [word for at, word in enumerate(command) if at not in used]
     is_corrected = any(word in _TAKEN_BACK for word in rest)

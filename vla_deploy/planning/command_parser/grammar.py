@@ -12,8 +12,8 @@ from typing import Any, Final
 # Fields whose words are copied. A value begins with a space: then a word at its beginning is the
 # same token as in the command, which makes copying easy to learn.
 COPIED_FIELDS: Final = frozenset({"what", "where", "from", "to", "by", "text", "name"})
-# Words that stand for what was not said: "come here" goes to "me".
-IMPLIED_WORDS: Final = ("me", "back", "charging", "station")
+# What stands for words that were not said: "come here" goes to "me".
+IMPLIED: Final = ("me", "back", "charging station")
 MOST_STEPS: Final = 6
 MOST_WORDS: Final = 24
 
@@ -56,21 +56,20 @@ STEPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     }
 )
 JsonSchema = dict[str, Any]
+_COPIED: Final[JsonSchema] = {"$ref": "#/$defs/copied"}
 Step = Mapping[str, str]
 
 
 def answer_schema(words: Sequence[str] = ()) -> JsonSchema:
     """Return the JSON Schema of an answer to a command of these words; without, that of any."""
-    word = "|".join(sorted({re.escape(one) for one in (*words, *IMPLIED_WORDS)}))
-    if not words:
-        word = "[a-z0-9_'.]+"
-    copied = {"type": "string", "pattern": f"^( ({word})){{1,{MOST_WORDS}}}$"}
+    copied = {"type": "string", "pattern": f"^(?:{_copied(words)})$"}
     return {
+        "$defs": {"copied": copied},
         "type": "object",
         "properties": {
             "steps": {
                 "type": "array",
-                "items": {"anyOf": [_step_schema(do, copied) for do in STEPS]},
+                "items": {"anyOf": [*map(_step_schema, STEPS)]},
                 "minItems": 1,
                 "maxItems": MOST_STEPS,
             }
@@ -78,6 +77,14 @@ def answer_schema(words: Sequence[str] = ()) -> JsonSchema:
         "required": ["steps"],
         "additionalProperties": False,
     }
+
+
+def _copied(words: Sequence[str]) -> str:
+    """Return the pattern of what may be copied: some of the words in their order, each once."""
+    if not words:
+        return f"( [a-z0-9_'.]+){{1,{MOST_WORDS}}}"
+    in_order = "".join(f"( {re.escape(one)})?" for one in words)
+    return "|".join((in_order, *(f" {one}" for one in IMPLIED)))
 
 
 def answer_text(steps: Sequence[Step]) -> str:
@@ -103,7 +110,7 @@ def _step_text(step: Step) -> str:
     return "{" + ",".join(fields) + "}"
 
 
-def _step_schema(do: str, copied: JsonSchema) -> JsonSchema:
+def _step_schema(do: str) -> JsonSchema:
     closed = {
         "arm": _ARMS,
         "how": RELATIONS,
@@ -113,7 +120,8 @@ def _step_schema(do: str, copied: JsonSchema) -> JsonSchema:
     properties: dict[str, Any] = {"do": {"const": do}}
     needed = ["do"]
     for name, is_needed in field_names(do):
-        properties[name] = copied if name in COPIED_FIELDS else {"enum": list(closed[name])}
+        is_copied = name in COPIED_FIELDS
+        properties[name] = _COPIED if is_copied else {"enum": list(closed[name])}
         if is_needed:
             needed.append(name)
     return {

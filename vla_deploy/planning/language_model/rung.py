@@ -1,0 +1,112 @@
+"""Plan by a language model on board: the same questions as to a server, the answer constrained."""
+
+import math
+from typing import Final
+
+from pydantic import ValidationError
+
+from platforms import ModelChoice
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.store import Model
+from vla_deploy.model_servers.chat import Chat
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.one_line import one_line
+from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
+from vla_deploy.planning.knowledge import spoken_places
+from vla_deploy.planning.ladder import Check
+from vla_deploy.planning.language_model.generating import Answer, Bounds
+from vla_deploy.planning.language_model.model import LanguageModel, Message, open_language_model
+from vla_deploy.planning.phrasing import Says, steps_in_words
+from vla_deploy.planning.prompts.composing import Wish, chat_for
+from vla_deploy.planning.served.plan_answer import PlanAnswer, answer_for
+from vla_deploy.robots import RobotDescription
+
+SURE: Final = 0.75
+"""A plan of which the model is less sure is read back before anything moves."""
+# English has about four characters to a token; what is left of the context is for the answer.
+_CHARACTERS_PER_TOKEN: Final = 3
+_MOST_ROOM: Final = 12_000
+
+
+class ChatRung:
+    """Ask one model on board for plans."""
+
+    def __init__(
+        self, name: str, model: LanguageModel, robot: RobotDescription, check: Check
+    ) -> None:
+        self.name = name
+        self.model = model
+        self._robot = robot.name
+        self._check = check
+        self._answer = answer_for(sorted(set(spoken_places(robot.places).values())))
+        self._schema = self._answer.model_json_schema()
+        free_tokens = model.config.context_tokens - model.language.most_tokens
+        self._room = min(_MOST_ROOM, _CHARACTERS_PER_TOKEN * free_tokens)
+
+    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+        """Return the plan that the model finds likeliest.
+
+        Raises:
+            Declined: it gives no whole answer in time, or none that can be read.
+            CannotBeDone: the model sees no way, and says why.
+            Ambiguous: the model asks something, or what it names is not clear.
+            PlanInvalid: what it plans may not run.
+        """
+        chat = chat_for(
+            request, self._robot, Wish(variant="structured", failed=request.failed), self._room
+        )
+        bounds = Bounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
+        try:
+            answer = self.model.answer(messages_of(chat), bounds, self._schema)
+            told = self._answer.model_validate_json(answer.text)
+        except InferenceError as error:
+            raise Declined(one_line(error)) from error
+        except ValidationError as error:
+            raise Declined(f"its answer cannot be read: {one_line(error)}") from error
+        return self._proposal(request, told, answer)
+
+    def close(self) -> None:
+        """Release the memory."""
+        self.model.close()
+
+    def _proposal(self, request: Request, told: PlanAnswer, answer: Answer) -> Proposal:
+        if told.question and not told.steps:
+            raise Ambiguous(told.question)
+        if not told.feasible or not told.steps:
+            raise CannotBeDone(f"{self.name} sees no way to do it: {told.reasoning or 'no reason'}")
+        plan = told.plan(request.text)
+        confidence = min(told.confidence, certainty_of(answer))
+        asked = Says.CONFIRM.format(steps=steps_in_words(self._check(plan, request)))
+        return Proposal(
+            plan=plan,
+            rung=self.name,
+            confidence=round(confidence, 3),
+            read_back="" if confidence >= SURE else asked,
+            saw_scene=True,
+        )
+
+
+def certainty_of(answer: Answer) -> float:
+    """Return the geometric mean of the probabilities of the tokens that were chosen."""
+    chosen = answer.chosen
+    return math.exp(sum(chosen) / len(chosen)) if chosen else 1.0
+
+
+def messages_of(chat: Chat) -> list[Message]:
+    """Return a question as chat templates take it; images are left out."""
+    turns: list[Message] = [
+        {"role": one.role.value, "content": one.text} for one in chat.messages
+    ]
+    return [{"role": "system", "content": chat.system}, *turns] if chat.system else turns
+
+
+def open_chat_rung(
+    model: Model, choice: ModelChoice, robot: RobotDescription, check: Check
+) -> ChatRung:
+    """Open a model of the store.
+
+    Raises:
+        InferenceError: it cannot be opened; each kind says why.
+    """
+    return ChatRung(model.manifest.name, open_language_model(model, choice), robot, check)
