@@ -15,7 +15,7 @@ from vla_deploy.cli.narrate import action_words
 from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.knowledge import world_of
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     in_force = _told(arguments, "profile_status").get("profile", "desktop")
     profile = load_profile(arguments.profile or in_force)
     clock = MonotonicClock()
-    planner = open_planner(robot, profile.planning, clock, base)
+    planner = planner_for(robot, profile, clock, base)
     answer = planner.plan(_request(arguments, robot))
     print(json.dumps(told(answer), indent=2) if arguments.json else as_text(answer))
     if isinstance(answer.error, Ambiguous):

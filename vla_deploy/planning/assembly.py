@@ -1,11 +1,13 @@
 """Build the planner that a profile asks for; what is missing is done without, and told."""
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from drivers.clock import Clock
+from platforms import Profile
 from platforms.profile import PlanningSettings
+from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.one_line import one_line
@@ -18,21 +20,38 @@ from vla_deploy.robots import RobotDescription
 _log = logging.getLogger(__name__)
 
 
+def planner_for(
+    robot: RobotDescription, profile: Profile, clock: Clock, base: Path, model_tier: int = 0
+) -> Planner:
+    """Return a planner for a robot, with the models on board that a profile names.
+
+    `model_tier` is how many steps below the best; `base` is the runtime directory.
+    """
+    # Its libraries take a third of a second to load, which a planner of rules can do without.
+    from vla_deploy.planning.on_board import open_on_board
+
+    shelf = ModelShelf.of_base(base, clock)
+    on_board = open_on_board(robot, profile, shelf, checked, model_tier)
+    return open_planner(robot, profile.planning, clock, base, on_board.rungs, on_board.away)
+
+
 def open_planner(
     robot: RobotDescription,
     settings: PlanningSettings,
     clock: Clock,
     base: Path,
     on_board: Sequence[Rung] = (),
+    models_away: Mapping[str, str] | None = None,
 ) -> Planner:
     """Return a planner for a robot: rules, cache, the models `on_board`, then the servers.
 
-    `base` is the runtime directory, which tells where `servers.toml` lies. Nothing is sent yet.
+    `base` is the runtime directory, which tells where `servers.toml` lies; `models_away` tells
+    which models could not be opened, and why. Nothing is sent yet.
     """
-    away: dict[str, str] = {}
+    away: dict[str, str] = dict(models_away or {})
     servers = _served(robot, settings, clock, base, away) if settings.servers else ()
-    for name, why in away.items():
-        _log.warning("planning does without server %s: %s", name, why)
+    for name in away.keys() - (models_away or {}).keys():
+        _log.warning("planning does without server %s: %s", name, away[name])
     slow = (*on_board, *servers)[: settings.max_rungs]
     return Planner(clock, slow, within_s=settings.within_s, away=away)
 

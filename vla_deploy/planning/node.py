@@ -8,7 +8,7 @@ from platforms import Profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.desk import Desk
 from vla_deploy.planning.errors import NotReady, PlanningError
 from vla_deploy.planning.inbox import Command, asks_to_stop, command_id_of, read_command
@@ -82,8 +82,7 @@ class PlannerNode:
 
     def prepare(self, profile: Profile, model_tier: int) -> Planner:
         """Build the planner that a profile asks for."""
-        del model_tier  # servers have no tiers
-        return open_planner(self._robot, profile.planning, self._clock, self._base)
+        return planner_for(self._robot, profile, self._clock, self._base, model_tier)
 
     def commit(self, prepared: Planner) -> Planner:
         """Plan by the new planner from the next command on."""
@@ -91,7 +90,8 @@ class PlannerNode:
         return before
 
     def discard(self, prepared: Planner) -> None:
-        """Release nothing: a server holds no connection between two calls."""
+        """Release the models of a planner; a server holds no connection between two calls."""
+        prepared.close()
 
     def _take_up(self, before: LeftOver) -> None:
         for command_id in before.in_work:

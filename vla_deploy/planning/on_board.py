@@ -14,7 +14,6 @@ from vla_deploy.inference.providers import CPU
 from vla_deploy.inference.roles import ModelShelf, tier_name
 from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.asking import Rung
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.ladder import Check
 from vla_deploy.planning.language_model.rung import ChatRung, open_chat_rung
@@ -30,11 +29,6 @@ class OnBoard:
 
     rungs: tuple[CommandParser | ChatRung, ...] = ()
     away: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def asked(self) -> tuple[Rung, ...]:
-        """Return the rungs as the ladder takes them."""
-        return self.rungs
 
     def close(self) -> None:
         """Release the memory of all of them."""

@@ -47,6 +47,15 @@ class Served(Protocol):
         ...
 
 
+@runtime_checkable
+class Held(Protocol):
+    """Let go of what a rung holds in memory."""
+
+    def close(self) -> None:
+        """Release it."""
+        ...
+
+
 class Planner:
     """Hold the two parts of the ladder; the slow one is climbed beside a process' steps.
 
@@ -94,6 +103,12 @@ class Planner:
             "servers": servers,
             "away": self.away,
         }
+
+    def close(self) -> None:
+        """Release the models on board; planning after that does without them."""
+        for rung in self._slow.rungs:
+            if isinstance(rung, Held):
+                rung.close()
 
     def plan(self, request: Request) -> Answer:
         """Return the answer of all rungs together; blocks until then."""
