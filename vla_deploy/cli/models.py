@@ -13,7 +13,7 @@ from typing import Any, Final
 from drivers.clock import MonotonicClock
 from platforms import ModelChoice, Profile, load_profile
 from platforms.profile import profile_names
-from vla_deploy.cli import models_whisper
+from vla_deploy.cli import models_language, models_whisper
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.models_arguments import Run, register_acts
 from vla_deploy.inference.errors import AccuracyLost, InferenceError
@@ -73,6 +73,8 @@ def add(arguments: argparse.Namespace) -> int:
     shelf = _shelf(arguments)
     if arguments.whisper is not None:
         return _tell(arguments, *models_whisper.add(arguments, shelf))
+    if arguments.language is not None:
+        return _tell(arguments, *models_language.add(arguments, shelf))
     model, trial = add_model(
         shelf.store,
         _request(arguments),
@@ -116,6 +118,9 @@ def bench_model(arguments: argparse.Namespace) -> int:
     if model.manifest.whisper is not None:
         told = models_whisper.measure(arguments, shelf, model, _profile(arguments))
         return _tell(arguments, *told)
+    if model.manifest.language is not None:
+        told = models_language.measure(arguments, shelf, model, _profile(arguments))
+        return _tell(arguments, *told)
     choice = _choice(model, _profile(arguments))
     if arguments.threads:
         choice = dataclasses.replace(choice, threads=arguments.threads)
@@ -134,6 +139,8 @@ def quantise_model(arguments: argparse.Namespace) -> int:
     model = shelf.store.load(arguments.name)
     if model.manifest.whisper is not None:
         raise UsageError(f"{arguments.name} is a Whisper: CTranslate2 quantises as it converts")
+    if model.manifest.language is not None:
+        raise UsageError(f"{arguments.name} is a language model: its exporter quantises it")
     if model.is_embedded and not arguments.new_name:
         raise UsageError(f"{arguments.name} comes with the software; name your own by --as NAME")
     classes = model.manifest.detection.classes if model.manifest.detection else ()
@@ -193,6 +200,8 @@ def _findings(shelf: ModelShelf, name: str, profile: Profile | None) -> Iterator
         return verify(shelf, name, profile)
     if model.manifest.whisper is not None:
         return models_whisper.findings(shelf, model, profile)
+    if model.manifest.language is not None:
+        return models_language.findings(shelf, model, profile)
     return verify(shelf, name, profile)
 
 
@@ -268,7 +277,8 @@ def _row(shelf: ModelShelf, name: str, used_by: list[str]) -> dict[str, Any]:
 
 def _weights(model: Model) -> tuple[ModelFile, ...]:
     """Return the part of a model of several that its size is in."""
-    return tuple(part for part in model.manifest.parts if part.path.endswith(".bin"))
+    endings = (".bin", ".onnx", ".data", "_data")
+    return tuple(part for part in model.manifest.parts if part.path.endswith(endings))
 
 
 def _missing_row(name: str, used_by: list[str]) -> dict[str, Any]:

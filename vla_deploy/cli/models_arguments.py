@@ -49,16 +49,29 @@ def _add(acts: Any) -> None:
     add = add_command(
         acts,
         "add",
-        "add a detector or a Whisper of your own, after a check and a trial run",
+        "add a detector, a Whisper or a language model of your own, after a check and a trial run",
         "  vla-deploy models add mugs --onnx best.onnx --classes classes.txt\n"
         "  vla-deploy models add mugs --onnx best.onnx --adapter yolo_end_to_end --licence MIT\n"
-        "  vla-deploy models add mine --whisper whisper-mine-ct2 --languages en\n",
+        "  vla-deploy models add mine --whisper whisper-mine-ct2 --languages en\n"
+        "  vla-deploy models add qwen --language qwen2.5-1.5b-int4 --licence Apache-2.0\n",
     )
     add.add_argument("name", help="to call it by; profiles name it as a tier")
     kind = add.add_mutually_exclusive_group(required=True)
     kind.add_argument("--onnx", type=Path, metavar="FILE", help="a detector, in fp32")
     kind.add_argument(
         "--whisper", type=Path, metavar="DIR", help="a Whisper, as CTranslate2 converts it"
+    )
+    kind.add_argument(
+        "--language",
+        type=Path,
+        metavar="DIR",
+        help="a language model in the layout of onnxruntime-genai",
+    )
+    add.add_argument(
+        "--most-tokens",
+        type=_count,
+        default=512,
+        help="of one answer of a language model (default: 512)",
     )
     _add_whisper_arguments(add)
     add.add_argument(

@@ -95,9 +95,7 @@ def certainty_of(answer: Answer) -> float:
 
 def messages_of(chat: Chat) -> list[Message]:
     """Return a question as chat templates take it; images are left out."""
-    turns: list[Message] = [
-        {"role": one.role.value, "content": one.text} for one in chat.messages
-    ]
+    turns: list[Message] = [{"role": one.role.value, "content": one.text} for one in chat.messages]
     return [{"role": "system", "content": chat.system}, *turns] if chat.system else turns
 
 

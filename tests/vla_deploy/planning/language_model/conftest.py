@@ -70,7 +70,7 @@ def tokenizer() -> Tokenizer:
 def sizes_of(family: Family, vocabulary: int) -> Sizes:
     return Sizes(
         vocabulary=vocabulary, width=32, layers=2, heads=family.heads, kv_heads=family.kv_heads,
-        head_size=16, context_tokens=160,
+        head_size=16, context_tokens=256,
     )  # fmt: skip
 
 

@@ -120,14 +120,14 @@ def test_an_answer_is_cut_at_its_most_tokens(model: LanguageModel) -> None:
 
 
 def test_a_prompt_beyond_the_context_is_refused(model: LanguageModel) -> None:
-    with pytest.raises(PromptTooLong, match="160 at most"):
-        model.answer([{"role": "user", "content": "kitchen " * 200}], bounds(), SCHEMA)
+    with pytest.raises(PromptTooLong, match="256 at most"):
+        model.answer([{"role": "user", "content": "kitchen " * 300}], bounds(), SCHEMA)
 
 
 def test_a_model_answers_again_after_a_refused_prompt(model: LanguageModel) -> None:
     before = model.answer(ASKED, bounds(), SCHEMA).text
     with pytest.raises(PromptTooLong):
-        model.answer([{"role": "user", "content": "kitchen " * 200}], bounds(), SCHEMA)
+        model.answer([{"role": "user", "content": "kitchen " * 300}], bounds(), SCHEMA)
     assert model.answer(ASKED, bounds(), SCHEMA).text == before
 
 

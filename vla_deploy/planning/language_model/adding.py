@@ -1,0 +1,139 @@
+"""Add a person's language model: describe its folder, try it out, and only then keep it."""
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from drivers.clock import Clock
+from platforms import ModelChoice
+from vla_deploy.inference.errors import ModelUnknown
+from vla_deploy.inference.file_check import sha256_of
+from vla_deploy.inference.language_schema import GENAI_CONFIG, PLANNER, TOKENIZER
+from vla_deploy.inference.manifest import Language, Manifest, ModelFile, Use
+from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.opening import PLAIN_CHOICE
+from vla_deploy.inference.store import Model, ModelStore
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.language_model.errors import ModelFolderInvalid
+from vla_deploy.planning.language_model.genai_config import read_genai_config
+from vla_deploy.planning.language_model.generating import Answer, Bounds
+from vla_deploy.planning.language_model.model import LanguageModel, open_language_model
+from vla_deploy.planning.language_model.prompting import CONFIG, TEMPLATE
+
+# What such a folder has besides, some of it only for other runtimes.
+_WEIGHTS: Final = ("*.onnx", "*.onnx.data", "*.onnx_data")
+_CARD: Final = "card.md"
+TRIAL_S: Final = 120.0
+TRIAL_SCHEMA: Final = {
+    "type": "object",
+    "properties": {"skill": {"enum": ["go_to", "wait"]}, "place": {"enum": ["kitchen", "hall"]}},
+    "required": ["skill", "place"],
+    "additionalProperties": False,
+}
+_TRIAL: Final = (
+    {"role": "system", "content": "You plan for a robot. Answer with one step as JSON."},
+    {"role": "user", "content": "go to the kitchen"},
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """Hold what a person tells of a model."""
+
+    name: str
+    folder: Path
+    most_tokens: int
+    summary: str
+    licence: str
+    card: Path | None = None
+
+
+def add_language_model(
+    store: ModelStore, request: Request, *, clock: Clock, replace: bool = False
+) -> tuple[Model, Answer]:
+    """Check a model, try it out and keep it; when anything is wrong, nothing has changed.
+
+    Returns the model, and its answer to a small command.
+
+    Raises:
+        ModelUnknown: the name cannot be used, or is taken and `replace` is not set.
+        ModelFolderInvalid: files are missing, or do not fit together.
+        InferenceError: it does not run; each kind says why.
+        OSError: the model cannot be stored.
+    """
+    if request.name in store.names() and not replace:
+        raise ModelUnknown(f"there is a model {request.name!r} already; give --replace, or a name")
+    manifest = describe(request)
+    draft = store.draft(request.name)
+    try:
+        for part in manifest.parts:
+            shutil.copyfile(request.folder / part.path, draft / part.path)
+        if request.card is not None:
+            shutil.copyfile(request.card, draft / _CARD)
+        write_manifest(draft, manifest)
+        answer = try_out(Model(manifest=manifest, folder=draft, is_embedded=False), clock)
+        folder = store.install(draft)
+    finally:
+        store.abandon(draft)
+    return Model(manifest=manifest, folder=folder, is_embedded=False), answer
+
+
+def describe(request: Request) -> Manifest:
+    """Return the manifest for a folder of files.
+
+    Raises:
+        ModelFolderInvalid: one that is needed is missing, or the configuration has faults.
+        ModelFileSpoiled: one cannot be read.
+    """
+    folder = request.folder
+    graph = read_genai_config(folder).file_name
+    names = sorted({path.name for path in _parts(folder)})
+    missing = [name for name in (GENAI_CONFIG, TOKENIZER, graph) if name not in names]
+    if missing:
+        raise ModelFolderInvalid(
+            folder, tuple(f"{name} is missing; export the model again" for name in missing)
+        )
+    return Manifest(
+        name=request.name,
+        role=PLANNER,
+        summary=request.summary,
+        licence=request.licence,
+        card=_CARD if request.card else "",
+        parts=tuple(ModelFile(path=name, sha256=sha256_of(folder / name)) for name in names),
+        language=Language(use=Use.CHAT, most_tokens=request.most_tokens),
+    )
+
+
+def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> Answer:
+    """Return a model's answer to a small command, as JSON of a small schema.
+
+    Raises:
+        InferenceError: it does not run, or not within two minutes; each kind says why.
+    """
+    opened = open_language_model(model, choice)
+    try:
+        return ask(opened, clock)
+    finally:
+        opened.close()
+
+
+def ask(model: LanguageModel, clock: Clock) -> Answer:
+    """Return an open model's answer to the same small command.
+
+    Raises:
+        InferenceError: there is no whole answer.
+    """
+    bounds = Bounds(
+        deadline=Deadline.within(clock, TRIAL_S), most_tokens=model.language.most_tokens
+    )
+    return model.answer(_TRIAL, bounds, dict(TRIAL_SCHEMA))
+
+
+def _parts(folder: Path) -> Iterator[Path]:
+    for name in (GENAI_CONFIG, TOKENIZER, CONFIG, TEMPLATE):
+        if (folder / name).is_file():
+            yield folder / name
+    for pattern in _WEIGHTS:
+        yield from folder.glob(pattern)

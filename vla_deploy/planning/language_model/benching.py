@@ -1,0 +1,87 @@
+"""Measure what a language model costs: reading a prompt, each token of an answer, memory."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from drivers.clock import NS_PER_S, Clock
+from platforms import ModelChoice
+from vla_deploy.inference.stats import resident_mb
+from vla_deploy.inference.store import Model
+from vla_deploy.planning.language_model.adding import ask
+from vla_deploy.planning.language_model.model import open_language_model
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bench:
+    """Hold the figures of one model: answers to the same small command, and of its parts.
+
+    `read_tokens_per_s` is of a prompt of `prompt_tokens`, `told_tokens_per_s` of single tokens
+    behind it. `memory_mb` is by how much the process grew.
+    """
+
+    model: str
+    provider: str
+    threads: int
+    rounds: int
+    answer_median_s: float
+    answer_p95_s: float
+    prompt_tokens: int
+    read_tokens_per_s: float
+    told_tokens_per_s: float
+    load_s: float
+    memory_mb: float
+    notices: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return the figures, as JSON takes them."""
+        return {**dataclasses.asdict(self), "notices": list(self.notices)}
+
+
+def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> Bench:
+    """Measure a model.
+
+    Raises:
+        InferenceError: it cannot be run as the choice asks.
+    """
+    before_mb, began_ns = resident_mb(), clock.now_ns()
+    opened = open_language_model(model, choice)
+    load_s = _since(began_ns, clock)
+    try:
+        answers_s, reads_s, tokens_s = [], [], []
+        prompt_tokens = ask(opened, clock).prompt_tokens
+        prompt = opened.decoder.tokens[:prompt_tokens]
+        for _ in range(rounds):
+            opened.decoder.keep([])
+            began_ns = clock.now_ns()
+            ask(opened, clock)
+            answers_s.append(_since(began_ns, clock))
+            opened.decoder.keep([])
+            began_ns = clock.now_ns()
+            opened.decoder.feed(prompt)
+            reads_s.append(_since(began_ns, clock))
+            began_ns = clock.now_ns()
+            opened.decoder.feed(prompt[-1:])
+            tokens_s.append(_since(began_ns, clock))
+        return Bench(
+            model=model.manifest.name,
+            provider=opened.provider,
+            threads=choice.threads,
+            rounds=rounds,
+            answer_median_s=float(np.median(answers_s)),
+            answer_p95_s=float(np.percentile(answers_s, 95)),
+            prompt_tokens=prompt_tokens,
+            read_tokens_per_s=prompt_tokens / float(np.median(reads_s)),
+            told_tokens_per_s=1.0 / float(np.median(tokens_s)),
+            load_s=load_s,
+            memory_mb=max(0.0, resident_mb() - before_mb),
+            notices=opened.notices,
+        )
+    finally:
+        opened.close()
+
+
+def _since(began_ns: int, clock: Clock) -> float:
+    return (clock.now_ns() - began_ns) / NS_PER_S
