@@ -92,6 +92,12 @@ def what(random: Random) -> list[Word]:
     return thing(random)
 
 
+def moved(random: Random) -> list[Word]:
+    """Return a thing with the place that it is to be taken from, all of which counts."""
+    source = place(random) if random.random() < 0.5 else target(random)
+    return [*thing(random), *said("from"), *source]
+
+
 def any_thing(random: Random) -> list[Word]:
     """Return a thing of which any will do."""
     article = random.choice(("a", "any", "some", "a", "another"))
@@ -220,6 +226,7 @@ def _one_of(choices: tuple[str, ...]) -> Source:
 SOURCES: Final[Mapping[str, Source]] = {
     "what": what,
     "thing": thing,
+    "moved": moved,
     "any": any_thing,
     "place": place,
     "where": target,

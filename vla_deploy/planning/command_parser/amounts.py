@@ -20,7 +20,10 @@ _NUMBERS: Final[Mapping[str, float]] = MappingProxyType(
     }
 )  # fmt: skip
 _SHARES: Final = frozenset({"half", "quarter"})
-_SILENT: Final = frozenset({"of", "the", "about", "around", "by", "for", "exactly", "and", "full"})
+# "Right" is of a right angle, "width" of a hand's width.
+_SILENT: Final = frozenset(
+    {"of", "the", "about", "around", "by", "for", "exactly", "and", "full", "right", "width"}
+)
 _DEGREE: Final = math.pi / 180.0
 METRES: Final[Mapping[str, float]] = MappingProxyType(
     {
@@ -52,33 +55,38 @@ def amount_of(words: Sequence[str], units: Mapping[str, float], bare: str = "") 
 
     `bare` is the unit of a number that stands alone; without it such a number is no amount.
     """
-    heard = [word for word in words if word not in _SILENT]
-    numbers: list[str] = []
+    before: list[str] = []
+    behind: list[str] = []
     factors: list[float] = []
-    for word in heard:
-        factor = units.get(word, units.get(word.removesuffix("s")))
+    for word in words:
+        factor = _unit(word, units)
         if factor is not None:
             factors.append(factor)
-        elif word == "right":  # a right angle
-            continue
         elif _is_number(word):
-            numbers.append(word)
-        elif word != "width":  # a hand's width
-            hand = units.get(word.removesuffix("'s"))
-            if hand is None:
-                return None
-            factors.append(hand)
-    value = number_of(numbers) if numbers else 1.0
-    if value is None:
+            (behind if factors else before).append(word)
+        elif word not in _SILENT:
+            return None
+    value = number_of(before) if before else 1.0
+    extra = number_of(behind) if behind else 0.0  # "a minute and a half"
+    if value is None or extra is None:
         return None
     if factors:
-        return value * min(factors)
-    alone = units.get(bare)
-    if alone is not None and numbers:
-        return value * alone
+        return (value + extra) * min(factors)
+    if not before:
+        return None
     # "a quarter" and "half" of nothing else are of a whole turn.
-    whole = units.get("turn")
-    return value * whole if whole is not None and numbers and numbers[-1] in _SHARES else None
+    is_share = before[-1] in _SHARES and "turn" in units
+    alone = units["turn"] if is_share else units.get(bare)
+    return None if alone is None else value * alone
+
+
+def _unit(word: str, units: Mapping[str, float]) -> float | None:
+    """Return what a unit is in SI units, also in the plural or as "a hand's width"."""
+    return next(
+        (units[form] for form in (word, word.removesuffix("s"), word.removesuffix("'s"))
+         if form in units),
+        None,
+    )  # fmt: skip
 
 
 def number_of(words: Sequence[str]) -> float | None:

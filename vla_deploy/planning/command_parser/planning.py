@@ -83,9 +83,10 @@ class Steps:
 
     def source(self, step: Step) -> tuple[list[Skill], str]:
         """Return the way to the room where things are, or words that say what they are on or in."""
-        if "from" not in step:
+        where = self._where_from(step)
+        if not where:
             return [], ""
-        world, where = self._request.world, self.spoken(step, "from")
+        world = self._request.world
         place = match_place(where, world.places)
         if place is not None and place not in world.furniture:
             return [("navigate_to", {"place": place})], ""
@@ -95,8 +96,14 @@ class Steps:
     def things(self, step: Step) -> str:
         """Return what a step is about, each thing with where it is to be taken from."""
         _, behind = self.source(step)
-        parts = building.parts_of(self.spoken(step, "what"))
-        return " and ".join(part + behind for part in parts)
+        spoken, _, _ = self.spoken(step, "what").partition(" from ")
+        return " and ".join(part + behind for part in building.parts_of(spoken))
+
+    def _where_from(self, step: Step) -> str:
+        """Return "the kitchen" of "the cup from the kitchen", or of a field of its own."""
+        if "from" in step:
+            return self.spoken(step, "from")
+        return self.spoken(step, "what").partition(" from ")[2] if "what" in step else ""
 
     def amount(self, step: Step, units: Mapping[str, float], default: float, bare: str) -> float:
         """Return the amount of a step in SI units.
@@ -139,13 +146,14 @@ def _put(steps: Steps, step: Step) -> list[Skill]:
     relation = step.get("how", "to")
     if relation not in _CAN_PUT:
         raise CannotBeDone(f"I can put things in or on something, not {relation} it")
+    way, _ = steps.source(step)
     things = steps.things(step)
     if "where" not in step:
         down = building.put_away if steps.says("away") else _put_down
-        return down({"object": things}, steps.request)
+        return way + down({"object": things}, steps.request)
     where = {"destination": steps.spoken(step, "where")}
     where |= {} if relation == "to" else {"relation": relation}
-    return [("place", {"object": one, **where}) for one in building.parts_of(things)]
+    return way + [("place", {"object": one, **where}) for one in building.parts_of(things)]
 
 
 def _put_down(groups: building.Groups, _: Request) -> list[Skill]:
@@ -157,7 +165,7 @@ def _bring(steps: Steps, step: Step) -> list[Skill]:
     if to_whom not in _SPEAKERS:
         raise UnknownPlace(to_whom, set(steps.request.world.places.values()))
     way, behind = steps.source(step)
-    parts = building.parts_of(steps.spoken(step, "what"))
+    parts = building.parts_of(steps.spoken(step, "what").partition(" from ")[0])
     brought: list[Skill] = []
     for part in parts:
         picked, *rest = building.bring({"object": part}, steps.request)

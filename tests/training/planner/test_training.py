@@ -1,0 +1,36 @@
+"""Training runs from the first step to a folder that the robot loads, and goes on where it was."""
+
+import dataclasses
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from training.planner.composing import Composer  # noqa: E402
+from training.planner.export import export  # noqa: E402
+from training.planner.settings import SIZES  # noqa: E402
+from training.planner.training import train  # noqa: E402
+from vla_deploy.inference.manifest import Language, Use  # noqa: E402
+from vla_deploy.inference.opening import PLAIN_CHOICE  # noqa: E402
+from vla_deploy.planning.language_model import LanguageModel  # noqa: E402
+
+
+def test_a_short_training_gives_a_model_whose_graph_tells_what_the_network_tells(
+    tmp_path: Path,
+) -> None:
+    settings = dataclasses.replace(SIZES["tiny"], budget_s=1.5)
+    network = train(tmp_path, settings)
+    export(tmp_path, tmp_path / "model", settings.shape)
+    language = Language(use=Use.COMMAND_PARSER, most_tokens=160)
+    model = LanguageModel(tmp_path / "model", language, PLAIN_CHOICE)
+    command = Composer().example(Random(2)).command
+    prompt = model.tokenizer.encode(model.prompt([{"role": "user", "content": command}])).ids
+    with torch.no_grad():
+        wanted = network.scores(network(torch.tensor([prompt])))[0, -1].numpy()
+    np.testing.assert_allclose(model.decoder.feed(prompt), wanted, rtol=1e-3, atol=1e-4)
+    longer = dataclasses.replace(settings, budget_s=2.0)
+    train(tmp_path, longer)
+    assert torch.load(tmp_path / "state.pt", weights_only=True)["spent_s"] >= 1.5
