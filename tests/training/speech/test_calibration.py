@@ -18,7 +18,7 @@ def _read(text: str, log_probability: float) -> Read:
         duration_s=1.0,
         took_s=0.01,
     )
-    return Read(clip=clip, reading=reading)
+    return Read(clip=clip, reading=reading, cpu_s=0.01)
 
 
 def test_confidence_learns_at_which_log_probability_half_of_the_readings_are_right() -> None:
