@@ -1,0 +1,59 @@
+"""Hold the recogniser that is shipped to its card; it is read as the robot reads."""
+
+import ctypes
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from drivers.clock import MonotonicClock
+from training.speech.card import AIMS, read_metrics, verdict
+from training.speech.shipping import CARD, LEAST_CONFIDENCE, METRICS, SHIPPED
+from training.speech.trials import heard, noises_alone
+from training.voices.cast import Speaker, say
+from training.voices.clip import Style
+from vla_deploy.inference.manifest_file import read_manifest
+from vla_deploy.inference.store import Model
+from vla_deploy.speech.confidence import confidence
+from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE
+from vla_deploy.speech.recogniser import Recogniser, open_recogniser
+
+pytest.importorskip("faster_whisper")
+pytestmark = pytest.mark.skipif(not (SHIPPED / METRICS).exists(), reason="none is shipped yet")
+
+COMMANDS = ("pick up the red cup and put it in the box", "go to the kitchen", "stop")
+
+
+@pytest.fixture(scope="module")
+def recogniser() -> Iterator[Recogniser]:
+    model = Model(manifest=read_manifest(SHIPPED), folder=SHIPPED, is_embedded=True)
+    opened = open_recogniser(model, PLAIN_CHOICE, beam=1, clock=MonotonicClock())
+    yield opened
+    opened.close()
+
+
+@pytest.mark.parametrize("text", COMMANDS)
+def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: str) -> None:
+    try:
+        ctypes.CDLL("libespeak-ng.so.1")
+    except OSError:
+        pytest.skip("no libespeak-ng1")
+    clip = heard(
+        say(text, Speaker(engine="espeak", voice="en-us"), Style()), np.random.default_rng(0), 20.0
+    )
+    reading = recogniser.read(clip.samples)
+    assert reading.text == text
+    assert confidence(reading, recogniser.declared.calibration) >= LEAST_CONFIDENCE
+
+
+def test_noise_gives_no_sure_words(recogniser: Recogniser) -> None:
+    for clip in noises_alone(8, np.random.default_rng(1)):
+        reading = recogniser.read(clip.samples)
+        assert confidence(reading, recogniser.declared.calibration) < LEAST_CONFIDENCE, clip.voice
+
+
+def test_the_card_tells_its_figures_and_what_it_never_heard() -> None:
+    text = (SHIPPED / CARD).read_text(encoding="utf-8")
+    metrics = read_metrics(SHIPPED / METRICS)
+    assert verdict(metrics) in text and "No human being was ever recorded" in text
+    assert set(AIMS) <= set(metrics)
