@@ -16,6 +16,8 @@ from benchmarks.command import parser, show
 OWN: Final = ("words",)
 PARTS: Final[Mapping[str, str]] = {
     "words": "word errors by voice and noise, sureness, other talk, time per phrase",
+    "plans": "spoken commands that give the plan of the typed ones; other talk that gives none",
+    "voice": "whether the robot hears itself, and how soon a person silences it",
     "ears": "where phrases begin and end, from the end of speech to the text, other sound",
 }
 

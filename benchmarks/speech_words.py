@@ -19,7 +19,7 @@ from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.whisper_schema import SPEECH_TO_TEXT
 from vla_deploy.robots import load_robot
 from vla_deploy.speech.hot_words import joined
-from vla_deploy.speech.recogniser import open_recogniser
+from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 from vla_deploy.state_dir import user_base
 
 MODEL: Final = "commands-whisper"
@@ -37,14 +37,10 @@ def measure(sentences: int = 150, seed: int = 0, profile: str = "desktop") -> di
         InferenceError: the model cannot be opened.
         EngineMissing: eSpeak NG or flite is not installed.
     """
-    clock = MonotonicClock()
-    loaded = load_profile(profile)
-    model = ModelShelf.of_base(user_base(), clock).store.load(MODEL)
-    choice = choice_for(SPEECH_TO_TEXT, loaded)
-    beam, least = loaded.speech.beam, loaded.speech.least_confidence
-    with closing(open_recogniser(model, choice, beam=beam, clock=clock)) as recogniser:
+    recogniser, least = open_shipped(profile)
+    with closing(recogniser):
         figures, reads = word_errors(recogniser, sentences, seed)
-        named, _ = word_errors(recogniser, sentences, seed, hot_words=_names())
+        named, _ = word_errors(recogniser, sentences, seed, hot_words=names())
         return {
             "model": MODEL,
             **figures,
@@ -57,9 +53,22 @@ def measure(sentences: int = 150, seed: int = 0, profile: str = "desktop") -> di
         }
 
 
-def _names() -> str:
+def open_shipped(profile: str) -> tuple[Recogniser, float]:
+    """Open the shipped recogniser under a profile; return the confidence that it asks for, too.
+
+    Raises:
+        InferenceError: it cannot be opened.
+    """
+    clock, loaded = MonotonicClock(), load_profile(profile)
+    model = ModelShelf.of_base(user_base(), clock).store.load(MODEL)
+    choice, beam = choice_for(SPEECH_TO_TEXT, loaded), loaded.speech.beam
+    opened = open_recogniser(model, choice, beam=beam, clock=clock)
+    return opened, loaded.speech.least_confidence
+
+
+def names() -> str:
     """Return hot words as the robot has them: things that it sees, its places."""
-    places = (name.replace("_", " ") for name in load_robot("butler").home.places)
+    places = (name.replace("_", " ") for name in load_robot("butler").places)
     return joined((*_THINGS, *places))
 
 
