@@ -6,11 +6,16 @@ import numpy as np
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples, check_samples
 from drivers.audio.pcm_protocol import PcmBlock, PcmParser, encode_block
+from drivers.clock import NS_PER_S
+from drivers.device_clock import DeviceClock
 from sim_twin.sound.room import Room
 from vla_deploy.speech.voice.clip import Clip, Wave
 
+LATENCY_NS: Final = 30 * NS_PER_S // 1000
+"""Of the speaker; longer than bytes are usually held up."""
 MAX_BACKLOG_S: Final = 1.0
 MAX_HEARD_S: Final = 60.0
+_SAME_NS: Final = 1_000
 
 
 class MicrophoneDevice:
@@ -65,13 +70,20 @@ class MicrophoneDevice:
 
 
 class SpeakerDevice:
-    """Sound in the room, if there is one, and keep what the robot says, the last minute of it."""
+    """Sound in the room, if there is one, and keep what the robot says, the last minute of it.
+
+    It plays by the stamps of the blocks, some time later: so the way from the robot's words to its
+    ear takes as long each time it speaks, whatever held the bytes up.
+    """
 
     def __init__(self, format_: AudioFormat, room: Room | None = None) -> None:
         self.format = format_
         self._room = room
         self._now_ns = 0
         self._parser = PcmParser()
+        self._host_clock = DeviceClock()
+        self._next_stamp_ns = 0
+        self._ends_ns = 0
         self._said: Samples = np.zeros((0, format_.channels), np.int16)
 
     def said(self) -> Samples:
@@ -85,11 +97,11 @@ class SpeakerDevice:
 
     def receive(self, data: bytes) -> None:
         """Take sound; blocks of another format make a noise that nobody understands."""
-        blocks = [b.samples for b in self._parser.feed(data) if b.format == self.format]
-        for samples in blocks:
-            self._sound(samples)
+        blocks = [block for block in self._parser.feed(data) if block.format == self.format]
+        for block in blocks:
+            self._sound(block)
         kept = round(MAX_HEARD_S * self.format.rate_hz)
-        self._said = np.concatenate([self._said, *blocks])[-kept:]
+        self._said = np.concatenate([self._said, *(block.samples for block in blocks)])[-kept:]
 
     def transmit(self) -> bytes:
         """Return nothing: a speaker only listens to its host."""
@@ -99,12 +111,20 @@ class SpeakerDevice:
         """Let time pass; a speaker plays as it is told."""
         self._now_ns = now_ns
 
-    def _sound(self, samples: Samples) -> None:
-        if self._room is None:
-            return
-        sound = Clip(rate_hz=self.format.rate_hz, wave=_wave(samples))
-        wave = sound.at_rate(self._room.rate_hz).wave
-        self._room.sound_from_speaker(wave, self.format.duration_ns(len(samples)), self._now_ns)
+    def _sound(self, block: PcmBlock) -> None:
+        starts_ns = self._starts_ns(block)
+        self._next_stamp_ns = block.stamp_ns + self.format.duration_ns(len(block.samples))
+        self._ends_ns = starts_ns + self.format.duration_ns(len(block.samples))
+        if self._room is not None:
+            clip = Clip(rate_hz=self.format.rate_hz, wave=_wave(block.samples))
+            self._room.sound_from_speaker(clip.at_rate(self._room.rate_hz).wave, starts_ns)
+
+    def _starts_ns(self, block: PcmBlock) -> int:
+        """Return when a block sounds: behind the one that it follows, else by its stamp."""
+        stamped_ns = self._host_clock.to_host_ns(block.stamp_ns, self._now_ns)
+        if abs(block.stamp_ns - self._next_stamp_ns) < _SAME_NS and self._ends_ns > self._now_ns:
+            return self._ends_ns
+        return max(stamped_ns + LATENCY_NS, self._now_ns)
 
 
 def _wave(samples: Samples) -> Wave:

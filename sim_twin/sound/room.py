@@ -17,7 +17,6 @@ from vla_deploy.speech.voice.clip import Wave
 
 NOISE_SIGMA: Final = 12.0
 """Of the quiet room and the microphone, in steps of 16 bits."""
-SPEAKER_LATENCY_S: Final = 0.03
 MAX_PENDING_S: Final = 120.0
 
 
@@ -43,7 +42,6 @@ class Room:
         self._sounding: list[_Sounding] = []
         own = self.acoustics
         self._speaker_path = own.speaker_gain * path(own.speaker_distance_m, rate_hz, own, seed)
-        self._speaker_ends_ns = 0
 
     def row_at(self, time_ns: int) -> int:
         """Return the row of a simulated time."""
@@ -59,16 +57,9 @@ class Room:
         oldest = starts - round(MAX_PENDING_S * self.rate_hz)
         self._sounding = [each for each in self._sounding if each.ends > oldest]
 
-    def sound_from_speaker(self, wave: Wave, duration_ns: int, now_ns: int) -> int:
-        """Let the robot's speaker sound, behind what it is playing; return when that ends.
-
-        `wave` is at the room's rate and lasts `duration_ns`.
-        """
-        latency_ns = round(SPEAKER_LATENCY_S * NS_PER_S)
-        starts_ns = max(self._speaker_ends_ns, now_ns + latency_ns)
-        self._speaker_ends_ns = starts_ns + duration_ns
+    def sound_from_speaker(self, wave: Wave, starts_ns: int) -> None:
+        """Let the robot's speaker sound from a moment on; `wave` is at the room's rate."""
         self.lay(through(wave, self._speaker_path), self.row_at(starts_ns))
-        return self._speaker_ends_ns
 
     def heard(self, first: int, end: int, channels: int) -> Samples:
         """Return what arrives in rows `first` to `end`, over the noise; each row is read once."""

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from drivers.audio.base import AudioFormat
+from drivers.audio.pcm_protocol import PcmBlock, PcmParser, encode_block
 from drivers.audio.pcm_stream import PcmInput, PcmOutput
 from sim_twin.lockstep import Lockstep
+from sim_twin.sensors.sound import LATENCY_NS, MicrophoneDevice, SpeakerDevice
 from sim_twin.sound.hearing import let_arrive
-from sim_twin.sound.room import NOISE_SIGMA, SPEAKER_LATENCY_S, Room
+from sim_twin.sound.room import NOISE_SIGMA, Room
 from sim_twin.sound.talker import Talker, arrival, loudness
 from vla_deploy.speech.voice.clip import Clip
 
@@ -31,7 +33,7 @@ def test_what_the_speaker_plays_reaches_the_microphone_late_and_rings_out(
     level = np.abs(block.samples[:, 0].astype(float))
     first = int(np.flatnonzero(level > 20 * NOISE_SIGMA)[0])
     distance_m = lockstep.twin.microphone.room.acoustics.speaker_distance_m
-    assert first / RATE_HZ == pytest.approx(SPEAKER_LATENCY_S + distance_m / 343, abs=0.003)
+    assert first / RATE_HZ == pytest.approx(LATENCY_NS / 1e9 + distance_m / 343, abs=0.003)
     ends = first + len(burst())
     assert level[first:ends].mean() > 2_000
     ringing, silence = (level[ends + at : ends + at + 800].mean() for at in (100, 5_000))
@@ -39,13 +41,32 @@ def test_what_the_speaker_plays_reaches_the_microphone_late_and_rings_out(
     assert silence < 2 * NOISE_SIGMA
 
 
-def test_blocks_of_the_speaker_follow_each_other_without_a_gap() -> None:
-    room = Room(RATE_HZ)
-    wave = np.full(320, 0.5, np.float32)
-    ends = [room.sound_from_speaker(wave, FORMAT.duration_ns(320), 10**9) for _ in range(3)]
-    assert np.diff(ends).tolist() == [FORMAT.duration_ns(320)] * 2
-    later_ns = ends[-1] + 10**9
-    assert room.sound_from_speaker(wave, FORMAT.duration_ns(320), later_ns) > later_ns
+def test_the_way_from_mouth_to_ear_takes_as_long_each_time_whatever_holds_the_bytes_up() -> None:
+    ear = MicrophoneDevice(FORMAT)
+    mouth = SpeakerDevice(FORMAT, ear.room)
+    parser = PcmParser()
+    host_ahead_ns, began = 77 * 10**9, []
+    for held_up_ns in (2_000_000, 9_000_000, 0, 5_000_000):
+        stamp_ns = ear.now_ns + 10**9
+        for number in range(5):
+            at_ns = stamp_ns + number * FORMAT.duration_ns(320)
+            block = PcmBlock(
+                format=FORMAT,
+                first_row=0,
+                stamp_ns=at_ns + host_ahead_ns,
+                samples=np.full((320, 1), 12_000, np.int16),
+            )
+            mouth.step(at_ns + held_up_ns)
+            mouth.receive(encode_block(block))
+        ear.announce()
+        ear.step(stamp_ns)
+        ear.announce()
+        ear.step(stamp_ns + 400_000_000)
+        (heard,) = parser.feed(ear.transmit())
+        loud = np.flatnonzero(np.abs(heard.samples[:, 0]) > 1_500)
+        began.append(int(loud[0]))
+        assert np.abs(heard.samples[loud[0] : loud[0] + 1_600, 0]).min() > 500
+    assert len(set(began[2:])) == 1
 
 
 def test_sound_that_nobody_listens_to_is_forgotten() -> None:
