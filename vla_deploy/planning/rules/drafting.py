@@ -26,6 +26,9 @@ _WITH_HAND: Final = re.compile(
 )
 # What of a clause can be corrected by a part alone.
 _CORRECTED: Final = frozenset({"object", "place", "destination", "quantity", "way", "what"})
+# What a rule finds in a clause: all of what is put somewhere, or some of what can be known.
+_PUT: Final = ("object", "relation", "destination")
+_NAMED: Final = ("object", "place", "destination")
 _HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
 
 
@@ -149,12 +152,11 @@ def _with_verb(clause: str, draft: _Draft) -> tuple[str, _Fit | None]:
 
 def _is_known(fit: _Fit, request: Request) -> bool:
     """Tell whether what a clause names is known, so that it is no accident that it fits."""
-    if "destination" in fit.groups:
-        moved, _, destination = split_put(
-            " ".join(fit.groups[name] for name in ("object", "relation", "destination")), request
-        )
+    put = [fit.groups[name] for name in _PUT if name in fit.groups]
+    if len(put) == len(_PUT):
+        moved, _, destination = split_put(" ".join(put), request)
         return all(is_one(one, request) for one in (*parts_of(moved), destination))
-    named = (fit.groups[name] for name in ("object", "place") if name in fit.groups)
+    named = (fit.groups[name] for name in _NAMED if name in fit.groups)
     return all(is_one(part, request) for text in named for part in parts_of(text))
 
 

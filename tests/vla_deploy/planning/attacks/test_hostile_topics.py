@@ -34,6 +34,7 @@ UTTERANCES: Final[dict[str, dict[str, Any]]] = {
     "what cannot be seen": {"text": "\u200b\u202e\x00"},
     "half a character": {"text": "go to the \ud800"},
     "a long word": {"text": "a" * 50_000},
+    "a place that nobody named": {"text": "take the bottle there"},
     "many brackets": {"text": "(" * 30_000},
     "many commas": {"text": "go, " * 10_000},
     "a plan that is a number": {"plan": 7},
