@@ -160,6 +160,12 @@ def quantise_model(arguments: argparse.Namespace) -> int:
     return _tell(arguments, done.document(), _quantised_text(done))
 
 
+def calibrate(arguments: argparse.Namespace) -> int:
+    """Learn how sure a recogniser's words are."""
+    shelf, profile = _shelf(arguments), _profile(arguments)
+    return _tell(arguments, *models_whisper.calibrate_whisper(arguments, shelf, profile))
+
+
 def verify_models(arguments: argparse.Namespace) -> int:
     """Check models; return 1 when a check failed."""
     shelf = _shelf(arguments)
@@ -180,6 +186,7 @@ RUNS: Final[Mapping[str, Run]] = {
     "show": show_model,
     "add": add,
     "fetch": fetch,
+    "calibrate": calibrate,
     "remove": remove,
     "bench": bench_model,
     "quantise": quantise_model,

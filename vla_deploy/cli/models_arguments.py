@@ -37,6 +37,7 @@ def register_acts(commands: Any, runs: Mapping[str, Run]) -> None:
         act.add_argument("name", help="of the model")
     _add(acts)
     _fetch(acts)
+    _calibrate(acts)
     _bench(acts)
     _quantise(acts)
     _verify(acts)
@@ -153,6 +154,24 @@ def _fetch(acts: Any) -> None:
     fetch.add_argument("name", choices=[*PUBLISHED], help="of the model")
     fetch.add_argument("--endpoint", metavar="URL", help="a mirror of the hub")
     fetch.add_argument("--replace", action="store_true", help="replace one of that name")
+
+
+def _calibrate(acts: Any) -> None:
+    calibrate = add_command(
+        acts,
+        "calibrate",
+        "learn from recordings how sure an added Whisper's words are",
+        "  vla-deploy models calibrate whisper-small.en --sounds recordings\n",
+    )
+    calibrate.add_argument("name", help="of the model")
+    calibrate.add_argument(
+        "--sounds",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="WAV files, the words of each in a .txt beside it, empty for other sound",
+    )
+    _profile(calibrate)
 
 
 def _quantise(acts: Any) -> None:

@@ -2,11 +2,13 @@
 
 import argparse
 import dataclasses
+import json
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from platforms import ModelChoice, Profile
+from vla_deploy.cli.errors import UsageError
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.manifest import Context, Whisper
 from vla_deploy.inference.roles import ModelShelf
@@ -15,6 +17,7 @@ from vla_deploy.perception.model_tools.verifying import Finding
 from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, add_whisper
 from vla_deploy.speech.model_tools.benching import Bench, bench, noises, recordings
+from vla_deploy.speech.model_tools.calibrating import calibrate, keep, known_recordings
 from vla_deploy.speech.model_tools.checks import Check, checks_of
 from vla_deploy.speech.model_tools.fetching import fetch
 from vla_deploy.speech.recogniser import Reading
@@ -75,6 +78,22 @@ def measure(
     return figures.document(), _bench_text(figures)
 
 
+def calibrate_whisper(arguments: argparse.Namespace, shelf: ModelShelf, profile: Profile) -> Told:
+    """Learn how sure a Whisper's words are, and keep that in its manifest."""
+    model = shelf.store.load(arguments.name)
+    if model.is_embedded or model.manifest.whisper is None:
+        raise UsageError(f"{arguments.name} was not added as a Whisper: nothing to calibrate")
+    choice: ModelChoice = profile.models.get(model.manifest.role, PLAIN_CHOICE)
+    known = known_recordings(arguments.sounds)
+    done = calibrate(model, choice, known, beam=profile.speech.beam, clock=shelf.clock)
+    keep(model, done.calibration)
+    text = (
+        f"{done.right} of {done.recordings} recordings were read rightly; mean squared error of "
+        f"the confidence {done.error_before:.3f} before, {done.error_after:.3f} now"
+    )
+    return dataclasses.asdict(done), text
+
+
 def findings(shelf: ModelShelf, model: Model, profile: Profile | None) -> Iterator[Finding]:
     """Check an installed Whisper."""
     name = model.manifest.name
@@ -99,11 +118,12 @@ def _told(model: Model, silence: Reading) -> Told:
         "no_speech": silence.no_speech,
         "took_s": silence.took_s,
     }
+    tiers = json.dumps(list(dict.fromkeys((name, "commands-whisper"))))
     text = (
         f"added {name} in {model.folder}; a second of silence took "
         f"{1000 * silence.took_s:.0f} ms and reads {silence.text!r}\n"
         f"next: vla-deploy models bench {name}, then name it in a profile: "
-        f'[models.speech_to_text] tiers = ["{name}", "commands-whisper"]'
+        f"[models.speech_to_text] tiers = {tiers}"
     )
     return document, text
 

@@ -1,8 +1,9 @@
 """Group the errors of hearing by what the caller can do about them.
 
 SpeechError
-├── SpeechMissing    the `speech` extra is not installed: install it
-└── NoRecogniser     no model can be opened: the robot is deaf to words, typed commands go on
+├── SpeechMissing       the `speech` extra is not installed: install it
+├── RecordingsInvalid   recordings to learn from cannot be used: mend the folder
+└── NoRecogniser        no model can be opened: the robot is deaf to words, typed commands go on
 """
 
 
@@ -12,6 +13,10 @@ class SpeechError(Exception):
 
 class SpeechMissing(SpeechError):
     """Say that a package is missing, and how to install it."""
+
+
+class RecordingsInvalid(SpeechError):
+    """Say what is wrong with a folder of recordings."""
 
 
 class NoRecogniser(SpeechError):
