@@ -1,5 +1,6 @@
 """Keep plans that were accepted, for the same command while what they depend on is the same."""
 
+import math
 import re
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -15,8 +16,10 @@ from vla_deploy.world import Query, Snapshot, Thing, UnknownWord, parse_query
 
 MOST_PLANS: Final = 64
 LONGEST_S: Final = 3600.0
-_PLACE_GRID_M: Final = 0.25
-_TURN_GRID_RAD: Final = 0.26
+# How far the robot may have moved: little where a plan has coordinates; to another part of the room
+# where it was made by whoever was told how far away things are.
+_CLOSE_GRID: Final = (0.25, 0.25, 0.26)  # m, m, rad
+_ROOM_GRID: Final = (1.0, 1.0, math.inf)
 _COORDINATES: Final = frozenset({"x_m", "y_m", "yaw_rad"})
 _SPOKEN_OF: Final = ("object", "destination")
 # Words whose meaning is in what was said before.
@@ -113,7 +116,7 @@ def context_of(request: Request, proposal: Proposal) -> Context:
     return (
         tuple(sorted(request.world.holding.items(), key=str)),
         tuple(sorted(map(_told, things))),
-        _stands(request) if saw_all or _has_coordinates(proposal.plan) else (),
+        _stands(request, proposal),
         _said_before(request),
         request.recollections if saw_all else (),
     )
@@ -146,12 +149,12 @@ def _has_coordinates(plan: Plan) -> bool:
     return any(_COORDINATES & action.parameters.keys() for action in plan.actions)
 
 
-def _stands(request: Request) -> tuple[int, ...]:
-    if request.here is None:
+def _stands(request: Request, proposal: Proposal) -> tuple[int, ...]:
+    is_close = _has_coordinates(proposal.plan)
+    if request.here is None or not (is_close or proposal.saw_scene):
         return ()
-    x_m, y_m, yaw_rad = request.here
-    grid = ((x_m, _PLACE_GRID_M), (y_m, _PLACE_GRID_M), (yaw_rad, _TURN_GRID_RAD))
-    return tuple(round(value / step) for value, step in grid)
+    grid = _CLOSE_GRID if is_close else _ROOM_GRID
+    return tuple(round(value / step) for value, step in zip(request.here, grid, strict=True))
 
 
 def _said_before(request: Request) -> Context:

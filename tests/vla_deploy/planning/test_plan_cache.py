@@ -82,6 +82,12 @@ def test_where_the_robot_stands_counts_for_a_plan_with_coordinates(cache, look, 
     assert look(ask(TIDY, here=(1.0, 0.0, 0.0)))
 
 
+def test_for_whoever_saw_the_scene_the_part_of_the_room_counts(cache, look, ask, propose):
+    cache.keep(ask(TIDY), propose(PICK, saw_scene=True))
+    assert look(ask(TIDY, here=(0.4, 0.0, 2.0)))
+    assert not look(ask(TIDY, here=(2.0, 0.0, 0.0)))
+
+
 def test_what_was_said_before_counts_where_words_refer_to_it(cache, look, ask, propose):
     talk = Conversation().after(Turn(said="find the cup"))
     later = talk.after(Turn(said="find the ball"))
