@@ -45,6 +45,7 @@ class PlannerNode:
         self._planner = planner or Planner(context.clock)
         self._aside = aside or AtOnce()
         self._status_due_ns = 0
+        self._is_stopped = False
         self._desk: Desk
         self._telling: Telling
         self._status: CellWriter
@@ -77,6 +78,7 @@ class PlannerNode:
 
     def stop(self) -> None:
         """Close the topics; what is planned beside the steps is given up."""
+        self._is_stopped = True
         self._aside.shutdown(wait=False, cancel_futures=True)
         self._space.close()
 
@@ -90,8 +92,13 @@ class PlannerNode:
         return before
 
     def discard(self, prepared: Planner) -> None:
-        """Release the models of a planner; a server holds no connection between two calls."""
-        prepared.close()
+        """Release the models of a planner, once what is planned beside the steps is done by them.
+
+        A server holds no connection between two calls.
+        """
+        if self._is_stopped:
+            return  # the process ends, and its memory with it
+        self._aside.submit(prepared.close)
 
     def _take_up(self, before: LeftOver) -> None:
         for command_id in before.in_work:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from platforms import load_profile
 from vla_deploy.planning.node import AWAY, UTTERANCE_AGE_S
 
 
@@ -157,3 +158,22 @@ def test_the_status_tells_of_commands_rungs_and_the_cache(desk):
     assert status["by_rung"]["rules"]["declined"] == 1
     assert status["cache"]["misses"] == 1
     assert status["rungs"] == ["rules", "cache"]
+
+
+def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
+    open_desk, later, rung, propose
+):
+    closed = []
+    model = rung("model", propose(("wait", {"duration_s": 1.0})))
+    model.close = lambda: closed.append("model")
+    desk = open_desk(model, aside=later)
+    desk.give(text="sing a sea shanty")
+    desk.answers()
+    node = desk.planner
+    before = node.commit(node.prepare(load_profile("desktop"), 0))
+    node.discard(before)
+    assert closed == []
+    later.do_one()
+    assert [one["event"] for one in desk.answers()] == ["accepted", "plan"]
+    later.do_one()
+    assert closed == ["model"]
