@@ -55,6 +55,8 @@ class SkillSpec:
 
 _ARM = Parameter(type=Type.CHOICE, required=False, choices=ARMS)
 _OBJECT = Parameter(type=Type.OBJECT)
+# Without it the base cruises as fast as its robot file lets it.
+_SPEED = Parameter(type=Type.NUMBER, required=False, minimum=0.05, maximum=2.0)
 
 # What older tools call for and this robot has nothing for.
 NOT_SKILLS: MappingProxyType[str, str] = MappingProxyType(
@@ -76,6 +78,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
                 "yaw_rad": Parameter(
                     type=Type.NUMBER, required=False, minimum=-math.pi, maximum=math.pi
                 ),
+                "speed_m_s": _SPEED,
             },
             one_of=(("place",), ("object",), ("x_m", "y_m")),
             resources=("base", "head", "camera", "arms"),
@@ -85,7 +88,10 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         ),
         "move": SkillSpec(
             summary="drive straight, forward or (negative) backward",
-            parameters={"distance_m": Parameter(type=Type.NUMBER, minimum=-3, maximum=3)},
+            parameters={
+                "distance_m": Parameter(type=Type.NUMBER, minimum=-3, maximum=3),
+                "speed_m_s": _SPEED,
+            },
             resources=("base",),
             estimated_duration_s=4.0,
         ),

@@ -33,11 +33,12 @@ STRAIGHT_TOLERANCE_M = 0.01
 LOOK_AHEAD_M = 0.06
 
 
-def limits_of(context: SkillContext) -> DriveLimits:
-    """Return the speeds at which this robot cruises."""
+def limits_of(context: SkillContext, speed_m_s: float | None = None) -> DriveLimits:
+    """Return the speeds at which this robot cruises, no faster than asked."""
     base = context.robot.base
+    cruise_m_s = CRUISE_RATIO * base.max_speed_m_s
     return DriveLimits(
-        speed_m_s=CRUISE_RATIO * base.max_speed_m_s,
+        speed_m_s=cruise_m_s if speed_m_s is None else min(cruise_m_s, speed_m_s),
         turn_rate_rad_s=CRUISE_RATIO * base.max_turn_rad_s,
         acceleration_m_s2=0.6 * base.max_acceleration_m_s2,
         turn_acceleration_rad_s2=0.6 * base.max_turn_acceleration_rad_s2,
@@ -49,6 +50,7 @@ def drive_to(
     goal: FloorPose,
     turn: bool = True,
     until: Callable[[], bool] = lambda: False,
+    speed_m_s: float | None = None,
 ) -> Skill:
     """Drive to a pose of the map along a planned path; halt on the way when `until()` holds.
 
@@ -62,7 +64,7 @@ def drive_to(
         points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
     except NavigationError as error:
         raise NotPossible(str(error)) from error
-    yield from follow(context, points, goal.yaw_rad if turn else None, until)
+    yield from follow(context, points, goal.yaw_rad if turn else None, until, speed_m_s)
 
 
 def follow(
@@ -70,13 +72,14 @@ def follow(
     points: NDArray[np.float64],
     final_yaw_rad: float | None,
     until: Callable[[], bool] = lambda: False,
+    speed_m_s: float | None = None,
 ) -> Skill:
     """Follow points of the map frame; wait for what stands in the way, and give up on it.
 
     Raises:
         TryAgain: the way stayed blocked.
     """
-    follower = PathFollower(points, limits_of(context), final_yaw_rad)
+    follower = PathFollower(points, limits_of(context, speed_m_s), final_yaw_rad)
     patience = _Patience(context)
     while follower.phase is not Phase.ARRIVED and not until():
         pose = context.link.pose
@@ -95,10 +98,10 @@ def move(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         NotPossible: the map shows a wall or furniture on the way.
         TryAgain: the way stayed blocked.
     """
-    yield from straight(context, float(parameters["distance_m"]))
+    yield from straight(context, float(parameters["distance_m"]), parameters.get("speed_m_s"))
 
 
-def straight(context: SkillContext, distance_m: float) -> Skill:
+def straight(context: SkillContext, distance_m: float, speed_m_s: float | None = None) -> Skill:
     """Drive straight, holding the heading; positive is forward.
 
     Raises:
@@ -107,6 +110,7 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
     """
     start = context.link.pose
     limits = limits_of(context)
+    most_m_s = limits.speed_m_s / 2 if speed_m_s is None else min(limits.speed_m_s, speed_m_s)
     sign = math.copysign(1.0, distance_m)
     patience = _Patience(context)
     while True:
@@ -118,7 +122,7 @@ def straight(context: SkillContext, distance_m: float) -> Skill:
         left_m = abs(distance_m) - travelled_m
         if left_m < STRAIGHT_TOLERANCE_M:
             break
-        speed = min(limits.speed_m_s / 2, math.sqrt(1.2 * limits.acceleration_m_s2 * left_m))
+        speed = min(most_m_s, math.sqrt(1.2 * limits.acceleration_m_s2 * left_m))
         twist = Twist(sign * max(speed, 0.03), 1.5 * wrap_angle(start.yaw_rad - pose.yaw_rad))
         if _leaves_free_floor(context, sign):
             context.link.drive(AT_REST)

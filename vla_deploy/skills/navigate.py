@@ -25,12 +25,13 @@ def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         TryAgain: the object has not been seen, or the way is blocked.
     """
     yield from carry(context)
+    speed_m_s = parameters.get("speed_m_s")
     if "object" in parameters:
-        yield from reach(context, parse_object(parameters["object"]))
+        yield from reach(context, parse_object(parameters["object"]), speed_m_s=speed_m_s)
         return
     yield from turn_head(context, *DRIVING_GAZE)
     if "place" in parameters:
-        yield from drive_to(context, _place(context, parameters["place"]))
+        yield from drive_to(context, _place(context, parameters["place"]), speed_m_s=speed_m_s)
         return
     yaw_rad = parameters.get("yaw_rad")
     goal = FloorPose(
@@ -38,10 +39,15 @@ def navigate_to(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         y_m=float(parameters["y_m"]),
         yaw_rad=float(yaw_rad) if yaw_rad is not None else 0.0,
     )
-    yield from drive_to(context, goal, turn=yaw_rad is not None)
+    yield from drive_to(context, goal, turn=yaw_rad is not None, speed_m_s=speed_m_s)
 
 
-def reach(context: SkillContext, query: ObjectQuery, anew: bool = False) -> Skill:
+def reach(
+    context: SkillContext,
+    query: ObjectQuery,
+    anew: bool = False,
+    speed_m_s: float | None = None,
+) -> Skill:
     """Drive to the best standing pose from which an object is within the arms' reach.
 
     `anew` leaves a pose that would do: it has just proved not to.
@@ -56,7 +62,7 @@ def reach(context: SkillContext, query: ObjectQuery, anew: bool = False) -> Skil
     reasons = []
     for goal in standing_poses(context, known["position_m"], anew=anew):
         try:
-            yield from drive_to(context, goal)
+            yield from drive_to(context, goal, speed_m_s=speed_m_s)
         except NotPossible as error:
             reasons.append(str(error))
             continue

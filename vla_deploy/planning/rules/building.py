@@ -25,6 +25,7 @@ Builder = Callable[[Groups, Request], list[Step]]
 
 DRIVE_M: Final = 0.5
 TURN_RAD: Final = math.pi / 2
+SLOW_RATIO: Final = 0.4
 LITTLE_M: Final = 0.2
 LITTLE_RAD: Final = math.radians(20.0)
 # "Go back" alone is about the command before; in a longer one it is about where that began.
@@ -45,10 +46,11 @@ def parts_of(text: str) -> list[str]:
     return [part for part in _AND.split(text) if part]
 
 
-def go(groups: Groups, _: Request) -> list[Step]:
+def go(groups: Groups, request: Request) -> list[Step]:
     """Drive to each place or thing in turn; "near the box" is where the box can be reached."""
     named = (_NEAR.sub("", part) for part in parts_of(groups["place"]))
-    return [("navigate_to", {"place": part}) for part in named]
+    speed = _speed(groups, request)
+    return [("navigate_to", {"place": part, **speed}) for part in named]
 
 
 def dock(_: Groups, __: Request) -> list[Step]:
@@ -171,11 +173,12 @@ def look_around(groups: Groups, _: Request) -> list[Step]:
     return there + [("look_at", {"direction": side}) for side in ("left", "ahead", "right", "down")]
 
 
-def drive(groups: Groups, _: Request) -> list[Step]:
+def drive(groups: Groups, request: Request) -> list[Step]:
     """Drive straight."""
     sign = -1.0 if groups["way"].startswith(("back", "reverse")) else 1.0
     default = LITTLE_M if "little" in groups else DRIVE_M
-    return [("move", {"distance_m": sign * _quantity(groups, "m", default)})]
+    distance_m = sign * _quantity(groups, "m", default)
+    return [("move", {"distance_m": distance_m, **_speed(groups, request)})]
 
 
 def turn(groups: Groups, _: Request) -> list[Step]:
@@ -243,6 +246,14 @@ def _quantity(groups: Groups, dimension: str, default: float) -> float:
     if value is None:
         raise NotUnderstood(groups["quantity"])
     return value
+
+
+def _speed(groups: Groups, request: Request) -> dict[str, Any]:
+    """Return how fast to drive, where it is said: "slowly", "at 0.2 m/s"."""
+    most_m_s = request.world.max_speed_m_s
+    if "speed" in groups:
+        return {"speed_m_s": quantity_of(groups["speed"], "m_s")}
+    return {"speed_m_s": SLOW_RATIO * most_m_s} if "pace" in groups and most_m_s else {}
 
 
 def _arm(groups: Groups) -> dict[str, Any]:

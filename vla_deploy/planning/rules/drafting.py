@@ -24,6 +24,11 @@ from vla_deploy.planning.rules.table import RULES, Rule
 _WITH_HAND: Final = re.compile(
     r"(?P<own>.+?),? (?:with|using|in) (?:the|your) (?P<arm>left|right) (?:hand|arm|gripper)"
 )
+_PACE: Final = re.compile(r",?\b(?:very |really |nice and )?(?:slowly|slow|carefully|gently)\b")
+_MANNERS: Final = (
+    _WITH_HAND,
+    re.compile(r"(?P<own>.+?),? (?:at|with) (?P<speed>[\d.]+ ?(?:m/s|cm/s|km/h|mps|mph))"),
+)
 # What of a clause can be corrected by a part alone.
 _CORRECTED: Final = frozenset({"object", "place", "destination", "quantity", "way", "what"})
 # What a rule finds in a clause: all of what is put somewhere, or some of what can be known.
@@ -170,18 +175,30 @@ def _fit(clause: str, request: Request) -> _Fit | None:
 
 
 def _fits(clause: str) -> Iterator[_Fit]:
-    hand = _WITH_HAND.fullmatch(clause)
-    own = clause if hand is None else hand["own"]
+    own, manner = _manner_off(clause)
     for rule in RULES:
         found = rule.pattern.fullmatch(own)
-        if found is None:
+        # How fast to drive is nothing that the other skills could heed.
+        if found is None or ("speed" in manner and rule.intent is not Intent.NAVIGATION):
             continue
         groups = {
             name.removesuffix("2"): value
             for name, value in found.groupdict().items()
             if value is not None
         }
-        yield _Fit(rule, groups | ({"arm": hand["arm"]} if hand is not None else {}))
+        yield _Fit(rule, groups | manner)
+
+
+def _manner_off(clause: str) -> tuple[str, Groups]:
+    """Return a clause without how it shall be done, and how: which hand, how fast."""
+    manner: dict[str, str] = {"pace": "slow"} if _PACE.search(clause) else {}
+    clause = " ".join(_PACE.sub(" ", clause).split())
+    for pattern in _MANNERS:
+        found = pattern.fullmatch(clause)
+        if found is not None:
+            clause = found["own"]
+            manner |= {name: value for name, value in found.groupdict().items() if name != "own"}
+    return clause, manner
 
 
 def _is_whole(fit: _Fit, request: Request) -> bool:

@@ -52,14 +52,14 @@ def _navigate(given: Parameters, resolver: Resolver, state: GetState) -> Iterato
         yield "navigate_to", given
         return
     if phrases.PRONOUNS.get(_spoken(goal)) == phrases.HERE:
-        yield "navigate_to", {**rest, **_here(goal, resolver)}
+        yield "navigate_to", {**_here(goal, resolver), **rest}
         return
     thing = _thing_unless_place(goal, resolver, Use.SEE)
     if thing is None:
-        yield "navigate_to", {**rest, "place": resolve_place(goal, resolver)}
+        yield "navigate_to", {"place": resolve_place(goal, resolver), **rest}
         return
     yield from _on_furniture(thing)
-    yield "navigate_to", {**rest, "object": thing.name}
+    yield "navigate_to", {"object": thing.name, **rest}
 
 
 def _here(text: str, resolver: Resolver) -> Parameters:
