@@ -186,7 +186,7 @@ def _fits(clause: str) -> Iterator[_Fit]:
             for name, value in found.groupdict().items()
             if value is not None
         }
-        yield _Fit(rule, groups | manner)
+        yield _Fit(rule, {**groups, **manner})
 
 
 def _manner_off(clause: str) -> tuple[str, Groups]:
