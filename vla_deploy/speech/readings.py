@@ -43,6 +43,7 @@ class Readings:
         self._executor = executor
         self._clock = clock
         self._draft: _Asked | None = None
+        self._drafting: Future[Reading] | None = None
         self._ended: list[_Asked] = []
         self._refused: list[Answer] = []
         self._closed = False
@@ -67,9 +68,10 @@ class Readings:
 
     def draft(self, phrase: Phrase, hot_words: str) -> None:
         """Read a phrase in advance, unless something is being read."""
-        under_way = self._draft is not None and not self._draft.future.done()
+        under_way = self._drafting is not None and not self._drafting.done()
         if self.recogniser is not None and not under_way and not self._ended:
             self._draft = self._ask(self.recogniser, phrase, hot_words)
+            self._drafting = self._draft.future
 
     def drafted(self) -> Reading | None:
         """Return what was read in advance, as soon as it is there."""
@@ -80,10 +82,9 @@ class Readings:
 
     def forget_draft(self) -> None:
         """Say that the speaker has gone on: what was read in advance is not all."""
-        if self._draft is not None:
-            self._draft.future.cancel()
-            if self._draft.future.done():
-                self._draft = None
+        draft, self._draft = self._draft, None
+        if draft is not None:
+            draft.future.cancel()
 
     def finish(self, phrase: Phrase, hot_words: str) -> None:
         """Take a phrase that has ended: by what was read in advance, if that was all of it."""

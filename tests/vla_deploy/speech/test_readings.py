@@ -130,6 +130,22 @@ def test_only_one_phrase_is_read_in_advance_at_a_time(readings: Readings, pool: 
     assert len(pool.waiting) == 1
 
 
+def test_what_is_read_too_late_of_a_pause_says_nothing_of_the_next_one(
+    readings: Readings, pool: Waiting
+) -> None:
+    readings.draft(phrase(1, 0.5), "")
+    pool.waiting[0][0].set_running_or_notify_cancel()
+    readings.forget_draft()
+    readings.draft(phrase(1, 0.9), "")
+    assert len(pool.waiting) == 1, "the network is still at the first one"
+    future, act = pool.waiting.pop()
+    future.set_result(act())
+    assert readings.drafted() is None
+    readings.draft(phrase(1, 0.9), "")
+    pool.work()
+    assert readings.drafted() is not None
+
+
 def test_more_phrases_than_can_wait_are_refused(readings: Readings, pool: Waiting) -> None:
     for number in range(MOST_WAITING + 1):
         readings.finish(phrase(number, 0.9), "")
