@@ -94,7 +94,8 @@ class PlanningSettings:
 
     `servers` are names of `servers.toml`, asked in this order after the model on board; of all
     that take time, `max_rungs` at most. `within_s` is the time for all of them together. An unsure
-    server is asked for `candidates` plans; a prompt has `prompt_characters` at most.
+    server is asked for `candidates` plans; a prompt has `prompt_characters` at most. So many
+    commands are `remembered` from run to run, 0 for none.
     """
 
     within_s: float
@@ -102,6 +103,7 @@ class PlanningSettings:
     max_rungs: int
     candidates: int
     prompt_characters: int
+    remembered: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -181,6 +181,7 @@ _PLANNING: Keys = {
     "max_rungs": _Range(0, 8, "", integer=True),
     "candidates": _Range(1, 5, "", integer=True),
     "prompt_characters": _Range(6000, 200_000, "characters", integer=True),
+    "remembered": _Range(0, 100_000, "commands", integer=True),
 }
 _TABLES: Final = (
     "board", "processes", "speech", "planning", "models", "budgets", "ladder", "ladder_timing",

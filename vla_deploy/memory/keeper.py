@@ -4,7 +4,7 @@ import logging
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, wait
 from dataclasses import replace
 from typing import Any, Final
 
@@ -72,6 +72,15 @@ class MemoryKeeper:
             self._look_due_ns = now_ns + LOOK_EVERY_NS
             self._look(now_ns)
         self._write(now_ns)
+
+    def close(self) -> None:
+        """Write what is complete, and release the file."""
+        self._write_due_ns = 0
+        if self._writing is not None:
+            wait([self._writing])
+        self._write(self._clock.now_ns())
+        self._aside.shutdown(wait=True)
+        self._store.close()
 
     def document(self) -> dict[str, Any]:
         """Return how remembering goes, for the status."""

@@ -31,7 +31,8 @@ CREATE INDEX thing_by_kind ON thing (kind, seen_s);
 def open_file(path: Path, patience_s: float) -> sqlite3.Connection:
     """Return a connection to the memory, which is made where there is none.
 
-    It waits so long for another process that writes. A damaged file is moved aside, and an empty memory begins: forgetting must not stop the robot.
+    It waits so long for another process that writes. A damaged file is moved aside, and an empty
+    memory begins: forgetting must not stop the robot.
 
     Raises:
         MemoryUnusable: the file cannot be made or opened, or a later release has written it.

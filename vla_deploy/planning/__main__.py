@@ -5,7 +5,7 @@ import sys
 from platforms import load_profile
 from vla_deploy.aside import beside
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.assembly import planner_for
+from vla_deploy.planning.assembly import open_memory, planner_for
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
@@ -14,9 +14,10 @@ from vla_deploy.robots import load_robot
 def build(context: NodeContext) -> PlannerNode:
     """Build the node from what the process was started with."""
     robot = load_robot(context.robot)
-    profile = load_profile(context.profile)
-    planner = planner_for(robot, profile, context.clock, context.run_dir.parent)
-    return PlannerNode(context, robot, planner, beside("plan"))
+    profile, base = load_profile(context.profile), context.run_dir.parent
+    planner = planner_for(robot, profile, context.clock, base)
+    memory = open_memory(profile.planning, base)
+    return PlannerNode(context, robot, planner, beside("plan"), memory)
 
 
 if __name__ == "__main__":

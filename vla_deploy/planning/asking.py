@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from vla_deploy.memory.episode import LastSeen
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.planning.knowledge import World
@@ -16,10 +17,11 @@ class Request:
     """Hold one command, with all that may be known when it is planned.
 
     `here` is the robot's x and y in metres and its yaw in radians, in the map. `recollections` are
-    what the robot remembers that may bear on the command, a sentence each. `heard_confidence`, 0 to
-    1, is how sure the recogniser is of the words; None for typed text. `image` (rows, columns, RGB)
-    is what the robot sees now, where a rung can use it. `failed` tells plans for this command that
-    were tried before, and what went wrong.
+    what the robot remembers that may bear on the command, a sentence each; `last_seen` says where
+    things were before, the newest first. `heard_confidence`, 0 to 1, is how sure the recogniser is
+    of the words; None for typed text. `image` (rows, columns, RGB) is what the robot sees now,
+    where a rung can use it. `failed` tells plans for this command that were tried before, and what
+    went wrong.
     """
 
     command_id: str
@@ -29,6 +31,7 @@ class Request:
     here: tuple[float, float, float] | None = None
     conversation: Conversation = field(default_factory=Conversation)
     recollections: tuple[str, ...] = ()
+    last_seen: tuple[LastSeen, ...] = ()
     heard_confidence: float | None = None
     image: Image | None = field(default=None, compare=False, repr=False)
     failed: tuple[str, ...] = ()

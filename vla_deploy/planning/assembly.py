@@ -8,6 +8,7 @@ from drivers.clock import Clock
 from platforms import Profile
 from platforms.profile import PlanningSettings
 from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.memory import MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.one_line import one_line
@@ -54,6 +55,17 @@ def open_planner(
         _log.warning("planning does without server %s: %s", name, away[name])
     slow = (*on_board, *servers)[: settings.max_rungs]
     return Planner(clock, slow, within_s=settings.within_s, away=away)
+
+
+def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:
+    """Return the robot's memory, None where the profile wants none or its file cannot be used."""
+    if settings.remembered == 0:
+        return None
+    try:
+        return MemoryStore.of_base(base, settings.remembered)
+    except MemoryUnusable as error:
+        _log.warning("planning does without memory: %s", error)
+        return None
 
 
 def _served(

@@ -218,7 +218,7 @@ class Desk:
         self.dialogue.remember(turn)
 
     def _request(self, command: Command) -> Request:
-        return self._situation.request(command, self.dialogue.talk, self.planner.sees)
+        return self._situation.request(command, self.dialogue.talk, of_use=self.planner.uses)
 
     # --- answers --------------------------------------------------------------------------------
 

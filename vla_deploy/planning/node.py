@@ -5,8 +5,11 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.aside import AtOnce
+from vla_deploy.aside import AtOnce, background
 from vla_deploy.ipc import CellWriter, Event, RingReader, SharedSpace
+from vla_deploy.memory import MemoryStore
+from vla_deploy.memory.episode import unix_s
+from vla_deploy.memory.keeper import MemoryKeeper
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.desk import Desk
@@ -17,6 +20,7 @@ from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.robots import RobotDescription
+from vla_deploy.world.surfaces import furniture_points
 
 UTTERANCE_AGE_S: Final = 5.0
 _STATUS_PERIOD_NS: Final = NS_PER_S // 2
@@ -37,6 +41,7 @@ class PlannerNode:
         robot: RobotDescription,
         planner: Planner | None = None,
         aside: Executor | None = None,
+        memory: MemoryStore | None = None,
     ) -> None:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
@@ -44,6 +49,9 @@ class PlannerNode:
         self._base = context.run_dir.parent
         self._planner = planner or Planner(context.clock)
         self._aside = aside or AtOnce()
+        self._memory = memory
+        self._run_id = context.run_dir.name
+        self._keeper: MemoryKeeper | None = None
         self._status_due_ns = 0
         self._is_stopped = False
         self._desk: Desk
@@ -59,7 +67,9 @@ class PlannerNode:
         plans = self._space.ring_reader("plan", from_start=True)
         before = left_over(self._utterances.drain(), self._events.drain(), plans.drain())
         self._telling = Telling(self._space, self._clock)
-        situation = Situation(self._space, self._clock, self._robot)
+        situation = Situation(self._space, self._clock, self._robot, self._memory)
+        if self._memory is not None:
+            self._keeper = self._new_keeper(self._memory)
         self._desk = Desk(self._planner, situation, self._telling, self._aside, self._clock)
         self._status = self._space.cell_writer("planner_status")
         self._take_up(before)
@@ -71,15 +81,20 @@ class PlannerNode:
         for event in self._events.drain():
             self._note(event)
         self._desk.advance()
+        if self._keeper is not None:
+            self._keeper.step()
         now_ns = self._clock.now_ns()
         if now_ns >= self._status_due_ns:
             self._status_due_ns = now_ns + _STATUS_PERIOD_NS
-            self._status.put_document(self._desk.document())
+            memory = self._keeper.document() if self._keeper is not None else None
+            self._status.put_document({**self._desk.document(), "memory": memory})
 
     def stop(self) -> None:
         """Close the topics; what is planned beside the steps is given up."""
         self._is_stopped = True
         self._aside.shutdown(wait=False, cancel_futures=True)
+        if self._keeper is not None:
+            self._keeper.close()
         self._space.close()
 
     def prepare(self, profile: Profile, model_tier: int) -> Planner:
@@ -99,6 +114,17 @@ class PlannerNode:
         if self._is_stopped:
             return  # the process ends, and its memory with it
         self._aside.submit(prepared.close)
+
+    def _new_keeper(self, memory: MemoryStore) -> MemoryKeeper:
+        return MemoryKeeper(
+            memory,
+            self._space,
+            self._clock,
+            background(),
+            run_id=self._run_id,
+            places=furniture_points(self._robot.places),
+            wall_s=unix_s,
+        )
 
     def _take_up(self, before: LeftOver) -> None:
         for command_id in before.in_work:

@@ -6,6 +6,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.aids import Aid
 from vla_deploy.planning.asking import Proposal, Request, Rung
 from vla_deploy.planning.correction import CORRECTED
 from vla_deploy.planning.dialects import Json, parse_plan
@@ -90,9 +91,11 @@ class Planner:
         return tuple(rung.name for rung in self._slow.rungs)
 
     @property
-    def sees(self) -> bool:
-        """Tell whether any rung can use an image."""
-        return any(isinstance(rung, Served) and rung.sees for rung in self._slow.rungs)
+    def uses(self) -> frozenset[Aid]:
+        """Return what any of the rungs can use."""
+        served = [rung for rung in self._slow.rungs if isinstance(rung, Served)]
+        aids = {Aid.MEMORY} if served else set()
+        return frozenset(aids | ({Aid.IMAGE} if any(rung.sees for rung in served) else set()))
 
     def document(self) -> dict[str, Any]:
         """Return how cache and servers have been doing, as JSON takes it."""

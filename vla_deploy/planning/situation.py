@@ -8,8 +8,10 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours
+from vla_deploy.memory import MemoryStore
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.planning.aids import Aid, Recall
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotReady
 from vla_deploy.planning.inbox import Command
@@ -32,9 +34,16 @@ Pose = tuple[float, float, float]
 class Situation:
     """Hold the cells that say how the robot is, where it stands, and what it knows around it."""
 
-    def __init__(self, space: SharedSpace, clock: Clock, robot: RobotDescription) -> None:
+    def __init__(
+        self,
+        space: SharedSpace,
+        clock: Clock,
+        robot: RobotDescription,
+        memory: MemoryStore | None = None,
+    ) -> None:
         self._clock = clock
         self._robot = robot
+        self._recall = Recall(memory) if memory is not None else None
         self._is_free = base_planner(robot).is_free
         self._pose: CellReader = space.cell_reader("pose")
         self._scene: CellReader = space.cell_reader("scene")
@@ -44,10 +53,11 @@ class Situation:
         self._frames: FrameReader = space.frame_reader("rgbd")
 
     def request(
-        self, command: Command, conversation: Conversation, with_image: bool = False
+        self, command: Command, conversation: Conversation, *, of_use: frozenset[Aid] = frozenset()
     ) -> Request:
-        """Return the request for a command, with what is known now; an image where it is of use."""
-        here = self._here()
+        """Return the request for a command with what is known now, and what aids are of use."""
+        here, recall = self._here(), self._recall
+        recalls = recall is not None and Aid.MEMORY in of_use
         return Request(
             command_id=command.command_id,
             text=command.text,
@@ -56,7 +66,9 @@ class Situation:
             here=here,
             conversation=conversation,
             heard_confidence=command.heard_confidence,
-            image=self._image() if with_image else None,
+            image=self._image() if Aid.IMAGE in of_use else None,
+            recollections=recall.sentences(command.text) if recall and recalls else (),
+            last_seen=recall.things() if recall else (),
         )
 
     def check_ready(self) -> None:

@@ -11,6 +11,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.memory import MemoryStore
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.asking import Proposal, Request
@@ -74,9 +75,17 @@ class Later(Executor):
 class Desk:
     """Hold the other ends of the planner's topics."""
 
-    def __init__(self, run_dir: Path, clock: StepClock, *slow: Any, aside: Executor) -> None:
+    def __init__(
+        self,
+        run_dir: Path,
+        clock: StepClock,
+        *slow: Any,
+        aside: Executor,
+        memory: MemoryStore | None = None,
+    ) -> None:
         self.clock = clock
         self.aside = aside
+        self.memory = memory
         self._space = SharedSpace(run_dir / "ipc", clock)
         self._context = NodeContext(
             run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=clock
@@ -95,7 +104,8 @@ class Desk:
     def start(self) -> PlannerNode:
         """Start a planner; one that is there already is left as it was when it was killed."""
         planner = Planner(self.clock, self._slow, within_s=20.0)
-        self.planner = PlannerNode(self._context, load_robot("butler"), planner, self.aside)
+        robot = load_robot("butler")
+        self.planner = PlannerNode(self._context, robot, planner, self.aside, self.memory)
         self.planner.start()
         return self.planner
 
@@ -153,8 +163,10 @@ def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]
     """Open a desk with an armed robot and a planner that asks these slow rungs after rules."""
     opened: list[Desk] = []
 
-    def open_desk(*slow: Any, aside: Executor | None = None) -> Desk:
-        desk = Desk(tmp_path, clock, *slow, aside=aside or AtOnce())
+    def open_desk(
+        *slow: Any, aside: Executor | None = None, memory: MemoryStore | None = None
+    ) -> Desk:
+        desk = Desk(tmp_path, clock, *slow, aside=aside or AtOnce(), memory=memory)
         opened.append(desk)
         desk.control("armed")
         return desk

@@ -6,6 +6,7 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from platforms import load_profile
+from vla_deploy.planning.aids import Aid
 from vla_deploy.planning.assembly import open_planner
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.robots import load_robot
@@ -48,12 +49,13 @@ def open_with(tmp_path, loopback):
 def test_nobody_else_is_asked_unless_configured(open_with):
     planner = open_with("within_s = 5.0")
     assert planner.rungs == ("rules", "cache")
-    assert not planner.sees
+    assert planner.uses == frozenset()
 
 
 def test_servers_are_asked_after_rules_and_cache(open_with, loopback, ask):
     planner = open_with('servers = ["bench"]')
     assert planner.rungs == ("rules", "cache", "server bench")
+    assert planner.uses == {Aid.MEMORY}
     loopback.then(loopback.says(json.dumps(ANSWER)))
     answer = planner.plan(ask("make it nice in here"))
     assert answer.plan.actions[0].parameters == {"place": "kitchen"}

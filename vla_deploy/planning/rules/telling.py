@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable, Sequence
 
+from vla_deploy.memory.episode import unix_s
+from vla_deploy.memory.wording import place_words
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
@@ -62,10 +64,10 @@ def tell_place(_: Groups, request: Request) -> list[Step]:
 
 
 def tell_or_find(groups: Groups, request: Request) -> list[Step]:
-    """Say where a thing is if that is known, else look for it."""
+    """Say where a thing is if that is known, else where it was, and look for it."""
     found = _known(groups["object"], request)
     if not found or request.scene is None:
-        return find(groups, request)
+        return [*_remembered(groups["object"], request), *find(groups, request)]
     sites = request.world.sites.values()
     places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
     told = [_where(one, place_of(one, places), request) for one in found[:MOST_TOLD]]
@@ -98,6 +100,15 @@ def _known(text: str, request: Request) -> list[Thing]:
         return []
     setting = Setting(request)
     return fitting(read_expression(text, setting.furniture), Use.SEE, setting)
+
+
+def _remembered(text: str, request: Request) -> list[Step]:
+    """Say where such a thing was in earlier runs, if that is remembered."""
+    query = read_expression(text, Setting(request).furniture).query
+    for seen in request.last_seen:
+        if seen.kind == query.kind and query.colour in ("", seen.colour):
+            return _say(place_words(seen, unix_s()) + " I will look for it.")
+    return []
 
 
 def _where(thing: Thing, place: str, request: Request) -> str:
