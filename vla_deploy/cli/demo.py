@@ -143,16 +143,14 @@ class Demo:
         clock.meanwhile = motion.look
         self._spoken = spoken = SpokenCommand(session, motion)
         self._tell(f'a voice says: "{order}"')
-        hearing = spoken.say(order, self._arguments.voice, self._arguments.snr)
-        self._tell(hearing.line())
-        return spoken.events(hearing)
+        return spoken.events(order, self._arguments.voice, self._arguments.snr)
 
     def _follow(self, events: Iterator[dict[str, Any]], session: Session) -> None:
         for event in events:
             self._last = event
             if event["event"] == "plan":
                 self._plan = event["plan"]
-            line = line_of(event)
+            line = event["text"] if event["event"] == "heard" else line_of(event)
             if line:
                 self._tell(line)
             if event["event"] == "action" and event["status"] == "active":

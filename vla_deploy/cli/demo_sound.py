@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from vla_deploy.cli.aloud import REJECTED, Aloud, Hearing, why_deaf
+from vla_deploy.cli.aloud import REJECTED, STATUS_AGE_S, Aloud, Hearing, why_deaf
 from vla_deploy.cli.session import Session
 
 MOST_TIMES_SAID: Final = 3
@@ -67,31 +67,48 @@ class SpokenCommand:
         self._hearing: Hearing | None = None
         self._planned_ns: int | None = None
 
-    def say(self, text: str, voice: str, snr_db: float | None) -> Hearing:
-        """Speak until something was heard that the robot does not ask to be repeated.
+    def events(self, text: str, voice: str, snr_db: float | None) -> Iterator[Event]:
+        """Speak, and return what was heard and the task events, up to and including the last one.
 
-        Raises:
-            CommandFailed: nobody heard it.
-        """
-        self._voice = voice
-        while True:
-            self._times_said += 1
-            self._motion.forget()
-            self._hearing = hearing = self._aloud.speak(text, voice, snr_db)
-            if hearing.told["verdict"] != REJECTED or self._times_said == MOST_TIMES_SAID:
-                return hearing
-
-    def events(self, hearing: Hearing) -> Iterator[Event]:
-        """Return the task events of what was heard, up to and including the last one.
+        Where the robot does not understand, it is told again, as a person would.
 
         Raises:
             UsageError: what was heard is no command.
-            CommandFailed: nobody answers; raised by the iterator.
+            CommandFailed: nobody heard it, or nobody answers.
         """
-        for event in self._aloud.follow(hearing):
-            if event["event"] == "plan":
-                self._planned_ns = self._session.clock.now_ns()
-            yield event
+        self._voice = voice
+        while True:
+            hearing = self._say(text, snr_db)
+            yield {"event": "heard", "text": hearing.line()}
+            if hearing.told["verdict"] == REJECTED and self._may_say_again:
+                continue
+            is_refused = False
+            for event in self._aloud.follow(hearing):
+                self._note(event)
+                is_refused = event["event"] == REJECTED
+                yield event
+            if not (is_refused and self._may_say_again):
+                return
+
+    @property
+    def _may_say_again(self) -> bool:
+        return self._times_said < MOST_TIMES_SAID
+
+    def _say(self, text: str, snr_db: float | None) -> Hearing:
+        """Speak, once the robot has said what it had to say."""
+        end_ns = self._session.clock.now_ns() + round(LISTENS_WITHIN_S * NS_PER_S)
+        while self._times_said and is_speaking(self._session):
+            self._session.pause(0.1)
+            if self._session.clock.now_ns() > end_ns:
+                break
+        self._times_said += 1
+        self._motion.forget()
+        self._hearing = self._aloud.speak(text, self._voice, snr_db)
+        return self._hearing
+
+    def _note(self, event: Event) -> None:
+        if event["event"] == "plan":
+            self._planned_ns = self._session.clock.now_ns()
 
     def document(self) -> dict[str, Any]:
         """Return what was said and heard, and the times from the end of the words, in s."""
@@ -112,6 +129,12 @@ class SpokenCommand:
         if at_ns is None or self._hearing is None:
             return None
         return round((at_ns - self._hearing.words_ended_ns) / NS_PER_S, 3)
+
+
+def is_speaking(session: Session) -> bool:
+    """Tell whether the robot says something."""
+    status = session.document("speech_status", age_limit_s=STATUS_AGE_S)
+    return status is not None and bool(status["speaking"] or status["voice"].get("waiting"))
 
 
 def await_ears(session: Session) -> str:
