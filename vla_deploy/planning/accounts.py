@@ -29,12 +29,13 @@ class _Rung:
 
 @dataclass(slots=True)
 class Accounts:
-    """Hold counts since the planner was started."""
+    """Hold counts since the planner was started; `failed` are faults of the planner itself."""
 
     heard: int = 0
     planned: int = 0
     refused: int = 0
     asked: int = 0
+    failed: int = 0
     _rungs: dict[str, _Rung] = field(default_factory=dict)
 
     def note(self, attempts: Iterable[Attempt]) -> None:
@@ -51,5 +52,6 @@ class Accounts:
             "planned": self.planned,
             "refused": self.refused,
             "asked": self.asked,
+            "failed": self.failed,
         }
         return {**counts, "by_rung": {name: one.document() for name, one in self._rungs.items()}}

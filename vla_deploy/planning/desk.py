@@ -2,15 +2,19 @@
 
 import logging
 from collections import deque
-from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import replace
+from functools import partial
 from threading import Event
 from typing import Any, Final
 
 from drivers.clock import Clock
+from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.beside import Beside
 from vla_deploy.planning.confirmation import confirmation_of
 from vla_deploy.planning.correction import CORRECTED, corrected_by
 from vla_deploy.planning.dialogue import Dialogue, Waiting
@@ -27,21 +31,7 @@ from vla_deploy.planning.understanding.mentioned import mentions_of
 
 MOST_WAITING: Final = 8
 CANCELLED: Final = "cancelled on request"
-# Whoever speaks to the robot hears by then that it has heard.
-_PATIENCE_S: Final = 1.5
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Work:
-    """Hold the command that is planned beside the steps."""
-
-    command: Command
-    request: Request
-    deadline: Deadline
-    patience: Deadline
-    future: "Future[Answer]"
-    is_announced: bool = False
 
 
 class Desk:
@@ -60,15 +50,17 @@ class Desk:
         self.dialogue = Dialogue(clock)
         self._situation = situation
         self._telling = telling
-        self._aside = aside
+        self._beside = Beside(aside, clock)
         self._clock = clock
         self._queue: deque[Command] = deque()
-        self._work: _Work | None = None
 
     # --- what comes in --------------------------------------------------------------------------
 
     def take(self, command: Command) -> None:
         """Take an utterance: the answer to what was asked, or a command of its own."""
+        self._guarded(command, partial(self._take, command))
+
+    def _take(self, command: Command) -> None:
         waiting = self.dialogue.waiting
         if waiting is not None and self._is_answer(command, waiting):
             return
@@ -78,23 +70,19 @@ class Desk:
             self._refuse(command, Says.MANY_WAIT)
         else:
             self._queue.append(command)
-            if self._work is not None:
+            if self._beside.work is not None:
                 self._telling.queued(command, len(self._queue))
 
     def stop_all(self, command_id: str) -> None:
         """Let go of every command, and let the executor end what it does."""
         self._telling.cancelled_all(command_id)
-        dropped = list(self._queue)
-        self._queue.clear()
-        work, self._work = self._work, None
-        if work is not None:
-            work.deadline.call_in()
-            dropped.insert(0, work.command)
         waiting = self.dialogue.settle()
-        if waiting is not None:
-            dropped.insert(0, waiting.command)
+        asked = None if waiting is None else waiting.command
+        dropped = (asked, self._beside.call_in(), *self._queue)
+        self._queue.clear()
         for command in dropped:
-            self._refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
+            if command is not None:
+                self._refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command; a plan that failed is not given again."""
@@ -110,14 +98,15 @@ class Desk:
         if self.dialogue.is_overdue:
             self._leave(Says.NO_ANSWER)
         self._look_after_work()
-        while self._queue and self._work is None and self.dialogue.waiting is None:
-            self._begin(self._queue.popleft())
+        while self._queue and self._beside.work is None and self.dialogue.waiting is None:
+            command = self._queue.popleft()
+            self._guarded(command, partial(self._begin, command))
             self._look_after_work()
 
     def document(self) -> dict[str, Any]:
         """Return which commands are in work, what was asked, and how it has been going."""
         waiting = self.dialogue.waiting
-        held = [one.command for one in (self._work, waiting) if one is not None]
+        held = [one.command for one in (self._beside.work, waiting) if one is not None]
         return {
             **self.accounts.document(),
             "commands": [one.command_id for one in (*held, *self._queue)],
@@ -136,30 +125,27 @@ class Desk:
             self._conclude(command, request, answer)
             return
         self._telling.planning(command, self.planner.slow_rungs)
-        self._work = _Work(
-            command=command,
-            request=request,
-            deadline=deadline,
-            patience=Deadline.within(self._clock, _PATIENCE_S),
-            future=self._aside.submit(self.planner.plan_slowly, request, deadline, answer),
-        )
+        slowly = partial(self.planner.plan_slowly, request, deadline, answer)
+        self._beside.begin(command, request, deadline, slowly)
 
     def _look_after_work(self) -> None:
-        work = self._work
-        if work is None:
-            return
-        if not work.future.done():
-            if work.patience.left_s <= 0.0 and not work.is_announced:
-                self._telling.aloud(work.command, Says.WORKING)
-                self._work = replace(work, is_announced=True)
-            return
-        self._work = None
-        error = work.future.exception()
-        if error is not None:  # a fault of ours; the command must not hang for it
-            _log.error("planning %r failed", work.command.text, exc_info=error)
-            self._refuse(work.command, f"the planner failed: {type(error).__name__}: {error}")
-            return
-        self._conclude(work.command, work.request, work.future.result())
+        done = self._beside.take_done()
+        if done is not None:
+            self._guarded(
+                done.command,
+                lambda: self._conclude(done.command, done.request, done.future.result()),
+            )
+        tedious = self._beside.take_tedious()
+        if tedious is not None:
+            self._telling.aloud(tedious, Says.WORKING)
+
+    def _guarded(self, command: Command, work: Callable[[], None]) -> None:
+        """Do work for one command; a fault of ours ends that command, and neither others nor us."""
+        error = AtOnce().submit(work).exception()
+        if error is not None:
+            _log.error("planning %r failed", command.text, exc_info=error)
+            self.accounts.failed += 1
+            self._refuse(command, f"the planner failed: {type(error).__name__}")
 
     def _conclude(self, command: Command, request: Request, answer: Answer) -> None:
         self.accounts.note(answer.attempts)

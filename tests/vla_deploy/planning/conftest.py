@@ -18,7 +18,7 @@ from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.planner import Planner
+from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot, Thing
 
@@ -81,9 +81,11 @@ class Desk:
         clock: StepClock,
         *slow: Any,
         aside: Executor,
+        check: Any = checked,
         memory: MemoryStore | None = None,
     ) -> None:
         self.clock = clock
+        self._check = check
         self.aside = aside
         self.memory = memory
         self._space = SharedSpace(run_dir / "ipc", clock)
@@ -103,7 +105,7 @@ class Desk:
 
     def start(self) -> PlannerNode:
         """Start a planner; one that is there already is left as it was when it was killed."""
-        planner = Planner(self.clock, self._slow, within_s=20.0)
+        planner = Planner(self.clock, self._slow, within_s=20.0, check=self._check)
         robot = load_robot("butler")
         self.planner = PlannerNode(self._context, robot, planner, self.aside, self.memory)
         self.planner.start()
@@ -164,9 +166,12 @@ def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]
     opened: list[Desk] = []
 
     def open_desk(
-        *slow: Any, aside: Executor | None = None, memory: MemoryStore | None = None
+        *slow: Any,
+        aside: Executor | None = None,
+        check: Any = checked,
+        memory: MemoryStore | None = None,
     ) -> Desk:
-        desk = Desk(tmp_path, clock, *slow, aside=aside or AtOnce(), memory=memory)
+        desk = Desk(tmp_path, clock, *slow, aside=aside or AtOnce(), check=check, memory=memory)
         opened.append(desk)
         desk.control("armed")
         return desk

@@ -72,8 +72,21 @@ def test_a_rung_that_breaks_ends_its_command_and_no_other(open_desk, rung, propo
     desk.give(command_id="c2", text="sing two")
     told = desk.answers()
     assert events(told)[1:3] == [("c1", "rejected"), ("c2", "planning")]
-    assert "RuntimeError: out of memory" in told[1]["reason"]
+    assert told[1]["reason"] == "the planner failed: RuntimeError"
     assert events(told)[-1] == ("c2", "plan")
+    assert desk.status()["failed"] == 1
+
+
+def test_a_fault_of_what_plans_at_once_ends_its_command_and_not_the_planner(open_desk):
+    def check(plan, request):
+        raise ZeroDivisionError(request.text)
+
+    desk = open_desk(check=check)
+    desk.give(text="go to the kitchen")
+    desk.give(command_id="c2", text="sing")
+    told = desk.answers()
+    assert events(told) == [("c1", "rejected"), ("c2", "rejected")]
+    assert told[0]["reason"] == "the planner failed: ZeroDivisionError"
 
 
 class TestQuestions:
