@@ -16,10 +16,10 @@ import numpy as np
 from benchmarks.command import parser, show
 from benchmarks.planner_corpus import PLAN, Case, commands, home, other_talk, scenes
 from benchmarks.planner_desk import Answer, fresh_desk
-from benchmarks.speech_words import names, open_shipped
+from benchmarks.speech_words import open_shipped
 from training.speech.judging import NOISY_DB
 from training.speech.sentences import normal
-from training.speech.trials import by_held_out_voices, by_unseen_engine, heard
+from training.speech.trials import NAMES, by_held_out_voices, by_unseen_engine, heard
 from training.voices.clip import Clip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.confidence import confidence
@@ -90,7 +90,7 @@ def _answer(scene: str, text: str) -> Answer:
 
 def _read(recogniser: Recogniser, clip: Clip, least: float) -> str:
     """Return the words, or nothing where the robot would ask again."""
-    reading = recogniser.read(clip.samples, names())
+    reading = recogniser.read(clip.samples, NAMES)
     sure = confidence(reading, recogniser.declared.calibration) >= least
     return reading.text if sure else ""
 

@@ -2,8 +2,8 @@
 
 Sentences and the names of the voices lie in `training/speech/held_out` and `training/voices`; they
 are spoken on the spot by eSpeak NG, flite and festival. `missing` says which engine is not
-installed: its figures are None then. `with_names` is read with names of things and places as hot
-words, as the robot reads.
+installed: its figures are None then. All is read as on the robot; `hot_words` tells whether the
+recogniser takes the names of things and places that it is given.
 """
 
 import sys
@@ -17,16 +17,10 @@ from platforms import load_profile
 from training.speech.judging import other_sounds, speed, sureness, word_errors
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.whisper_schema import SPEECH_TO_TEXT
-from vla_deploy.robots import load_robot
-from vla_deploy.speech.hot_words import joined
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 from vla_deploy.state_dir import user_base
 
 MODEL: Final = "commands-whisper"
-_THINGS: Final = (
-    "red cup", "blue ball", "green bottle", "white bowl", "brown box", "black phone", "grey remote",
-    "yellow can", "red book",
-)  # fmt: skip
 _OTHER_SOUNDS: Final = 66
 
 
@@ -40,12 +34,11 @@ def measure(sentences: int = 150, seed: int = 0, profile: str = "desktop") -> di
     recogniser, least = open_shipped(profile)
     with closing(recogniser):
         figures, reads = word_errors(recogniser, sentences, seed)
-        named, _ = word_errors(recogniser, sentences, seed, hot_words=names())
         return {
             "model": MODEL,
             **figures,
             "wer_10db": figures["wer_held_out_voices_10db"],
-            "with_names": {name: named[name] for name in named if name.startswith("wer")},
+            "hot_words": recogniser.declared.hot_words,
             **speed(reads),
             **sureness(recogniser, reads, least),
             **other_sounds(recogniser, least, _OTHER_SOUNDS, seed),
@@ -64,12 +57,6 @@ def open_shipped(profile: str) -> tuple[Recogniser, float]:
     choice, beam = choice_for(SPEECH_TO_TEXT, loaded), loaded.speech.beam
     opened = open_recogniser(model, choice, beam=beam, clock=clock)
     return opened, loaded.speech.least_confidence
-
-
-def names() -> str:
-    """Return hot words as the robot has them: things that it sees, its places."""
-    places = (name.replace("_", " ") for name in load_robot("butler").places)
-    return joined((*_THINGS, *places))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -11,7 +11,6 @@ from torch import Tensor
 
 from training.speech.features import HOP, WARPS, frames
 from training.speech.network import FRAMES_PER_STATE, LARGEST_FRAMES, MELS
-from training.speech.sentences import fill
 from training.speech.spoiling import Spoiler, draw_gains
 from training.speech.tokens import Coder
 from training.voices.clip import RATE_HZ, Wave
@@ -22,12 +21,9 @@ IGNORED: Final = -100
 _LARGEST_CLIP_S: Final = 9.0
 _EMPTY_SHARE: Final = 0.04
 """Of clips without speech, from which the model learns to write nothing."""
-_HINT_SHARE: Final = 0.12
-"""Of batches whose clips come with names that may be said, as hot words come."""
 _WIDE_SHARE: Final = 0.01
 """Of batches padded to Whisper's whole half minute."""
 _WIDE_CLIPS: Final = 4
-_NAMES: Final = ("<colour> <thing>", "<colour> <thing>", "<thing>", "<place>")
 _PADDING_FRAMES: Final = (20, 60)
 
 Random = np.random.Generator
@@ -93,13 +89,11 @@ class Maker:
         empty = random.random(len(clips)) < _EMPTY_SHARE
         leads_s = random.uniform(0.0, 0.5, len(clips))
         waves = [
-            self._spoiler.spoil_between(
-                clip.samples if not bare else np.zeros_like(clip.samples),
-                lead_s, random.uniform(0.0, 0.6), random,
-            )
-            if not bare else self._no_speech(len(clip.data), random)
+            self._no_speech(len(clip.data), random)
+            if bare
+            else self._spoiler.spoil(clip.samples, lead_s, random.uniform(0.0, 0.6), random)
             for clip, bare, lead_s in zip(clips, empty, leads_s, strict=True)
-        ]  # fmt: skip
+        ]
         made = self._frames(waves, hop, wide, random)
         sounds = np.full((len(clips), made.shape[2]), IGNORED)
         for row, (clip, bare, lead_s) in enumerate(zip(clips, empty, leads_s, strict=True)):
@@ -139,15 +133,12 @@ class Maker:
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         coder = self._coder
         rows: list[tuple[list[int], list[int]]] = []
-        hinted = random.random() < _HINT_SHARE
         for clip, bare in zip(clips, empty, strict=True):
-            hint = self._hint(clip.text, random) if hinted else []
             text = [] if bare else coder.text(clip.text)
             first = coder.no_speech if bare else coder.bare
-            unlearnt = [IGNORED] * len(hint)
             rows.append((
-                [*hint, coder.start, coder.bare, *text],
-                [*unlearnt, first, *text, coder.end],
+                [coder.start, coder.bare, *text],
+                [first, *text, coder.end],
             ))  # fmt: skip
         longest = max(len(row) for row, _ in rows)
         tokens = torch.full((len(rows), longest), coder.end)
@@ -156,19 +147,6 @@ class Maker:
             tokens[number, : len(row)] = torch.tensor(row)
             targets[number, : len(aims)] = torch.tensor(aims)
         return tokens, targets
-
-    def _hint(self, text: str, random: Random) -> list[int]:
-        """Return names before the start, as hot words come: some are said, most are not."""
-        words = text.split()
-        starts = np.flatnonzero(random.random(len(words)) < 0.25)
-        said = [" ".join(words[n : n + int(random.integers(1, 3))]) for n in starts]
-        count = int(random.integers(1, 26 if random.random() < 0.3 else 9))
-        names = [*said, *(self._name(random) for _ in range(count))]
-        told = ", ".join(names[int(n)] for n in random.permutation(len(names)))
-        return [self._coder.previous, *self._coder.text(told)]
-
-    def _name(self, random: Random) -> str:
-        return fill(str(random.choice(_NAMES)), random)
 
 
 def _sounds(

@@ -24,6 +24,7 @@ CARD, METRICS, MODEL = "card.md", "metrics.json", "model"
 LEAST_CONFIDENCE: Final = 0.5
 _SUMMARY: Final = "Spoken commands in the English of synthetic voices; never heard a person"
 _CALIBRATION_CLIPS: Final = 300
+_HOT_WORD_CLIPS: Final = 40
 _OTHER_SOUNDS: Final = 66
 _LOG = logging.getLogger(__name__)
 
@@ -39,8 +40,9 @@ def judge(out: Path, size: Size) -> None:
     plain = Whisper(languages=("en",), context=Context.TRIMMED, hot_words=True)
     draft = _open(_manifest(folder, plain), folder)
     fitted = calibration.fit(calibration.readings(draft, _CALIBRATION_CLIPS, size.seed))
+    heeds = judging.heeds_hot_words(draft, _HOT_WORD_CLIPS, size.seed)
     draft.close()
-    manifest = _manifest(folder, replace(plain, calibration=fitted))
+    manifest = _manifest(folder, replace(plain, calibration=fitted, hot_words=heeds))
     recogniser = _open(manifest, folder)
     metrics = _measure(recogniser, out, size)
     recogniser.close()

@@ -31,12 +31,7 @@ class Spoiler:
         ]
         self._rooms = [draw_room(random) for _ in range(_ROOMS)]
 
-    def spoil(self, speech: Wave, random: Random) -> Wave:
-        """Return speech with silence around it, in a room, in noise, at a level."""
-        lead_s, tail_s = random.uniform(0.0, 0.5), random.uniform(0.0, 0.6)
-        return self.spoil_between(speech, lead_s, tail_s, random)
-
-    def spoil_between(self, speech: Wave, lead_s: float, tail_s: float, random: Random) -> Wave:
+    def spoil(self, speech: Wave, lead_s: float, tail_s: float, random: Random) -> Wave:
         """Return speech spoilt, `lead_s` after the start and `tail_s` before the end."""
         wave = np.pad(speech, (int(lead_s * RATE_HZ), int(tail_s * RATE_HZ)))
         if random.random() < 0.35:
