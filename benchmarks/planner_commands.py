@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from benchmarks.command import parser, show
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import ASK, PLAN, REFUSE, command_kinds, commands
-from benchmarks.planner_desk import Answer
+from benchmarks.planner_desk import PROFILE, Answer, opened
 from benchmarks.planner_play import Judgement, Verdict, play_afresh
 from vla_deploy.planning.plan import Plan
 
@@ -25,7 +25,9 @@ from vla_deploy.planning.plan import Plan
 def measure(kinds: Sequence[str] = (), misses: bool = False) -> dict[str, Any]:
     """Return the figures of all commands, or of some kinds; `misses` lists what went wrong."""
     verdicts = [play_afresh(case) for case in commands(kinds)]
-    return report(verdicts) | ({"misses": _misses(verdicts)} if misses else {})
+    models = opened(PROFILE)
+    told = {"models": [rung.name for rung in models.rungs], "models_away": models.away}
+    return told | report(verdicts) | ({"misses": _misses(verdicts)} if misses else {})
 
 
 def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:

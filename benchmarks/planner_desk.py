@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -13,12 +14,22 @@ from benchmarks.planner_flat import ROBOT
 from benchmarks.planner_told import executor_document, scene_document
 from benchmarks.planner_world import World
 from drivers.clock import NS_PER_S, MonotonicClock
+from platforms import load_profile
+from vla_deploy.aside import beside
+from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import Event, IpcError, SharedSpace
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.__main__ import build
+from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.node import PlannerNode
+from vla_deploy.planning.on_board import OnBoard, open_on_board
+from vla_deploy.planning.planner import checked
+from vla_deploy.robots import load_robot
 
 ANSWER_LIMIT_S: Final = 20.0
+# No state of a user: what ships is measured.
+NOWHERE: Final = Path("/nonexistent/vla-deploy")
 _LOOK_NS: Final = NS_PER_S // 2000
+PROFILE: Final = "desktop"
 # Of a planner that names no rung: there was one only.
 FIRST_RUNG: Final = "rules"
 
@@ -51,23 +62,30 @@ def fresh_desk() -> Iterator["Desk"]:
     """Give a planner to whom nobody has spoken yet."""
     memory = Path("/dev/shm")
     with TemporaryDirectory(prefix="vla-", dir=memory if memory.is_dir() else None) as folder:
-        desk = Desk(Path(folder))
+        desk = Desk(Path(folder) / "base" / "run")
         try:
             yield desk
         finally:
             desk.close()
 
 
+@cache
+def opened(profile: str) -> OnBoard:
+    """Open the shipped models that a profile names, once for all desks: that takes longest."""
+    clock, robot = MonotonicClock(), load_robot(ROBOT)
+    return open_on_board(robot, load_profile(profile), ModelShelf.of_base(NOWHERE, clock), checked)
+
+
 class Desk:
     """Run one planner on a time of its own; `say` returns its answer."""
 
-    def __init__(self, folder: Path, profile: str = "desktop") -> None:
+    def __init__(self, folder: Path, profile: str = PROFILE) -> None:
         self._clock = MonotonicClock()
         self._space = SharedSpace(folder / "ipc", self._clock)
         self._context = NodeContext(
             run_dir=folder, robot=ROBOT, profile=profile, devices_dir=None, clock=self._clock
         )
-        self.node = build(self._context)
+        self.node = self._built()
         self._numbers = itertools.count(1)
         self._utterances = self._space.ring_writer("utterance")
         self._told = self._space.ring_writer("task_event")
@@ -142,9 +160,18 @@ class Desk:
         sample = self._space.cell_reader("planner_status").latest()
         return {} if sample is None else sample.document()
 
+    def _built(self) -> PlannerNode:
+        """Build the node as its process does, with models that are open already."""
+        robot, profile = load_robot(ROBOT), load_profile(self._context.profile)
+        models, base = opened(self._context.profile), self._context.run_dir.parent
+        planner = open_planner(
+            robot, profile.planning, self._clock, base, models.rungs, models.away
+        )
+        return PlannerNode(self._context, robot, planner, beside("plan"))
+
     def _start_anew(self) -> None:
         self.node.stop()
-        self.node = build(self._context)
+        self.node = self._built()
         self.node.start()
 
     def _await(self, command_id: str) -> Answer:
