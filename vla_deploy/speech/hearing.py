@@ -18,7 +18,7 @@ from vla_deploy.speech.sound import SoundBlock, level_db
 from vla_deploy.speech.surroundings import Music, NoiseFloor
 from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge
 from vla_deploy.speech.voice_activity import VoiceActivity
-from vla_deploy.speech.words import is_stop, is_unfinished
+from vla_deploy.speech.words import is_unfinished
 
 OWN_WORDS_NS: Final = NS_PER_S
 
@@ -154,12 +154,9 @@ class Hearing:
             self._refuse(phrase, f"{self.settings.longest_phrase_s:g} s of talk are no command")
 
     def _heed_draft(self) -> None:
-        """Wait longer for a speaker who pauses where the words so far are not all, or not sure."""
+        """Wait longer for a speaker who pauses where the words so far cannot be all."""
         reading = self.readings.drafted() if self._phrases.is_open else None
-        if reading is None or is_stop(reading.text):
-            return
-        unsure = self._confidence(reading) < self.settings.least_confidence
-        if unsure or is_unfinished(reading.text):
+        if reading is not None and is_unfinished(reading.text):
             self._phrases.wait_longer()
 
     def _refuse(self, phrase: Phrase, reason: str) -> None:

@@ -372,3 +372,13 @@ def test_another_profile_brings_another_model_and_the_way_back(
     rig.node.discard(rig.node.commit(before))
     rig.say(TEXT)
     assert [one["text"] for one in rig.told("utterance")] == [TEXT]
+
+
+def test_a_sentence_that_cannot_be_all_is_waited_for(bench: MakeBench) -> None:
+    rig = bench(text="pick up the")
+    rig.quiet(1.0)
+    rig.say("pick up the")
+    (heard,) = rig.told("heard")
+    waited_s = (heard["told_ns"] - heard["ended_ns"]) / NS_PER_S
+    settings = load_profile("desktop").speech
+    assert settings.end_silence_s + 0.1 < waited_s < settings.unfinished_silence_s + 0.1
