@@ -107,6 +107,10 @@ def test_ten_faults_are_reported_as_ten(faults_of):
             "perception_rate_hz: expected at most camera_rate_hz (5 Hz), got 10",
         ),
         (
+            "speech.end_silence_s = 1.0\nspeech.unfinished_silence_s = 0.5",
+            "speech.unfinished_silence_s: expected at least end_silence_s (1 s), got 0.5",
+        ),
+        (
             "board.cpu_count = 4\nprocesses.control.affinity = [3, 4]",
             "processes.control.affinity: expected CPUs of the board, 0 to 3, got [4]",
         ),
