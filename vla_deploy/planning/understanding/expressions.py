@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import cache
+from functools import cache, lru_cache
 from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
@@ -98,6 +98,17 @@ def read_expression(text: str, furniture: Mapping[str, str] | None = None) -> Ex
     """
     if len(text) > MOST_LETTERS:
         raise UnknownObject(f"{text[:40]}...", OBJECT_CLASSES)
+    read = _read(text, tuple((furniture or {}).items()))
+    if read is None:
+        raise UnknownObject(text.strip(), OBJECT_CLASSES)
+    return read
+
+
+# Rules try many readings of a command before one is built: the same words come again and again.
+@lru_cache(maxsize=1024)
+def _read(text: str, named: tuple[tuple[str, str], ...]) -> Expression | None:
+    """Return what an expression says, None where it says nothing that is known."""
+    furniture = dict(named)
     said = " ".join(_TOKEN.findall(text.lower().replace("'s", "").replace("-", "")))
     said, by_speaker = _order_by_whom(said)
     key = " ".join(word for word in said.split() if word not in ARTICLES) or said
@@ -120,15 +131,13 @@ def read_expression(text: str, furniture: Mapping[str, str] | None = None) -> Ex
         by_speaker=by_speaker or my_side,
     )
     read = _pointing(words, read)
-    read = _generic_support(read, furniture or {})
-    read = _known_words(read, furniture or {})
+    read = _generic_support(read, furniture)
+    read = _known_words(read, furniture)
     try:
         query = parse_query(" ".join(read.words), furniture)
-    except UnknownWord as error:
-        raise UnknownObject(text.strip(), OBJECT_CLASSES) from error
-    if not _means_things(query, said):
-        raise UnknownObject(text.strip(), OBJECT_CLASSES)
-    return replace(read, query=query)
+    except UnknownWord:
+        return None
+    return replace(read, query=query) if _means_things(query, said) else None
 
 
 def _means_things(query: Query, said: str) -> bool:

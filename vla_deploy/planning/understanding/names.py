@@ -52,7 +52,11 @@ class Match:
 
 def closest(word: str, known: Iterable[str]) -> Match | None:
     """Return what a word most likely means, or None where nothing known is like it."""
-    words = tuple(dict.fromkeys(known))
+    return _closest(word, tuple(dict.fromkeys(known)))
+
+
+@lru_cache(maxsize=1024)
+def _closest(word: str, words: tuple[str, ...]) -> Match | None:
     if word in words:
         return Match(word=word, known=(word,), likeness=Likeness.SAME)
     if HOMOPHONES.get(word) in words:
