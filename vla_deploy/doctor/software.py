@@ -23,6 +23,7 @@ UNIT_FOLDERS: Final = ("/etc/systemd/system", "/usr/lib/systemd/system", "/lib/s
 # Import name, the extra that brings it, what it is for.
 EXTRAS: Mapping[str, tuple[str, str]] = {
     "sounddevice": ("audio", "microphone and speaker"),
+    "faster_whisper": ("speech", "spoken commands"),
     "gpiod": ("gpio", "an e-stop button on a GPIO line"),
     "pynvml": ("nvml", "the load of NVIDIA cards, and of Thor's GPU"),
 }
