@@ -110,23 +110,23 @@ class _Run:
         return (self._spent_s + time.monotonic() - self._began_s) / self._budget_s
 
     def _resume(self) -> None:
-        paths = [self._out / STATE, self._out / BEFORE_FALL]
-        for path in (path for path in paths if path.exists()):
-            state = torch.load(path, weights_only=True)
-            if (
-                state["spent_s"] / self._budget_s > FALL_FROM
-                and path.name == STATE
-                and state["fell"] != self._budget_s
-            ):
+        """Go on from the newest state that fits; one that fell fits only the time it fell for."""
+        for path in (self._out / STATE, self._out / BEFORE_FALL):
+            if not path.exists():
                 continue
-            self.model.load_state_dict(state["model"])
-            self.average.load_state_dict(state.get("average", state["model"]))
-            for optimiser, values in zip(self._optimisers, state["optimisers"], strict=True):
-                optimiser.load_state_dict(values)
-            self._steps, self._spent_s = state["steps"], state["spent_s"]
-            self._heard_s = state["heard_s"]
-            _LOG.info("goes on after %d steps, %.0f s", self._steps, self._spent_s)
-            return
+            state = torch.load(path, weights_only=True)
+            if state["fell_for_s"] in (0.0, self._budget_s):
+                self._take(state)
+                return
+
+    def _take(self, state: dict[str, Any]) -> None:
+        self.model.load_state_dict(state["model"])
+        self.average.load_state_dict(state["average"])
+        for optimiser, values in zip(self._optimisers, state["optimisers"], strict=True):
+            optimiser.load_state_dict(values)
+        self._steps, self._spent_s = state["steps"], state["spent_s"]
+        self._heard_s, self._fell = state["heard_s"], state["fell_for_s"] > 0.0
+        _LOG.info("goes on after %d steps, %.0f s", self._steps, self._spent_s)
 
     def save(self, name: str) -> None:
         """Write all that going on needs."""
@@ -137,7 +137,7 @@ class _Run:
             "steps": self._steps,
             "spent_s": self.progress() * self._budget_s,
             "heard_s": self._heard_s,
-            "fell": self._budget_s if self._fell else 0.0,
+            "fell_for_s": self._budget_s if self._fell else 0.0,
         }
         _write(state, self._out / name)
 
