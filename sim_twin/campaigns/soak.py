@@ -37,7 +37,11 @@ JOBS: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sample:
-    """Hold what the process has, at a moment of the wall clock and of the simulation."""
+    """Hold what the process has, at a moment of the wall clock and of the simulation.
+
+    `memory_mib` is its own memory. What it maps of files is not in it: pages of topics come into
+    use one by one, and the size of their files, `run_mib`, bounds them.
+    """
 
     wall_h: float
     sim_h: float
@@ -45,6 +49,7 @@ class Sample:
     open_files: int
     threads: int
     run_files: int
+    run_mib: float
 
 
 class Soak:
@@ -87,13 +92,16 @@ class Soak:
         self._stack.lockstep.run_for(_IDLE_S)
 
     def _sample(self) -> Sample:
+        memory = self._process.memory_info()
+        files = [Path(root, name) for root, _, names in os.walk(self._folder) for name in names]
         return Sample(
             wall_h=(self._clock.now_ns() - self._began_ns) / NS_PER_S / _S_PER_H,
             sim_h=(self._stack.lockstep.now_s - self._began_s) / _S_PER_H,
-            memory_mib=self._process.memory_info().rss / _MIB,
+            memory_mib=(memory.rss - memory.shared) / _MIB,
             open_files=self._process.num_fds(),
             threads=threading.active_count(),
-            run_files=sum(len(files) for _, _, files in os.walk(self._folder)),
+            run_files=len(files),
+            run_mib=sum(file.stat().st_size for file in files) / _MIB,
         )
 
 
@@ -138,7 +146,7 @@ def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
         )
     ]
     warm = samples[round(_WARM_UP_RATIO * len(samples)) :]
-    for field in ("open_files", "threads", "run_files"):
+    for field in ("open_files", "threads", "run_files", "run_mib"):
         first, last = getattr(warm[0], field), getattr(samples[-1], field)
         grown = (f"grew from {first} to {last}",) if last > first else ()
         cases.append(Case(name=field, failures=grown, figures={"first": first, "last": last}))
@@ -158,5 +166,6 @@ def _summary(soak: Soak, samples: Sequence[Sample]) -> dict[str, Any]:
 def _row(number: int, sample: Sample) -> str:
     return (
         f"job {number}: {sample.sim_h:.3f} h simulated, {sample.memory_mib:.1f} MiB, "
-        f"{sample.open_files} files open, {sample.threads} threads, {sample.run_files} files"
+        f"{sample.open_files} files open, {sample.threads} threads, "
+        f"{sample.run_files} files of {sample.run_mib:.1f} MiB"
     )

@@ -16,6 +16,7 @@ def samples(mib_per_h: float, *, files: int = 0, count: int = 80) -> list[Sample
             open_files=40 + (files * n) // count,
             threads=4,
             run_files=30,
+            run_mib=12.0,
         )
         for n in range(count)
     ]
