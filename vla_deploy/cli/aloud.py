@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -59,6 +60,7 @@ class Aloud:
         why = why_deaf(session)
         if why:
             raise UsageError(f"the robot hears nothing: {why}; give the command without --aloud")
+        import_module("vla_deploy.cli.follow")  # loads pydantic: not once the robot acts
         self._session = session
         self._heard = session.events("heard")
         self._utterances = session.events("utterance")

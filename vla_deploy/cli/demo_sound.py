@@ -66,6 +66,7 @@ class SpokenCommand:
         self._times_said = 0
         self._hearing: Hearing | None = None
         self._planned_ns: int | None = None
+        self._stamped = session.events("task_event")
 
     def events(self, text: str, voice: str, snr_db: float | None) -> Iterator[Event]:
         """Speak, and return what was heard and the task events, up to and including the last one.
@@ -108,7 +109,8 @@ class SpokenCommand:
 
     def _note(self, event: Event) -> None:
         if event["event"] == "plan":
-            self._planned_ns = self._session.clock.now_ns()
+            plans = [one for one in self._stamped.drain() if one.payload["event"] == "plan"]
+            self._planned_ns = plans[-1].stamp_ns if plans else self._session.clock.now_ns()
 
     def document(self) -> dict[str, Any]:
         """Return what was said and heard, and the times from the end of the words, in s."""
