@@ -19,6 +19,7 @@ PARTS: Final[Mapping[str, str]] = {
     "plans": "spoken commands that give the plan of the typed ones; other talk that gives none",
     "voice": "whether the robot hears itself, and how soon a person silences it",
     "ears": "where phrases begin and end, from the end of speech to the text, other sound",
+    "stop": "stop words missed by noise and voice, false alarms, from the word to the latch",
 }
 
 

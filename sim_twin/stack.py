@@ -20,6 +20,7 @@ from vla_deploy.planning.node import PlannerNode
 from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.speech.devices import streamed_microphone, streamed_speaker
 from vla_deploy.speech.node import SpeechNode
+from vla_deploy.speech.stop_words.opening import build_stop_words
 from vla_deploy.speech.voice.engines import build_voice
 
 READY_TIMEOUT_S = 10.0
@@ -145,12 +146,14 @@ class LockstepStack(LockstepControl):
     def _speech(self) -> Node:
         context, devices, robot = self.lockstep.context, self.lockstep.devices, self.robot
         speaker = streamed_speaker(robot, devices, context.clock)
+        voice = build_voice(robot.voice, speaker, context.clock, AtOnce())
         return SpeechNode(
             context,
             robot,
             self._profile,
             streamed_microphone(robot, devices, context.clock),
-            voice=build_voice(robot.voice, speaker, context.clock, AtOnce()),
+            voice=voice,
+            listeners=[build_stop_words(context, self._profile, voice)],
         )
 
     def give(self, **utterance: Any) -> str:

@@ -14,13 +14,13 @@ class Settings:
     name: str
     seed: int = 0
     scale: float = 1.0
-    cpu_minutes: float = 12.5
+    cpu_minutes: float = 10.0
     fresh: int = 4
     seen: int = 12
     stretch_s: float = 7.5
     learning_rate: float = 3e-3
-    judged_hours: float = 1.0
-    judged_stops: int = 400
+    judged_hours: float = 0.5
+    judged_stops: int = 200
 
 
 FULL = Settings(name="full")

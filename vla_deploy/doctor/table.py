@@ -13,6 +13,7 @@ from vla_deploy.doctor import (
     power,
     realtime,
     software,
+    speech,
     storage,
 )
 from vla_deploy.doctor.context import Context
@@ -41,6 +42,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Devices", "latency timers", devices.latency_timers),
     Check("Devices", "CAN link", devices.can_link),
     Check("Devices", "sound", devices.sound),
+    Check("Devices", "spoken stop", speech.spoken_stop, live=True),
     Check("Real time", "kernel", realtime.preempt_rt),
     Check("Real time", "SCHED_FIFO", realtime.fifo, live=True),
     Check("Real time", "real-time share", realtime.realtime_share),

@@ -10,6 +10,7 @@ from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 from vla_deploy.speech.devices import linked_microphone, linked_speaker
 from vla_deploy.speech.node import SpeechNode
+from vla_deploy.speech.stop_words.opening import build_stop_words
 from vla_deploy.speech.voice.engines import build_voice
 
 
@@ -20,13 +21,15 @@ def build(context: NodeContext) -> SpeechNode:
     profile = load_profile(context.profile)
     clock = context.clock
     speaker = linked_speaker(robot, links, clock)
+    voice = build_voice(robot.voice, speaker, clock, beside("voice"))
     return SpeechNode(
         context,
         robot,
         profile,
         linked_microphone(robot, links, clock),
         beside("recogniser"),
-        voice=build_voice(robot.voice, speaker, clock, beside("voice")),
+        voice=voice,
+        listeners=[build_stop_words(context, profile, voice)],
     )
 
 

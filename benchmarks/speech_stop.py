@@ -1,0 +1,185 @@
+"""Measure the spoken stop: what is missed, what alarms by mistake, and how soon the button is hit.
+
+Phrases with a stop word are said by voices of every installed engine, in noise and in rooms, and
+other talk by the same voices, all into the spotter on board at its normal threshold. A delay is
+from the end of the word to the end of the block of sound in which it was told, and what the
+computer took for that block. `latch` does it with the whole way: a person in the twin's room says
+it while an arm moves, and physics tells when all stands still.
+"""
+
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from benchmarks.command import parser, show
+from benchmarks.speech_stop_latch import latch
+from benchmarks.speech_stop_talk import Voices, other_talk, phrases
+from drivers.clock import MonotonicClock
+from platforms import load_profile
+from training.voices.clip import RATE_HZ, Clip, Wave
+from training.voices.mixing import at_level, at_snr
+from training.voices.noises import KINDS, noise
+from training.voices.rooms import draw_room, in_room
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.speech.sound import duration_ns
+from vla_deploy.speech.stop_words.opening import open_spotter
+from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
+from vla_deploy.state_dir import user_base
+
+SNRS_DB: Final[Mapping[str, float | None]] = {"clean": None, "20db": 20.0, "10db": 10.0, "5db": 5.0}
+BLOCK: Final = RATE_HZ // 50
+"""The node steps so often."""
+TOO_LATE_S: Final = 1.0
+_LEVEL_DB: Final = -26.0
+_HISS: Final = 2e-4
+_BEFORE_S, _AFTER_S = 0.8, 1.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Alarm:
+    """Tell a word, when the button is hit in the stream, and what the last block took."""
+
+    word: str
+    at_s: float
+    computed_s: float
+
+
+class Ear:
+    """Run the spotter on board over whole pieces of sound."""
+
+    def __init__(self) -> None:
+        shelf = ModelShelf.of_base(user_base(), MonotonicClock())
+        self.spotter: Spotter
+        self.spotter, thresholds = open_spotter(shelf, load_profile("desktop"))
+        self.threshold = thresholds["normal"]
+        self.heard_s = 0.0
+        self.busy_s = 0.0
+
+    def alarms(self, sound: Wave) -> Iterator[Alarm]:
+        """Yield what a piece of sound sets off, heard from silence on."""
+        self.spotter.reset()
+        for at in range(0, len(sound), BLOCK):
+            block = sound[at : at + BLOCK]
+            end = at + len(block)
+            began_s, busy_s = time.perf_counter(), time.process_time()
+            spotted: Spotted | None = self.spotter.feed(block, duration_ns(end), self.threshold)
+            took_s = time.perf_counter() - began_s
+            self.busy_s += time.process_time() - busy_s
+            if spotted is not None:
+                yield Alarm(word=spotted.word, at_s=end / RATE_HZ, computed_s=took_s)
+        self.heard_s += len(sound) / RATE_HZ
+
+
+def measure(
+    clips: int = 40, hours: float = 0.5, seed: int = 0, latches: int = 3, misses: bool = False
+) -> dict[str, Any]:
+    """Return the figures; `clips` are phrases by each engine, `hours` those of other talk.
+
+    Raises:
+        InferenceError: the model cannot be opened.
+        EngineMissing: not even eSpeak is installed.
+    """
+    random = np.random.default_rng(seed)
+    voices, ear = Voices(), Ear()
+    stops = _stops(voices, ear, clips, random)
+    talk = _talk(voices, ear, hours, random)
+    if not misses:
+        stops.pop("stop_misses")
+        talk.pop("stop_false_alarms")
+    return {
+        "stop_engines": sorted(voices.engines),
+        "stop_engines_missing": voices.missing,
+        "stop_threshold": ear.threshold,
+        **stops,
+        **talk,
+        "stop_cpu_ratio": ear.busy_s / ear.heard_s,
+        **latch(latches),
+    }
+
+
+def _stops(voices: Voices, ear: Ear, clips: int, random: np.random.Generator) -> dict[str, Any]:
+    missed: dict[str, dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
+    delays_s: list[float] = []
+    misses: list[str] = []
+    for engine in voices.engines:
+        for clip, (start_s, end_s) in phrases(voices, engine, clips, random):
+            for name, snr_db in SNRS_DB.items():
+                delay_s = _delay_s(ear, _around(clip, snr_db, random), start_s, end_s)
+                for group in (engine, "all"):
+                    missed[name][group].append(delay_s is None)
+                if delay_s is None:
+                    misses.append(f"{name}, {engine} {clip.voice}: {clip.text}")
+                else:
+                    delays_s.append(delay_s)
+    return {
+        "stop_phrases": len(missed["clean"]["all"]),
+        **{f"stop_missed_ratio_{name}": float(np.mean(missed[name]["all"])) for name in SNRS_DB},
+        "stop_missed_by_engine_10db": {
+            engine: float(np.mean(missed["10db"][engine])) for engine in voices.engines
+        },
+        "stop_delay_p50_s": float(np.percentile(delays_s, 50)) if delays_s else None,
+        "stop_delay_p95_s": float(np.percentile(delays_s, 95)) if delays_s else None,
+        "stop_misses": misses,
+    }
+
+
+def _delay_s(ear: Ear, sound: Wave, start_s: float, end_s: float) -> float | None:
+    """Return how long after the word the button was hit; None where it was not, or far too late."""
+    for alarm in ear.alarms(sound):
+        late_s = alarm.at_s - (_BEFORE_S + end_s)
+        if alarm.at_s > _BEFORE_S + start_s and late_s < TOO_LATE_S:
+            return max(0.0, late_s) + alarm.computed_s
+    return None
+
+
+def _around(clip: Clip, snr_db: float | None, random: np.random.Generator) -> Wave:
+    """Return a clip with a quiet moment at each end, in noise, every other time in a room."""
+    before, after = round(_BEFORE_S * RATE_HZ), round(_AFTER_S * RATE_HZ)
+    sound = np.pad(at_level(clip.samples, _LEVEL_DB), (before, after))
+    if random.random() < 0.5:
+        sound = in_room(sound, draw_room(random))
+    if snr_db is not None:
+        kind = str(random.choice(list(KINDS)))
+        sound = at_snr(sound, noise(kind, len(sound), random), snr_db)
+    return sound + np.float32(_HISS) * random.standard_normal(len(sound), np.float32)
+
+
+def _talk(voices: Voices, ear: Ear, hours: float, random: np.random.Generator) -> dict[str, Any]:
+    """Let people talk of other things, half of the time in noise at 20 or 10 dB."""
+    alarms: list[str] = []
+    talked_s = 0.0
+    for clip in other_talk(voices, random):
+        if talked_s >= 3600.0 * hours:
+            break
+        snr_db = (None, None, 20.0, 10.0)[int(random.integers(4))]
+        found = list(ear.alarms(_around(clip, snr_db, random)[: -RATE_HZ // 2]))
+        alarms += [f"{one.word}, {clip.engine} {clip.voice}: {clip.text}" for one in found]
+        talked_s += clip.duration_s
+    return {
+        "stop_talk_hours": talked_s / 3600.0,
+        "stop_false_alarms_per_hour": len(alarms) / max(talked_s / 3600.0, 1e-9),
+        "stop_false_alarms": alarms,
+    }
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the figures."""
+    arguments = parser("speech_stop", __doc__)
+    arguments.add_argument("--clips", type=int, default=40, help="phrases by each engine")
+    arguments.add_argument("--hours", type=float, default=0.5, help="of other talk")
+    arguments.add_argument("--latches", type=int, default=3, help="stops of a moving robot")
+    arguments.add_argument("--seed", type=int, default=0)
+    arguments.add_argument("--misses", action="store_true", help="list what went wrong")
+    given = arguments.parse_args(argv)
+    figures = measure(given.clips, given.hours, given.seed, given.latches, given.misses)
+    show(figures, as_json=given.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

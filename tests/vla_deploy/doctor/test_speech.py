@@ -1,0 +1,43 @@
+"""A spoken stop that nobody would hear is told before it is needed."""
+
+import dataclasses
+
+from platforms import load_profile
+from vla_deploy.doctor import Context, Level
+from vla_deploy.doctor.speech import spoken_stop
+
+
+def with_stop_words(context: Context, sensitivity: str) -> Context:
+    profile = load_profile("desktop")
+    speech = dataclasses.replace(profile.speech, stop_words=sensitivity)
+    return dataclasses.replace(context, profile=dataclasses.replace(profile, speech=speech))
+
+
+def test_the_shipped_model_is_opened_and_its_words_are_told(computer) -> None:
+    (finding,) = spoken_stop(with_stop_words(computer.context(robot="butler"), "normal"))
+    assert finding.level is Level.OK
+    assert finding.measured.startswith("stop, halt, freeze; sensitivity normal, from 0.")
+
+
+def test_switched_off_is_a_warning_that_says_how_to_switch_it_on(computer) -> None:
+    (finding,) = spoken_stop(with_stop_words(computer.context(robot="butler"), "off"))
+    assert finding.level is Level.WARN
+    assert "nobody can stop the robot by voice" in finding.measured
+    assert "speech.stop_words" in finding.remedy
+
+
+def test_without_a_model_it_is_a_warning(computer) -> None:
+    context = with_stop_words(computer.context(robot="butler"), "normal")
+    assert context.profile is not None
+    bare = dataclasses.replace(context, profile=dataclasses.replace(context.profile, models={}))
+    (finding,) = spoken_stop(bare)
+    assert finding.level is Level.WARN
+    assert "[models.key_words]" in finding.measured
+
+
+def test_a_robot_without_a_microphone_says_so(computer) -> None:
+    context = with_stop_words(computer.context(robot="butler"), "normal")
+    assert context.robot is not None
+    deaf = dataclasses.replace(context, robot=dataclasses.replace(context.robot, microphone=None))
+    (finding,) = spoken_stop(deaf)
+    assert (finding.level, finding.name) == (Level.MISSING, "spoken stop")

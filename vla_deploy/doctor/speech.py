@@ -1,0 +1,38 @@
+"""Check that a person can stop the robot by voice."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from vla_deploy.doctor.context import Context
+from vla_deploy.doctor.finding import Finding, missing, ok, warn
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.one_line import one_line
+from vla_deploy.speech.stop_words.errors import StopWordsError
+from vla_deploy.speech.stop_words.listener import OFF
+from vla_deploy.speech.stop_words.opening import open_spotter
+from vla_deploy.state_dir import user_base
+
+NAME: Final = "spoken stop"
+
+
+def spoken_stop(context: Context) -> Iterator[Finding]:
+    """Check that stop words are switched on and that their model runs."""
+    profile, robot = context.profile, context.robot
+    if profile is None:
+        yield missing(NAME, "no profile to look at", "vla-deploy doctor --profile desktop")
+    elif robot is not None and robot.microphone is None:
+        yield missing(NAME, f"{robot.name} has no microphone: nobody can stop it by voice")
+    elif profile.speech.stop_words == OFF:
+        remedy = 'set speech.stop_words = "normal" in the profile'
+        yield warn(NAME, "switched off: nobody can stop the robot by voice", remedy)
+    else:
+        shelf = ModelShelf.of_base(user_base(), context.clock)
+        try:
+            spotter, thresholds = open_spotter(shelf, profile)
+        except (InferenceError, StopWordsError) as error:
+            yield warn(NAME, one_line(error), "vla-deploy models list")
+            return
+        chosen = profile.speech.stop_words
+        words = ", ".join(spotter.words)
+        yield ok(NAME, f"{words}; sensitivity {chosen}, from {thresholds[chosen]:g} on")
