@@ -3,7 +3,8 @@
 `typed_to_plan_*` is from the utterance in its ring to the plan in the executor's, as those who talk
 to the robot wait for it: the planner's sleep between steps is in it. `typed_to_motion_*` ends where
 wheels or joints are first told to be faster than while they rest; `spoken_to_motion_*` begins where
-the last word ends in the room of the twin, `spoken_heard_ratio` tells how many became that command.
+the last word ends in the room of the twin. `*_planned` and `*_moved` count what came at all, not
+whether it was what was said.
 Memory and CPU are the planner's, as the supervisor accounts them to its budget. The machine runs
 the physics too, so these are upper bounds.
 """
