@@ -17,6 +17,7 @@ from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, Unkn
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules import building, cleaning, telling
+from vla_deploy.planning.understanding.insertions import is_surface
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
 Skill = building.Step
@@ -88,7 +89,7 @@ class Steps:
             return [], ""
         world = self._request.world
         place = match_place(where, world.places)
-        if place is not None and place not in world.furniture:
+        if place is not None and not is_surface(place, world):
             return [("navigate_to", {"place": place})], ""
         kinds = {SYNONYMS.get(word, word) for word in where.split()}
         return [], f" {'in' if kinds & CONTAINERS else 'on'} {where}"

@@ -1,0 +1,105 @@
+"""Steps become actions in the speaker's words; what cannot be done says so."""
+
+import math
+
+import pytest
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.planning import Steps
+from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.understanding import Conversation, Turn
+from vla_deploy.robots import load_robot
+
+WORLD = world_of(load_robot("butler"), {})
+HERE = (1.0, 2.0, 0.5)
+Skills = list[tuple[str, dict[str, object]]]
+
+
+def planned(command: str, *steps: Step, request: Request | None = None) -> Skills:
+    request = request or Request(command_id="c", text=command, world=WORLD, here=HERE)
+    actions = Steps(command.split(), request).actions(steps)
+    assert [one.depends_on for one in actions[1:]] == [(one.id,) for one in actions[:-1]]
+    return [(one.skill, dict(one.parameters)) for one in actions]
+
+
+def test_articles_come_back_so_that_any_cup_is_told_from_the_cup() -> None:
+    found = planned("take a cup on the table", {"do": "pick", "what": "cup on table"})
+    assert found == [("pick_up", {"object": "a cup on the table"})]
+
+
+def test_two_things_are_two_actions() -> None:
+    step = {"do": "put", "what": "cup and ball", "how": "in", "where": "box"}
+    found = planned("put the cup and the ball in the box", step)
+    assert [one["object"] for _, one in found] == ["the cup", "the ball"]
+    assert {one["relation"] for _, one in found} == {"in"}
+
+
+def test_a_room_to_take_it_from_is_driven_to_first() -> None:
+    command = "get my phone from the bedroom"
+    found = planned(command, {"do": "pick", "what": "phone", "from": "bedroom"})
+    assert found == [
+        ("navigate_to", {"place": "bedroom"}),
+        ("pick_up", {"object": "my phone"}),
+    ]
+
+
+def test_furniture_to_take_it_from_tells_which_one_is_meant() -> None:
+    command = "move the can from the coffee table to the box"
+    step = {"do": "put", "what": "can from coffee table", "how": "to", "where": "box"}
+    assert planned(command, step) == [
+        ("place", {"object": "the can on the coffee table", "destination": "the box"})
+    ]
+
+
+def test_bringing_goes_back_to_who_asked() -> None:
+    found = planned("bring me the bottle", {"do": "bring", "what": "bottle"})
+    assert [skill for skill, _ in found] == ["pick_up", "navigate_to", "speak"]
+    assert found[1][1] == {"place": "here"}
+
+
+def test_back_is_where_the_command_before_was_told() -> None:
+    turn = Turn(said="go to the kitchen", here=(4.0, 5.0, 0.0))
+    talk = Conversation(turns=(turn,))
+    request = Request(command_id="c", text="go back", world=WORLD, conversation=talk)
+    found = planned("go back", {"do": "go", "where": "back"}, request=request)
+    assert found == [("navigate_to", {"x_m": 4.0, "y_m": 5.0, "yaw_rad": 0.0})]
+
+
+@pytest.mark.parametrize(
+    ("step", "skill", "name", "value"),
+    [
+        ({"do": "move", "way": "backward", "by": "50 cm"}, "move", "distance_m", -0.5),
+        ({"do": "move", "way": "forward"}, "move", "distance_m", 0.5),
+        ({"do": "turn", "way": "right", "by": "ninety degrees"}, "turn", "angle_rad", -math.pi / 2),
+        ({"do": "turn", "way": "around"}, "turn", "angle_rad", math.pi),
+        ({"do": "wait", "by": "half a minute"}, "wait", "duration_s", 30.0),
+    ],
+)
+def test_amounts_become_numbers(step: Step, skill: str, name: str, value: float) -> None:
+    ((found, parameters),) = planned("whatever was said", step)
+    assert found == skill
+    assert parameters[name] == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("step", "error"),
+    [
+        ({"do": "unknown"}, Declined),
+        ({"do": "impossible"}, CannotBeDone),
+        ({"do": "nothing"}, CannotBeDone),
+        ({"do": "put", "what": "cup", "how": "behind", "where": "box"}, CannotBeDone),
+        ({"do": "bring", "what": "cup", "to": "anna"}, UnknownPlace),
+        ({"do": "go", "where": "back"}, UnknownPlace),
+        ({"do": "wait", "by": "blue"}, PlanInvalid),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_its_reason(step: Step, error: type[Exception]) -> None:
+    with pytest.raises(error):
+        planned("whatever was said", step)
+
+
+def test_one_step_that_is_none_leaves_no_plan_at_all() -> None:
+    with pytest.raises(CannotBeDone):
+        planned("go home and fly", {"do": "go", "where": "home"}, {"do": "impossible"})

@@ -1,0 +1,143 @@
+"""The model that comes with the software reads plain commands, leaves other talk alone, in time."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Event
+
+import pytest
+
+from drivers.clock import MonotonicClock
+from vla_deploy.inference.errors import InferenceError, ModelFileSpoiled
+from vla_deploy.inference.opening import PLAIN_CHOICE
+from vla_deploy.inference.store import EMBEDDED, Model, ModelStore
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.command_parser.rung import CommandParser, open_command_parser
+from vla_deploy.planning.errors import Declined, PlanningError
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.planner import checked
+from vla_deploy.robots import load_robot
+
+WORLD = world_of(load_robot("butler"), {})
+CLOCK = MonotonicClock()
+
+
+@pytest.fixture(scope="module")
+def parser() -> Iterator[CommandParser]:
+    opened = open_command_parser(stored(EMBEDDED), PLAIN_CHOICE)
+    yield opened
+    opened.close()
+
+
+def stored(folder: Path) -> Model:
+    return ModelStore(folder / "nobody", embedded=folder).load("command_parser")
+
+
+def soon(recall: Event | None = None, within_s: float = 20.0) -> Deadline:
+    return Deadline.within(CLOCK, within_s, recall)
+
+
+def request(text: str, heard: float | None = None) -> Request:
+    return Request(
+        command_id="c", text=text, world=WORLD, here=(1.0, 2.0, 0.0), heard_confidence=heard
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "steps"),
+    [
+        ("I'd like you to head over to the kitchen", [{"do": "go", "where": "kitchen"}]),
+        (
+            "Could you put the red cup in the box?",
+            [{"do": "put", "what": "red cup", "how": "in", "where": "box"}],
+        ),
+        ("I need the bottle", [{"do": "bring", "what": "bottle"}]),
+        (
+            "would you mind fetching my phone from the bedroom",
+            [{"do": "bring", "what": "phone", "from": "bedroom"}],
+        ),
+        (
+            "please rotate 45 degrees to the left",
+            [{"do": "turn", "way": "left", "by": "45 degrees"}],
+        ),
+        ("have you seen my keys", [{"do": "where", "what": "keys"}]),
+        ("grab the wug", [{"do": "pick", "what": "wug"}]),
+    ],
+)
+def test_plain_commands_are_read(
+    parser: CommandParser, text: str, steps: list[dict[str, str]]
+) -> None:
+    assert list(parser.parse(text, soon()).steps) == steps
+
+
+def test_a_plan_of_it_passes_grounding_and_validation(parser: CommandParser) -> None:
+    asked = request("I'd like you to head over to the kitchen")
+    proposal = parser.propose(asked, soon())
+    plan = checked(proposal.plan, asked)
+    assert [one.skill for one in plan.actions] == ["navigate_to"]
+    assert plan.actions[0].parameters == {"place": "kitchen"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "what is the weather like today",
+        "I think it is going to rain tomorrow",
+        "how much is a flight to paris",
+        "возьми красную чашку",
+        "!!!",
+        "word " * 80,
+        "make me a sandwich",
+        "don't touch the bottle",
+    ],
+)
+def test_other_talk_gives_no_plan(parser: CommandParser, text: str) -> None:
+    with pytest.raises(PlanningError):
+        parser.propose(request(text), soon())
+
+
+def test_the_same_words_give_the_same_answer(parser: CommandParser) -> None:
+    text = "take the blue ball, no, the red one, to the side table"
+    first, second = parser.parse(text, soon()), parser.parse(text, soon())
+    assert first == second
+
+
+def test_words_that_were_hardly_heard_are_read_back(parser: CommandParser) -> None:
+    text = "I'd like you to head over to the kitchen"
+    assert parser.propose(request(text), soon()).read_back == ""
+    weights = parser.model.language.certainty
+    assert weights is not None
+    doubtful = 0.5 * (weights.decline_below + weights.read_back_below)
+    asked = parser.propose(request(text, heard=doubtful), soon())
+    assert asked.read_back == "Shall I go to kitchen?"
+    with pytest.raises(Declined, match="not sure"):
+        parser.propose(request(text, heard=0.5 * weights.decline_below), soon())
+
+
+def test_a_deadline_that_has_passed_leaves_it_to_the_next_rung(parser: CommandParser) -> None:
+    with pytest.raises(Declined, match="time is up"):
+        parser.propose(request("go to the kitchen"), soon(within_s=0.0))
+
+
+def test_a_command_that_was_called_in_leaves_no_plan(parser: CommandParser) -> None:
+    recall = Event()
+    recall.set()
+    with pytest.raises(Declined, match="nobody waits"):
+        parser.propose(request("go to the kitchen"), soon(recall))
+
+
+@pytest.mark.parametrize("name", ["model.onnx", "tokenizer.json", "known_words.txt"])
+def test_a_half_written_folder_is_refused(tmp_path: Path, name: str) -> None:
+    folder = Path(shutil.copytree(EMBEDDED / "command_parser", tmp_path / "command_parser"))
+    file = folder / name
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    with pytest.raises(ModelFileSpoiled, match=name):
+        open_command_parser(stored(tmp_path), PLAIN_CHOICE)
+
+
+def test_a_folder_without_its_list_of_words_is_refused(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(EMBEDDED / "command_parser", tmp_path / "command_parser"))
+    (folder / "known_words.txt").unlink()
+    with pytest.raises(InferenceError, match="known_words"):
+        open_command_parser(stored(tmp_path), PLAIN_CHOICE)
