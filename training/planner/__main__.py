@@ -12,7 +12,7 @@ from training.planner.settings import SIZES, Settings
 _EXAMPLE: Final = (
     "example: nice python -m training.planner all --out /data/planner --chatter data_full.json"
 )
-_JUDGED: Final = 600
+_JUDGED: Final = 400
 MODELS: Final = "models"
 _UNSEEN: Final = ("val", "oos_val", "oos_test", "test")
 Step = Callable[[argparse.Namespace, Settings], None]

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vla_deploy.inference.manifest import Certainty
 
 _NAMES: Final = ("least", "mean", "strange")
 _STEPS: Final = 200
 _RIDGE: Final = 0.01
-READ_BACK_BELOW: Final = 0.85
-DECLINE_BELOW: Final = 0.30
+RIGHT_UNASKED: Final = 0.97
+DECLINE_BELOW: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +38,20 @@ def fit(judged: Sequence[Judged]) -> Certainty:
         if np.abs(step).max() < 1e-8:
             break
     bias, least, mean, strange = (round(float(one), 4) for one in weights)
+    sure = 1.0 / (1.0 + np.exp(-np.clip(seen @ weights, -30.0, 30.0)))
     return Certainty(
         bias=bias,
         least=least,
         mean=mean,
         strange=strange,
-        read_back_below=READ_BACK_BELOW,
+        read_back_below=_bound(sure, right),
         decline_below=DECLINE_BELOW,
     )
+
+
+def _bound(sure: NDArray[np.float64], right: NDArray[np.float64]) -> float:
+    """Return the least confidence from which upwards answers are right as often as they must be."""
+    order = np.argsort(-sure)
+    shares = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
+    enough = np.nonzero(shares >= RIGHT_UNASKED)[0]
+    return round(float(sure[order][enough[-1]]), 3) if len(enough) else 1.0

@@ -74,9 +74,13 @@ def evaluate(models: Path, count: int, chatter: Sequence[str]) -> None:
 
 
 def examples(seed: str, count: int, chatter: Sequence[str]) -> list[Example]:
-    """Return what the doubt is fitted on: phrases kept back, and other talk."""
+    """Return what the doubt is fitted on: phrases learnt and kept back alike, and other talk.
+
+    What people say lies between the two: most of it is like something that was learnt.
+    """
     talk = [Example(text, "") for text in chatter[: count // 3]]
-    return [*_of(Composer(held_out=True), count, seed), *talk]
+    learnt = _of(Composer(), count, seed)
+    return [*learnt, *_of(Composer(held_out=True), count // 2, seed), *talk]
 
 
 def figures(told: Sequence[Told], weights: Certainty) -> dict[str, Any]:
