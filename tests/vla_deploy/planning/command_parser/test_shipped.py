@@ -62,7 +62,7 @@ def request(text: str, heard: float | None = None) -> Request:
             [{"do": "turn", "way": "left", "by": "45 degrees"}],
         ),
         ("have you seen my keys", [{"do": "where", "what": "keys"}]),
-        ("grab the wug", [{"do": "pick", "what": "wug"}]),
+        ("pick up the blue wug please", [{"do": "pick", "what": "blue wug"}]),
     ],
 )
 def test_plain_commands_are_read(
