@@ -18,7 +18,6 @@ PARTS: Final[Mapping[str, str]] = {
     "words": "word errors by voice and noise, sureness, other talk, time per phrase",
     "plans": "spoken commands that give the plan of the typed ones; other talk that gives none",
     "voice": "whether the robot hears itself, and how soon a person silences it",
-    "stop": "stop words: missed, false alarms, from the end of the word to the latch",
     "ears": "where phrases begin and end, from the end of speech to the text, other sound",
     "stop": "stop words missed by noise and voice, false alarms, from the word to the latch",
 }
