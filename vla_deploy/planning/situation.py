@@ -20,6 +20,7 @@ from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import SceneUnreadable, Snapshot, Viewpoint, read_snapshot
+from vla_deploy.world.touch import is_denied
 
 STATUS_AGE_S: Final = 2.0
 _POSE_AGE_S: Final = 1.0
@@ -57,12 +58,13 @@ class Situation:
     ) -> Request:
         """Return the request for a command with what is known now, and what aids are of use."""
         here, recall = self._here(), self._recall
+        scene = self._snapshot(here)
         recalls = recall is not None and Aid.MEMORY in of_use
         return Request(
             command_id=command.command_id,
             text=command.text,
-            world=world_of(self._robot, self._holding(), self._is_free),
-            scene=self._snapshot(here),
+            world=world_of(self._robot, self._holding(scene), self._is_free),
+            scene=scene,
             here=here,
             conversation=conversation,
             heard_confidence=command.heard_confidence,
@@ -85,12 +87,16 @@ class Situation:
         if refusal:
             raise NotReady(refusal)
 
-    def _holding(self) -> Mapping[str, str | None]:
+    def _holding(self, scene: Snapshot | None) -> Mapping[str, str | None]:
+        """Return what the executor says that each hand holds, less what the fingers deny."""
         sample = self._fresh(self._executor, STATUS_AGE_S)
         if sample is None:
             return {}
-        holding: Mapping[str, str | None] = sample.document().get("holding", {})
-        return holding
+        told: Mapping[str, str | None] = sample.document().get("holding", {})
+        hands = scene.hands if scene is not None else {}
+        return {
+            name: None if is_denied(hands.get(name), kind) else kind for name, kind in told.items()
+        }
 
     def _here(self) -> Pose | None:
         sample = self._fresh(self._pose, _POSE_AGE_S)

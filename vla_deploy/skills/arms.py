@@ -13,6 +13,7 @@ from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.motion import follow_joints, move_joints, pause, settle
+from vla_deploy.world.touch import is_denied
 
 AT_POSE_RAD = 0.05
 LOADED_SPEED_RATIO, EMPTY_SPEED_RATIO = 0.6, 0.85
@@ -110,6 +111,14 @@ def recall_hands(context: SkillContext) -> bool:
     except TryAgain:
         return False
     return True
+
+
+def believe_fingers(context: SkillContext) -> None:
+    """Take what the fingers are sure not to feel for lost: it has slipped out, or been taken."""
+    felt = context.link.hands
+    for hand, held in context.hands.items():
+        if held is not None and is_denied(felt.get(hand), held.kind):
+            context.hands[hand] = None
 
 
 def move_arm(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:

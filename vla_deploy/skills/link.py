@@ -171,6 +171,15 @@ class RobotLink:
         return () if sample is None else sample.document().get("objects", ())
 
     @property
+    def hands(self) -> Mapping[str, Mapping[str, Any]]:
+        """Return what each hand feels, as perception told it last; empty while it is silent."""
+        sample = self._scene.latest()
+        if sample is None or sample.age_s(self.clock.now_ns()) > PATIENCE_S:
+            return {}
+        told: Mapping[str, Mapping[str, Any]] = sample.document().get("hands", {})
+        return told
+
+    @property
     def scene_stamp_ns(self) -> int:
         """Return when the newest image that perception judged was taken; 0 before the first."""
         sample = self._scene.latest()

@@ -12,7 +12,7 @@ from vla_deploy.node import NodeContext
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.robots import RobotDescription
-from vla_deploy.skills.arms import recall_hands
+from vla_deploy.skills.arms import believe_fingers, recall_hands
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.executor import ActionRecord, PlanExecution
 from vla_deploy.skills.link import RobotLink
@@ -64,6 +64,10 @@ class ExecutorNode:
         if self._execution is not None:
             self._execution.step()
             self._conclude()
+        elif self._knows_hands:
+            believe_fingers(
+                self._skills
+            )  # while an action is under way, its skill feels for itself
         self._tell_status()
 
     def stop(self) -> None:

@@ -6,6 +6,7 @@ it. What slides along the fingers without changing their opening cannot be felt 
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -153,3 +154,13 @@ def _become(now: Touch, grip: Grip, sample: FingerSample, cause: str = "") -> To
 
 def _since_s(then_ns: int, sample: FingerSample) -> float:
     return (sample.stamp_ns - then_ns) / NS_PER_S
+
+
+def is_denied(hand: Mapping[str, object] | None, told: str | None) -> bool:
+    """Tell whether the fingers are sure not to hold what is told that they hold.
+
+    `hand` is as the scene tells it; a scene that does not know yet what is told denies nothing.
+    """
+    if hand is None or not told or hand.get("told") != told:
+        return False
+    return bool(hand.get("confirmed")) and not hand.get("class")

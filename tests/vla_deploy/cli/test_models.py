@@ -7,6 +7,8 @@ import pytest
 from vla_deploy.cli.main import main
 from vla_deploy.state_dir import models_dir_of
 
+SHIPPED = {"command_parser", "commands-whisper", "detector", "stop_words"}
+
 
 @pytest.fixture
 def base(tmp_path):
@@ -125,7 +127,7 @@ def test_verify_returns_1_when_a_check_fails(vla, added, base):
     code, out, _ = vla("verify", "--profile", "desktop")
     assert code == 0
     rows = [line.split()[:2] for line in out.splitlines()]
-    assert {name for _, name in rows} == {added, "detector"}
+    assert {name for _, name in rows} == {added, *SHIPPED}
     assert {verdict for verdict, _ in rows} == {"ok"}
     assert [name for _, name in rows].count(added) == 4
     code, out, _ = vla("verify", added, "--profile", "jetson_orin_nx", "--json")

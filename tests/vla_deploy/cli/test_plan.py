@@ -59,7 +59,8 @@ def test_what_the_robot_would_ask_is_told_by_its_own_exit_code(plan):
 def test_what_nobody_can_plan_is_refused_with_what_each_said(plan):
     code, printed = plan("sing a sea shanty")
     assert code == 2
-    assert [line.split()[0] for line in printed.splitlines()] == ["rules", "cache"]
+    said = [line.split()[0] for line in printed.splitlines()]
+    assert said == ["rules", "cache", "command_parser"]
 
 
 @pytest.mark.parametrize("content", ["[1, 2]", "{", '{"objects": 3}', '{"things": [7]}'])

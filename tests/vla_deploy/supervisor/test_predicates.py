@@ -41,7 +41,7 @@ def test_a_process_for_a_device_runs_where_the_robot_declares_one():
 
 def test_a_process_without_a_budget_does_not_run():
     assert budgeted("planner")(CONTEXT) == ""
-    assert budgeted("speech")(CONTEXT) == "profile desktop has no budget for it"
+    assert budgeted("juggler")(CONTEXT) == "profile desktop has no budget for it"
 
 
 def test_a_suspended_process_tells_why():

@@ -14,7 +14,7 @@ import pytest
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_desk import Answer, Desk
 
-ODD: Final = "make it nice here"  # no rule covers it
+ODD: Final = "sing a sea shanty"  # neither rules nor the model on board take it
 GO: Final = {"skill": "navigate_to", "place": "kitchen"}
 SERVER: Final = """[servers.tiny]
 api = "openai_compatible"
