@@ -1,12 +1,12 @@
 """Add a person's detector: describe it, try it out, and only then keep it."""
 
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.inference.errors import ImagesInvalid, ModelMismatch, ModelUnknown
+from vla_deploy.inference.adding import CARD, keep_tried, require_free
+from vla_deploy.inference.errors import ImagesInvalid, ModelMismatch
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
     Detection,
@@ -18,7 +18,6 @@ from vla_deploy.inference.manifest import (
     Tensor,
     Variant,
 )
-from vla_deploy.inference.manifest_file import write_manifest
 from vla_deploy.inference.opening import PLAIN_CHOICE, Graph, read_graph
 from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import Model, ModelStore
@@ -26,7 +25,6 @@ from vla_deploy.perception.detectors.adapters import ADAPTERS
 from vla_deploy.perception.detectors.detector import ROLE, Detector
 from vla_deploy.perception.model_tools.trial import Trial, try_out
 
-_CARD: Final = "card.md"
 _CHANNELS: Final = 3
 
 
@@ -68,18 +66,15 @@ def add_model(
         RunFailed: it fails on an empty image, or tells what cannot be.
         OSError: the model cannot be stored.
     """
-    if request.name in store.names() and not replace:
-        raise ModelUnknown(f"there is a model {request.name!r} already; give --replace, or a name")
+    require_free(store, request.name, replace=replace)
     manifest = describe(request, read_graph(request.onnx))
-    draft = store.draft(request.name)
-    try:
-        _fill(draft, request, manifest)
-        model = Model(manifest=manifest, folder=draft, is_embedded=False)
-        trial = try_model(model, engines=engines, clock=clock)
-        folder = store.install(draft)
-    finally:
-        store.abandon(draft)
-    return Model(manifest=manifest, folder=folder, is_embedded=False), trial
+    return keep_tried(
+        store,
+        manifest,
+        {_file_name(request): request.onnx},
+        request.card,
+        lambda model: try_model(model, engines=engines, clock=clock),
+    )
 
 
 def try_model(model: Model, *, engines: Path, clock: Clock) -> Trial:
@@ -116,7 +111,7 @@ def describe(request: Request, graph: Graph) -> Manifest:
         role=ROLE,
         summary=request.summary,
         licence=request.licence,
-        card=_CARD if request.card else "",
+        card=CARD if request.card else "",
         inputs=(tensor,),
         outputs=graph.outputs,
         files={Variant.FP32: ModelFile(path=_file_name(request), sha256=sha256_of(request.onnx))},
@@ -192,13 +187,6 @@ def _classes(request: Request, graph: Graph) -> tuple[str, ...]:
             f"{request.classes}: expected a name in each line, none twice; got {names}"
         )
     return names
-
-
-def _fill(draft: Path, request: Request, manifest: Manifest) -> None:
-    shutil.copyfile(request.onnx, draft / _file_name(request))
-    if request.card is not None:
-        shutil.copyfile(request.card, draft / _CARD)
-    write_manifest(draft, manifest)
 
 
 def _file_name(request: Request) -> str:

@@ -1,6 +1,5 @@
 """Add a person's language model: describe its folder, try it out, and only then keep it."""
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,11 +7,10 @@ from typing import Final
 
 from drivers.clock import Clock
 from platforms import ModelChoice
-from vla_deploy.inference.errors import ModelUnknown
+from vla_deploy.inference.adding import CARD, keep_tried, require_free
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.language_schema import GENAI_CONFIG, PLANNER, TOKENIZER
 from vla_deploy.inference.manifest import Language, Manifest, ModelFile, Use
-from vla_deploy.inference.manifest_file import write_manifest
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
@@ -24,7 +22,6 @@ from vla_deploy.planning.language_model.prompting import CONFIG, TEMPLATE
 
 # What such a folder has besides, some of it only for other runtimes.
 _WEIGHTS: Final = ("*.onnx", "*.onnx.data", "*.onnx_data")
-_CARD: Final = "card.md"
 TRIAL_S: Final = 120.0
 TRIAL_SCHEMA: Final = {
     "type": "object",
@@ -63,21 +60,10 @@ def add_language_model(
         InferenceError: it does not run; each kind says why.
         OSError: the model cannot be stored.
     """
-    if request.name in store.names() and not replace:
-        raise ModelUnknown(f"there is a model {request.name!r} already; give --replace, or a name")
+    require_free(store, request.name, replace=replace)
     manifest = describe(request)
-    draft = store.draft(request.name)
-    try:
-        for part in manifest.parts:
-            shutil.copyfile(request.folder / part.path, draft / part.path)
-        if request.card is not None:
-            shutil.copyfile(request.card, draft / _CARD)
-        write_manifest(draft, manifest)
-        answer = try_out(Model(manifest=manifest, folder=draft, is_embedded=False), clock)
-        folder = store.install(draft)
-    finally:
-        store.abandon(draft)
-    return Model(manifest=manifest, folder=folder, is_embedded=False), answer
+    files = {part.path: request.folder / part.path for part in manifest.parts}
+    return keep_tried(store, manifest, files, request.card, lambda model: try_out(model, clock))
 
 
 def describe(request: Request) -> Manifest:
@@ -100,7 +86,7 @@ def describe(request: Request) -> Manifest:
         role=PLANNER,
         summary=request.summary,
         licence=request.licence,
-        card=_CARD if request.card else "",
+        card=CARD if request.card else "",
         parts=tuple(ModelFile(path=name, sha256=sha256_of(folder / name)) for name in names),
         language=Language(use=Use.CHAT, most_tokens=request.most_tokens),
     )

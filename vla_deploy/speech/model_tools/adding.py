@@ -1,7 +1,6 @@
 """Add a person's Whisper in CTranslate2's form: describe it, try it out, and only then keep it."""
 
-import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -9,11 +8,11 @@ import numpy as np
 
 from drivers.clock import Clock
 from platforms import ModelChoice
-from vla_deploy.inference.errors import ModelFileSpoiled, ModelUnknown
+from vla_deploy.inference import opening
+from vla_deploy.inference.adding import CARD, keep_tried, require_free
+from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Manifest, ModelFile, Whisper
-from vla_deploy.inference.manifest_file import write_manifest
-from vla_deploy.inference.providers import CPU
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.inference.whisper_schema import NEEDED_PARTS, SPEECH_TO_TEXT, VOCABULARIES
 from vla_deploy.speech.recogniser import Reading, open_recogniser
@@ -21,16 +20,8 @@ from vla_deploy.speech.sound import RATE_HZ
 
 OPTIONAL_PARTS: Final = ("preprocessor_config.json",)
 PARTS: Final = (*NEEDED_PARTS, *VOCABULARIES, *OPTIONAL_PARTS)
-PLAIN_CHOICE: Final = ModelChoice(
-    tiers=(),
-    providers=(CPU,),
-    precision="int8",
-    threads=1,
-    cpu_fallback=False,
-    memory_arena=True,
-)
+PLAIN_CHOICE: Final = replace(opening.PLAIN_CHOICE, precision="int8")
 """To look at a model by itself, as no profile is needed for."""
-_CARD: Final = "card.md"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,21 +50,10 @@ def add_whisper(
         SpeechMissing: faster-whisper is not installed.
         OSError: the model cannot be stored.
     """
-    if request.name in store.names() and not replace:
-        raise ModelUnknown(f"there is a model {request.name!r} already; give --replace, or a name")
+    require_free(store, request.name, replace=replace)
     manifest = describe(request)
-    draft = store.draft(request.name)
-    try:
-        for part in manifest.parts:
-            shutil.copyfile(request.folder / part.path, draft / part.path)
-        if request.card is not None:
-            shutil.copyfile(request.card, draft / _CARD)
-        write_manifest(draft, manifest)
-        reading = try_out(Model(manifest=manifest, folder=draft, is_embedded=False), clock)
-        folder = store.install(draft)
-    finally:
-        store.abandon(draft)
-    return Model(manifest=manifest, folder=folder, is_embedded=False), reading
+    files = {part.path: request.folder / part.path for part in manifest.parts}
+    return keep_tried(store, manifest, files, request.card, lambda model: try_out(model, clock))
 
 
 def describe(request: Request) -> Manifest:
@@ -97,7 +77,7 @@ def describe(request: Request) -> Manifest:
         role=SPEECH_TO_TEXT,
         summary=request.summary,
         licence=request.licence,
-        card=_CARD if request.card else "",
+        card=CARD if request.card else "",
         parts=tuple(ModelFile(path=name, sha256=sha256_of(folder / name)) for name in there),
         whisper=request.whisper,
     )

@@ -1,0 +1,54 @@
+"""Keep a person's model only once it has been tried out."""
+
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final, TypeVar
+
+from vla_deploy.inference.errors import ModelUnknown
+from vla_deploy.inference.manifest import Manifest
+from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.store import Model, ModelStore
+
+CARD: Final = "card.md"
+T = TypeVar("T")
+
+
+def require_free(store: ModelStore, name: str, *, replace: bool) -> None:
+    """Accept that a model gets a name.
+
+    Raises:
+        ModelUnknown: there is one of that name, and it is not to be replaced.
+    """
+    if name in store.names() and not replace:
+        raise ModelUnknown(f"there is a model {name!r} already; give --replace, or a name")
+
+
+def keep_tried(
+    store: ModelStore,
+    manifest: Manifest,
+    files: Mapping[str, Path],
+    card: Path | None,
+    try_out: Callable[[Model], T],
+) -> tuple[Model, T]:
+    """Copy a model's files and its card under their names, try it out there, and install it.
+
+    Returns the model and what the trial gave; when anything is wrong, nothing has changed.
+
+    Raises:
+        ModelUnknown: the name cannot be used.
+        OSError: the model cannot be stored.
+        InferenceError: it does not run, as `try_out` says.
+    """
+    draft = store.draft(manifest.name)
+    try:
+        for name, source in files.items():
+            shutil.copyfile(source, draft / name)
+        if card is not None:
+            shutil.copyfile(card, draft / CARD)
+        write_manifest(draft, manifest)
+        told = try_out(Model(manifest=manifest, folder=draft, is_embedded=False))
+        folder = store.install(draft)
+    finally:
+        store.abandon(draft)
+    return Model(manifest=manifest, folder=folder, is_embedded=False), told
