@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from vla_deploy.inference.manifest import Use
+from vla_deploy.inference.parts_schema import parts_faults
 from vla_deploy.robots.schema import (
     NUMBER,
     OPTIONAL_TABLE,
@@ -46,11 +47,7 @@ def language_faults(language: Mapping[str, Any]) -> Iterator[Fault]:
 
 def language_cross_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Find what of such a manifest does not fit together."""
-    if document["role"] != PLANNER:
-        yield Fault(key="role", got=document["role"], expected=f"{PLANNER}, for [language]")
+    yield from parts_faults(document, table="language", role=PLANNER, needed=NEEDED_PARTS)
     paths = [part["path"] for part in document["parts"]]
-    for name in NEEDED_PARTS:
-        if name not in paths:
-            yield Fault(key="parts", got=f"{paths}", expected=f"{name} among them")
     if not any(path.endswith(".onnx") for path in paths):
         yield Fault(key="parts", got=f"{paths}", expected="an .onnx file among them")

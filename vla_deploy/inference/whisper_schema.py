@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from vla_deploy.inference.manifest import Context
+from vla_deploy.inference.parts_schema import parts_faults
 from vla_deploy.robots.schema import (
     NUMBER,
     OPTIONAL_TABLE,
@@ -50,11 +51,7 @@ def whisper_faults(whisper: Mapping[str, Any]) -> Iterator[Fault]:
 
 def whisper_cross_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Find what of such a manifest does not fit together."""
-    if document["role"] != SPEECH_TO_TEXT:
-        yield Fault(key="role", got=document["role"], expected=f"{SPEECH_TO_TEXT}, for [whisper]")
+    yield from parts_faults(document, table="whisper", role=SPEECH_TO_TEXT, needed=NEEDED_PARTS)
     paths = [part["path"] for part in document["parts"]]
-    for name in NEEDED_PARTS:
-        if name not in paths:
-            yield Fault(key="parts", got=f"{paths}", expected=f"{name} among them")
     if not any(name in paths for name in VOCABULARIES):
         yield Fault(key="parts", got=f"{paths}", expected=f"{VOCABULARIES[0]} among them")
