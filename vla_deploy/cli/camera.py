@@ -26,6 +26,7 @@ from vla_deploy.perception.camera_tools.board_pose import board_pose, depth_rati
 from vla_deploy.perception.camera_tools.hand_eye import HandEye, HeadView, fit_hand_eye
 from vla_deploy.perception.camera_tools.lens_fit import MODELS, LensFit, fit_lens
 from vla_deploy.perception.camera_tools.selecting import Selection, select
+from vla_deploy.perception.rotation import angle_rad
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.camera_calibration import (
     LENS_FILE,
@@ -253,8 +254,7 @@ def _as_mounting(found: HandEye, robot: RobotDescription) -> Mounting:
 
 
 def _turn_deg(found: HandEye) -> float:
-    cosine = (float(np.trace(found.site_from_camera[:3, :3])) - 1.0) / 2.0
-    return math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
+    return math.degrees(angle_rad(found.site_from_camera[:3, :3]))
 
 
 def _by_view(errors_px: dict[str, float]) -> str:

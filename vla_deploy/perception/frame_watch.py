@@ -13,6 +13,7 @@ from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.cloud import Floats
 from vla_deploy.perception.frame_check import Use, Verdict, judge_frame
 from vla_deploy.perception.frame_statistics import FrameStatistics, Glance, measure_frame
+from vla_deploy.perception.rotation import angle_rad
 
 VIEW_DISTANCE_M: Final = 3.0
 """Driving by one metre changes the view as turning by one over this does."""
@@ -60,7 +61,5 @@ class FrameWatch:
             self._still = (glance, rotation, base)
             return 0.0
         _, before, stood = self._still
-        cosine = (float(np.trace(before.T @ rotation)) - 1.0) / 2.0
-        turned_rad = math.acos(min(1.0, max(-1.0, cosine)))
         driven_m = math.hypot(base.x_m - stood.x_m, base.y_m - stood.y_m)
-        return turned_rad + driven_m / VIEW_DISTANCE_M
+        return angle_rad(before.T @ rotation) + driven_m / VIEW_DISTANCE_M

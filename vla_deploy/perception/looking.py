@@ -1,6 +1,5 @@
 """Look at the camera's images: what stands in the way at once, what things are as soon as asked."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -19,6 +18,7 @@ from vla_deploy.perception.frame_watch import FrameWatch
 from vla_deploy.perception.near_obstacles import NearObstacles
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.pinhole_view import as_pinhole, in_image
+from vla_deploy.perception.rotation import angle_rad
 from vla_deploy.perception.scene import Scene
 from vla_deploy.perception.whereabouts import Whereabouts
 from vla_deploy.world.surfaces import Point
@@ -30,13 +30,14 @@ MAX_CAMERA_TURN_RAD_S: Final = 0.35
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Moment:
-    """Hold an image and how the robot stood when it was taken."""
+    """Hold an image and how the robot stood when it was taken; `view` is 3 x 3, camera to map."""
 
     frame: RgbdFrame
     depth_m: NDArray[np.float32]
     base_from_camera: Array
     base: Pose2D
     body: NDArray[np.bool_]
+    view: Array
     turn_rad_s: float
 
 
@@ -68,8 +69,7 @@ class Looking:
         if positions is None:
             return False
         moment = self._moment(frame, positions)
-        rotation = self._body.view_rotation(frame.stamp_ns, moment.base)
-        verdict = self._watch.judge(frame, moment.depth_m, rotation, moment.base)
+        verdict = self._watch.judge(frame, moment.depth_m, moment.view, moment.base)
         if verdict.use < Use.OBSTACLES:
             return False
         hands = self._body.hands(positions, frame.stamp_ns)
@@ -135,21 +135,20 @@ class Looking:
         )
 
     def _moment(self, frame: RgbdFrame, positions: Array) -> Moment:
+        base = self._whereabouts.pose_at(frame.stamp_ns)
+        view = self._body.view_rotation(frame.stamp_ns, base)
         return Moment(
             frame=frame,
             depth_m=frame.depth_m(),
             base_from_camera=self._body.camera_pose(positions),
-            base=self._whereabouts.pose_at(frame.stamp_ns),
+            base=base,
             body=self._body.mask(positions, frame.intrinsics),
-            turn_rad_s=self._camera_turn(frame.stamp_ns),
+            view=view,
+            turn_rad_s=self._camera_turn(view, frame.stamp_ns),
         )
 
-    def _camera_turn(self, stamp_ns: int) -> float:
+    def _camera_turn(self, view: Array, stamp_ns: int) -> float:
         """Return how fast the camera turned, in the map frame, up to a moment."""
-        before, after = (
-            self._body.view_rotation(at_ns, self._whereabouts.pose_at(at_ns))
-            for at_ns in (stamp_ns - STILL_WINDOW_NS, stamp_ns)
-        )
-        cosine = (float(np.trace(before.T @ after)) - 1.0) / 2.0
-        angle_rad = math.acos(min(1.0, max(-1.0, cosine)))
-        return angle_rad * NS_PER_S / STILL_WINDOW_NS
+        before_ns = stamp_ns - STILL_WINDOW_NS
+        before = self._body.view_rotation(before_ns, self._whereabouts.pose_at(before_ns))
+        return angle_rad(before.T @ view) * NS_PER_S / STILL_WINDOW_NS
