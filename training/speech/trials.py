@@ -7,10 +7,8 @@ from typing import Final
 import numpy as np
 
 from training.speech.sentences import HELD_OUT, draw_sentence
-from training.voices import espeak, festival, flite
+from training.voices import espeak, festival
 from training.voices.cast import (
-    HELD_OUT_ACCENT,
-    HELD_OUT_VARIANTS,
     Speaker,
     draw_held_out,
     draw_speaker,
@@ -107,11 +105,3 @@ def drawn_sentences(count: int, random: Random) -> list[str]:
     return [
         text for text, _ in zip((t for t in drawn if t.count(" ") > 1), range(count), strict=False)
     ]
-
-
-def is_new(clip: Clip) -> bool:
-    """Tell whether training heard neither its engine's voice nor its speaker's variant."""
-    if clip.engine == flite.ENGINE:
-        return False
-    accent, _, variant = clip.voice.partition("+")
-    return accent == HELD_OUT_ACCENT or variant in HELD_OUT_VARIANTS or clip.engine != espeak.ENGINE

@@ -2,7 +2,7 @@
 
 import pydoc_data.topics
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -227,8 +227,3 @@ def _made_up(random: np.random.Generator) -> str:
 
 def _pick(values: Sequence[str], random: np.random.Generator) -> str:
     return values[int(random.integers(len(values)))]
-
-
-def sentences_of(text: str) -> Iterator[str]:
-    """Yield the sentences of a text that a voice can read and that hold no stop word."""
-    yield from (found for found in _SENTENCE.findall(text) if is_clean(found))
