@@ -3,12 +3,13 @@
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command, add_top_command
-from vla_deploy.memory import MemoryStore
+from vla_deploy.memory import Episode, MemoryStore
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words, sentence_of
 from vla_deploy.supervisor.runtime import default_base
@@ -51,36 +52,36 @@ def _act(acts: Any, name: str, summary: str, run: Any) -> argparse.ArgumentParse
 def list_episodes(arguments: argparse.Namespace) -> int:
     """Print the last commands, the newest first."""
     episodes = _store(arguments).newest(arguments.count)
-    if arguments.json:
-        print(json.dumps([one.document() for one in episodes], indent=2))
-        return 0
-    now_s = unix_s()
-    lines = [f"{one.number:>5}  {sentence_of(one, now_s)}" for one in episodes]
-    print("\n".join(lines) or "nothing is remembered yet")
-    return 0
+    told = [one.document() for one in episodes]
+    return _tell(arguments, told, _numbered(episodes), "nothing is remembered yet")
 
 
 def find(arguments: argparse.Namespace) -> int:
     """Print what fits some words, the best first."""
     found = _store(arguments).recall(arguments.text, arguments.count)
-    if arguments.json:
-        told = [{**one.episode.document(), "score": round(one.score, 5)} for one in found]
-        print(json.dumps(told, indent=2))
-        return 0
-    now_s = unix_s()
-    lines = [f"{one.episode.number:>5}  {sentence_of(one.episode, now_s)}" for one in found]
-    print("\n".join(lines) or "nothing like that is remembered")
-    return 0
+    told = [{**one.episode.document(), "score": round(one.score, 5)} for one in found]
+    lines = _numbered([one.episode for one in found])
+    return _tell(arguments, told, lines, "nothing like that is remembered")
 
 
 def list_things(arguments: argparse.Namespace) -> int:
     """Print where things were seen last."""
     things = _store(arguments).last_seen(arguments.kind, arguments.colour)
-    if arguments.json:
-        print(json.dumps([one.document() for one in things], indent=2))
-        return 0
     now_s = unix_s()
-    print("\n".join(place_words(one, now_s) for one in things) or "no such thing is remembered")
+    lines = [place_words(one, now_s) for one in things]
+    told = [one.document() for one in things]
+    return _tell(arguments, told, lines, "no such thing is remembered")
+
+
+def _numbered(episodes: Sequence[Episode]) -> list[str]:
+    now_s = unix_s()
+    return [f"{one.number:>5}  {sentence_of(one, now_s)}" for one in episodes]
+
+
+def _tell(
+    arguments: argparse.Namespace, told: list[dict[str, Any]], lines: list[str], nothing: str
+) -> int:
+    print(json.dumps(told, indent=2) if arguments.json else "\n".join(lines) or nothing)
     return 0
 
 
