@@ -9,6 +9,7 @@ from drivers.clock import NS_PER_S
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.cli.session import Session
 
+PROFILE_FILE: Final = "bench.toml"
 _ARM_S: Final = 30.0
 _LOOKS_PER_TRY: Final = 25
 _WAY: Final = {"stopped": "reset", "fault": "reset", "disarmed": "arm"}
@@ -20,22 +21,32 @@ class NotReached(Exception):
 
 
 @contextmanager
+def live_stack(folder: Path, profile: str) -> Iterator[tuple[ProcessStack, Session]]:
+    """Give the processes of a robot by the text of a profile, which lies in `PROFILE_FILE`.
+
+    Raises:
+        StackFailed: the processes do not come up.
+    """
+    (folder / PROFILE_FILE).write_text(profile, encoding="utf-8")
+    stack = ProcessStack(folder / "run", "--profile", str(folder / PROFILE_FILE))
+    try:
+        stack.wait_until_ready()
+        with closing(Session(stack.run_dir)) as session:
+            yield stack, session
+    finally:
+        stack.close()
+
+
+@contextmanager
 def live_robot(folder: Path, realtime_priority: int) -> Iterator[Session]:
     """Give a session with a desktop's robot whose control has this priority; 0 is none.
 
     Raises:
         StackFailed: the processes do not come up.
     """
-    profile = folder / "bench.toml"
-    text = f'inherits = "desktop"\nrealtime_priority = {realtime_priority}\n'
-    profile.write_text(text, encoding="utf-8")
-    stack = ProcessStack(folder / "run", "--profile", str(profile))
-    try:
-        stack.wait_until_ready()
-        with closing(Session(stack.run_dir)) as session:
-            yield session
-    finally:
-        stack.close()
+    profile = f'inherits = "desktop"\nrealtime_priority = {realtime_priority}\n'
+    with live_stack(folder, profile) as (_, session):
+        yield session
 
 
 def arm(session: Session) -> None:

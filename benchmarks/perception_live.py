@@ -10,7 +10,6 @@ its cores.
 import sys
 import tempfile
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -19,10 +18,9 @@ import numpy as np
 import psutil
 
 from benchmarks.command import parser, show
-from benchmarks.live_robot import arm
+from benchmarks.live_robot import PROFILE_FILE, arm, live_stack
 from drivers.clock import NS_PER_S
 from platforms import Profile, load_profile
-from sim_twin.process_stack import ProcessStack
 from vla_deploy.cli.session import Session
 
 PROFILE: Final = "jetson_orin_nano"
@@ -74,16 +72,11 @@ def measure(seconds: float = 40.0, profile: str = PROFILE) -> dict[str, Any]:
         StackFailed: the processes do not come up.
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        path = Path(folder) / "bench.toml"
-        path.write_text(HERE.format(profile=profile), encoding="utf-8")
-        stack = ProcessStack(Path(folder) / "run", "--profile", str(path))
-        try:
-            stack.wait_until_ready()
-            with closing(Session(stack.run_dir)) as session:
-                arm(session)
-                return _report(*_watch(session, seconds), load_profile(path), profile)
-        finally:
-            stack.close()
+        text = HERE.format(profile=profile)
+        with live_stack(Path(folder), text) as (_, session):
+            arm(session)
+            used = load_profile(Path(folder) / PROFILE_FILE)
+            return _report(*_watch(session, seconds), used, profile)
 
 
 def _watch(session: Session, seconds: float) -> tuple[_Seen, float, float]:

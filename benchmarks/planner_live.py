@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from benchmarks.live_robot import NotReached, arm
+from benchmarks.live_robot import PROFILE_FILE, NotReached, arm, live_stack
 from benchmarks.perception_live import HERE
 from drivers.clock import NS_PER_S
 from platforms import load_profile
@@ -113,24 +113,18 @@ def measure(rounds: int = 1, spoken: bool = True, profile: str = PROFILE) -> dic
         StackFailed: the processes do not come up.
     """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        path = Path(folder) / "bench.toml"
-        path.write_text(HERE.format(profile=profile), encoding="utf-8")
-        stack = ProcessStack(Path(folder) / "run", "--profile", str(path))
-        try:
-            stack.wait_until_ready()
-            with (
-                closing(Session(stack.run_dir)) as session,
-                closing(SharedSpace(stack.run_dir / "ipc", session.clock)) as space,
-            ):
-                arm(session)
-                robot = _Robot(stack, session, space)
-                texts = COMMANDS * rounds
-                report = _delays("typed", texts, robot, robot.type)
-                if spoken:
-                    report |= _delays("spoken", texts, robot, robot.speak)
-                return report | _cost(stack, path, profile)
-        finally:
-            stack.close()
+        text = HERE.format(profile=profile)
+        with (
+            live_stack(Path(folder), text) as (stack, session),
+            closing(SharedSpace(stack.run_dir / "ipc", session.clock)) as space,
+        ):
+            arm(session)
+            robot = _Robot(stack, session, space)
+            texts = COMMANDS * rounds
+            report = _delays("typed", texts, robot, robot.type)
+            if spoken:
+                report |= _delays("spoken", texts, robot, robot.speak)
+            return report | _cost(stack, Path(folder) / PROFILE_FILE, profile)
 
 
 def _delays(
