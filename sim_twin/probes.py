@@ -18,6 +18,7 @@ _SHOWN_GROUP = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _ENDLESS_M = 1e6
 _SLACK_M = 1e-6
 _NOWHERE = (0.0, 0.0)
+_RADIUS, _REACH = 4, 5
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE.value
 
 
@@ -33,21 +34,21 @@ class RangeProbe:
         self._data = data
         self._origin = data.site_xpos[model.site(site).id]
         self._rotation = data.xmat[model.body(ROBOT_ROOT).id].reshape(3, 3)
-        self._centres = data.geom_xpos
+        self._centres = data.geom_xpos.T
         self._view = copy.copy(model)
         self._hidden = self._view.geom_group
         of_world = np.isin(model.geom_group, _WORLD_GROUPS)
         _empty_bodies(self._view, np.bincount(model.geom_bodyid, of_world, model.nbody) == 0)
         radius_m = np.where(model.geom_type == _PLANE, _ENDLESS_M, model.geom_rbound)
-        self._radius_m = radius_m
         reach_m = _reach_from_level_plane(model, data, radius_m) + _SLACK_M
-        self._reach_m = np.where(of_world, reach_m, -math.inf)
-        self._bound_m = np.stack([radius_m, radius_m, radius_m]) + _SLACK_M
+        self._geoms = np.ones((6, model.ngeom))
+        self._places = self._geoms[:3]
+        self._geoms[_RADIUS] = radius_m + _SLACK_M
+        self._geoms[_REACH] = np.where(of_world, reach_m, -_ENDLESS_M)
         turn = np.tile(np.radians(np.arange(BEAMS)), 2)
         cos, sin = np.cos(turn), np.sin(turn)
         self._directions = np.stack([cos, sin, np.zeros(2 * BEAMS)], axis=1)
         self._heading = list(zip(cos.tolist(), sin.tolist(), strict=True))
-        self._offsets_m = np.empty_like(data.geom_xpos)
         self._hit = np.empty(BEAMS, np.int32)
 
     def cast(self, beams: range) -> NDArray[np.float32]:
@@ -77,18 +78,23 @@ class RangeProbe:
         return ranges_m.astype(np.float32)
 
     def _hide_what_they_miss(self, first: int, count: int) -> None:
-        """Hide geoms on one side of the plane, to the right of the first or left of the last."""
-        bound_m = self._bound_m
+        """Hide geoms above or below the plane, to the right of the first or left of the last.
+
+        How far each geom reaches into each of these half-spaces is one product of matrices: a few
+        operations on small arrays cost more than what they compute.
+        """
         (ax, bx, up_x), (ay, by, up_y), (az, bz, up_z) = self._rotation.tolist()
-        axes = [(up_x, up_y, up_z)]
+        x, y, z = self._origin.tolist()
+        height, tilt = up_x * x + up_y * y + up_z * z, math.hypot(up_x, up_y)
+        sides = [
+            (up_x, up_y, up_z, -height, tilt, 1.0),
+            (-up_x, -up_y, -up_z, height, tilt, 1.0),
+        ]
         for cos, sin in self._inwards(first, count):
-            axes.append((cos * ax + sin * bx, cos * ay + sin * by, cos * az + sin * bz))
-        inside_m = np.dot(axes, np.subtract(self._centres, self._origin, out=self._offsets_m).T)
-        np.copysign(inside_m[0], -1.0, inside_m[0])
-        np.multiply(self._radius_m, math.hypot(up_x, up_y), bound_m[0])
-        bound_m[0] += self._reach_m
-        inside_m += bound_m
-        np.less(np.minimum.reduce(inside_m), 0.0, self._hidden)
+            in_x, in_y, in_z = cos * ax + sin * bx, cos * ay + sin * by, cos * az + sin * bz
+            sides.append((in_x, in_y, in_z, -(in_x * x + in_y * y + in_z * z), 1.0, 0.0))
+        self._places[:] = self._centres
+        np.less(np.minimum.reduce(np.dot(sides, self._geoms)), 0.0, self._hidden)
 
     def _inwards(self, first: int, count: int) -> tuple[tuple[float, float], ...]:
         """Return, in the base's plane, what is at right angles to the first and last beam."""

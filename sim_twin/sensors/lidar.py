@@ -160,7 +160,10 @@ class LidarDevice:
         packet_deg = POINTS_PER_PACKET * step_deg
         numbers = range(first, end)
         block = self._block(end - first)
-        due_ns = [self._last_point_ns(number) for number in numbers]
+        # When the last point of each is measured, rounded up.
+        due_ns = [
+            self._start_ns - (number + 1) * NS_PER_S // -_PACKETS_PER_S for number in numbers
+        ]
         # Lists, as a dozen of packets is too few for array operations to pay.
         starts = [number * (100.0 * packet_deg) + 100.0 * phase_deg for number in numbers]
         sweep = 100.0 * _LAST_POINT * step_deg
@@ -172,10 +175,6 @@ class LidarDevice:
         data, size = block.to_bytes(), _PACKET.itemsize
         packets = [data[start : start + size] for start in range(0, len(data), size)]
         self._waiting = deque(zip(due_ns, packets, strict=True))
-
-    def _last_point_ns(self, number: int) -> int:
-        """Return when a packet's last point is measured, rounded up."""
-        return self._start_ns - (number + 1) * NS_PER_S // -_PACKETS_PER_S
 
     def _block(self, count: int) -> PacketBlock:
         if count not in self._blocks:
