@@ -188,7 +188,7 @@ class Cia402Axis:
         """Move the demand along its ramp and return the torque."""
         self._velocity_rad_s = velocity_rad_s
         state = self._machine.state
-        if state not in POWERED:
+        if state is not _ENABLED and state not in POWERED:
             self._demand_rad_s = velocity_rad_s
             self._loop.reset()
             self._torque_nm = 0.0
@@ -196,10 +196,10 @@ class Cia402Axis:
         self._demand_rad_s = demand_rad_s = self._next_demand(state, dt_s)
         low_nm, high_nm = self._stage.torque_range_nm(velocity_rad_s)
         error_rad_s = demand_rad_s - velocity_rad_s
-        self._torque_nm = self._loop.torque_nm(error_rad_s, dt_s, low_nm, high_nm)
-        if demand_rad_s == 0.0 and self._stands():
+        self._torque_nm = torque_nm = self._loop.torque_nm(error_rad_s, dt_s, low_nm, high_nm)
+        if demand_rad_s == 0.0 and state is not _ENABLED and self._stands():
             self._machine.at_standstill(self._objects.get(QUICK_STOP_OPTION))
-        return self._torque_nm
+        return torque_nm
 
     def _next_demand(self, state: PowerState, dt_s: float) -> float:
         values = self._objects.values

@@ -65,7 +65,7 @@ class ODriveController:
     def set_limits(self, velocity_rev_s: float, current_a: float) -> None:
         """Set both limits; the current's is at most what the power stage gives."""
         self.velocity_limit_rev_s = velocity_rev_s
-        self._stage.current_limit_a = min(max(current_a, 0.0), self._stage.spec.current_limit_a)
+        self._stage.limit_current(current_a)
 
     def arm(self, position_rev: float, velocity_rev_s: float) -> None:
         """Start from where the shaft is."""

@@ -77,14 +77,27 @@ class PowerStage:
         self.is_strained = False
         """Whether `trip` may find something; it cannot otherwise."""
         self._cool_c = spec.temperature_limit_c - spec.temperature_hysteresis_c
+        self._bound_torque()
+
+    def limit_current(self, current_a: float) -> None:
+        """Give at most this current, which is at most the motor's."""
+        self.current_limit_a = min(max(current_a, 0.0), self.spec.current_limit_a)
+        self._bound_torque()
+
+    def _bound_torque(self) -> None:
+        """Find up to which speed the full current flows: every step asks for it."""
+        spec, limit_a = self.spec, self.current_limit_a
+        limit_nm = limit_a * spec.torque_nm_per_a
+        self._full_torque_nm = -limit_nm, limit_nm
+        headroom_v = self.bus_v - limit_a * spec.resistance_ohm
+        self._full_torque_rad_s = headroom_v / spec.torque_nm_per_a
 
     def torque_range_nm(self, velocity_rad_s: float) -> tuple[float, float]:
         """Return the torques that current limit and back-EMF allow, the lowest first."""
+        if abs(velocity_rad_s) <= self._full_torque_rad_s:
+            return self._full_torque_nm
         spec, limit_a = self.spec, self.current_limit_a
         emf_v = spec.torque_nm_per_a * velocity_rad_s
-        if abs(emf_v) + limit_a * spec.resistance_ohm <= self.bus_v:
-            limit_nm = limit_a * spec.torque_nm_per_a
-            return -limit_nm, limit_nm
         low_a = min(max((-self.bus_v - emf_v) / spec.resistance_ohm, -limit_a), limit_a)
         high_a = max(min((self.bus_v - emf_v) / spec.resistance_ohm, limit_a), -limit_a)
         return low_a * spec.torque_nm_per_a, high_a * spec.torque_nm_per_a
@@ -99,6 +112,7 @@ class PowerStage:
         self.bus_v = bus_v = self.supply_v - spec.supply_resistance_ohm * self.bus_current_a
         cooling_w = (self.temperature_c - spec.ambient_c) / spec.thermal_resistance_k_w
         self.temperature_c += (copper_w - cooling_w) / spec.heat_capacity_j_k * dt_s
+        self._bound_torque()
         felt_a = spec.current_limit_a if self.jammed else current_a
         i2t_a2s = self._i2t_a2s + (felt_a * felt_a - self._continuous_a2) * dt_s
         self._i2t_a2s = i2t_a2s = i2t_a2s if i2t_a2s > 0.0 else 0.0
@@ -113,6 +127,7 @@ class PowerStage:
     def supply(self, volts: float) -> None:
         """Change the supply's voltage."""
         self.supply_v = self.bus_v = volts
+        self._bound_torque()
         self.is_strained = True
 
     def trip(self, armed: bool) -> Trip | None:
@@ -145,7 +160,7 @@ class PowerStage:
     def forget_load(self) -> None:
         """Clear what the firmware keeps in memory, as a reset does; the heat stays."""
         self._i2t_a2s = 0.0
-        self.current_limit_a = self.spec.current_limit_a
+        self.limit_current(self.spec.current_limit_a)
 
 
 class Encoder:

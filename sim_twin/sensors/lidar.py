@@ -161,9 +161,7 @@ class LidarDevice:
         numbers = range(first, end)
         block = self._block(end - first)
         # When the last point of each is measured, rounded up.
-        due_ns = [
-            self._start_ns - (number + 1) * NS_PER_S // -_PACKETS_PER_S for number in numbers
-        ]
+        due_ns = [self._start_ns - (number + 1) * NS_PER_S // -_PACKETS_PER_S for number in numbers]
         # Lists, as a dozen of packets is too few for array operations to pay.
         starts = [number * (100.0 * packet_deg) + 100.0 * phase_deg for number in numbers]
         sweep = 100.0 * _LAST_POINT * step_deg
