@@ -15,6 +15,7 @@ PROCESSES: Final[tuple[str, ...]] = (
     "planner",
     "executor",
     "recorder",
+    "dashboard",
     "twin",
 )
 NODES: Final[tuple[str, ...]] = (
@@ -24,6 +25,7 @@ NODES: Final[tuple[str, ...]] = (
     "planner",
     "executor",
     "recorder",
+    "dashboard",
 )
 ROLES: Final = (
     "detector",

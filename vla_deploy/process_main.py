@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from drivers.clock import MonotonicClock
+from drivers.clock import Clock, MonotonicClock
 from drivers.errors import DriverError
 from platforms import ProfileError, load_profile
 from vla_deploy.adapting import AdaptingNode
@@ -36,36 +36,36 @@ _PR_SET_NAME = 15
 _log = logging.getLogger(__name__)
 
 
+Stepper = Callable[[Node, Clock, Callable[[], bool]], None]
+
+
 def main(
-    name: str, build: Callable[[NodeContext], Node], arguments: Sequence[str] | None = None
+    name: str,
+    build: Callable[[NodeContext], Node],
+    arguments: Sequence[str] | None = None,
+    run: Stepper = run_node,
+    mendable: tuple[type[Exception], ...] = (),
 ) -> int:
     """Run one node until SIGTERM or SIGINT, and return the exit code of its process.
 
-    The file `<run_dir>/ready/<name>` holds the pid while the node is started.
+    The file `<run_dir>/ready/<name>` holds the pid while the node is started. `run` starts, steps
+    and stops the node; one that does more than that beside the steps is given for it.
+    `mendable` are errors of this process that a person has to mend, beside those of all.
     """
     context = _context(name, arguments)
     _name_process(name)
     stop_signals = _catch_stop_signals()
     with process_log(name, context.robot, context.run_dir):
-        return _run(name, build, context, lambda: bool(stop_signals))
-
-
-def _run(
-    name: str,
-    build: Callable[[NodeContext], Node],
-    context: NodeContext,
-    should_stop: Callable[[], bool],
-) -> int:
-    try:
-        node = _Announced(_adapting(name, build, context), context.run_dir / READY_DIR / name)
-        run_node(node, context.clock, should_stop)
-    except CONFIGURATION_ERRORS as error:
-        _log.error("%s", error)
-        return EXIT_CONFIGURATION
-    except Exception:  # the last place where a crash can be told to the log
-        _log.exception("crashed")
-        return EXIT_CRASHED
-    return EXIT_OK
+        try:
+            node = _Announced(_adapting(name, build, context), context.run_dir / READY_DIR / name)
+            run(node, context.clock, lambda: bool(stop_signals))
+        except CONFIGURATION_ERRORS + mendable as error:
+            _log.error("%s", error)
+            return EXIT_CONFIGURATION
+        except Exception:  # the last place where a crash can be told to the log
+            _log.exception("crashed")
+            return EXIT_CRASHED
+        return EXIT_OK
 
 
 def _adapting(

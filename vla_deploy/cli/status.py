@@ -5,12 +5,10 @@ import json
 import math
 from typing import Any
 
-import numpy as np
-
 from vla_deploy.cli.example import add_top_command
-from vla_deploy.cli.session import Session, attach
-from vla_deploy.ipc import Sample
-from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt, PlaceState
+from vla_deploy.cli.session import attach
+from vla_deploy.dashboard.robot_state import collect
+from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
 from vla_deploy.supervisor.profile_change import Outcome
 
 
@@ -30,34 +28,6 @@ def run(arguments: argparse.Namespace) -> int:
     status = collect(attach(arguments.runtime_base))
     print(json.dumps(status, indent=2) if arguments.json else as_text(status))
     return 0
-
-
-def collect(session: Session) -> dict[str, Any]:
-    """Return everything that the processes tell of themselves; what is silent is null."""
-    pose = session.fresh("pose", age_limit_s=1.0)
-    return {
-        "run_dir": str(session.run_dir),
-        "process_table": session.document("process_table", age_limit_s=3.0),
-        "control": session.document("control_status", age_limit_s=1.0),
-        "planner": session.document("planner_status", age_limit_s=2.0),
-        "executor": session.document("executor_status", age_limit_s=2.0),
-        "pose": None if pose is None else _pose_document(pose),
-        "scene": session.document("scene", age_limit_s=5.0),
-        "speech": session.document("speech_status", age_limit_s=2.0),
-        "profile": session.document("profile_status", age_limit_s=3.0),
-        "dashboard_url": None,
-    }
-
-
-def _pose_document(sample: Sample) -> dict[str, Any]:
-    numbers = {name: float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad", "match_ratio")}
-    state, doubt = PlaceState(int(sample.data["state"])), Doubt(int(sample.data["doubt"]))
-    return {
-        **numbers,
-        "state": state.name.lower(),
-        "doubt": doubt.name.lower(),
-        "covariance": np.reshape(sample.data["covariance"], (3, 3)).tolist(),
-    }
 
 
 def as_text(status: dict[str, Any]) -> str:

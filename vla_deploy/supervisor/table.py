@@ -161,4 +161,15 @@ TABLE: tuple[ProcessSpec, ...] = (
         stop_timeout_s=10.0,  # what waits to be written is written first
         giving_up=GivingUp.CARRY_ON,
     ),
+    ProcessSpec(
+        name="dashboard",
+        command=("-m", "vla_deploy.dashboard", *_NODE),
+        devices_command=_DEVICES,
+        when=all_of(budgeted("dashboard"), not_suspended("dashboard")),
+        with_previous=True,
+        ready_topic="dashboard_status",
+        ready_files=("ready/dashboard",),
+        watched=(Watched(topic="dashboard_status", silence_limit_s=20.0),),
+        giving_up=GivingUp.CARRY_ON,  # the stop door and the command line go on
+    ),
 )

@@ -1,0 +1,43 @@
+"""Run the dashboard: `python -m vla_deploy.dashboard --run-dir D --robot butler --profile P`."""
+
+import sys
+from collections.abc import Callable
+
+from drivers.clock import Clock
+from vla_deploy.dashboard.errors import DashboardError
+from vla_deploy.dashboard.node import DashboardNode
+from vla_deploy.dashboard.serving import serve
+from vla_deploy.dashboard.settings import DashboardSettings, read_settings
+from vla_deploy.node import Node, NodeContext
+from vla_deploy.process_main import main
+
+
+class Dashboard:
+    """Build the node, and step it in the event loop that answers the requests."""
+
+    def __init__(self) -> None:
+        self._node: DashboardNode
+        self._settings: DashboardSettings
+
+    def build(self, context: NodeContext) -> DashboardNode:
+        """Build the node from what the process was started with.
+
+        Raises:
+            SettingsInvalid: dashboard.toml has faults.
+        """
+        self._settings = read_settings(context.run_dir.parent)
+        self._node = DashboardNode(context, self._settings)
+        return self._node
+
+    def run(self, node: Node, clock: Clock, should_stop: Callable[[], bool]) -> None:
+        """Serve until `should_stop()`; `node` is the built one, wrapped."""
+        try:
+            node.start()
+            serve(self._node.app, self._node.doors, self._settings, node, clock, should_stop)
+        finally:
+            node.stop()
+
+
+if __name__ == "__main__":
+    dashboard = Dashboard()
+    sys.exit(main("dashboard", dashboard.build, run=dashboard.run, mendable=(DashboardError,)))

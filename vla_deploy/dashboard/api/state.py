@@ -1,0 +1,29 @@
+"""Tell how the robot is."""
+
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+from fastapi import APIRouter, Request
+
+from vla_deploy.dashboard.robot_state import collect
+
+router = APIRouter(tags=["state"])
+health = APIRouter(tags=["state"])
+
+
+@router.get("/state")
+async def get_state(request: Request) -> dict[str, Any]:
+    """Return what every process tells of itself; what is silent is null."""
+    told = collect(request.app.state.link)
+    return {
+        **told,
+        "version": version("vla-deploy"),
+        "wall_time": datetime.now(UTC).isoformat(timespec="milliseconds"),
+    }
+
+
+@health.get("/healthz")
+async def get_health() -> dict[str, bool]:
+    """Say that the dashboard answers; of the robot it says nothing."""
+    return {"answers": True}

@@ -1,0 +1,34 @@
+"""Build the web application; what it serves is listed in `routers.py` and `parts.py`."""
+
+from fastapi import FastAPI
+
+from vla_deploy.dashboard.answers import add_error_answers
+from vla_deploy.dashboard.headers import SafeHeaders
+from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.dashboard.page import add_page_files
+from vla_deploy.dashboard.parts import PARTS
+from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS
+from vla_deploy.dashboard.settings import DashboardSettings
+
+
+def create_app(link: RobotLink, settings: DashboardSettings) -> FastAPI:
+    """Return the application; `app.state` holds `link`, `settings` and what the parts put there.
+
+    Whoever serves it steps `app.state.parts`.
+    """
+    app = FastAPI(
+        title="vla_deploy",
+        openapi_url=f"{API_PREFIX}/openapi.json",
+        docs_url=None,  # their pages load scripts from other hosts
+        redoc_url=None,
+    )
+    app.state.link, app.state.settings = link, settings
+    app.state.parts = [make(app) for make in PARTS]
+    add_error_answers(app)
+    for router in API_ROUTERS:
+        app.include_router(router, prefix=API_PREFIX)
+    for router in ROOT_ROUTERS:
+        app.include_router(router)
+    add_page_files(app)
+    app.add_middleware(SafeHeaders)
+    return app

@@ -1,0 +1,78 @@
+"""Keep the dashboard's own state, and tell how it is."""
+
+from typing import Final
+
+from fastapi import FastAPI
+
+from drivers.clock import NS_PER_S
+from vla_deploy.dashboard.app import create_app
+from vla_deploy.dashboard.doors import SOCKET_NAME, open_port, open_socket
+from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.dashboard.serving import Door
+from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.ipc import CellWriter
+from vla_deploy.node import NodeContext
+
+STATUS_TOPIC: Final = "dashboard_status"
+TCP: Final = "tcp"
+UNIX: Final = "unix"
+_TELL_NS: Final = NS_PER_S // 2
+_EVERYWHERE: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+
+
+class DashboardNode:
+    """Open the doors, step what works beside the requests, and tell the address."""
+
+    period_s = 0.05
+
+    def __init__(self, context: NodeContext, settings: DashboardSettings) -> None:
+        self._context = context
+        self._settings = settings
+        self._clock = context.clock
+        self.link = RobotLink(context.run_dir, context.clock)
+        self.app: FastAPI
+        self.doors: tuple[Door, ...] = ()
+        self._status: CellWriter
+        self._due_ns = 0
+        self._url = ""
+
+    def start(self) -> None:
+        """Listen; requests wait until they are served.
+
+        Raises:
+            PortTaken: somebody else listens there.
+        """
+        twin = self._context.devices_dir is not None  # runs on one computer share its ports
+        before = (self.link.document(STATUS_TOPIC) or {}).get("port")
+        settings = self._settings
+        tcp = open_port(settings.host, settings.port, search=twin, before=before)
+        unix = open_socket(self._context.run_dir / SOCKET_NAME)
+        self.doors = (Door(TCP, tcp, settings.scheme == "https"), Door(UNIX, unix))
+        self._status = self.link.space.cell_writer(STATUS_TOPIC)
+        self.app = create_app(self.link, settings)
+        self._port = tcp.getsockname()[1]
+        self._url = f"{settings.scheme}://{_reachable(settings.host)}:{self._port}"
+
+    def step(self) -> None:
+        """Step the parts, and tell twice a second where the page is."""
+        for part in self.app.state.parts:
+            part.step()
+        now_ns = self._clock.now_ns()
+        if now_ns >= self._due_ns:
+            self._due_ns = now_ns + _TELL_NS
+            told = {"url": self._url, "port": self._port, "host": self._settings.host}
+            self._status.put_document(told)
+
+    def stop(self) -> None:
+        """Stop the parts and close everything."""
+        for part in self.app.state.parts if self.doors else ():
+            part.stop()
+        for door in self.doors:
+            door.listener.close()
+        self.link.close()
+
+
+def _reachable(host: str) -> str:
+    """Return an address that a browser on this computer finds; IPv6 in its brackets."""
+    name = _EVERYWHERE.get(host, host)
+    return f"[{name}]" if ":" in name else name

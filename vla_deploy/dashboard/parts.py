@@ -1,0 +1,23 @@
+"""Declare what works in the dashboard beside its requests, stepped in the event loop."""
+
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from fastapi import FastAPI
+
+
+class Part(Protocol):
+    """Do a bit of work many times a second, and never wait: all clients share the event loop."""
+
+    def step(self) -> None:
+        """Look at the topics and do what is new."""
+        ...
+
+    def stop(self) -> None:
+        """Let go of what the part holds."""
+        ...
+
+
+# Each is made with the app, finds `link` and `settings` in its state, and puts there what routes
+# want to find.
+PARTS: Final[tuple[Callable[[FastAPI], Part], ...]] = ()

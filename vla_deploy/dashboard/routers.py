@@ -1,0 +1,15 @@
+"""List the routes: one row per group."""
+
+from typing import Final
+
+from fastapi import APIRouter
+
+from vla_deploy.dashboard import page
+from vla_deploy.dashboard.api import state
+
+API_PREFIX: Final = "/api/v1"
+
+# Below the prefix.
+API_ROUTERS: Final[tuple[APIRouter, ...]] = (state.router,)
+# At the root: the page, and what has its place by convention.
+ROOT_ROUTERS: Final[tuple[APIRouter, ...]] = (page.router, state.health)

@@ -1,0 +1,116 @@
+"""Serve one application at several doors, and step the node beside it, in one event loop."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.node import Node
+
+GOODBYE_S: Final = 1  # for requests that are under way at the end
+_KEEP_ALIVE_S: Final = 10
+_MOST_CONNECTIONS: Final = 256
+_MOST_MESSAGE_BYTES: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Door:
+    """Name a listening socket; whether it speaks TLS is the settings' matter."""
+
+    name: str
+    listener: socket.socket
+    is_encrypted: bool = False
+
+
+class _Server(uvicorn.Server):
+    """Leave the process' signals to whoever runs it."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+def serve(
+    app: ASGIApp,
+    doors: Sequence[Door],
+    settings: DashboardSettings,
+    node: Node,
+    clock: Clock,
+    should_stop: Callable[[], bool],
+) -> None:
+    """Answer requests and step a started node until `should_stop()`."""
+    asyncio.run(_serve(app, doors, settings, node, clock, should_stop))
+
+
+async def _serve(
+    app: ASGIApp,
+    doors: Sequence[Door],
+    settings: DashboardSettings,
+    node: Node,
+    clock: Clock,
+    should_stop: Callable[[], bool],
+) -> None:
+    servers = [_Server(_config(app, door, settings)) for door in doors]
+    serving = [
+        asyncio.create_task(server.serve([door.listener]))
+        for server, door in zip(servers, doors, strict=True)
+    ]
+    try:
+        await _step(node, clock, lambda: should_stop() or any(task.done() for task in serving))
+    finally:
+        for server in servers:
+            server.should_exit = True
+        await asyncio.gather(*serving)
+
+
+async def _step(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> None:
+    """Step on absolute deadlines, as `run_node` does; skip periods that were missed."""
+    deadline_ns = clock.now_ns()
+    while not should_stop():
+        node.step()
+        period_ns = round(node.period_s * NS_PER_S)
+        deadline_ns = max(deadline_ns + period_ns, clock.now_ns())
+        await asyncio.sleep((deadline_ns - clock.now_ns()) / NS_PER_S)
+
+
+def _config(app: ASGIApp, door: Door, settings: DashboardSettings) -> uvicorn.Config:
+    encrypted: dict[str, Any] = {}
+    if door.is_encrypted:
+        encrypted = {
+            "ssl_certfile": settings.tls_certificate,
+            "ssl_keyfile": settings.tls_key,
+        }
+    return uvicorn.Config(
+        _named(app, door.name),
+        log_config=None,
+        log_level=logging.WARNING,
+        access_log=False,
+        lifespan="off",
+        loop="asyncio",
+        http="h11",
+        ws="websockets-sansio",
+        proxy_headers=False,
+        server_header=False,
+        limit_concurrency=_MOST_CONNECTIONS,
+        timeout_keep_alive=_KEEP_ALIVE_S,
+        timeout_graceful_shutdown=GOODBYE_S,
+        ws_max_size=_MOST_MESSAGE_BYTES,
+        **encrypted,
+    )
+
+
+def _named(app: ASGIApp, name: str) -> ASGIApp:
+    """Let the application know through which door a request came: `scope["door"]`."""
+
+    async def through_door(scope: Any, receive: Any, send: Any) -> None:
+        await app({**scope, "door": name}, receive, send)
+
+    return through_door
