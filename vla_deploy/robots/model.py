@@ -68,6 +68,15 @@ class RobotModel:
         pinocchio.framesForwardKinematics(self._model, self._data, q)
         return np.array(self._data.oMf[frame].homogeneous, dtype=np.float64)
 
+    def joint_poses(self, positions: Array) -> dict[str, Array]:
+        """Return the pose of every joint's frame in the base frame, followers included."""
+        q = self._coupling @ positions
+        pinocchio.forwardKinematics(self._model, self._data, q)
+        return {
+            self._model.names[joint]: np.array(self._data.oMi[joint].homogeneous, dtype=np.float64)
+            for joint in range(1, self._model.njoints)
+        }
+
     def site_jacobian(self, site: str, positions: Array) -> Array:
         """Return the site's velocity per joint velocity, 6 x joints: linear first, site's frame.
 

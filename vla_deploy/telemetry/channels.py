@@ -11,17 +11,12 @@ import numpy as np
 
 from vla_deploy.ipc import Field, Kind, Topic
 from vla_deploy.ipc.layout import is_document, record_dtype
+from vla_deploy.telemetry.schemas.geometry import CAMERA, time_json
+from vla_deploy.telemetry.schemas.well_known import well_known
 
 TICKS: Final = "tick_record"
 IMAGE_SCHEMA: Final = "foxglove.CompressedImage"
-_TIME = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
 _BYTES = {"type": "string", "contentEncoding": "base64"}
-_IMAGE = {
-    "timestamp": _TIME,
-    "frame_id": {"type": "string"},
-    "data": _BYTES,
-    "format": {"type": "string"},
-}
 _TICK = {
     "tick": {"type": "integer", "description": "number of the tick since control started"},
     "writer_pid": {"type": "integer", "description": "pid of control"},
@@ -49,10 +44,14 @@ def channels_of(topic: Topic) -> tuple[Channel, ...]:
     """Return what a topic becomes in the file: one channel, two for images with depth."""
     if topic.kind is Kind.FRAME:
         return tuple(
-            Channel(topic=f"{topic.name}/{part}", schema_name=IMAGE_SCHEMA, schema=_object(_IMAGE))
+            Channel(
+                topic=f"{topic.name}/{part}",
+                schema_name=IMAGE_SCHEMA,
+                schema=well_known(IMAGE_SCHEMA),
+            )
             for part in ("colour", "depth")
         )
-    schema = {**_object(_properties(topic)), "description": topic.summary}
+    schema = {"type": "object", **_content(topic), "description": topic.summary}
     return (Channel(topic=topic.name, schema_name=f"vla_deploy.{topic.name}", schema=schema),)
 
 
@@ -64,13 +63,12 @@ def cell_text(topic: Topic, payload: bytes) -> bytes:
     return json.dumps({field.name: _plain(record[field.name]) for field in topic.fields}).encode()
 
 
-def image_text(frame_id: str, stamp_ns: int, data: bytes, form: str) -> bytes:
-    """Return a compressed image as the JSON that viewers know."""
-    second, rest = divmod(stamp_ns, 1_000_000_000)
+def image_text(stamp_ns: int, data: bytes, form: str) -> bytes:
+    """Return a compressed image of the camera as the JSON that viewers know."""
     return json.dumps(
         {
-            "timestamp": {"sec": second, "nsec": rest},
-            "frame_id": frame_id,
+            "timestamp": time_json(stamp_ns),
+            "frame_id": CAMERA,
             "data": base64.b64encode(data).decode(),
             "format": form,
         }
@@ -96,21 +94,22 @@ def tick_bytes(text: bytes) -> bytes:
     return base64.b64decode(json.loads(text)["record"])
 
 
-def _properties(topic: Topic) -> Mapping[str, Any]:
+def _content(topic: Topic) -> dict[str, Any]:
+    """Return what a message holds; documents and events are told in docs/architecture.md."""
     if topic.kind is Kind.RECORD:
-        return _TICK
+        return {"properties": _TICK, "required": ["record"]}
     if topic.kind is Kind.CELL and not is_document(topic):
-        return {field.name: _property(field) for field in topic.fields}
+        properties = {field.name: _property(field) for field in topic.fields}
+        return {"properties": properties, "required": list(properties)}
     return {}
 
 
 def _property(field: Field) -> dict[str, Any]:
-    number = {"type": ["number", "null"], "description": field.unit}
-    return number if field.shape == 1 else {"type": "array", "items": number}
-
-
-def _object(properties: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "object", "properties": dict(properties)}
+    kind = ["number", "null"] if field.dtype.startswith("f") else "integer"
+    number = {"type": kind, "description": field.unit}
+    if field.shape == 1:
+        return number
+    return {"type": "array", "items": number, "minItems": field.shape, "maxItems": field.shape}
 
 
 def _plain(value: Any) -> Any:

@@ -118,6 +118,6 @@ def _text(channel: str, kept: Kept, wall_offset_ns: int) -> bytes:
     topic, _, part = channel.partition("/")
     if part:
         form = {"colour": "jpeg", "depth": "png"}[part]
-        return image_text(topic, kept.stamp_ns + wall_offset_ns, kept.payload, form)
+        return image_text(kept.stamp_ns + wall_offset_ns, kept.payload, form)
     is_cell = BY_NAME[topic].kind is Kind.CELL
     return cell_text(BY_NAME[topic], kept.payload) if is_cell else kept.payload

@@ -1,0 +1,1 @@
+"""Show the robot to viewers: what its topics mean, in schemas that Foxglove and others know."""

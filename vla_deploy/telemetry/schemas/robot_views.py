@@ -1,0 +1,130 @@
+"""Draw what the robot is and feels: joints, frames, wheels, lidar, near obstacles."""
+
+import base64
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from vla_deploy.ipc.topics import SCAN_BEAMS
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.model import RobotModel, full_positions
+from vla_deploy.telemetry.schemas.geometry import (
+    BASE,
+    CAMERA,
+    MAP,
+    ODOM,
+    Json,
+    Matrix,
+    floor_pose_json,
+    matrix_json,
+    point_json,
+    time_json,
+)
+
+_FLOAT32: Final = 7  # foxglove.NumericType
+_FLOAT_BYTES: Final = 4
+
+
+class RobotViews:
+    """Draw the topics of one robot; one instance per thread."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        """Build the robot's kinematics.
+
+        Raises:
+            RobotFileError: pinocchio does not find the robot file's joints in the MJCF.
+        """
+        self._model = RobotModel(robot)
+        self._names = robot.joint_names
+        self._lidar_m = self._model.site_pose(robot.lidar.site, full_positions(robot))[:3, 3]
+
+    def joints(self, state: np.void, stamp_ns: int) -> Json:
+        """Return every joint's position and velocity; what is no number is left out."""
+        joints = []
+        for index, name in enumerate(self._names):
+            numbers = {field: float(state[field][index]) for field in ("position", "velocity")}
+            finite = {field: value for field, value in numbers.items() if math.isfinite(value)}
+            joints.append({"name": name, **finite})
+        return {"timestamp": time_json(stamp_ns), "joints": joints}
+
+    def frames(self, state: np.void, stamp_ns: int) -> Json:
+        """Return the frames of every joint and of the camera in the base; none while blind."""
+        positions = np.array(state["position"][: len(self._names)], dtype=np.float64)
+        if not np.isfinite(positions).all():
+            return {"transforms": []}
+        poses = {**self._model.joint_poses(positions), CAMERA: self._model.camera_pose(positions)}
+        return {"transforms": [_frame(BASE, name, at, stamp_ns) for name, at in poses.items()]}
+
+    def scan(self, scan: np.void, stamp_ns: int) -> Json:
+        """Return a turn of the lidar, from where it sits on the base; 0 is no return."""
+        x_m, y_m, z_m = self._lidar_m
+        return {
+            "timestamp": time_json(stamp_ns),
+            "frame_id": BASE,
+            "pose": floor_pose_json(x_m, y_m, 0.0, z_m),
+            "start_angle": 0.0,
+            "end_angle": 2 * math.pi * (SCAN_BEAMS - 1) / SCAN_BEAMS,
+            "ranges": np.nan_to_num(scan["range_m"], posinf=0.0).round(3).tolist(),
+            "intensities": [],
+        }
+
+
+def base_frame(pose: np.void, stamp_ns: int) -> Json:
+    """Return where the base is in the map, as a frame."""
+    drawn = floor_pose_json(pose["x_m"], pose["y_m"], pose["yaw_rad"])
+    frame = {
+        "timestamp": time_json(stamp_ns),
+        "parent_frame_id": MAP,
+        "child_frame_id": BASE,
+        "translation": drawn["position"],
+        "rotation": drawn["orientation"],
+    }
+    return {"transforms": [frame]}
+
+
+def pose(pose: np.void, stamp_ns: int) -> Json:
+    """Return where the base is in the map."""
+    at = floor_pose_json(pose["x_m"], pose["y_m"], pose["yaw_rad"])
+    return {"timestamp": time_json(stamp_ns), "frame_id": MAP, "pose": at}
+
+
+def odometry(state: np.void, stamp_ns: int) -> Json:
+    """Return where the wheels have brought the base, and how fast they turn."""
+    return {
+        "timestamp": time_json(stamp_ns),
+        "frame_id": ODOM,
+        "body_frame_id": BASE,
+        "pose": floor_pose_json(state["x_m"], state["y_m"], state["yaw_rad"]),
+        "linear_velocity": point_json(state["v_m_s"], 0.0),
+        "angular_velocity": point_json(0.0, 0.0, state["w_rad_s"]),
+    }
+
+
+def obstacles(seen: np.void, stamp_ns: int) -> Json:
+    """Return what stands up from the floor as points in the base's frame."""
+    count = int(seen["count"])
+    points = np.stack([seen[axis][:count] for axis in ("x_m", "y_m", "z_m")], axis=1)
+    fields = [
+        {"name": name, "offset": _FLOAT_BYTES * place, "type": _FLOAT32}
+        for place, name in enumerate("xyz")
+    ]
+    return {
+        "timestamp": time_json(stamp_ns),
+        "frame_id": BASE,
+        "pose": floor_pose_json(0.0, 0.0, 0.0),
+        "point_stride": 3 * _FLOAT_BYTES,
+        "fields": fields,
+        "data": base64.b64encode(points.astype("<f4").tobytes()).decode(),
+    }
+
+
+def _frame(parent: str, child: str, pose: Matrix, stamp_ns: int) -> dict[str, Any]:
+    translation, rotation = matrix_json(pose)
+    return {
+        "timestamp": time_json(stamp_ns),
+        "parent_frame_id": parent,
+        "child_frame_id": child,
+        "translation": translation,
+        "rotation": rotation,
+    }
