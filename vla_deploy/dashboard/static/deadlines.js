@@ -1,0 +1,30 @@
+/** Say how old a live value may be before the page shows it as stale, in seconds. */
+
+const USUAL_S = 3;
+
+// Ages on the robot are judged there, to the millisecond; these add the way to the browser.
+const DEADLINES_S = {
+  joint_state: 1,
+  base_state: 1,
+  base_command: 1,
+  control_status: 1,
+  pose: 1.5,
+  scan: 1.5,
+  near_obstacles: 2,
+  scene: 3,
+  camera: 3,
+  executor_status: 2,
+  planner_status: 3,
+  speech_status: 3,
+  process_table: 4,
+  profile_status: 4,
+  budget: 4,
+  topics: 4,
+  path: 4,
+  alarms: Infinity, // told on change
+};
+
+/** Return the deadline of a topic. */
+export function deadlineOf(topic) {
+  return DEADLINES_S[topic] ?? USUAL_S;
+}

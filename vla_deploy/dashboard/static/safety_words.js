@@ -1,0 +1,98 @@
+/** Say control's state in words, and how grave it is. */
+
+import { sentence, significant, words } from "./format.js";
+
+const STATES = {
+  armed: { title: "Armed", tone: "ok", icon: "check", means: "Ready: motors are under control." },
+  disarmed: { title: "Disarmed", tone: "info", icon: "power", means: "No motion. Arm it to work." },
+  protective_stop: {
+    title: "Protective stop",
+    tone: "warn",
+    icon: "shield",
+    means: "It stands still, and goes on once the cause has gone.",
+  },
+  stopping: { title: "Stopping", tone: "bad", icon: "hand", means: "It comes to rest." },
+  stopped: { title: "Stopped", tone: "bad", icon: "hand", means: "Reset it, then arm it." },
+  fault: {
+    title: "Fault",
+    tone: "bad",
+    icon: "alert",
+    means: "It cannot be armed before the cause is gone.",
+  },
+};
+
+const SILENT = {
+  title: "Unknown",
+  tone: "bad",
+  icon: "question",
+  means: "Control is silent: nobody knows what the robot does.",
+};
+
+// Where a name as words says too little: what has happened, in one sentence.
+const CAUSES = {
+  estop: "Emergency stop",
+  standstill_motion: "It was moved while it had to stand still",
+  servo_bus_lost: "A servo bus does not answer",
+  can_bus_lost: "A wheel drive's bus does not answer",
+  servo_hardware_error: "A servo reports a hardware error",
+  drive_fault: "A wheel drive reports a fault",
+  servo_watchdog_tripped: "A servo's watchdog has tripped: control was silent",
+  encoder_jump: "A joint's encoder has jumped",
+  joint_position_limit: "A joint is beyond its range",
+  joint_velocity_limit: "A joint moves too fast",
+  following_error: "A joint does not follow its setpoint",
+  wheel_following_error: "A wheel does not follow its setpoint",
+  joint_current_limit: "A joint takes too much current",
+  joint_temperature_limit: "A joint is too hot",
+  collision: "It has met something",
+  supervisor_lost: "The supervisor is silent",
+  joint_voltage_limit: "The supply voltage is out of range",
+  self_collision: "Two of its parts come too close",
+  environment_collision: "A part comes too close to its surroundings",
+  workspace: "A part leaves the workspace",
+  tip_over: "It may tip over",
+  budget_exhausted: "The computer is at the end of its budget",
+  stale_scan: "The lidar is silent: the base stands",
+  stale_command: "Whoever drives the base is silent: it stands",
+  keep_out_zone: "It is in a keep-out zone",
+  obstacle_stop_zone: "Something is in the stop zone",
+  obstacle_slow_zone: "Something is in the slow-down zone",
+  obstacle_limit_zone: "Something is in the limit zone",
+  obstacle_approach: "It approaches something",
+};
+
+/** Return `{title, tone, icon, means, cause}` of a control status that is live, else of silence. */
+export function safetyWords(control, stale) {
+  if (!control || stale) return { ...SILENT, cause: "" };
+  const state = STATES[control.state] ?? { ...SILENT, title: sentence(control.state) };
+  return { ...state, ...slowed(control, state), cause: causeWords(control.cause) };
+}
+
+/** Return a cause as a sentence. */
+export function causeWords(cause) {
+  return cause ? (CAUSES[cause] ?? sentence(cause)) : "";
+}
+
+/** Return what the rules leave the base: lines, none where they leave it everything. */
+export function boundsWords(control) {
+  const lines = [];
+  if (control.speed_ratio < 1) {
+    lines.push(`Base at most ${Math.round(100 * control.speed_ratio)} % of its speed`);
+  }
+  if (control.blocked?.length) lines.push(`Base not ${control.blocked.map(words).join(", ")}`);
+  return lines;
+}
+
+/** Return "measured 1.23, limit 0.8", or "" where a cause has no numbers. */
+export function numbersWords({ measured, limit }) {
+  const known = [
+    ["measured", measured],
+    ["limit", limit],
+  ].filter(([, value]) => value !== null && value !== undefined);
+  return known.map(([name, value]) => `${name} ${significant(value)}`).join(", ");
+}
+
+function slowed(control, state) {
+  if (control.state !== "armed" || !control.cause) return {};
+  return { tone: "warn", icon: "alert", means: boundsWords(control).join(". ") || state.means };
+}
