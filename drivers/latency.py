@@ -3,6 +3,8 @@
 Each power of two is cut into eight equal buckets, so that a percentile is at most 1/8 too high.
 """
 
+from bisect import bisect_left
+from itertools import accumulate
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -12,6 +14,9 @@ _WHOLE_BITS: Final = _SUB_BITS + 1
 _SUB_BUCKETS: Final = 1 << _SUB_BITS
 _LAST_OCTAVE: Final = 36  # 2^36 ns is 69 s; what takes longer is counted there
 _BUCKETS: Final = (_LAST_OCTAVE - _SUB_BITS + 1) * _SUB_BUCKETS
+_TOLD_OCTAVES: Final = range(18, 28)  # 0.26 ms to 0.13 s, where a bus' answers lie
+_TOLD_BOUNDS_S: Final = [(1 << octave) / NS_PER_S for octave in _TOLD_OCTAVES]
+_TOLD_ENDS: Final = [(octave - _SUB_BITS + 1) * _SUB_BUCKETS for octave in _TOLD_OCTAVES]
 
 
 class LatencyHistogram:
@@ -53,12 +58,7 @@ class LatencyHistogram:
         """
         if not 0.0 <= ratio <= 1.0:
             raise ValueError(f"percentile ratio must be within 0..1, got {ratio}")
-        wanted, seen = ratio * self.count, 0
-        for index, count in enumerate(self._buckets):
-            seen += count
-            if count and seen >= wanted:
-                return min(_upper_ns(index), self.max_ns)
-        return self.max_ns
+        return self._percentile_ns(ratio, self._totals())
 
     def reset(self) -> None:
         """Start over, as for the next telemetry period."""
@@ -66,14 +66,30 @@ class LatencyHistogram:
         self._buckets[:] = [0] * _BUCKETS
 
     def as_dict(self) -> dict[str, Any]:
-        """Return count, mean, p50, p99 and max in seconds."""
+        """Return count, sum, mean, p50, p99 and max in seconds, and counts by octave.
+
+        `counts` has for each upper bound of `le_s` how many durations lie below it.
+        """
+        totals = self._totals()
+        count = totals[-1]
         return {
-            "count": self.count,
-            "mean_s": round(self.mean_ns / NS_PER_S, 7),
-            "p50_s": round(self.percentile_ns(0.5) / NS_PER_S, 7),
-            "p99_s": round(self.percentile_ns(0.99) / NS_PER_S, 7),
+            "count": count,
+            "sum_s": round(self.total_ns / NS_PER_S, 6),
+            "mean_s": round(self.total_ns / max(count, 1) / NS_PER_S, 7),
+            "p50_s": round(self._percentile_ns(0.5, totals) / NS_PER_S, 7),
+            "p99_s": round(self._percentile_ns(0.99, totals) / NS_PER_S, 7),
             "max_s": round(self.max_ns / NS_PER_S, 7),
+            "le_s": _TOLD_BOUNDS_S,
+            "counts": [totals[index - 1] for index in _TOLD_ENDS],
         }
+
+    def _totals(self) -> list[int]:
+        """Return for each bucket how many durations it and those before it hold."""
+        return list(accumulate(self._buckets))
+
+    def _percentile_ns(self, ratio: float, totals: list[int]) -> int:
+        index = bisect_left(totals, max(ratio * totals[-1], 1))
+        return self.max_ns if index >= _BUCKETS else min(_upper_ns(index), self.max_ns)
 
 
 def _upper_ns(index: int) -> int:

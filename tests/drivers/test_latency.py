@@ -13,13 +13,10 @@ def histogram_of(values: list[int]) -> LatencyHistogram:
 
 
 def test_nothing_recorded_is_zero_everywhere() -> None:
-    assert LatencyHistogram().as_dict() == {
-        "count": 0,
-        "mean_s": 0.0,
-        "p50_s": 0.0,
-        "p99_s": 0.0,
-        "max_s": 0.0,
-    }
+    told = LatencyHistogram().as_dict()
+    bounds_s, counts = told.pop("le_s"), told.pop("counts")
+    assert set(told.values()) == {0}
+    assert counts == [0] * len(bounds_s)
 
 
 @pytest.mark.parametrize("value", [0, 1, 7, 8, 15, 16, 17, 1000, 123_456, 10**9, 6 * 10**10])
@@ -43,6 +40,15 @@ def test_what_is_beyond_the_last_bucket_or_before_the_first_is_counted() -> None
     assert histogram.count == 2
     assert histogram.max_ns == 10**15
     assert histogram.percentile_ns(0.0) == 0
+
+
+def test_counts_by_octave_are_those_below_each_bound() -> None:
+    chance = random.Random(7)
+    values = [chance.randrange(2 * 10**8) for _ in range(3000)]
+    told = histogram_of(values).as_dict()
+    expected = [sum(value < bound_s * 10**9 for value in values) for bound_s in told["le_s"]]
+    assert told["counts"] == expected
+    assert 0 < expected[0] < expected[-1] < len(values)
 
 
 def test_a_reset_starts_over() -> None:

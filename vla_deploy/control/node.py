@@ -79,7 +79,7 @@ class ControlNode:
         self._commands = space.ring_reader("motion_command", from_start=False)
         self._telemetry = Telemetry(space, len(robot.joint_names))
         self._status = Status(
-            self._ticks, self._modes, self._judging, self._desk, self._motions, (servos, wheels)
+            self._ticks, self._modes, self._judging, self._desk, self._motions, servos, wheels
         )
 
     def start(self) -> None:

@@ -6,10 +6,17 @@ from vla_deploy.control.judging import Judging
 from vla_deploy.control.modes import Modes
 from vla_deploy.control.motions import MotionSet
 from vla_deploy.control.operator_desk import OperatorDesk
+from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import status_name
-from vla_deploy.control.status_document import Bus, bus_document, detail, verdict_document
+from vla_deploy.control.status_document import (
+    bus_document,
+    detail,
+    joint_document,
+    verdict_document,
+)
 from vla_deploy.control.status_pace import StatusPace
 from vla_deploy.control.telemetry import TickClock
+from vla_deploy.control.wheels import Wheels
 
 
 class Status:
@@ -22,14 +29,16 @@ class Status:
         judging: Judging,
         desk: OperatorDesk,
         motions: MotionSet,
-        buses: tuple[Bus, ...],
+        servos: ServoLine,
+        wheels: Wheels,
     ) -> None:
         self._ticks = ticks
         self._modes = modes
         self._judging = judging
         self._desk = desk
         self._motions = motions
-        self._buses = buses
+        self._servos = servos
+        self._wheels = wheels
         self._pace = StatusPace()
 
     def due(self, every_ticks: int) -> dict[str, Any] | None:
@@ -58,6 +67,9 @@ class Status:
             "judged_tick": self._judging.tick,
             "late_ticks": ticks.late_ticks,
             "period_s": round(ticks.period_s, 6),
-            "buses": bus_document(*self._buses),
+            "nominal_period_s": ticks.nominal_s,
+            "period_ratio": ticks.periods.document(),
+            "buses": bus_document(self._servos, self._wheels),
+            "joints": joint_document(self._servos.state),
             "active_motions": self._motions.active_ids,
         }

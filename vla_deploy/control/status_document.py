@@ -4,6 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import Any, Protocol
 
+import numpy as np
+
+from drivers.dynamixel import BusState
+from vla_deploy.control.axes import Floats
 from vla_deploy.safety import Cause, Verdict
 
 _LONGEST_DETAIL = 1500
@@ -42,6 +46,21 @@ def detail(*parts: str) -> str:
 def bus_document(*buses: Bus) -> dict[str, Any]:
     """Return each bus' counters by its name."""
     return {bus.name: bus.counters for bus in buses}
+
+
+def joint_document(state: BusState) -> dict[str, list[float | None]]:
+    """Return what servos tell slowly, in joint order; null where it was not read yet."""
+    return {
+        "temperature_c": _tenths(state.temperature_c),
+        "voltage_v": _tenths(state.voltage_v),
+    }
+
+
+def _tenths(values: Floats) -> list[float | None]:
+    rounded: list[float | None] = np.round(values, 1).tolist()
+    if np.isfinite(values).all():
+        return rounded
+    return [value if value is not None and math.isfinite(value) else None for value in rounded]
 
 
 def _number(value: float) -> float | None:

@@ -6,6 +6,7 @@ from typing import Any
 from drivers.dynamixel import BusState
 from vla_deploy.control.axes import Floats
 from vla_deploy.control.motions import MotionResult
+from vla_deploy.control.tick_periods import TickPeriods
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
 
@@ -70,20 +71,26 @@ class Telemetry:
             writer.close()
 
 
-# A tick is late when more than this many periods lie between its begin and the last one's.
-_LATE_PERIODS = 1.2
-
-
 class TickClock:
     """Measure the ticks: how long since the last one, how many came late."""
 
     def __init__(self, period_s: float) -> None:
         self.tick = 0
-        self.late_ticks = 0
+        self.periods = TickPeriods()
         self.period_s = period_s
         self._nominal_s = period_s
         self._next_nominal_s = period_s
         self._last_ns: int | None = None
+
+    @property
+    def late_ticks(self) -> int:
+        """Return how many ticks began late."""
+        return self.periods.late
+
+    @property
+    def nominal_s(self) -> float:
+        """Return the period that the next tick is to keep."""
+        return self._next_nominal_s
 
     def retune(self, period_s: float) -> None:
         """Expect another period from the next tick on: the time up to it has the old one."""
@@ -97,6 +104,6 @@ class TickClock:
         if last_ns is None:
             return nominal_s
         gap_s = (now_ns - last_ns) / 1e9
-        self.late_ticks += gap_s > _LATE_PERIODS * nominal_s
+        self.periods.count(gap_s / nominal_s)
         self.period_s += 0.02 * (gap_s - self.period_s)
         return min(max(gap_s, 0.0), 2.0 * nominal_s)

@@ -14,6 +14,7 @@ from vla_deploy.ipc.errors import (
     UnknownTopic,
 )
 from vla_deploy.ipc.frame_ring import Frame, FrameReader, FrameWriter
+from vla_deploy.ipc.pulse import Pulse, PulseReader
 from vla_deploy.ipc.record_ring import Record, RecordReader, RecordWriter
 from vla_deploy.ipc.ring import Event, RingReader, RingWriter
 from vla_deploy.ipc.space import SharedSpace
@@ -40,6 +41,8 @@ __all__ = [
     "FrameWriter",
     "IpcError",
     "Kind",
+    "Pulse",
+    "PulseReader",
     "Record",
     "RecordReader",
     "RecordWriter",

@@ -72,6 +72,15 @@ class SlotReader:
         value: int = _SEQUENCE.unpack_from(self._memory, start)[0]
         return value
 
+    def origin(self, sequence: int) -> tuple[int, int] | None:
+        """Return stamp and writer's pid of the slot of `sequence`, or None when it is another."""
+        start = self._layout.offset(sequence)
+        front, stamp_ns, pid, *_ = _HEADER.unpack_from(self._memory, start)
+        _, _, back = _TRAILER.unpack_from(self._memory, self._layout.trailer_offset(sequence))
+        if not front == back == sequence or self.front(sequence) != sequence:
+            return None
+        return stamp_ns, pid
+
     def read(self, sequence: int) -> SlotContent | None:
         """Copy the slot of `sequence`, or return None when it is not whole or not that one."""
         start = self._layout.offset(sequence)

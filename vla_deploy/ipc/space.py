@@ -8,6 +8,7 @@ from vla_deploy.ipc.cell import CellReader, CellWriter
 from vla_deploy.ipc.doorbell import Doorbell
 from vla_deploy.ipc.errors import SpaceUnavailable, UnknownTopic
 from vla_deploy.ipc.frame_ring import FrameReader, FrameWriter
+from vla_deploy.ipc.pulse import PulseReader
 from vla_deploy.ipc.record_ring import RecordReader, RecordWriter
 from vla_deploy.ipc.ring import RingReader, RingWriter
 from vla_deploy.ipc.segment import Segment
@@ -76,6 +77,10 @@ class SharedSpace:
     def record_reader(self, name: str) -> RecordReader:
         """Open a record ring for reading."""
         return RecordReader(self._segment(self._topic(name, Kind.RECORD), writable=False))
+
+    def pulse_reader(self, name: str) -> PulseReader:
+        """Follow how often a topic of any kind is written, and when it was last."""
+        return PulseReader(self._segment(self._topic(name, *Kind), writable=False))
 
     def doorbell(self, name: str) -> Doorbell:
         """Listen for the writers of an event or frame ring.

@@ -380,6 +380,15 @@ TOPICS: tuple[Topic, ...] = (
         fields=(Field("document", "json", 32768),),
     ),
     Topic(
+        name="board",
+        kind=Kind.CELL,
+        owner="supervisor",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="every reading of the computer by name, or why there is none, as JSON",
+        fields=(Field("document", "json", 32768),),
+    ),
+    Topic(
         name="budget_stop",
         kind=Kind.CELL,
         owner="supervisor",

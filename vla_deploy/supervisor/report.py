@@ -13,7 +13,7 @@ from vla_deploy.supervisor.liveness import Vital
 from vla_deploy.supervisor.options import RunOptions
 
 _SUPERVISOR = "supervisor"
-_UNKNOWN_USAGE = {"memory_mb": None, "rss_mb": None, "cpu_ratio": None}
+_UNKNOWN_USAGE = {"memory_mb": None, "rss_mb": None, "cpu_ratio": None, "cpu_s": None}
 
 
 class Report:
@@ -66,6 +66,7 @@ def _usages(snapshot: Snapshot) -> dict[str, dict[str, float]]:
             "memory_mb": round(usage.memory_mb, 1),
             "rss_mb": round(usage.rss_mb, 1),
             "cpu_ratio": round(usage.cpu_ratio, 3),
+            "cpu_s": round(usage.cpu_s, 2),
         }
         for name, usage in snapshot.usages.items()
     }

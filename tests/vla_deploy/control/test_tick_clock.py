@@ -43,3 +43,16 @@ def test_late_is_judged_by_the_period_that_was_in_force() -> None:
 def test_a_tick_stands_for_at_most_two_periods() -> None:
     assert begun(1.1 * PERIOD_S)[1] == pytest.approx(1.1 * PERIOD_S)
     assert begun(50 * PERIOD_S)[1] == pytest.approx(2 * PERIOD_S)
+
+
+def test_periods_are_counted_by_their_share_of_the_one_in_force() -> None:
+    clock, _ = begun(0.4 * PERIOD_S, PERIOD_S, PERIOD_S, 1.3 * PERIOD_S, 20 * PERIOD_S)
+    told = clock.periods.document()
+    by_bound = dict(zip([*told["le"], None], told["counts"], strict=True))
+    assert {bound: count for bound, count in by_bound.items() if count} == {
+        0.5: 1,
+        1.05: 2,
+        1.5: 1,
+        None: 1,
+    }
+    assert told["sum"] == pytest.approx(23.7)

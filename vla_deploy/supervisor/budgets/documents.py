@@ -2,15 +2,19 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from platforms import LadderAction, LadderStep
+from platforms.probes import Reading
 from vla_deploy.supervisor.budgets.enforcement import Enforced
 from vla_deploy.supervisor.budgets.judge import Finding
 from vla_deploy.supervisor.budgets.ladder import Change, Taken
 
 _LONGEST_REASON: Final = 160
+_MOST_READINGS: Final = 128
+_OF_A_PROCESS: Final = "gpu_memory_used_bytes."
 
 
 def directives(taken: Iterable[Taken]) -> dict[str, Any]:
@@ -75,6 +79,18 @@ def history_rows(changes: Iterable[Change], now_ns: int) -> list[dict[str, Any]]
         }
         for one in changes
     ]
+
+
+def board(readings: Iterable[Reading]) -> dict[str, Any]:
+    """Return what the probes read, or why not; what belongs to one process is told of that."""
+    told: dict[str, float] = {}
+    missing: dict[str, str] = {}
+    for reading in islice(readings, _MOST_READINGS):
+        if reading.value is None:
+            missing[reading.name] = _short(reading.reason)
+        elif not reading.name.startswith(_OF_A_PROCESS):
+            told[reading.name] = float(f"{reading.value:.9g}")
+    return {"readings": told, "missing": missing}
 
 
 def enforcement_rows(enforced: Mapping[str, Enforced]) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ from drivers.clock import NS_PER_S, Clock
 from platforms import LadderAction, Profile
 from vla_deploy.ipc import ClaimBook, SharedSpace
 from vla_deploy.supervisor.budgets.documents import (
+    board,
     directives,
     enforcement_rows,
     history_rows,
@@ -70,6 +71,7 @@ class BudgetKeeper:
         self._measurer = Measurer()
         self._directives = space.cell_writer("resource_directives")
         self._cell = space.cell_writer("budget")
+        self._board = space.cell_writer("board")
         self._stop_cell = space.cell_writer("budget_stop")
         self._findings: dict[tuple[str, str], Finding] = {}
         self._ladder = LadderState()
@@ -114,6 +116,11 @@ class BudgetKeeper:
         if restart or now_ns - self._told_ns >= TELL_PERIOD_NS:
             self._tell(now_ns)
         return Orders(suspended=self._suspended(), restart=restart)
+
+    def _tell_board(self, snapshot: Snapshot | None) -> None:
+        """Tell what was read last; old readings are told no more, so that they grow stale."""
+        if snapshot is not None and not self._stale:
+            self._board.put_document(board(snapshot.readings.values()))
 
     def close(self) -> None:
         """Measure no more and give back what enforcement has made."""
@@ -162,6 +169,7 @@ class BudgetKeeper:
 
     def _tell(self, now_ns: int) -> None:
         self._told_ns = now_ns
+        self._tell_board(self._feed.latest())
         taken = self._ladder.taken
         stop = stop_reason(taken)
         self._stop_cell.put_document({"stop": bool(stop), "reason": stop[:_REASON_CHARACTERS]})

@@ -218,3 +218,11 @@ def test_memory_may_be_claimed_up_to_the_profiles_total(world, profile, tmp_path
     world.profile = replace(profile, total=replace(profile.total, gpu_memory_mb=800))
     world.go(0.5)
     assert book.look().capacities["gpu_memory_mb"] == 800
+
+
+def test_every_reading_of_the_computer_is_told_and_what_is_missing_with_its_reason(world):
+    world.readings = {"temperature_c": 50.0, "power_w": None, "gpu_memory_used_bytes.17": 4.0}
+    world.go(1)
+    board = world.cell("board")
+    assert board["readings"] == {"temperature_c": 50.0}
+    assert "power_w" in board["missing"] and board["missing"]["power_w"]
