@@ -108,8 +108,8 @@ def _split(
         return []
     rows, columns = np.unravel_index(standing, heights.shape)
     points = cloud.points[rows, columns]
-    cell_m = NEAR_CELL_M if np.median(cloud.depth_m[rows, columns]) < NEAR_M else FAR_CELL_M
-    labels = _label(points[:, :2], heights[rows, columns], cell_m)
+    depth_m = float(np.median(cloud.depth_m[rows, columns]))
+    labels = _label(points[:, :2], heights[rows, columns], _cell_m(depth_m))
     clusters = []
     for label in np.flatnonzero(np.bincount(labels) >= MIN_PIXELS):
         if label == 0:
@@ -121,6 +121,10 @@ def _split(
         if extent.max() < MAX_EXTENT_M and lowest_m < FLOATING_M:
             clusters.append(_cluster(cloud, support, heights, standing[member]))
     return clusters
+
+
+def _cell_m(depth_m: float) -> float:
+    return NEAR_CELL_M if depth_m < NEAR_M else FAR_CELL_M
 
 
 def _label(xy: Floats, heights: Floats, cell_m: float) -> NDArray[np.int32]:
@@ -143,6 +147,21 @@ def part_of(cluster: Cluster, cloud: Cloud, member: Mask) -> Cluster | None:
     heights = np.zeros(cloud.depth_m.shape, dtype=np.float32)
     heights.flat[cluster.pixels] = cluster.heights
     return _cluster(cloud, cluster.support, heights, cluster.pixels[member])
+
+
+def split_apart(cluster: Cluster, cloud: Cloud, member: Mask) -> list[Cluster]:
+    """Return what of a part of a cluster stands apart, seen from above; specks are left out."""
+    chosen = np.flatnonzero(member)
+    if chosen.size < MIN_PIXELS:
+        return []
+    xy, heights = cluster.points[chosen, :2], cluster.heights[chosen]
+    labels = _label(xy, heights, _cell_m(cluster.depth_m))
+    parts = []
+    for label in np.flatnonzero(np.bincount(labels) >= MIN_PIXELS):
+        mask = np.zeros_like(member)
+        mask[chosen[labels == label]] = True
+        parts.append(part_of(cluster, cloud, mask))
+    return [part for part in parts if part is not None]
 
 
 def split_by_colour(cluster: Cluster, cloud: Cloud) -> list[Cluster]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from vla_deploy.perception.classes import OTHER, Form, judge_form
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Cloud
-from vla_deploy.perception.clusters import Cluster, find_clusters, part_of, split_by_colour
+from vla_deploy.perception.clusters import Cluster, find_clusters, split_apart, split_by_colour
 from vla_deploy.perception.colour import dominant_colour
 from vla_deploy.perception.naming import Name, Source, by_both, by_form
 from vla_deploy.perception.network_view import NetworkView
@@ -107,15 +107,17 @@ def _detections(cluster: Cluster, look: _Look) -> list[Detection]:
 
 
 def _contents(box: Detection, cluster: Cluster, look: _Look) -> list[Detection]:
-    """Return the known thing that stands within a box's walls, if there is one."""
+    """Return the known things that stand within a box's walls.
+
+    Between its walls a corner of the rim may show a pixel of its own, which belongs to nothing.
+    """
     x, y, _ = box.position_m
     length_m, width_m, _ = box.size_m
     rim = Rectangle(centre=(x, y), length_m=length_m, width_m=width_m, yaw_rad=box.yaw_rad)
     within = inside_rectangle(cluster.points[:, :2], rim, WALL_M)
-    part = part_of(cluster, look.cloud, within & (cluster.heights > BOX_FLOOR_M))
-    content = _detection(part, look) if part is not None else None
-    known = content is not None and content.class_name != OTHER and content.colour != box.colour
-    return [content] if content is not None and known else []
+    parts = split_apart(cluster, look.cloud, within & (cluster.heights > BOX_FLOOR_M))
+    contents = (_detection(part, look) for part in parts)
+    return [one for one in contents if one.class_name != OTHER and one.colour != box.colour]
 
 
 def _least_height_m(cluster: Cluster) -> float:

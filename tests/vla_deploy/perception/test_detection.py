@@ -115,14 +115,26 @@ def test_a_turned_box_tells_its_yaw(flat: "StillFlat") -> None:
     assert min(turned, math.pi / 2 - turned) < 0.06
 
 
-def test_a_cup_in_the_box_is_seen_there_and_the_box_stays_a_box(flat: "StillFlat") -> None:
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.5, math.pi / 4, 1.1])
+def test_a_cup_in_the_box_is_seen_there_as_wide_as_it_is(flat: "StillFlat", yaw_rad: float) -> None:
     flat.scatter(0)
     x, y, z = flat.truth("box")
+    flat.put("box", (x, y, z), yaw_rad=yaw_rad)
     flat.put("red_cup", (x, y, z + 0.008 + 0.0475))
     flat.stand_at_viewpoint("side_table", head_tilt=0.85)
-    kinds = {(d.class_name, d.colour) for d, _ in see(flat)}
+    kinds = {(d.class_name, d.colour): d for d, _ in see(flat)}
     assert ("box", "orange") in kinds
-    assert ("cup", "red") in kinds
+    assert kinds["cup", "red"].size_m[:2] == pytest.approx((0.066, 0.066), abs=0.012)
+
+
+def test_two_things_in_the_box_are_seen_both(flat: "StillFlat") -> None:
+    flat.scatter(0)
+    x, y, z = flat.truth("box")
+    flat.put("red_cup", (x + 0.05, y + 0.05, z + 0.008 + 0.0475))
+    flat.put("blue_ball", (x - 0.05, y - 0.05, z + 0.008 + 0.03))
+    flat.stand_at_viewpoint("side_table", head_tilt=0.85)
+    kinds = {(d.class_name, d.colour) for d, _ in see(flat)}
+    assert {("box", "orange"), ("cup", "red"), ("ball", "blue")} <= kinds
 
 
 def test_things_that_touch_are_told_apart_by_colour(flat: "StillFlat") -> None:
