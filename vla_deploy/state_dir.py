@@ -10,6 +10,7 @@ _ROOT_CONFIG: Final = Path("/etc/vla-deploy")
 _ROOT_LIBRARY: Final = Path("/var/lib/vla-deploy")
 _MODELS: Final = "models"
 _ENGINES: Final = "engines"
+_ACCESS: Final = "access"
 
 
 def state_dir_of(base: Path) -> Path:
@@ -40,6 +41,11 @@ def models_dir_of(base: Path) -> Path:
 def engines_dir_of(base: Path) -> Path:
     """Return where execution providers keep what they build from models; it may be deleted."""
     return _library_of(base) / _ENGINES
+
+
+def access_dir_of(base: Path) -> Path:
+    """Return where the dashboard's accounts lie, and what was done through it."""
+    return _library_of(base) / _ACCESS
 
 
 def user_base() -> Path:

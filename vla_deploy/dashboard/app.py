@@ -2,6 +2,7 @@
 
 from fastapi import FastAPI
 
+from vla_deploy.dashboard.access import Access, guard
 from vla_deploy.dashboard.answers import add_error_answers
 from vla_deploy.dashboard.headers import SafeHeaders
 from vla_deploy.dashboard.link import RobotLink
@@ -11,8 +12,8 @@ from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS
 from vla_deploy.dashboard.settings import DashboardSettings
 
 
-def create_app(link: RobotLink, settings: DashboardSettings) -> FastAPI:
-    """Return the application; `app.state` holds `link`, `settings` and what the parts put there.
+def create_app(link: RobotLink, settings: DashboardSettings, access: Access) -> FastAPI:
+    """Return the application; `app.state` holds what is given, and what the parts put there.
 
     Whoever serves it steps `app.state.parts`.
     """
@@ -24,6 +25,7 @@ def create_app(link: RobotLink, settings: DashboardSettings) -> FastAPI:
     )
     app.state.link, app.state.settings = link, settings
     app.state.parts = [make(app) for make in PARTS]
+    guard(app, access)
     add_error_answers(app)
     for router in API_ROUTERS:
         app.include_router(router, prefix=API_PREFIX)

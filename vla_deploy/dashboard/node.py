@@ -5,6 +5,7 @@ from typing import Final
 from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S
+from vla_deploy.dashboard.access import Access, AccessRules
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.doors import SOCKET_NAME, open_port, open_socket
 from vla_deploy.dashboard.link import RobotLink
@@ -49,7 +50,8 @@ class DashboardNode:
         unix = open_socket(self._context.run_dir / SOCKET_NAME)
         self.doors = (Door(TCP, tcp, settings.scheme == "https"), Door(UNIX, unix))
         self._status = self.link.space.cell_writer(STATUS_TOPIC)
-        self.app = create_app(self.link, settings)
+        access = Access.of_base(self._context.run_dir.parent, _rules(settings), self._clock)
+        self.app = create_app(self.link, settings, access)
         self._port = tcp.getsockname()[1]
         self._url = f"{settings.scheme}://{_reachable(settings.host)}:{self._port}"
 
@@ -70,6 +72,15 @@ class DashboardNode:
         for door in self.doors:
             door.listener.close()
         self.link.close()
+
+
+def _rules(settings: DashboardSettings) -> AccessRules:
+    return AccessRules(
+        trust_loopback=settings.trust_loopback,
+        hosts=(*settings.allowed_hosts, settings.host),
+        origins=settings.allowed_origins,
+        is_https=settings.scheme == "https",
+    )
 
 
 def _reachable(host: str) -> str:

@@ -3,17 +3,18 @@
 from pathlib import Path
 from typing import Any, Final
 
-from fastapi import APIRouter, FastAPI, Request
+from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.responses import Response
 
+from vla_deploy.dashboard.access import Role, require
 from vla_deploy.dashboard.stop_address import stop_door_url
 
 STATIC: Final = Path(__file__).with_name("static")
 _STOP_META: Final = 'name="stop-door" content=""'
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, dependencies=[Depends(require(Role.ANYONE))])
 
 
 class _PageFiles(StaticFiles):

@@ -3,6 +3,7 @@
 It is read with the standard library alone: the stop door reads it, too.
 """
 
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from vla_deploy.state_dir import config_dir_of
 
 SETTINGS_FILE: Final = "dashboard.toml"
 _LAST_PORT: Final = 65535
+_ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9.\[\]:_-]+")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,12 +25,14 @@ class DashboardSettings:
     On loopback a request counts as the admin's unless `trust_loopback` is off: switch it off behind
     a reverse proxy, whose every request comes from there. `allowed_hosts` are names, beside the
     loopback ones and `host`, by which the page may be called: others are taken for DNS rebinding.
+    `allowed_origins` are those of pages that a proxy serves for the robot: `https://robot.example`.
     """
 
     host: str = "127.0.0.1"
     port: int = 8088
     stop_port: int = 8089
     allowed_hosts: tuple[str, ...] = ()
+    allowed_origins: tuple[str, ...] = ()
     trust_loopback: bool = True
     tls_certificate: str = ""
     tls_key: str = ""
@@ -60,6 +64,12 @@ def _is_names(value: object) -> bool:
     return isinstance(value, list) and all(map(_is_text, value))
 
 
+def _is_origins(value: object) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(one, str) and _ORIGIN.fullmatch(one) is not None for one in value
+    )
+
+
 _PORT = _Rule(f"a port, 1 to {_LAST_PORT}", _is_port)
 _FILE = _Rule("the path of a PEM file", _is_text)
 _RULES: Final[Mapping[str, _Rule]] = {
@@ -67,6 +77,7 @@ _RULES: Final[Mapping[str, _Rule]] = {
     "port": _PORT,
     "stop_port": _PORT,
     "allowed_hosts": _Rule("a list of host names", _is_names, tuple),
+    "allowed_origins": _Rule("a list such as https://robot.example", _is_origins, tuple),
     "trust_loopback": _Rule("true or false", lambda value: isinstance(value, bool)),
     "tls_certificate": _FILE,
     "tls_key": _FILE,

@@ -4,15 +4,16 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Depends, Request
 
+from vla_deploy.dashboard.access import Role, require
 from vla_deploy.dashboard.robot_state import collect
 
 router = APIRouter(tags=["state"])
 health = APIRouter(tags=["state"])
 
 
-@router.get("/state")
+@router.get("/state", dependencies=[Depends(require(Role.VIEWER))])
 async def get_state(request: Request) -> dict[str, Any]:
     """Return what every process tells of itself; what is silent is null."""
     told = collect(request.app.state.link)
@@ -23,7 +24,7 @@ async def get_state(request: Request) -> dict[str, Any]:
     }
 
 
-@health.get("/healthz")
+@health.get("/healthz", dependencies=[Depends(require(Role.ANYONE))])
 async def get_health() -> dict[str, bool]:
     """Say that the dashboard answers; of the robot it says nothing."""
     return {"answers": True}

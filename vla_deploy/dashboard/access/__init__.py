@@ -1,0 +1,32 @@
+"""Decide who may see the robot, command it, and change it; anyone may stop it."""
+
+from vla_deploy.dashboard.access.access import Access
+from vla_deploy.dashboard.access.errors import AccessError, RequestRefused
+from vla_deploy.dashboard.access.identity import Identity, Role, Way
+from vla_deploy.dashboard.access.requiring import (
+    Admin,
+    Anyone,
+    Operator,
+    Require,
+    Viewer,
+    guard,
+    require,
+)
+from vla_deploy.dashboard.access.rules import AccessRules
+
+__all__ = [
+    "Access",
+    "AccessError",
+    "AccessRules",
+    "Admin",
+    "Anyone",
+    "Identity",
+    "Operator",
+    "RequestRefused",
+    "Require",
+    "Role",
+    "Viewer",
+    "Way",
+    "guard",
+    "require",
+]

@@ -1,0 +1,181 @@
+"""Describe who may log in, and which tokens count."""
+
+import hashlib
+import hmac
+import re
+import secrets
+from datetime import UTC, datetime
+from typing import Annotated, Final
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from vla_deploy.dashboard.access.errors import AccountRefused
+from vla_deploy.dashboard.access.identity import Role
+from vla_deploy.dashboard.access.passwords import is_stored_form
+
+NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]{0,31}$"
+MOST_USERS: Final = 64
+MOST_TOKENS: Final = 256
+_TOKEN: Final = re.compile(r"vla_([0-9a-f]{8})_([0-9a-f]{64})")
+_ID_BYTES: Final = 4
+_SECRET_BYTES: Final = 32
+# A clock that was set back by less is only corrected; by more, it cannot tell what has expired.
+_CLOCK_SLACK_S: Final = 600.0
+
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+_STRICT: Final = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+def may_log_in(role: Role) -> Role:
+    """Return the role of an account or token.
+
+    Raises:
+        ValueError: it is that of anyone, which needs neither.
+    """
+    if role is Role.ANYONE:
+        raise ValueError("expected viewer, operator or admin")
+    return role
+
+
+class User(BaseModel):
+    """Hold one account; `password` is what is stored of it, `changed_s` wall-clock seconds."""
+
+    model_config = _STRICT
+
+    role: Annotated[Role, Field(strict=False)]
+    password: str
+    changed_s: float
+
+    _role = field_validator("role")(may_log_in)
+
+    @field_validator("password")
+    @classmethod
+    def _is_hashed(cls, text: str) -> str:
+        if not is_stored_form(text):
+            raise ValueError("expected scrypt$...; set it by: vla-deploy dashboard password")
+        return text
+
+
+class Token(BaseModel):
+    """Hold one token; `digest` is all that is stored of its secret, times are wall-clock s."""
+
+    model_config = _STRICT
+
+    name: Name
+    role: Annotated[Role, Field(strict=False)]
+    digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    made_s: float
+    expires_s: float | None
+
+    _role = field_validator("role")(may_log_in)
+
+    def counts(self, secret: str, now_s: float) -> bool:
+        """Tell whether a secret is this token's, and whether it counts now."""
+        is_own = hmac.compare_digest(_digest(secret), self.digest)
+        begun = now_s > self.made_s - _CLOCK_SLACK_S
+        return is_own and begun and (self.expires_s is None or now_s < self.expires_s)
+
+
+class Accounts(BaseModel):
+    """Hold all accounts, and all tokens by their public ids."""
+
+    model_config = _STRICT
+
+    users: Annotated[dict[Name, User], Field(max_length=MOST_USERS)] = {}
+    tokens: Annotated[dict[str, Token], Field(max_length=MOST_TOKENS)] = {}
+
+    def token_of(self, text: str, now_s: float) -> Token | None:
+        """Return the token that a text is, or None when there is none such that counts."""
+        parts = _TOKEN.fullmatch(text)
+        token = self.tokens.get(parts[1]) if parts else None
+        return token if parts and token is not None and token.counts(parts[2], now_s) else None
+
+    def with_user(self, name: str, user: User) -> "Accounts":
+        """Return the accounts with one more, or with one changed.
+
+        Raises:
+            AccountRefused: the name is none, or there are as many as there may be.
+        """
+        _check_name(name)
+        return self._with(users={**self.users, name: user})
+
+    def without_user(self, name: str) -> "Accounts":
+        """Return the accounts without one.
+
+        Raises:
+            AccountRefused: there is none of that name.
+        """
+        if name not in self.users:
+            known = ", ".join(sorted(self.users)) or "none"
+            raise AccountRefused(f"no user {name!r:.40}; there are: {known}")
+        return self._with(users={key: one for key, one in self.users.items() if key != name})
+
+    def with_token(self, token_id: str, token: Token) -> "Accounts":
+        """Return the accounts with one more token.
+
+        Raises:
+            AccountRefused: another has its name, or there are as many as there may be.
+        """
+        if any(one.name == token.name for one in self.tokens.values()):
+            raise AccountRefused(f"a token {token.name!r} is there; revoke it, or name another")
+        return self._with(tokens={**self.tokens, token_id: token})
+
+    def without_token(self, name: str) -> "Accounts":
+        """Return the accounts without a token, which counts no more.
+
+        Raises:
+            AccountRefused: there is none of that name.
+        """
+        kept = {key: one for key, one in self.tokens.items() if one.name != name}
+        if len(kept) == len(self.tokens):
+            known = ", ".join(sorted(one.name for one in self.tokens.values())) or "none"
+            raise AccountRefused(f"no token {name!r:.40}; there are: {known}")
+        return self._with(tokens=kept)
+
+    def _with(
+        self, users: dict[str, User] | None = None, tokens: dict[str, Token] | None = None
+    ) -> "Accounts":
+        for what, group, most in (
+            ("users", users or {}, MOST_USERS),
+            ("tokens", tokens or {}, MOST_TOKENS),
+        ):
+            if len(group) > most:
+                raise AccountRefused(f"{most} {what} are all that there may be; remove one")
+        return Accounts(
+            users=self.users if users is None else users,
+            tokens=self.tokens if tokens is None else tokens,
+        )
+
+
+def new_token(name: str, role: Role, now_s: float, lasts_s: float | None) -> tuple[str, str, Token]:
+    """Return a token's id, the text that counts as it and is stored nowhere, and what is stored.
+
+    Raises:
+        AccountRefused: the name is none.
+    """
+    _check_name(name)
+    token_id, secret = secrets.token_hex(_ID_BYTES), secrets.token_hex(_SECRET_BYTES)
+    token = Token(
+        name=name,
+        role=role,
+        digest=_digest(secret),
+        made_s=now_s,
+        expires_s=None if lasts_s is None else now_s + lasts_s,
+    )
+    return token_id, f"vla_{token_id}_{secret}", token
+
+
+def wall_s() -> float:
+    """Return the wall clock in seconds since 1970: what outlives a boot is dated by it."""
+    return datetime.now(UTC).timestamp()
+
+
+def _check_name(name: str) -> None:
+    if re.fullmatch(NAME_PATTERN, name) is None:
+        raise AccountRefused(
+            f"{name!r:.40}: expected a small letter, then up to 31 small letters, digits, _ or -"
+        )
+
+
+def _digest(secret: str) -> str:
+    return hashlib.sha256(secret.encode()).hexdigest()

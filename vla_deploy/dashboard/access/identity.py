@@ -1,0 +1,60 @@
+"""Say who asks, how that is known, and what they may do."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+
+class Role(StrEnum):
+    """Name what somebody may do; each may do what those before it may."""
+
+    ANYONE = "anyone"
+    """Whoever reaches the page: press stop, log in."""
+    VIEWER = "viewer"
+    """See everything: state, camera, map, logs, recordings."""
+    OPERATOR = "operator"
+    """Give commands, reset, arm, disarm, acknowledge, record."""
+    ADMIN = "admin"
+    """Change the profile, read the audit log."""
+
+    def allows(self, needed: "Role") -> bool:
+        """Tell whether this role may do what `needed` may."""
+        return _ORDER.index(self) >= _ORDER.index(needed)
+
+
+_ORDER: Final = tuple(Role)
+
+
+class Way(StrEnum):
+    """Name how somebody is known."""
+
+    NONE = "none"
+    LOOPBACK = "loopback"
+    SOCKET = "socket"
+    SESSION = "session"
+    TOKEN = "token"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """Describe who asks.
+
+    `user` is the name of an account, of a token, or of the way; `address` is where the connection
+    comes from. `csrf` is what a session's changes must repeat, and empty for other ways.
+    """
+
+    role: Role
+    user: str
+    way: Way
+    address: str
+    csrf: str = ""
+
+    @property
+    def source(self) -> str:
+        """Return the name that stop, commands and acts carry into the robot."""
+        return f"dashboard:{self.user}"
+
+
+def nobody(address: str) -> Identity:
+    """Return who asks where nothing is known of them."""
+    return Identity(role=Role.ANYONE, user="anyone", way=Way.NONE, address=address)
