@@ -10,6 +10,7 @@ from platforms.profile_source import Table
 PROCESSES: Final[tuple[str, ...]] = (
     "supervisor",
     "control",
+    "stop_door",
     "perception",
     "speech",
     "planner",

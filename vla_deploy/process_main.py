@@ -45,19 +45,22 @@ def main(
     arguments: Sequence[str] | None = None,
     run: Stepper = run_node,
     mendable: tuple[type[Exception], ...] = (),
+    adapts: bool = True,
 ) -> int:
     """Run one node until SIGTERM or SIGINT, and return the exit code of its process.
 
     The file `<run_dir>/ready/<name>` holds the pid while the node is started. `run` starts, steps
     and stops the node; one that does more than that beside the steps is given for it.
-    `mendable` are errors of this process that a person has to mend, beside those of all.
+    `mendable` are errors of this process that a person has to mend, beside those of all. One that
+    does not adapt runs alike under every profile, also under one that cannot be read.
     """
     context = _context(name, arguments)
     _name_process(name)
     stop_signals = _catch_stop_signals()
     with process_log(name, context.robot, context.run_dir):
         try:
-            node = _Announced(_adapting(name, build, context), context.run_dir / READY_DIR / name)
+            built = _adapting(name, build, context) if adapts else build(context)
+            node = _Announced(built, context.run_dir / READY_DIR / name)
             run(node, context.clock, lambda: bool(stop_signals))
         except CONFIGURATION_ERRORS + mendable as error:
             _log.error("%s", error)

@@ -7,7 +7,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.exit_codes import EXIT_CONFIGURATION
-from vla_deploy.supervisor.table import ProcessSpec
+from vla_deploy.supervisor.table import GivingUp, ProcessSpec
 
 ABORT_GRACE_NS = NS_PER_S
 """How long a process that hangs may take to write down where it hung, before it is killed."""
@@ -101,7 +101,7 @@ def reconcile(
         after[spec.name] = record
         if act is not None:
             actions.append((act, spec.name))
-        all_before_work &= _lets_others_go(record)
+        all_before_work &= _lets_others_go(spec, record)
     return after, tuple(actions)
 
 
@@ -144,9 +144,11 @@ def _end(
     return after, tuple(actions)
 
 
-def _lets_others_go(record: Record) -> bool:
-    """Tell whether those after it may start: not when it never worked at all."""
-    return record.state is State.READY or (record.state is State.GIVEN_UP and record.was_ready)
+def _lets_others_go(spec: ProcessSpec, record: Record) -> bool:
+    """Tell whether those after it may start: not when it never worked at all, unless they can do
+    without it."""
+    dispensable = record.was_ready or spec.giving_up is GivingUp.CARRY_ON
+    return record.state is State.READY or (record.state is State.GIVEN_UP and dispensable)
 
 
 def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, now_ns: int) -> Step:

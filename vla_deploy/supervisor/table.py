@@ -113,6 +113,16 @@ TABLE: tuple[ProcessSpec, ...] = (
         giving_up=GivingUp.END_RUN,
     ),
     ProcessSpec(
+        name="stop_door",
+        command=("-m", "vla_deploy.stop_door", *_NODE),
+        devices_command=_DEVICES,
+        with_previous=True,  # as long as control
+        ready_topic="stop_door_status",
+        ready_files=("ready/stop_door",),
+        watched=(Watched(topic="stop_door_status", silence_limit_s=5.0),),
+        giving_up=GivingUp.CARRY_ON,  # dashboard, voice, command line and hardware stop it as well
+    ),
+    ProcessSpec(
         name="perception",
         command=("-m", "vla_deploy.perception", *_NODE),
         devices_command=_DEVICES,

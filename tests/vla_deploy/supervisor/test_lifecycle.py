@@ -13,7 +13,7 @@ from vla_deploy.supervisor.lifecycle import (
     wind_down,
 )
 from vla_deploy.supervisor.predicates import twin_only
-from vla_deploy.supervisor.table import TABLE, ProcessSpec, RestartPolicy
+from vla_deploy.supervisor.table import TABLE, GivingUp, ProcessSpec, RestartPolicy
 
 S = 1_000_000_000
 POLICY = RestartPolicy(initial_s=1.0, factor=2.0, cap_s=5.0, window_s=100.0, max_restarts=4)
@@ -233,6 +233,7 @@ def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_
     assert [row.name for row in TABLE] == [
         "twin",
         "control",
+        "stop_door",
         "perception",
         "speech",
         "planner",
@@ -243,7 +244,7 @@ def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_
     assert [row.name for row in TABLE if row.when is twin_only] == ["twin"]
     assert all(row.ready_files or row.ready_topic for row in TABLE)
     together = [row.name for row in TABLE if row.with_previous]
-    assert together == ["speech", "planner", "executor", "recorder", "dashboard"]
+    assert together == ["stop_door", "speech", "planner", "executor", "recorder", "dashboard"]
 
 
 def test_a_ready_process_that_falls_silent_is_aborted_and_started_again_with_that_reason():
@@ -345,6 +346,12 @@ def test_a_change_of_mind_does_not_revive_what_was_given_up():
     play.step(unwanted="a")
     play.step()
     assert (play.state("a"), play.records["a"].reason) == (State.GIVEN_UP, "exit code 1")
+
+
+def test_what_all_can_do_without_holds_nobody_back_once_it_is_given_up():
+    play = Play((replace(ROWS[0], giving_up=GivingUp.CARRY_ON), ROWS[1]))
+    play.records["a"] = Record(state=State.GIVEN_UP, reason="exit code 2")
+    assert play.step(a=Seen(exit_code=2)) == [(Act.SPAWN, "b")]
 
 
 def test_nothing_is_started_after_one_that_was_given_up_before_it_ever_worked():
