@@ -4,33 +4,22 @@ import argparse
 import json
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.dashboard.acts import REACHED, Status, why_not
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.supervisor.runtime import default_base, running
 
 WAIT_S = 5.0
 
-Reached = Callable[[Mapping[str, Any]], bool]
-
-ACTS: Mapping[str, Reached] = {
-    "estop": lambda status: bool(status["estop_latched"]),
-    "reset": lambda status: (
-        status["state"] in ("disarmed", "armed", "protective_stop") and not status["estop_latched"]
-    ),
-    "arm": lambda status: status["state"] == "armed",
-    "disarm": lambda status: status["state"] == "disarmed",
-}
-
-
 def register(commands: Any) -> None:
     """Add the commands."""
-    for act in ACTS:
+    for act in REACHED:
         command = add_top_command(commands, act, f"  vla-deploy {act}\n")
         command.add_argument("--reason", default="", help="why, for the log")
         command.add_argument("--json", action="store_true", help="print control's status as JSON")
@@ -53,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     session = attach(arguments.runtime_base)
     session.operate(arguments.act, arguments.reason)
-    status = _wait(session, ACTS[arguments.act])
+    status = _wait(session, REACHED[arguments.act])
     if arguments.json:
         print(json.dumps(status, indent=2))
     else:
@@ -61,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _wait(session: Session, reached: Reached) -> dict[str, Any]:
+def _wait(session: Session, reached: Callable[[Status], bool]) -> dict[str, Any]:
     end_ns = session.clock.now_ns() + round(WAIT_S * NS_PER_S)
     status = None
     while session.clock.now_ns() < end_ns:
@@ -69,12 +58,7 @@ def _wait(session: Session, reached: Reached) -> dict[str, Any]:
         if status is not None and reached(status):
             return status
         session.pause()
-    if status is None:
-        raise CommandFailed("control does not answer; see: vla-deploy status")
-    raise CommandFailed(
-        f"control is still {status['state']}: "
-        f"{status['detail'] or status['cause'] or 'no reason given'}"
-    )
+    raise CommandFailed(f"{why_not(status)}; see: vla-deploy status")
 
 
 def run_stop(arguments: argparse.Namespace) -> int:

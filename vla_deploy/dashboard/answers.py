@@ -29,7 +29,7 @@ def add_error_answers(app: FastAPI) -> None:
     """Answer what the routes raise."""
     app.add_exception_handler(Refused, _refused)
     app.add_exception_handler(RequestValidationError, _invalid)
-    app.add_exception_handler(BadPayload, _too_long)
+    app.add_exception_handler(BadPayload, _unfit)
     app.add_exception_handler(IpcError, _unreachable)
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(Exception, _broken)
@@ -48,9 +48,9 @@ async def _invalid(_: Request, error: Any) -> JSONResponse:
     )
 
 
-async def _too_long(_: Request, error: Any) -> JSONResponse:
+async def _unfit(_: Request, error: Any) -> JSONResponse:
     return error_answer(
-        HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too_long", str(error), "send less at once"
+        HTTPStatus.UNPROCESSABLE_ENTITY, "unfit", str(error), "send plain text, and less of it"
     )
 
 

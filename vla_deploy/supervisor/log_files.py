@@ -1,6 +1,7 @@
 """Read the log files of a run, while it goes on or after its end."""
 
 import json
+import logging
 import os
 from collections import deque
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ OUTPUT_SUFFIX = ".out"
 """What a process and its libraries write past the log: crashes of the interpreter, warnings."""
 LOG_SUFFIX = ".log"
 _OLDER_SUFFIX = ".log.1"
+_BLOCK_BYTES = 65_536
 
 LogLine = dict[str, Any]
 
@@ -24,6 +26,39 @@ def read_log(folder: Path, process: str) -> list[LogLine]:
             text = path.read_text(encoding="utf-8", errors="replace")
             lines.extend(_parsed(text.splitlines()))
     return lines
+
+
+def newest_lines(
+    folder: Path, process: str, limit: int, least_level: int, before_ns: int | None = None
+) -> list[LogLine]:
+    """Return the newest lines of at least a level, the newest first; `before_ns` bounds stamps.
+
+    The files are read from their ends, so that the newest lines of a long log cost little.
+    """
+    levels = logging.getLevelNamesMapping()
+    found: list[LogLine] = []
+    for suffix in (LOG_SUFFIX, _OLDER_SUFFIX):
+        path = folder / f"{process}{suffix}"
+        for line in _backwards(path) if path.is_file() else ():
+            is_old = before_ns is None or int(line["stamp_ns"]) < before_ns
+            if is_old and levels.get(str(line["level"]), logging.CRITICAL) >= least_level:
+                found.append(line)
+                if len(found) == limit:
+                    return found
+    return found
+
+
+def _backwards(path: Path) -> Iterator[LogLine]:
+    """Yield the lines of a file, the last first."""
+    with path.open("rb") as log:
+        offset, rest = log.seek(0, os.SEEK_END), b""
+        while offset > 0:
+            block = min(offset, _BLOCK_BYTES)
+            offset -= block
+            log.seek(offset)
+            rest, *whole = (log.read(block) + rest).split(b"\n")
+            yield from _parsed([line.decode(errors="replace") for line in reversed(whole)])
+        yield from _parsed([rest.decode(errors="replace")])
 
 
 def processes_in(folder: Path) -> list[str]:

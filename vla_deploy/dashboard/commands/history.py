@@ -1,0 +1,135 @@
+"""Remember the commands of every source and what became of them, for pages that come later."""
+
+import logging
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S
+from vla_deploy.dashboard.commands.record import CommandRecord, Kind, record_of
+from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.ipc import Event
+from vla_deploy.planning.following import ANSWER_TIMEOUT_S, Following
+
+MOST_COMMANDS: Final = 200
+_JUDGE_PERIOD_NS: Final = NS_PER_S // 2
+_UNKNOWN: Final = "unknown"
+_UNANSWERED: Final = (
+    f"lost: no answer from planner or executor within {ANSWER_TIMEOUT_S:g} s, the command is not "
+    "carried out; see the state of both, and stop the robot if it moves"
+)
+_log = logging.getLogger(__name__)
+
+
+class CommandHistory:
+    """Read the rings of commands and their events; what is still in them at the start counts.
+
+    A command that nobody works on any more ends here as `lost`: no command stays open for ever.
+    """
+
+    def __init__(self, link: RobotLink, wall_ns: Callable[[], int]) -> None:
+        self._link = link
+        self._wall_ns = wall_ns
+        self._utterances = link.events("utterance", from_start=True)
+        self._events = link.events("task_event", from_start=True)
+        self._records: OrderedDict[str, CommandRecord] = OrderedDict()
+        self._open: dict[str, Following] = {}
+        self._lost = 0
+        self._judge_due_ns = 0
+
+    def step(self) -> None:
+        """Take what is new, and look now and then for commands that nobody works on."""
+        now_ns = self._link.clock.now_ns()
+        is_due = now_ns >= self._judge_due_ns
+        reasons = self._reasons() if is_due else {}
+        for event in self._utterances.drain():
+            self._hear(event)
+        for event in self._events.drain():
+            self._note(event)
+        self._note_lost()
+        if is_due:
+            self._judge_due_ns = now_ns + _JUDGE_PERIOD_NS
+            self._end_lost(reasons)
+
+    def stop(self) -> None:
+        """Forget the rings."""
+        self._utterances.close()
+        self._events.close()
+
+    def find(self, command_id: str) -> CommandRecord | None:
+        """Return a command; None when it was never given, or is long forgotten."""
+        self.step()
+        return self._records.get(command_id)
+
+    def newest(self, limit: int) -> list[CommandRecord]:
+        """Return the newest commands, the newest first."""
+        self.step()
+        return list(reversed(self._records.values()))[:limit]
+
+    def _hear(self, event: Event) -> None:
+        record = record_of(event.payload, self._wall_s(event.stamp_ns))
+        self._keep(record)
+        if record.kind is not Kind.CANCEL:
+            link = self._link
+            self._open[record.command_id] = Following(
+                record.command_id,
+                planner=lambda: link.fresh("planner_status", age_limit_s=2.0),
+                executor=lambda: link.fresh("executor_status", age_limit_s=1.0),
+                clock=link.clock,
+            )
+
+    def _keep(self, record: CommandRecord) -> None:
+        self._records[record.command_id] = record
+        while len(self._records) > MOST_COMMANDS:
+            forgotten, _ = self._records.popitem(last=False)
+            self._open.pop(forgotten, None)
+
+    def _note(self, event: Event) -> None:
+        told, at_s = event.payload, self._wall_s(event.stamp_ns)
+        command_id = str(told.get("command_id", ""))
+        if command_id not in self._records:  # its words were pushed out of the ring unread
+            self._keep(CommandRecord(command_id=command_id, source=_UNKNOWN, given_s=at_s))
+        following = self._open.get(command_id)
+        if following is not None:
+            list(following.take([told]))
+        self._finish(command_id, told, at_s)
+
+    def _finish(self, command_id: str, told: dict[str, Any], at_s: float) -> None:
+        record = self._records[command_id]
+        record.note(told, at_s)
+        if record.standing.is_final:
+            self._open.pop(command_id, None)
+
+    def _note_lost(self) -> None:
+        lost = self._events.lost + self._events.torn
+        for command_id in self._open if lost > self._lost else ():
+            self._records[command_id].lost_events += lost - self._lost
+        if lost > self._lost:
+            _log.warning("%d events of commands were lost: too many at once", lost - self._lost)
+        self._lost = lost
+
+    def _reasons(self) -> dict[str, str]:
+        """Say who works on which command no more: before the drain, which may hold its end."""
+        return {name: following.why_lost() for name, following in self._open.items()}
+
+    def _end_lost(self, reasons: dict[str, str]) -> None:
+        now_s = self._wall_ns() / NS_PER_S
+        for command_id, following in list(self._open.items()):
+            last = following.conclude(reasons.get(command_id, ""))
+            if last is None and following.is_unanswered:
+                last = _unanswered(command_id)
+            if last is not None:
+                self._finish(command_id, last, now_s)
+
+    def _wall_s(self, stamp_ns: int) -> float:
+        return (self._wall_ns() - self._link.clock.now_ns() + stamp_ns) / NS_PER_S
+
+
+def _unanswered(command_id: str) -> dict[str, Any]:
+    return {
+        "command_id": command_id,
+        "event": "finished",
+        "success": False,
+        "error": _UNANSWERED,
+        "actions": [],
+    }

@@ -1,0 +1,140 @@
+"""Remember one command: who gave it, what became of it, how it stands."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, Final
+
+from vla_deploy.planning.following import Event
+
+MOST_EVENTS: Final = 400
+_CANCELLED: Final = "cancelled on request"
+
+
+class Kind(StrEnum):
+    """Name what an utterance is."""
+
+    COMMAND = "command"
+    ANSWER = "answer"
+    CANCEL = "cancel"
+
+
+class Standing(StrEnum):
+    """Name how a command stands; the last six are final."""
+
+    GIVEN = "given"
+    QUEUED = "queued"
+    PLANNING = "planning"
+    ASKED = "asked"
+    ACTIVE = "active"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    REJECTED = "rejected"
+    ANSWERED = "answered"
+    LOST = "lost"
+
+    @property
+    def is_final(self) -> bool:
+        """Tell whether nothing more comes."""
+        return self in _FINAL
+
+
+_FINAL: Final = frozenset(
+    {
+        Standing.SUCCEEDED,
+        Standing.FAILED,
+        Standing.CANCELLED,
+        Standing.REJECTED,
+        Standing.ANSWERED,
+        Standing.LOST,
+    }
+)
+_AFTER: Final[Mapping[str, Standing]] = {
+    "queued": Standing.QUEUED,
+    "planning": Standing.PLANNING,
+    "asked": Standing.ASKED,
+    "answered": Standing.ANSWERED,
+    "accepted": Standing.ACTIVE,
+    "plan": Standing.ACTIVE,
+    "action": Standing.ACTIVE,
+}
+
+
+def _finished(event: Event) -> Standing:
+    error = str(event.get("error") or "")
+    if event.get("success"):
+        return Standing.SUCCEEDED
+    if error.startswith("lost"):
+        return Standing.LOST
+    return Standing.CANCELLED if error.endswith(_CANCELLED) else Standing.FAILED
+
+
+def _rejected(event: Event) -> Standing:
+    return Standing.CANCELLED if event.get("reason") == _CANCELLED else Standing.REJECTED
+
+
+_JUDGED: Final[Mapping[str, Callable[[Event], Standing]]] = {
+    "finished": _finished,
+    "rejected": _rejected,
+}
+
+
+@dataclass(slots=True, kw_only=True)
+class CommandRecord:
+    """Hold one command; of its events the newest `MOST_EVENTS` are kept.
+
+    `given_s` and each event's `at_s` are Unix seconds. `lost_events` were pushed out before anybody
+    could read them, or by newer ones.
+    """
+
+    command_id: str
+    source: str
+    kind: Kind = Kind.COMMAND
+    text: str = ""
+    plan: Any = None
+    given_s: float
+    standing: Standing = Standing.GIVEN
+    lost_events: int = 0
+    events: deque[Event] = field(default_factory=deque)
+
+    def note(self, event: Event, at_s: float) -> None:
+        """Add an event, and judge by it how the command stands."""
+        name = str(event.get("event"))
+        judge = _JUDGED.get(name)
+        self.standing = judge(event) if judge else _AFTER.get(name, self.standing)
+        self.events.append(event | {"at_s": round(at_s, 3)})
+        if len(self.events) > MOST_EVENTS:
+            self.events.popleft()
+            self.lost_events += 1
+
+    def document(self) -> dict[str, Any]:
+        """Return it as JSON."""
+        return {
+            "command_id": self.command_id,
+            "source": self.source,
+            "kind": self.kind.value,
+            "text": self.text,
+            "plan": self.plan,
+            "given_s": round(self.given_s, 3),
+            "state": self.standing.value,
+            "is_final": self.standing.is_final,
+            "lost_events": self.lost_events,
+            "events": list(self.events),
+        }
+
+
+def record_of(utterance: Mapping[str, Any], given_s: float) -> CommandRecord:
+    """Return the record of what was said to the planner."""
+    kind = Kind.COMMAND
+    for word in (Kind.ANSWER, Kind.CANCEL):
+        kind = word if utterance.get(word.value) else kind
+    return CommandRecord(
+        command_id=str(utterance.get("command_id", "")),
+        source=str(utterance.get("source", "")),
+        kind=kind,
+        text=str(utterance.get("text", "")),
+        plan=utterance.get("plan"),
+        given_s=given_s,
+    )

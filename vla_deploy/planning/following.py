@@ -1,0 +1,150 @@
+"""Follow commands to their end, which may be that nobody is left to plan or carry them out."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.ipc import Sample
+from vla_deploy.planning.plan import ActionStatus
+
+ANSWER_TIMEOUT_S: Final = 5.0
+SILENCE_LIMIT_S: Final = 5.0
+LAST_EVENTS: Final = frozenset({"finished", "rejected"})
+_UNFINISHED: Final = frozenset({ActionStatus.PENDING.value, ActionStatus.ACTIVE.value})
+
+Event = dict[str, Any]
+Newest = Callable[[], Sample | None]
+
+
+class Following:
+    """Follow one command, look by look.
+
+    A look asks `why_lost` first, takes the new events, and concludes: what has ended a command may
+    be told at the moment in which its process ends. An answer to a question is followed on as the
+    command that asked.
+    """
+
+    def __init__(self, command_id: str, planner: Newest, executor: Newest, clock: Clock) -> None:
+        """Begin now; `planner` and `executor` return their status while that is young."""
+        self.command_id = command_id
+        self.is_answered = False
+        self.has_ended = False
+        self._planner = planner
+        self._executor = executor
+        self._clock = clock
+        self._watch = Watch("planner", in_planner(command_id), planner, clock)
+        self._actions: dict[str, Event] = {}
+        self._answer_by_ns = clock.now_ns() + round(ANSWER_TIMEOUT_S * NS_PER_S)
+
+    @property
+    def is_unanswered(self) -> bool:
+        """Tell whether nobody has answered in time."""
+        return not self.is_answered and self._clock.now_ns() > self._answer_by_ns
+
+    def why_lost(self) -> str:
+        """Return why nobody works on the command, or "" while somebody may."""
+        return self._watch.why_lost() if self.is_answered else ""
+
+    def take(self, events: Iterable[Event]) -> Iterator[Event]:
+        """Yield those that are the command's, up to its last one."""
+        for event in events:
+            if self.has_ended or event.get("command_id") != self.command_id:
+                continue
+            self._note(event)
+            yield event
+
+    def conclude(self, why: str) -> Event | None:
+        """Return the last event of a command that is lost, unless it has ended meanwhile."""
+        if self.has_ended or not why:
+            return None
+        self.has_ended = True
+        return lost(self.command_id, why, self._actions)
+
+    def _note(self, event: Event) -> None:
+        self.is_answered = True
+        self.has_ended = event["event"] in LAST_EVENTS
+        _note_action(self._actions, event)
+        if event["event"] == "answered":
+            self.command_id = str(event["of"])
+            self._watch = Watch(
+                "planner", in_planner(self.command_id), self._planner, self._clock
+            )
+        if event["event"] == "plan":
+            has_it = in_executor(self.command_id)
+            self._watch = Watch("executor", has_it, self._executor, self._clock)
+
+
+def in_planner(command_id: str) -> Callable[[Event], bool]:
+    """Return what tells whether a planner's status names a command."""
+    return lambda status: command_id in status.get("commands", ())
+
+
+def in_executor(command_id: str) -> Callable[[Event], bool]:
+    """Return what tells whether an executor's status names a command."""
+    return lambda status: status["command_id"] == command_id
+
+
+class Watch:
+    """Judge by a process' status whether it still works on a command."""
+
+    def __init__(
+        self, who: str, has_it: Callable[[Event], bool], status: Newest, clock: Clock
+    ) -> None:
+        self._who = who
+        self._has_it = has_it
+        self._status = status
+        self._clock = clock
+        self._pid: int | None = None
+        self._seen_ns: int | None = None
+
+    def why_lost(self) -> str:
+        """Return why nobody works on the command, or "" while somebody may."""
+        now_ns = self._clock.now_ns()
+        sample = self._status()
+        if self._seen_ns is None:
+            self._seen_ns = now_ns
+        if sample is not None and self._has_it(sample.document()):
+            self._pid, self._seen_ns = sample.writer_pid, now_ns
+        if sample is not None and self._pid not in (None, sample.writer_pid):
+            return f"the {self._who} ended while it had the command, and was started again"
+        if now_ns - self._seen_ns > SILENCE_LIMIT_S * NS_PER_S:
+            return f"the {self._who} has not spoken of the command for {SILENCE_LIMIT_S:g} s"
+        return ""
+
+
+def lost(command_id: str, why: str, actions: Mapping[str, Event]) -> Event:
+    """Return the last event of a command that nobody carries out any more."""
+    told = [
+        action | {"status": ActionStatus.LOST.value} if action["status"] in _UNFINISHED else action
+        for action in actions.values()
+    ]
+    return {
+        "command_id": command_id,
+        "event": "finished",
+        "success": False,
+        "error": f"lost: {why}; look where the robot is, then give the command again",
+        "actions": told,
+    }
+
+
+def _note_action(actions: dict[str, Event], event: Event) -> None:
+    """Keep the newest word about every action, in the form of the `finished` event."""
+    if event["event"] == "plan":
+        actions.update({action["id"]: _pending(action) for action in event["plan"]["actions"]})
+    if event["event"] == "action":
+        told = {key: value for key, value in event.items() if key not in ("command_id", "event")}
+        identity = told.pop("action_id")
+        actions[identity] = {"id": identity} | told
+
+
+def _pending(action: Event) -> Event:
+    return {
+        "id": action["id"],
+        "skill": action["skill"],
+        "parameters": action["parameters"],
+        "status": ActionStatus.PENDING.value,
+        "execution_time_s": 0.0,
+        "error": None,
+        "retries": 0,
+        "note": None,
+    }
