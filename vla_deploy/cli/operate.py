@@ -17,6 +17,7 @@ from vla_deploy.supervisor.runtime import default_base, running
 
 WAIT_S = 5.0
 
+
 def register(commands: Any) -> None:
     """Add the commands."""
     for act in REACHED:

@@ -1,9 +1,12 @@
 """Declare what works in the dashboard beside its requests, stepped in the event loop."""
 
+import time
 from collections.abc import Callable
 from typing import Final, Protocol
 
 from fastapi import FastAPI
+
+from vla_deploy.dashboard.commands.history import CommandHistory
 
 
 class Part(Protocol):
@@ -18,6 +21,12 @@ class Part(Protocol):
         ...
 
 
+def _commands(app: FastAPI) -> Part:
+    app.state.commands = CommandHistory(app.state.link, time.time_ns)
+    part: Part = app.state.commands
+    return part
+
+
 # Each is made with the app, finds `link` and `settings` in its state, and puts there what routes
 # want to find.
-PARTS: Final[tuple[Callable[[FastAPI], Part], ...]] = ()
+PARTS: Final[tuple[Callable[[FastAPI], Part], ...]] = (_commands,)

@@ -5,11 +5,18 @@ from typing import Final
 from fastapi import APIRouter
 
 from vla_deploy.dashboard import page
-from vla_deploy.dashboard.api import state
+from vla_deploy.dashboard.api import commands, files, logs, operate, profile, state
 
 API_PREFIX: Final = "/api/v1"
 
 # Below the prefix.
-API_ROUTERS: Final[tuple[APIRouter, ...]] = (state.router,)
+API_ROUTERS: Final[tuple[APIRouter, ...]] = (
+    state.router,
+    commands.router,
+    operate.router,
+    profile.router,
+    files.router,
+    logs.router,
+)
 # At the root: the page, and what has its place by convention.
 ROOT_ROUTERS: Final[tuple[APIRouter, ...]] = (page.router, state.health)

@@ -66,9 +66,7 @@ class Following:
         _note_action(self._actions, event)
         if event["event"] == "answered":
             self.command_id = str(event["of"])
-            self._watch = Watch(
-                "planner", in_planner(self.command_id), self._planner, self._clock
-            )
+            self._watch = Watch("planner", in_planner(self.command_id), self._planner, self._clock)
         if event["event"] == "plan":
             has_it = in_executor(self.command_id)
             self._watch = Watch("executor", has_it, self._executor, self._clock)

@@ -1,0 +1,47 @@
+"""The profile in force, those that there are, their differences, and a switch."""
+
+import pytest
+
+
+@pytest.fixture
+def on_desktop(dashboard):
+    dashboard.robot.shows("profile_status", profile="desktop", phase="", target="", last={})
+    return dashboard
+
+
+def test_the_profiles_of_this_computer_are_told(on_desktop):
+    told = on_desktop.get("profile")
+    assert told["current"]["profile"] == "desktop"
+    names = [one["name"] for one in told["available"]]
+    assert "jetson_thor" in names
+    assert not any(name.endswith("base") for name in names)
+    assert told["detected"]["why"]
+
+
+def test_a_difference_names_what_would_change(on_desktop):
+    keys = on_desktop.get("profile/jetson_thor/difference")["keys"]
+    assert keys["board.cpu_count"] == {"current": 4, "wanted": 12}
+    assert on_desktop.get("profile/desktop/difference")["keys"] == {}
+
+
+def test_without_a_supervisor_nothing_is_compared(dashboard):
+    assert dashboard.get("profile/desktop/difference", status=503)["error"]["code"] == "no_profile"
+
+
+def test_a_switch_asks_the_supervisor(on_desktop):
+    wanted = {"name": "jetson_thor", "may_restart": True}
+    request_id = on_desktop.post("profile", body=wanted)["request_id"]
+    assert on_desktop.robot.hears("profile_request") == [
+        {
+            "request_id": request_id,
+            "profile": "jetson_thor",
+            "allow_restart": True,
+            "dry_run": False,
+        }
+    ]
+
+
+@pytest.mark.parametrize("name", ["nowhere", "base", "/etc/passwd.toml", "../profiles/desktop", ""])
+def test_only_shipped_profiles_have_names(on_desktop, name):
+    on_desktop.post("profile", status=404, body={"name": name})
+    assert on_desktop.robot.hears("profile_request") == []

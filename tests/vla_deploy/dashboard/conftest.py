@@ -1,0 +1,106 @@
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+from starlette.testclient import TestClient
+
+from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.dashboard.access import Access, AccessRules
+from vla_deploy.dashboard.access.accounts_file import AccountsFile
+from vla_deploy.dashboard.app import create_app
+from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.ipc import RingReader, SharedSpace
+
+
+class HandClock:
+    """Time passes when a test says so."""
+
+    def __init__(self) -> None:
+        self.time_ns = 1000 * NS_PER_S
+
+    def now_ns(self) -> int:
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        self.time_ns = max(self.time_ns, deadline_ns)
+
+    def pass_s(self, seconds: float) -> None:
+        self.time_ns += round(seconds * NS_PER_S)
+
+    def wall_ns(self) -> int:
+        return self.time_ns + 1_800_000_000 * NS_PER_S
+
+
+@dataclass
+class RobotProcesses:
+    """Play the processes at the other end of shared memory."""
+
+    space: SharedSpace
+    _readers: dict[str, RingReader] = field(default_factory=dict)
+
+    def hears(self, topic: str) -> list[dict[str, Any]]:
+        """Return what came on a ring since the last call."""
+        if topic not in self._readers:
+            self._readers[topic] = self.space.ring_reader(topic, from_start=True)
+        return [event.payload for event in self._readers[topic].drain()]
+
+    def tells(self, command_id: str, event: str, **details: Any) -> None:
+        ring = self.space.ring_writer("task_event")
+        ring.publish({"command_id": command_id, "event": event} | details)
+
+    def shows(self, topic: str, **document: Any) -> None:
+        self.space.cell_writer(topic).put_document(document)
+
+    def control_is(self, state: str, **changes: Any) -> None:
+        status = {"state": state, "estop_latched": False, "cause": "", "detail": ""}
+        self.shows("control_status", **(status | changes))
+
+
+@dataclass
+class Dashboard:
+    """An application over the shared memory of a run, asked from loopback."""
+
+    app: FastAPI
+    client: TestClient
+    robot: RobotProcesses
+    link: RobotLink
+    base: Path
+
+    def get(self, path: str, status: int = 200, **parameters: Any) -> Any:
+        answer = self.client.get(f"/api/v1/{path}", params=parameters)
+        assert answer.status_code == status, answer.text
+        return answer.json()
+
+    def post(self, path: str, status: int = 202, body: Any = None) -> Any:
+        answer = self.client.post(f"/api/v1/{path}", json=body)
+        assert answer.status_code == status, answer.text
+        return answer.json()
+
+
+@pytest.fixture
+def hand_clock() -> HandClock:
+    return HandClock()
+
+
+@pytest.fixture
+def dashboard(tmp_path: Path) -> Iterator[Dashboard]:
+    base = tmp_path / "base"
+    run_dir = base / "20260101-000000-1"
+    (run_dir / "logs").mkdir(parents=True)
+    clock = MonotonicClock()
+    accounts = AccountsFile(tmp_path / "access" / "accounts.json")
+    access = Access(AccessRules(), accounts, clock, now_s=time.monotonic)
+    link = RobotLink(run_dir, clock)
+    app = create_app(link, DashboardSettings(), access)
+    client = TestClient(app, "http://127.0.0.1:8088", client=("127.0.0.1", 50_000))
+    robot = RobotProcesses(SharedSpace(run_dir / "ipc", clock))
+    yield Dashboard(app, client, robot, link, base)
+    for part in app.state.parts:
+        part.stop()
+    robot.space.close()
+    link.close()
