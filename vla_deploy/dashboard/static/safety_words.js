@@ -1,6 +1,6 @@
 /** Say control's state in words, and how grave it is. */
 
-import { sentence, significant, words } from "./format.js";
+import { sentence, words } from "./format.js";
 
 const STATES = {
   armed: { title: "Armed", tone: "ok", icon: "check", means: "Ready: motors are under control." },
@@ -83,16 +83,35 @@ export function boundsWords(control) {
   return lines;
 }
 
-/** Return "measured 1.23, limit 0.8", or "" where a cause has no numbers. */
-export function numbersWords({ measured, limit }) {
-  const known = [
-    ["measured", measured],
-    ["limit", limit],
-  ].filter(([, value]) => value !== null && value !== undefined);
-  return known.map(([name, value]) => `${name} ${significant(value)}`).join(", ");
-}
-
 function slowed(control, state) {
   if (control.state !== "armed" || !control.cause) return {};
   return { tone: "warn", icon: "alert", means: boundsWords(control).join(". ") || state.means };
+}
+
+// Units of `measured` and `limit`; a cause that is not here has numbers without one, or none.
+const UNITS = {
+  standstill_motion: "rad/s",
+  servo_bus_lost: "s",
+  can_bus_lost: "s",
+  joint_velocity_limit: "rad/s",
+  wheel_following_error: "rad/s",
+  joint_current_limit: "of stall current",
+  joint_temperature_limit: "°C",
+  supervisor_lost: "s",
+  joint_voltage_limit: "V",
+  self_collision: "m",
+  environment_collision: "m",
+  workspace: "m",
+  stale_scan: "s",
+  stale_command: "s",
+  keep_out_zone: "m",
+  obstacle_stop_zone: "m",
+  obstacle_slow_zone: "m",
+  obstacle_limit_zone: "m",
+  obstacle_approach: "m",
+};
+
+/** Return the unit of a cause's numbers, or "". */
+export function unitOf(cause) {
+  return UNITS[cause] ?? "";
 }

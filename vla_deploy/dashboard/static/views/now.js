@@ -1,15 +1,26 @@
-/** Show in one glance whether the robot may move, and if not, why. */
+/** Show in one glance whether the robot may move, if not why, and what it does. */
 
-import { useTopic } from "../following.js";
-import { Card } from "../parts.js";
-import { safetyWords } from "../safety_words.js";
+import { AlarmsCard } from "../now/alarms_card.js";
+import { PlaceCard, SensesCard } from "../now/place_card.js";
+import { PowerCard } from "../now/power_card.js";
+import { ProcessesCard } from "../now/processes_card.js";
+import { SafetyCard } from "../now/safety_card.js";
+import { WorkCard } from "../now/work_card.js";
 import { html } from "../ui.js";
 
 export function View() {
-  const { data, stale, age_s } = useTopic("control_status");
-  const told = safetyWords(data, stale);
   return html`
-    <div class="view-head"><h1>Now</h1></div>
-    <${Card} title=${told.title} stale=${stale} age_s=${age_s}>${told.cause || told.means}<//>
+    <h1 class="out-of-sight">Now</h1>
+    <div class="now">
+      <${SafetyCard} />
+      <div class="grid">
+        <${WorkCard} />
+        <${AlarmsCard} />
+        <${PowerCard} />
+        <${PlaceCard} />
+        <${SensesCard} />
+        <${ProcessesCard} />
+      </div>
+    </div>
   `;
 }

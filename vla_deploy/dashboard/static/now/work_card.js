@@ -1,0 +1,48 @@
+/** Say what the robot does now: the command, its action, what the hands hold. */
+
+import { openCommand, useCommands } from "../command/store.js";
+import { STATES } from "../command/story.js";
+import { Timeline } from "../command/timeline.js";
+import { words } from "../format.js";
+import { useTopic } from "../following.js";
+import { Badge, Card, Empty } from "../parts.js";
+import { html } from "../ui.js";
+
+export function WorkCard() {
+  const { data, stale, age_s } = useTopic("executor_status");
+  const commands = useCommands();
+  const command = openCommand(commands) ?? commands[0];
+  const link = html`<a class="button" data-kind="plain" href="#/command">Command</a>`;
+  return html`
+    <${Card} title="Work" note=${data && !stale ? words(data.skill ?? data.state) : ""} stale=${stale} age_s=${age_s} actions=${link} span="2">
+      <div class="stack">
+        ${command ? html`<${Work} command=${command} />` : html`<${Empty} icon="speech">No command in this run yet.<//>`}
+        ${data && html`<${Hands} holding=${data.holding} />`}
+      </div>
+    <//>
+  `;
+}
+
+function Work({ command }) {
+  const { story } = command;
+  const { text, tone, icon } = STATES[story.state];
+  return html`
+    <p class="row">
+      <span class="said-words grow">${command.text || story.plan?.goal || "A plan as JSON"}</span>
+      <${Badge} tone=${tone} icon=${icon}>${text}<//>
+    </p>
+    ${story.asked && html`<p><strong>${story.asked.question}</strong> <a href="#/command">Answer</a></p>`}
+    ${story.why && story.state !== "done" && html`<p class="step-why">${story.why}</p>`}
+    <${Timeline} actions=${story.actions} />
+  `;
+}
+
+function Hands({ holding }) {
+  const held = Object.entries(holding ?? {});
+  if (!held.length) return null;
+  return html`
+    <dl class="pairs">
+      ${held.map(([hand, what]) => html`<div key=${hand}><dt>${words(hand)}</dt><dd>${what ? `holds ${words(what)}` : "empty"}</dd></div>`)}
+    </dl>
+  `;
+}

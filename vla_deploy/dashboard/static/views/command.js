@@ -1,0 +1,35 @@
+/** Type or say a command, watch its plan, answer, cancel, look back. */
+
+import { CommandCard } from "../command/command_card.js";
+import { Composer } from "../command/composer.js";
+import { History } from "../command/history.js";
+import { openCommand, useCommands } from "../command/store.js";
+import { useTopic } from "../following.js";
+import { Notice } from "../parts.js";
+import { html, useState } from "../ui.js";
+
+export function View() {
+  const commands = useCommands();
+  const [chosen, setChosen] = useState(null);
+  const open = openCommand(commands);
+  const shown = commands.find((one) => one.command_id === chosen) ?? open ?? commands[0];
+  return html`
+    <div class="view-head"><h1>Command</h1></div>
+    <${Refusal} />
+    <div class="command-view">
+      <div class="stack">
+        <${Composer} />
+        ${shown && html`<${CommandCard} command=${shown} title=${shown === open ? "Under way" : "Command"} />`}
+      </div>
+      <${History} commands=${commands} chosen=${shown?.command_id} onChoose=${setChosen} />
+    </div>
+  `;
+}
+
+/** Say why no command is taken now, before one is given. */
+function Refusal() {
+  const table = useTopic("process_table").data;
+  const control = useTopic("control_status");
+  const why = table?.refusal || (!control.stale && control.data?.state !== "armed" && "The robot is not armed: see the view Now.");
+  return why ? html`<${Notice} tone="warn" icon="alert">No command is carried out now. ${why}<//>` : null;
+}
