@@ -58,6 +58,13 @@ export function clock(wall_s) {
   return today ? time : `${at.toLocaleDateString("en-GB", { day: "numeric", month: "short" })} ${time}`;
 }
 
+/** Return a time of day with milliseconds. */
+export function clockExact(wall_s) {
+  if (!Number.isFinite(wall_s)) return UNKNOWN;
+  const at = new Date(1000 * wall_s);
+  return `${at.toLocaleTimeString("en-GB")}.${String(at.getMilliseconds()).padStart(3, "0")}`;
+}
+
 /** Return a name of the robot's as words: "joint_current_limit" is "joint current limit". */
 export function words(name) {
   return String(name ?? "").replaceAll("_", " ");

@@ -66,7 +66,14 @@ function given({ data, stamp_s }) {
 
 function happened({ data }) {
   const known = find(data.command_id);
-  if (known) put(data.command_id, { events: [...known.events, data] });
+  if (!known) return ask(); // its words came before this page did
+  const isKnown = known.events.some((one) => isSame(one, data));
+  return isKnown ? undefined : put(data.command_id, { events: [...known.events, data] });
+}
+
+/** Tell whether two events are one: what was asked for carries the time besides. */
+function isSame({ at_s: _, ...asked }, event) {
+  return JSON.stringify(asked) === JSON.stringify(event);
 }
 
 function find(command_id) {
