@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 from vla_deploy.safety import Reaction
 
@@ -88,3 +89,6 @@ _WORDS = {
     Mode.PAUSING: "protective_stop",
     Mode.PAUSED: "protective_stop",
 }
+
+CONTROL_STATES: Final = (*dict.fromkeys(_WORDS.get(mode, mode.value) for mode in Mode), "fault")
+"""Every word that `status_name` has."""
