@@ -1,11 +1,12 @@
 /** Start the page: who are we, then what the robot tells. */
 
 import { Questions } from "./dialog.js";
-import { connect, disconnect } from "./live.js";
+import { connect, disconnect, subscribe } from "./live.js";
 import { Login } from "./login.js";
 import { Messages, tell } from "./messages.js";
 import { refresh, useSession } from "./session.js";
 import { Shell } from "./shell.js";
+import { saw } from "./stop.js";
 import { html, render, useEffect } from "./ui.js";
 
 const AGAIN_MS = 2_000;
@@ -29,4 +30,5 @@ async function begin() {
 
 render(html`<${Page} />`, document.getElementById("application"));
 render(html`<${Messages} />`, document.getElementById("messages"));
+subscribe("control_status", ({ data }) => saw(data));
 begin();
