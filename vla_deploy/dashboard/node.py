@@ -33,6 +33,7 @@ class DashboardNode:
         self.link = RobotLink(context.run_dir, context.clock)
         self.app: FastAPI
         self.doors: tuple[Door, ...] = ()
+        self._access: Access
         self._status: CellWriter
         self._due_ns = 0
         self._url = ""
@@ -50,8 +51,8 @@ class DashboardNode:
         unix = open_socket(self._context.run_dir / SOCKET_NAME)
         self.doors = (Door(TCP, tcp, settings.scheme == "https"), Door(UNIX, unix))
         self._status = self.link.space.cell_writer(STATUS_TOPIC)
-        access = Access.of_base(self._context.run_dir.parent, _rules(settings), self._clock)
-        self.app = create_app(self.link, settings, access)
+        self._access = Access.of_base(self._context.run_dir.parent, _rules(settings), self._clock)
+        self.app = create_app(self.link, settings, self._access)
         self._port = tcp.getsockname()[1]
         self._url = f"{settings.scheme}://{_reachable(settings.host)}:{self._port}"
 
@@ -71,6 +72,8 @@ class DashboardNode:
             part.stop()
         for door in self.doors:
             door.listener.close()
+        if self.doors:
+            self._access.close()
         self.link.close()
 
 

@@ -5,12 +5,14 @@ from typing import Final
 from fastapi import APIRouter
 
 from vla_deploy.dashboard import page
+from vla_deploy.dashboard.access import routes as access
 from vla_deploy.dashboard.api import commands, files, logs, operate, profile, state
 
 API_PREFIX: Final = "/api/v1"
 
 # Below the prefix.
 API_ROUTERS: Final[tuple[APIRouter, ...]] = (
+    access.router,
     state.router,
     commands.router,
     operate.router,

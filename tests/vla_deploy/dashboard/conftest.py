@@ -11,6 +11,8 @@ from starlette.testclient import TestClient
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.dashboard.access import Access, AccessRules
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
+from vla_deploy.dashboard.access.audit import AuditLog
+from vla_deploy.dashboard.access.audit_file import AuditFile
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.settings import DashboardSettings
@@ -94,7 +96,8 @@ def dashboard(tmp_path: Path) -> Iterator[Dashboard]:
     (run_dir / "logs").mkdir(parents=True)
     clock = MonotonicClock()
     accounts = AccountsFile(tmp_path / "access" / "accounts.json")
-    access = Access(AccessRules(), accounts, clock, now_s=time.monotonic)
+    audit = AuditLog(AuditFile(tmp_path / "access" / "audit.jsonl"), clock, now_s=time.monotonic)
+    access = Access(AccessRules(), accounts, audit, clock, now_s=time.monotonic)
     link = RobotLink(run_dir, clock)
     app = create_app(link, DashboardSettings(), access)
     client = TestClient(app, "http://127.0.0.1:8088", client=("127.0.0.1", 50_000))

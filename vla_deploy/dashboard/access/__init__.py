@@ -13,6 +13,7 @@ from vla_deploy.dashboard.access.requiring import (
     require,
 )
 from vla_deploy.dashboard.access.rules import AccessRules
+from vla_deploy.dashboard.access.witness import note
 
 __all__ = [
     "Access",
@@ -28,5 +29,6 @@ __all__ = [
     "Viewer",
     "Way",
     "guard",
+    "note",
     "require",
 ]

@@ -11,9 +11,11 @@ from typing import Final, Self
 from starlette.requests import cookie_parser
 
 from drivers.clock import Clock
+from vla_deploy.aside import background
 from vla_deploy.dashboard.access.accounts import Accounts, wall_s
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
 from vla_deploy.dashboard.access.asked import Asked
+from vla_deploy.dashboard.access.audit import AuditLog
 from vla_deploy.dashboard.access.errors import (
     AccountsAway,
     AccountsUnusable,
@@ -23,6 +25,7 @@ from vla_deploy.dashboard.access.errors import (
     TooMany,
 )
 from vla_deploy.dashboard.access.identity import Identity, Role, Way, nobody
+from vla_deploy.dashboard.access.logins import Logins
 from vla_deploy.dashboard.access.origin import (
     FORWARDED,
     check_host,
@@ -30,6 +33,7 @@ from vla_deploy.dashboard.access.origin import (
     host_name,
     is_loopback_name,
 )
+from vla_deploy.dashboard.access.passwords import DEFAULT_COST, Cost
 from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.access.rules import AccessRules
 from vla_deploy.dashboard.access.sessions import Sessions
@@ -50,14 +54,17 @@ class Access:
         self,
         rules: AccessRules,
         accounts: AccountsFile,
+        audit: AuditLog,
         clock: Clock,
         now_s: Callable[[], float] = wall_s,
+        cost: Cost = DEFAULT_COST,
     ) -> None:
         """Begin with nobody logged in; `now_s` is the wall clock, which tells tokens' ends."""
         self.rules = rules
         self.accounts = accounts
-        self.clock = clock
+        self.audit = audit
         self.sessions = Sessions(rules.session_idle_s, rules.session_longest_s, clock)
+        self.logins = Logins(accounts, self.sessions, clock, cost)
         self._now_s = now_s
         self._own_names = own_names() | {name.lower() for name in rules.hosts}
         self._acts = Buckets(rules.acts_hz, rules.acts_burst, clock)
@@ -66,7 +73,12 @@ class Access:
     @classmethod
     def of_base(cls, base: Path, rules: AccessRules, clock: Clock) -> Self:
         """Return the access to the robot that runs in a runtime directory."""
-        return cls(rules, AccountsFile.of_base(base), clock)
+        audit = AuditLog.of_base(base, clock, background())
+        return cls(rules, AccountsFile.of_base(base), audit, clock)
+
+    def close(self) -> None:
+        """Write what the audit log has not written yet."""
+        self.audit.close()
 
     def admit(self, asked: Asked) -> Identity:
         """Return who asks; whether that is enough, the route's `require` says.
@@ -166,7 +178,7 @@ class Access:
         )
 
     def _check_csrf(self, asked: Asked, identity: Identity) -> None:
-        if identity.way is not Way.SESSION:
+        if identity.way is not Way.SESSION or asked.is_login:
             return
         given, own = asked.first(CSRF_HEADER).encode(), identity.csrf.encode()
         if not hmac.compare_digest(given, own):

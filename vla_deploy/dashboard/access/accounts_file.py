@@ -1,7 +1,6 @@
 """Keep accounts in one file that only its owner may read; change it in turns."""
 
 import contextlib
-import fcntl
 import json
 import os
 import stat
@@ -15,11 +14,11 @@ from pydantic import ValidationError
 
 from vla_deploy.dashboard.access.accounts import Accounts
 from vla_deploy.dashboard.access.errors import AccountsUnusable
+from vla_deploy.dashboard.access.private_file import give, turn
 from vla_deploy.state_dir import access_dir_of
 
 FILE_NAME: Final = "accounts.json"
 _MOST_BYTES: Final = 2**20
-_MODE: Final = 0o600
 T = TypeVar("T")
 
 
@@ -61,7 +60,7 @@ class AccountsFile:
         Raises:
             AccountsUnusable: the file cannot be read or written; it is as it was.
         """
-        with self._told(), _turn(self.path):
+        with self._told(), turn(self.path.with_suffix(".lock")):
             accounts, told = act(self.read())
             _write(self.path, accounts)
             return told
@@ -97,35 +96,11 @@ def _parse(path: Path) -> Accounts:
         ) from None
 
 
-@contextmanager
-def _turn(path: Path) -> Iterator[None]:
-    """Hold the lock beside the file, which is replaced and so cannot be locked itself."""
-    _make_folder(path.parent)
-    lock = os.open(
-        path.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, _MODE
-    )
-    try:
-        _give(lock, path.parent)
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(lock)
-
-
-def _make_folder(folder: Path) -> None:
-    if folder.is_dir():
-        return
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    owner = folder.parent.stat()
-    if owner.st_uid != os.getuid():
-        os.chown(folder, owner.st_uid, owner.st_gid, follow_symlinks=False)
-
-
 def _write(path: Path, accounts: Accounts) -> None:
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=".accounts-")
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
-            _give(file.fileno(), path.parent)
+            give(file.fileno(), path.parent)
             file.write(json.dumps(accounts.model_dump(mode="json"), indent=1))
             file.flush()
             os.fsync(file.fileno())
@@ -134,10 +109,3 @@ def _write(path: Path, accounts: Accounts) -> None:
         with contextlib.suppress(FileNotFoundError):
             Path(name).unlink()
         raise
-
-
-def _give(handle: int, folder: Path) -> None:
-    """Leave a file that root writes to whom the folder belongs: the robot reads it."""
-    owner = folder.stat()
-    if os.getuid() == 0 and owner.st_uid != 0:
-        os.fchown(handle, owner.st_uid, owner.st_gid)

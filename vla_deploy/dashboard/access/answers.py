@@ -8,6 +8,7 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from vla_deploy.dashboard.access.errors import LoginNeeded, RequestRefused
+from vla_deploy.dashboard.access.witness import note_refusal
 
 _DENIAL = "websocket.http.response"
 _POLICY_VIOLATION = 1008
@@ -26,6 +27,7 @@ def response_of(refusal: RequestRefused) -> JSONResponse:
 
 async def refuse(refusal: RequestRefused, scope: Scope, receive: Receive, send: Send) -> None:
     """Answer a request, or deny the opening of a WebSocket."""
+    note_refusal(scope, refusal.code)
     if scope["type"] == "websocket":
         await _deny(refusal, WebSocket(scope, receive, send))
     else:
@@ -35,6 +37,7 @@ async def refuse(refusal: RequestRefused, scope: Scope, receive: Receive, send: 
 async def answer(connection: HTTPConnection, refusal: Exception) -> JSONResponse:
     """Return the response to a refusal that a route raised; a WebSocket is denied here."""
     assert isinstance(refusal, RequestRefused)
+    note_refusal(connection.scope, refusal.code)
     if isinstance(connection, WebSocket):
         await _deny(refusal, connection)
     return response_of(refusal)

@@ -8,6 +8,7 @@ from vla_deploy.dashboard.access.peer import Peer, peer_of
 
 WEBSOCKET: Final = "WEBSOCKET"
 STOP_PATH: Final = "/api/v1/stop"
+LOGIN_PATH: Final = "/api/v1/login"
 _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _SECURE: Final = {"ws": "http", "wss": "https"}
 
@@ -36,6 +37,11 @@ class Asked:
     def is_stop(self) -> bool:
         """Tell whether it presses the stop, which nothing may refuse."""
         return self.method == "POST" and self.path == STOP_PATH
+
+    @property
+    def is_login(self) -> bool:
+        """Tell whether it asks for a session, whatever session there is."""
+        return self.method == "POST" and self.path == LOGIN_PATH
 
     def first(self, name: str) -> str:
         """Return the first value of a header, "" when there is none."""

@@ -17,7 +17,8 @@ AccessError
     ├── BodyTooLarge     413: more bytes than any act needs
     ├── BodyTooSlow      408: the body did not come in time
     ├── TooMany          429: wait as long as it says
-    └── AccountsAway     503: nobody can log in; the robot's log says why
+    ├── AccountsAway     503: nobody can log in; the robot's log says why
+    └── AuditAway        503: the audit log cannot be read; the robot's log says why
 """
 
 from typing import ClassVar
@@ -135,3 +136,10 @@ class AccountsAway(RequestRefused):
 
     status = 503
     code = "accounts_away"
+
+
+class AuditAway(RequestRefused):
+    """Say that the audit log cannot be shown now."""
+
+    status = 503
+    code = "audit_away"

@@ -9,8 +9,8 @@ from vla_deploy.dashboard.access.answers import refuse
 from vla_deploy.dashboard.access.asked import Asked, asked_of
 from vla_deploy.dashboard.access.body import read_body, read_stop_body, replay
 from vla_deploy.dashboard.access.errors import RequestRefused
-
-IDENTITY: Final = "identity"
+from vla_deploy.dashboard.access.identity import IDENTITY, nobody
+from vla_deploy.dashboard.access.witness import Witness
 
 
 class AccessGuard:
@@ -26,26 +26,31 @@ class AccessGuard:
             await self._app(scope, receive, send)
             return
         asked = asked_of(scope)
+        scope.setdefault("state", {})[IDENTITY] = nobody(asked.peer.address)
+        witness = Witness(scope, asked, send, self._access.audit)
         try:
             receive = await self._admit(scope, receive, asked)
         except RequestRefused as refusal:
-            await refuse(refusal, scope, receive, send)
+            await refuse(refusal, scope, receive, witness.send)
             return
-        await self._app(scope, receive, send)
+        with witness:
+            await self._app(scope, receive, witness.send)
 
     async def _admit(self, scope: Scope, receive: Receive, asked: Asked) -> Receive:
-        state = scope.setdefault("state", {})
         if asked.is_stop:
-            state[IDENTITY] = self._access.admit_stop(asked)
+            scope["state"][IDENTITY] = self._access.admit_stop(asked)
             scope["headers"] = _as_json(scope["headers"])
             return replay(await read_stop_body(receive), receive)
-        state[IDENTITY] = self._access.admit(asked)
+        scope["state"][IDENTITY] = self._access.admit(asked)
         if not asked.is_change:
             return receive
         return replay(await read_body(asked, receive), receive)
 
 
+_OF_BODY: Final = (b"content-type", b"content-length")
+
+
 def _as_json(headers: list[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
     """Say that the body is JSON, as it now is."""
-    kept = [one for one in headers if one[0] not in (b"content-type", b"content-length")]
+    kept = [one for one in headers if one[0].lower() not in _OF_BODY]
     return [*kept, (b"content-type", b"application/json")]

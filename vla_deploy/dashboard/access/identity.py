@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+IDENTITY: Final = "identity"
+"""The name under which a request's state holds who asks."""
+
 
 class Role(StrEnum):
     """Name what somebody may do; each may do what those before it may."""

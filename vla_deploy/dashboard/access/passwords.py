@@ -6,14 +6,11 @@ import re
 import secrets
 import threading
 from base64 import b64decode, b64encode
+from dataclasses import dataclass
 from typing import Final
 
 SHORTEST: Final = 12
 LONGEST: Final = 256
-# 16 MiB and a quarter of a second on a small board: OWASP's row for little memory.
-_LOG2_COST: Final = 14
-_BLOCK: Final = 8
-_PARALLEL: Final = 5
 _SALT_BYTES: Final = 16
 _KEY_BYTES: Final = 32
 _MOST_BYTES: Final = 64 * 2**20
@@ -26,6 +23,21 @@ _GROUP_LETTERS: Final = 4
 _one_at_a_time = threading.Lock()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """Say what trying a password costs: 2 to the power of `log2_rounds`, blocks, repetitions.
+
+    The default is OWASP's for little memory: 16 MiB and a quarter of a second on a small board.
+    """
+
+    log2_rounds: int = 14
+    block: int = 8
+    parallel: int = 5
+
+
+DEFAULT_COST: Final = Cost()
+
+
 def generated() -> str:
     """Return a password of 100 random bits that a person can read out and type."""
     groups = (
@@ -34,12 +46,15 @@ def generated() -> str:
     return "-".join(groups)
 
 
-def stored_form(password: str) -> str:
+def stored_form(password: str, cost: Cost = DEFAULT_COST) -> str:
     """Return what is stored of a password: cost, salt and key, from which it cannot be found."""
     salt = secrets.token_bytes(_SALT_BYTES)
-    key = _key(password, salt, _LOG2_COST, _BLOCK, _PARALLEL)
-    words = (str(_LOG2_COST), str(_BLOCK), str(_PARALLEL), _text(salt), _text(key))
-    return "$".join(("scrypt", *words))
+    return _written(cost, salt, _key(password, salt, cost))
+
+
+def nobodys(cost: Cost = DEFAULT_COST) -> str:
+    """Return the stored form of a password that nobody knows."""
+    return _written(cost, secrets.token_bytes(_SALT_BYTES), secrets.token_bytes(_KEY_BYTES))
 
 
 def fits(password: str, stored: str) -> bool:
@@ -47,8 +62,8 @@ def fits(password: str, stored: str) -> bool:
     parts = _parts(stored)
     if parts is None:
         return False
-    log2_cost, block, parallel, salt, key = parts
-    return hmac.compare_digest(_key(password, salt, log2_cost, block, parallel), key)
+    cost, salt, key = parts
+    return hmac.compare_digest(_key(password, salt, cost), key)
 
 
 def is_stored_form(text: str) -> bool:
@@ -56,32 +71,34 @@ def is_stored_form(text: str) -> bool:
     return _parts(text) is not None
 
 
-def _parts(text: str) -> tuple[int, int, int, bytes, bytes] | None:
+def _written(cost: Cost, salt: bytes, key: bytes) -> str:
+    numbers = (str(cost.log2_rounds), str(cost.block), str(cost.parallel))
+    return "$".join(("scrypt", *numbers, b64encode(salt).decode(), b64encode(key).decode()))
+
+
+def _parts(text: str) -> tuple[Cost, bytes, bytes] | None:
     found = _STORED.fullmatch(text)
     if found is None:
         return None
-    log2_cost, block, parallel = (int(found[number]) for number in (1, 2, 3))
+    log2_rounds, block, parallel = (int(found[number]) for number in (1, 2, 3))
     try:
         salt, key = b64decode(found[4], validate=True), b64decode(found[5], validate=True)
     except ValueError:  # letters of that alphabet, but not so many
         return None
-    is_small = 128 * block * (2**log2_cost + parallel + 2) < _MOST_BYTES
+    is_small = 128 * block * (2**log2_rounds + parallel + 2) < _MOST_BYTES
     is_whole = len(key) == _KEY_BYTES and len(salt) >= _SALT_BYTES
-    return (log2_cost, block, parallel, salt, key) if is_small and is_whole else None
+    cost = Cost(log2_rounds=log2_rounds, block=block, parallel=parallel)
+    return (cost, salt, key) if is_small and is_whole else None
 
 
-def _key(password: str, salt: bytes, log2_cost: int, block: int, parallel: int) -> bytes:
+def _key(password: str, salt: bytes, cost: Cost) -> bytes:
     with _one_at_a_time:  # many logins at once take time, not memory
         return hashlib.scrypt(
             password.encode(errors="surrogatepass"),
             salt=salt,
-            n=2**log2_cost,
-            r=block,
-            p=parallel,
+            n=2**cost.log2_rounds,
+            r=cost.block,
+            p=cost.parallel,
             maxmem=_MOST_BYTES,
             dklen=_KEY_BYTES,
         )
-
-
-def _text(data: bytes) -> str:
-    return b64encode(data).decode()

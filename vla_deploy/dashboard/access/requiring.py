@@ -9,8 +9,9 @@ from starlette.requests import HTTPConnection
 from vla_deploy.dashboard.access.access import Access
 from vla_deploy.dashboard.access.answers import answer
 from vla_deploy.dashboard.access.errors import LoginNeeded, RequestRefused, RoleTooLow
-from vla_deploy.dashboard.access.guard import IDENTITY, AccessGuard
-from vla_deploy.dashboard.access.identity import Identity, Role
+from vla_deploy.dashboard.access.guard import AccessGuard
+from vla_deploy.dashboard.access.identity import IDENTITY, Identity, Role
+from vla_deploy.dashboard.access.witness import note_required
 
 Required = Callable[[HTTPConnection], Identity]
 
@@ -28,6 +29,7 @@ class Require:
             LoginNeeded: nothing is known of them.
             RoleTooLow: they may less.
         """
+        note_required(connection, self.role)
         identity: Identity = getattr(connection.state, IDENTITY)
         if identity.role.allows(self.role):
             return identity

@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,26 +17,17 @@ from vla_deploy.dashboard.access import (
     guard,
     require,
 )
+from vla_deploy.dashboard.access.accounts import User, new_token
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
+from vla_deploy.dashboard.access.audit import AuditLog
+from vla_deploy.dashboard.access.audit_file import AuditFile
+from vla_deploy.dashboard.access.passwords import Cost, stored_form
+from vla_deploy.dashboard.access.routes import router
 
 HERE = "127.0.0.1"
 ELSEWHERE = "192.168.1.7"
-
-
-class StepClock:
-    """Time passes when a test says so."""
-
-    def __init__(self) -> None:
-        self.now = 1_000_000_000_000
-
-    def now_ns(self) -> int:
-        return self.now
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.now = max(self.now, deadline_ns)
-
-    def pass_s(self, seconds: float) -> None:
-        self.now += round(seconds * 1e9)
+CHEAP = Cost(log2_rounds=10, block=1, parallel=1)
+PASSWORD = "the robot wears blue socks"
 
 
 def small_app(access: Access) -> FastAPI:
@@ -65,6 +56,7 @@ def small_app(access: Access) -> FastAPI:
         await socket.send_json({"user": who.user})
         await socket.close()
 
+    app.include_router(router, prefix="/api/v1")
     guard(app, access)
     return app
 
@@ -75,7 +67,7 @@ class World:
 
     access: Access
     app: FastAPI
-    clock: StepClock
+    clock: Any
     wall: list[float]
 
     def client(self, address: str = HERE, host: str = "", **settings: Any) -> TestClient:
@@ -85,13 +77,29 @@ class World:
         url = f"{scheme}://{name}:8088"
         return TestClient(self.app, url, client=(address, 50_000), **settings)
 
+    def add_user(self, name: str, role: Role, password: str = PASSWORD) -> None:
+        user = User(role=role, password=stored_form(password, CHEAP), changed_s=self.wall[0])
+        self.access.accounts.change(lambda held: (held.with_user(name, user), None))
+
+    def add_token(self, name: str, role: Role, lasts_s: float | None = None) -> str:
+        token_id, text, token = new_token(name, role, self.wall[0], lasts_s)
+        self.access.accounts.change(lambda held: (held.with_token(token_id, token), None))
+        return text
+
+    def audit(self) -> list[dict[str, Any]]:
+        return self.access.audit.newest(1000)
+
 
 @pytest.fixture
-def world(tmp_path: Path) -> Iterator[Callable[..., World]]:
+def world(tmp_path: Path, hand_clock: Any) -> Callable[..., World]:
     def make(**rules: Any) -> World:
-        clock, wall = StepClock(), [1_800_000_000.0]
+        wall = [1_800_000_000.0]
         accounts = AccountsFile(tmp_path / "access" / "accounts.json")
-        access = Access(AccessRules(**rules), accounts, clock, now_s=lambda: wall[0])
-        return World(access, small_app(access), clock, wall)
+        file = AuditFile(tmp_path / "access" / "audit.jsonl")
+        audit = AuditLog(file, hand_clock, now_s=lambda: wall[0])
+        access = Access(
+            AccessRules(**rules), accounts, audit, hand_clock, now_s=lambda: wall[0], cost=CHEAP
+        )
+        return World(access, small_app(access), hand_clock, wall)
 
     return make

@@ -121,7 +121,7 @@ def test_a_stop_carries_its_reason(world):
 
 def test_however_often_it_is_pressed_the_stop_is_taken(world):
     client = world().client("192.168.1.7")
-    assert {client.post(STOP).status_code for _ in range(200)} == {200}
+    assert {client.post(STOP).status_code for _ in range(50)} == {200}
 
 
 @pytest.mark.parametrize(
