@@ -35,12 +35,12 @@ def config_dir_of(base: Path) -> Path:
 
 def models_dir_of(base: Path) -> Path:
     """Return where the models lie that a person has added."""
-    return _library_of(base) / _MODELS
+    return library_dir_of(base) / _MODELS
 
 
 def engines_dir_of(base: Path) -> Path:
     """Return where execution providers keep what they build from models; it may be deleted."""
-    return _library_of(base) / _ENGINES
+    return library_dir_of(base) / _ENGINES
 
 
 def access_dir_of(base: Path) -> Path:
@@ -58,5 +58,6 @@ def user_base() -> Path:
     )
 
 
-def _library_of(base: Path) -> Path:
+def library_dir_of(base: Path) -> Path:
+    """Return where what grows with use is kept: models, recordings."""
     return _ROOT_LIBRARY if base == _ROOT_BASE else state_dir_of(base)

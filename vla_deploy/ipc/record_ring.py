@@ -63,12 +63,20 @@ class RecordReader:
     def __init__(self, segment: Segment) -> None:
         self._segment = segment
         self._slots = SlotReader(segment.memory, segment.layout, payload_crc=True)
+        self._position = segment.newest
 
     def held(self, since_ns: int = 0) -> list[Record]:
         """Return every whole record that was appended at `since_ns` or later, oldest first."""
         newest = self._segment.newest
         oldest = max(1, newest - self._segment.layout.slots + 1)
         return list(self._records(oldest, newest, since_ns))
+
+    def fresh(self) -> list[Record]:
+        """Return every whole record since the last call, at first since opening, oldest first."""
+        newest = self._segment.newest
+        oldest = max(self._position, newest - self._segment.layout.slots) + 1
+        self._position = newest
+        return list(self._records(oldest, newest, 0))
 
     def close(self) -> None:
         """Unmap the ring."""

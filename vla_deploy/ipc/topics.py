@@ -144,6 +144,23 @@ TOPICS: tuple[Topic, ...] = (
         fields=(Field("document", "json", 256),),
     ),
     Topic(
+        name="recording_request",
+        kind=Kind.RING,
+        owner="any",
+        summary="asks the recorder to begin or to end a rolling recording: topics, duration, label",
+        slots=16,
+        slot_bytes=4096,
+    ),
+    Topic(
+        name="recording_status",
+        kind=Kind.CELL,
+        owner="recorder",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="whether a rolling recording is made, into which file, what was lost, as JSON",
+        fields=(Field("document", "json", 4096),),
+    ),
+    Topic(
         name="motion_command",
         kind=Kind.RING,
         owner="executor",

@@ -7,11 +7,17 @@ from vla_deploy.node import NodeContext
 from vla_deploy.process_main import main
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.node import RecorderNode
+from vla_deploy.telemetry.recording.building import rolling_recorder
 
 
 def build(context: NodeContext) -> RecorderNode:
     """Build the node from what the process was started with."""
-    return RecorderNode(context, FlightFolder(folder_of(context.run_dir.parent)), time.time_ns)
+    return RecorderNode(
+        context,
+        FlightFolder(folder_of(context.run_dir.parent)),
+        time.time_ns,
+        rolling=lambda space: rolling_recorder(context, space, time.time_ns),
+    )
 
 
 if __name__ == "__main__":

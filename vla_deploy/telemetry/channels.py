@@ -9,13 +9,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from vla_deploy.ipc import Field, Kind, Topic
+from vla_deploy.ipc import BY_NAME, TOPICS, Field, Kind, Topic
 from vla_deploy.ipc.layout import is_document, record_dtype
+from vla_deploy.telemetry.history import Kept
 from vla_deploy.telemetry.schemas.geometry import CAMERA, time_json
 from vla_deploy.telemetry.schemas.well_known import well_known
 
 TICKS: Final = "tick_record"
 IMAGE_SCHEMA: Final = "foxglove.CompressedImage"
+_IMAGE_FORMS: Final[Mapping[str, str]] = {"colour": "jpeg", "depth": "png"}
 _BYTES = {"type": "string", "contentEncoding": "base64"}
 _TICK = {
     "tick": {"type": "integer", "description": "number of the tick since control started"},
@@ -49,10 +51,19 @@ def channels_of(topic: Topic) -> tuple[Channel, ...]:
                 schema_name=IMAGE_SCHEMA,
                 schema=well_known(IMAGE_SCHEMA),
             )
-            for part in ("colour", "depth")
+            for part in _IMAGE_FORMS
         )
     schema = {"type": "object", **_content(topic), "description": topic.summary}
     return (Channel(topic=topic.name, schema_name=f"vla_deploy.{topic.name}", schema=schema),)
+
+
+def value_text(channel: str, kept: Kept, wall_offset_ns: int) -> bytes:
+    """Return a value of any topic as JSON; an image comes compressed, on the channel of a part."""
+    topic, _, part = channel.partition("/")
+    if part:
+        return image_text(kept.stamp_ns + wall_offset_ns, kept.payload, _IMAGE_FORMS[part])
+    is_cell = BY_NAME[topic].kind is Kind.CELL
+    return cell_text(BY_NAME[topic], kept.payload) if is_cell else kept.payload
 
 
 def cell_text(topic: Topic, payload: bytes) -> bytes:
@@ -117,3 +128,9 @@ def _plain(value: Any) -> Any:
     numbers = plain if isinstance(plain, list) else [plain]
     finite = [number if math.isfinite(number) else None for number in numbers]
     return finite if isinstance(plain, list) else finite[0]
+
+
+TOPIC_CHANNELS: Final[tuple[Channel, ...]] = tuple(
+    channel for topic in TOPICS for channel in channels_of(topic)
+)
+"""The channels of every topic of the schema table."""

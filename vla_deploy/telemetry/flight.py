@@ -1,22 +1,17 @@
 """Read a recorded flight: who, why, and every message in order."""
 
 import json
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcap.exceptions import McapError
 from mcap.reader import McapReader, make_reader
-from zstandard import ZstdError
 
 from vla_deploy.telemetry.errors import FlightUnreadable
 from vla_deploy.telemetry.history import KEPT_NS
+from vla_deploy.telemetry.mcap_file import SPOILED
 from vla_deploy.telemetry.writing import METADATA
-
-# What the library and what it unpacks with raise on bytes that are no MCAP; lz4: RuntimeError.
-_SPOILED = (McapError, struct.error, ZstdError, RuntimeError, ValueError, KeyError, EOFError)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +63,7 @@ class Flight:
                         stamp_ns=message.log_time - self.wall_offset_ns,
                         text=message.data,
                     )
-            except _SPOILED as error:
+            except SPOILED as error:
                 raise _unreadable(self.path, error) from error
 
 
@@ -83,7 +78,7 @@ def read_flight(path: Path) -> Flight:
             return _describe(path, make_reader(file, validate_crcs=True))
     except OSError as error:
         raise FlightUnreadable(f"{path}: {error.strerror}") from error
-    except _SPOILED as error:
+    except SPOILED as error:
         raise _unreadable(path, error) from error
 
 

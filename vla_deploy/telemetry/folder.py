@@ -1,4 +1,4 @@
-"""Keep flights in a bounded folder; a half-written one never has a final name."""
+"""Keep files in a bounded folder by number; a half-written one never has a final name."""
 
 import logging
 import os
@@ -6,6 +6,7 @@ import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.telemetry.errors import FlightMissing
@@ -30,15 +31,19 @@ def folder_of(base: Path) -> Path:
     return _ROOT_FLIGHTS if base == _ROOT_BASE else state_dir_of(base) / "flights"
 
 
-class FlightFolder:
-    """Number, bound and list the flights of one folder."""
+class NumberedFolder:
+    """Number, bound and list the MCAP files of one folder, each a `noun`."""
+
+    noun: ClassVar[str]
+    verb: ClassVar[str]
+    """The command that lists them."""
 
     def __init__(self, path: Path, bounds: Bounds | None = None) -> None:
         self.path = path
         self._bounds = bounds or Bounds()
 
-    def flights(self) -> list[Path]:
-        """Return every whole flight, the oldest first."""
+    def files(self) -> list[Path]:
+        """Return every whole file, the oldest first."""
         if not self.path.is_dir():
             return []
         return sorted(
@@ -46,39 +51,39 @@ class FlightFolder:
         )
 
     def find(self, name: str) -> Path:
-        """Return a flight by path, by its number, or the `latest`.
+        """Return a file by path, by its number, or the `latest`.
 
         Raises:
             FlightMissing: there is none.
         """
         if Path(name).is_file():
             return Path(name)
-        flights = self.flights()
-        if name == "latest" and flights:
-            return flights[-1]
-        for path in flights:
+        files = self.files()
+        if name == "latest" and files:
+            return files[-1]
+        for path in files:
             if path.name == name or (name.isdigit() and _number(path) == int(name)):
                 return path
-        known = ", ".join(path.name for path in flights[-3:]) or "none yet"
+        known = ", ".join(path.name for path in files[-3:]) or "none yet"
         raise FlightMissing(
-            f"no flight {name!r} in {self.path}; the newest there: {known}; see: "
-            "vla-deploy flight list"
+            f"no {self.noun} {name!r} in {self.path}; the newest there: {known}; see: "
+            f"vla-deploy {self.verb} list"
         )
 
     def unfinished(self, label: str) -> Path:
-        """Make room for one more flight and return where to write it.
+        """Make room for one more file and return where to write it.
 
         Raises:
-            OSError: the folder cannot be made, or the disk is full without any flight in it.
+            OSError: the folder cannot be made, or the disk is full without any file in it.
         """
         self.path.mkdir(mode=0o750, parents=True, exist_ok=True)
         self.sweep()
         self.prune(files=self._bounds.files - 1)
-        number = max(map(_number, self.flights()), default=0) + 1
+        number = max(map(_number, self.files()), default=0) + 1
         return self.path / f".{number:06d}-{label}.mcap.part"
 
     def publish(self, part: Path) -> Path:
-        """Give a whole flight its final name, once its bytes are on the disk.
+        """Give a whole file its final name, once its bytes are on the disk.
 
         Raises:
             OSError: the disk refuses it.
@@ -94,22 +99,42 @@ class FlightFolder:
         return final
 
     def sweep(self) -> None:
-        """Delete what a killed recorder left half-written."""
+        """Deal with what a killed process left half-written: delete it."""
         for part in self.path.glob(".*.mcap.part"):
             part.unlink(missing_ok=True)
 
     def prune(self, files: int) -> None:
-        """Delete the oldest flights until the bounds hold; the newest one always stays."""
-        flights = self.flights()
-        while len(flights) > 1 and self._is_over(flights, files):
-            oldest = flights.pop(0)
+        """Delete the oldest files until the bounds hold; the newest one always stays."""
+        kept = self.files()
+        while len(kept) > 1 and self._is_over(kept, files):
+            oldest = kept.pop(0)
             oldest.unlink(missing_ok=True)
-            _log.info("deleted the oldest flight %s to keep the folder's bounds", oldest.name)
+            _log.info("deleted %s %s to keep the folder's bounds", self.noun, oldest.name)
 
-    def _is_over(self, flights: list[Path], files: int) -> bool:
-        total_bytes = sum(path.stat().st_size for path in flights)
-        full = shutil.disk_usage(self.path).free < self._bounds.spare_bytes
-        return len(flights) > files or total_bytes > self._bounds.total_bytes or full
+    def is_disk_full(self) -> bool:
+        """Tell whether less of the disk is free than is to be spared."""
+        return shutil.disk_usage(self.path).free < self._bounds.spare_bytes
+
+    def prune_for(self, coming_bytes: int) -> None:
+        """Delete the oldest files while one of `coming_bytes` is being written beside them."""
+        kept = self.files()
+        while kept and self._is_over(kept, self._bounds.files - 1, coming_bytes):
+            kept.pop(0).unlink(missing_ok=True)
+
+    def _is_over(self, kept: list[Path], files: int, coming_bytes: int = 0) -> bool:
+        total_bytes = coming_bytes + sum(path.stat().st_size for path in kept)
+        return len(kept) > files or total_bytes > self._bounds.total_bytes or self.is_disk_full()
+
+
+class FlightFolder(NumberedFolder):
+    """Keep the flights of one folder."""
+
+    noun = "flight"
+    verb = "flight"
+
+    def flights(self) -> list[Path]:
+        """Return every whole flight, the oldest first."""
+        return self.files()
 
 
 def _number(path: Path) -> int:

@@ -16,6 +16,7 @@ from vla_deploy.ipc import CellWriter, RingWriter, SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.memory import Memory
+from vla_deploy.telemetry.recording.recorder import RollingRecorder
 from vla_deploy.telemetry.triggers import Debounce, Kind, Trigger, Watcher
 from vla_deploy.telemetry.writing import FlightHead, write_flight
 
@@ -47,6 +48,7 @@ class RecorderNode:
         folder: FlightFolder,
         wall_ns: Callable[[], int],
         debounce: Debounce | None = None,
+        rolling: Callable[[SharedSpace], RollingRecorder] | None = None,
     ) -> None:
         self._context = context
         self._clock = context.clock
@@ -62,6 +64,7 @@ class RecorderNode:
         self._status_due_ns = 0
         self._started_ns = 0
         self._parent_pid = os.getppid()
+        self._rolling = None if rolling is None else rolling(self._space)
 
     def start(self) -> None:
         """Open every topic of the schema table; what is still in the rings counts."""
@@ -69,6 +72,8 @@ class RecorderNode:
         self._memory = Memory(self._space)
         self._events = self._space.ring_writer("flight_event")
         self._status = self._space.cell_writer("recorder_status")
+        if self._rolling is not None:
+            self._rolling.start()
 
     def step(self) -> None:
         """Remember what is new, look for a reason to write, and write a bit."""
@@ -91,6 +96,8 @@ class RecorderNode:
         self._finish()
         self._begin(math.inf)
         self._finish()
+        if self._rolling is not None:
+            self._rolling.stop()
         self._space.close()
 
     # --- look ---------------------------------------------------------------------------------
@@ -101,7 +108,10 @@ class RecorderNode:
             "process_table": self._watcher.table,
             "flight_request": self._request,
         }
-        for channel, kept in self._memory.refresh(now_ns):
+        new = self._memory.refresh(now_ns)
+        if self._rolling is not None:
+            self._rolling.step(now_ns, new, self._memory.newest)
+        for channel, kept in new:
             if channel in find:
                 for trigger in find[channel](json.loads(kept.payload), kept.stamp_ns):
                     self._notice(trigger)

@@ -58,3 +58,14 @@ def test_a_record_that_was_torn_is_left_out(space):
 def test_a_record_longer_than_half_of_the_ring_is_refused(space):
     with pytest.raises(BadPayload, match="record of 65 bytes, limit 64"):
         space.record_writer("log").append(bytes(65))
+
+
+def test_fresh_records_come_once_and_what_was_before_is_not_among_them(space):
+    writer = space.record_writer("log")
+    writer.append(b"before")
+    reader = space.record_reader("log")
+    assert reader.fresh() == []
+    writer.append(b"x" * 40)
+    writer.append(b"new")
+    assert [record.payload for record in reader.fresh()] == [b"x" * 40, b"new"]
+    assert reader.fresh() == []

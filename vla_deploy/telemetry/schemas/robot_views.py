@@ -8,7 +8,6 @@ import numpy as np
 
 from vla_deploy.ipc.topics import SCAN_BEAMS
 from vla_deploy.robots import RobotDescription
-from vla_deploy.robots.model import RobotModel, full_positions
 from vla_deploy.telemetry.schemas.geometry import (
     BASE,
     CAMERA,
@@ -35,6 +34,8 @@ class RobotViews:
         Raises:
             RobotFileError: pinocchio does not find the robot file's joints in the MJCF.
         """
+        from vla_deploy.robots.model import RobotModel, full_positions  # loads pinocchio
+
         self._model = RobotModel(robot)
         self._names = robot.joint_names
         self._lidar_m = self._model.site_pose(robot.lidar.site, full_positions(robot))[:3, 3]

@@ -1,0 +1,1 @@
+"""Record any topics for as long as wanted: rolling MCAP files in a bounded folder."""

@@ -1,0 +1,97 @@
+"""Write one recording: what it is of, what was so when it began, then what comes."""
+
+import contextlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final
+
+from vla_deploy.telemetry.channels import TOPIC_CHANNELS, Channel
+from vla_deploy.telemetry.mcap_file import McapFile
+from vla_deploy.telemetry.recording.batch import Message
+from vla_deploy.telemetry.recording.selection import Selection
+from vla_deploy.telemetry.schemas.views import CHANNELS
+
+METADATA: Final = "recording"
+ALL_CHANNELS: Final[tuple[Channel, ...]] = (*TOPIC_CHANNELS, *CHANNELS)
+"""The channels of every topic and every view."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedRun:
+    """Say whose values are recorded."""
+
+    run_id: str
+    robot: str
+    profile: str
+
+
+class RecordingFile:
+    """Hold one open file; stamps that precede its beginning are taken for its beginning."""
+
+    def __init__(
+        self, path: Path, run: RecordedRun, selection: Selection, began_ns: int, offset_ns: int
+    ) -> None:
+        """Begin a file at a moment of the run's clock; `offset_ns` makes wall clock of that.
+
+        Raises:
+            OSError: the disk refuses it.
+        """
+        self.path = path
+        self.began_ns = began_ns
+        self.offset_ns = offset_ns
+        self.messages = 0
+        self._stream = path.open("wb")
+        try:
+            channels = [one for one in ALL_CHANNELS if selection.takes(one.topic)]
+            self._mcap = McapFile(self._stream, channels, METADATA, self._metadata(run))
+        except OSError:
+            self._stream.close()
+            raise
+
+    def add(self, messages: Iterable[Message]) -> None:
+        """Add messages.
+
+        Raises:
+            OSError: the disk refuses it.
+        """
+        for one in messages:
+            published_ns = one.stamp_ns + self.offset_ns
+            stamp_ns = max(one.stamp_ns, self.began_ns) + self.offset_ns
+            self._mcap.add(one.channel, stamp_ns, one.text, one.sequence, published_ns)
+            self.messages += 1
+
+    def flush(self) -> int:
+        """Hand everything to the kernel and return how many bytes the file has.
+
+        Raises:
+            OSError: the disk refuses it.
+        """
+        self._mcap.flush()
+        return self._stream.tell()
+
+    def finish(self) -> None:
+        """Make it a whole file.
+
+        Raises:
+            OSError: the disk refuses it.
+        """
+        try:
+            self._mcap.finish()
+        finally:
+            self._stream.close()
+
+    def abandon(self) -> None:
+        """Let go of a file that the disk refuses; what is whole of it can be recovered."""
+        with contextlib.suppress(OSError):  # it closes the file all the same
+            self._stream.close()
+
+    def _metadata(self, run: RecordedRun) -> Mapping[str, str]:
+        return {
+            "run_id": run.run_id,
+            "robot": run.robot,
+            "profile": run.profile,
+            "vla_deploy": version("vla-deploy"),
+            "wall_offset_ns": str(self.offset_ns),
+        }

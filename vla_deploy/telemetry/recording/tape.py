@@ -1,0 +1,211 @@
+"""Write recordings one after another: the next file begins by size or time, never by chance.
+
+All of it runs in the writer's thread: a disk that is slow holds up nobody else.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import Enum
+from pathlib import Path
+from typing import Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.robots import load_robot
+from vla_deploy.telemetry.recording.batch import Batch, Message, messages_of
+from vla_deploy.telemetry.recording.folder import RecordingFolder
+from vla_deploy.telemetry.recording.recording_file import RecordedRun, RecordingFile
+from vla_deploy.telemetry.recording.request import RecordingWish
+from vla_deploy.telemetry.schemas.pictures import Pictures
+
+FLUSH_S: Final = 1.0
+RETRY_S: Final = 10.0
+_FULL: Final = "the disk is as full as it may be; make room on it"
+_log = logging.getLogger(__name__)
+
+
+class TapeState(Enum):
+    """Say what a recording is doing."""
+
+    BEGINNING = "beginning"
+    RECORDING = "recording"
+    PAUSED = "paused"
+    FAILED = "failed"
+    ENDED = "ended"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TapeReport:
+    """Tell how a recording is going; another thread reads it whole."""
+
+    state: TapeState = TapeState.BEGINNING
+    why: str = ""
+    file: str = ""
+    file_bytes: int = 0
+    messages: int = 0
+    files: int = 0
+    unwritten: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileLimits:
+    """Bound one file."""
+
+    size_bytes: int
+    duration_s: float
+
+
+class Tape:
+    """Hold the file that is being written, and what the next one has to begin with."""
+
+    def __init__(
+        self,
+        folder: RecordingFolder,
+        run: RecordedRun,
+        wish: RecordingWish,
+        limits: FileLimits,
+        clock: Clock,
+        wall_ns: Callable[[], int],
+    ) -> None:
+        self.report = TapeReport()
+        self._folder = folder
+        self._run = run
+        self._selection = wish.selection
+        self._label = wish.label
+        self._limits = limits
+        self._clock = clock
+        self._wall_ns = wall_ns
+        self._pictures: Pictures | None = None
+        self._file: RecordingFile | None = None
+        self._lasting: dict[str, Message] = {}
+        self._messages = self._files = self._unwritten = 0
+        self._flush_ns = self._retry_ns = 0
+
+    def write(self, batch: Batch) -> None:
+        """Write a batch; what the disk refuses is counted, and tried anew some seconds later."""
+        try:
+            file = self._file or self._next_file()
+            if file is None:
+                self._unwritten += batch.count
+                self._tell(self.report.state, self.report.why)
+                return
+            self._add(file, batch)
+            if self._clock.now_ns() >= self._flush_ns:
+                self._look(file)
+        except OSError as error:
+            self._fail(error, batch.count)
+
+    def close(self) -> None:
+        """Finish the file."""
+        try:
+            self._finish()
+        except OSError as error:
+            self._fail(error, 0)
+        self._tell(TapeState.ENDED, self.report.why)
+
+    def _add(self, file: RecordingFile, batch: Batch) -> None:
+        before = file.messages
+        for message in messages_of(batch, file.offset_ns, self._selection.takes):
+            self._put(file, message)
+        for topic, kept in batch.values:
+            stamp_ns = kept.stamp_ns + file.offset_ns
+            views = self._drawn().of(topic, kept.payload, stamp_ns, self._selection.takes)
+            for channel, text in views:
+                shown = Message(
+                    channel=channel,
+                    stamp_ns=kept.stamp_ns,
+                    text=text,
+                    sequence=kept.sequence,
+                    stays=True,
+                )
+                self._put(file, shown)
+        self._messages += file.messages - before
+
+    def _put(self, file: RecordingFile, message: Message) -> None:
+        if message.stays:
+            self._lasting[message.channel] = message
+        file.add((message,))
+
+    def _next_file(self) -> RecordingFile | None:
+        """Begin a file, unless it is too soon after a failure, or the disk is too full."""
+        now_ns = self._clock.now_ns()
+        if now_ns < self._retry_ns:
+            return None
+        self._retry_ns = now_ns + round(RETRY_S * NS_PER_S)
+        offset_ns = self._wall_ns() - now_ns
+        part = self._folder.unfinished(f"{_moment(now_ns + offset_ns)}-{self._label}")
+        if self._folder.is_disk_full():
+            self._tell(TapeState.PAUSED, _FULL)
+            return None
+        file = RecordingFile(part, self._run, self._selection, now_ns, offset_ns)
+        self._file, self._retry_ns = file, 0
+        self._begin(file, now_ns)
+        return file
+
+    def _begin(self, file: RecordingFile, now_ns: int) -> None:
+        """Write what was so before, and what stays as it is."""
+        file.add(self._lasting.values())
+        stamp_ns = now_ns + file.offset_ns
+        for channel, text in self._drawn().still(stamp_ns, self._selection.takes):
+            file.add((Message(channel=channel, stamp_ns=now_ns, text=text),))
+        self._messages += file.messages
+        self._files += 1
+        self._look(file)
+
+    def _look(self, file: RecordingFile) -> None:
+        """Hand the file to the kernel, and end it where it is large, old, or the disk full."""
+        now_ns = self._clock.now_ns()
+        self._flush_ns = now_ns + round(FLUSH_S * NS_PER_S)
+        size_bytes = file.flush()
+        self._tell(TapeState.RECORDING, "", size_bytes)
+        is_old = now_ns - file.began_ns >= self._limits.duration_s * NS_PER_S
+        if is_old or size_bytes >= self._limits.size_bytes:
+            self._finish()
+            return
+        self._folder.prune_for(size_bytes)
+        if self._folder.is_disk_full():
+            self._finish()
+            self._retry_ns = now_ns + round(RETRY_S * NS_PER_S)
+            self._tell(TapeState.PAUSED, _FULL)
+
+    def _finish(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.finish()
+            _log.info("recorded %s", self._folder.publish(file.path))
+
+    def _fail(self, error: OSError, unwritten: int) -> None:
+        if self._file is not None:
+            self._file.abandon()
+            self._file = None
+        self._unwritten += unwritten
+        self._retry_ns = self._clock.now_ns() + round(RETRY_S * NS_PER_S)
+        reason = f"{self._folder.path}: {error.strerror or error}"
+        if self.report.state is not TapeState.FAILED:
+            _log.error("nothing is recorded: %s; tried again every %.0f s", reason, RETRY_S)
+        self._tell(TapeState.FAILED, reason)
+
+    def _drawn(self) -> Pictures:
+        if self._pictures is None:
+            self._pictures = Pictures(load_robot(self._run.robot))
+        return self._pictures
+
+    def _tell(self, state: TapeState, why: str, size_bytes: int = 0) -> None:
+        self.report = TapeReport(
+            state=state,
+            why=why,
+            file="" if self._file is None else _final(self._file.path),
+            file_bytes=size_bytes,
+            messages=self._messages,
+            files=self._files,
+            unwritten=self._unwritten,
+        )
+
+
+def _final(part: Path) -> str:
+    return part.name.removeprefix(".").removesuffix(".part")
+
+
+def _moment(wall_ns: int) -> str:
+    return f"{datetime.fromtimestamp(wall_ns / NS_PER_S, UTC):%Y%m%dT%H%M%SZ}"
