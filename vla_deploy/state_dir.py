@@ -45,7 +45,7 @@ def engines_dir_of(base: Path) -> Path:
 
 def access_dir_of(base: Path) -> Path:
     """Return where the dashboard's accounts lie, and what was done through it."""
-    return _library_of(base) / _ACCESS
+    return library_dir_of(base) / _ACCESS
 
 
 def user_base() -> Path:
