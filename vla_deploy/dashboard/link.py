@@ -23,8 +23,15 @@ PAGE: Final = "page"
 class RobotLink:
     """Read topics and send acts and commands of one source; nothing here waits for anybody."""
 
-    def __init__(self, run_dir: Path, clock: Clock | None = None, *, source: str = PAGE) -> None:
-        """Open the run's shared memory.
+    def __init__(
+        self,
+        run_dir: Path,
+        clock: Clock | None = None,
+        *,
+        source: str = PAGE,
+        robot: str = "butler",
+    ) -> None:
+        """Open the run's shared memory; `robot` is the name or folder of its description.
 
         Raises:
             SpaceUnavailable: it cannot be opened.
@@ -32,6 +39,7 @@ class RobotLink:
         self.run_dir = run_dir
         self.clock: Clock = clock or MonotonicClock()
         self.source = source
+        self.robot = robot
         self._space = SharedSpace(run_dir / "ipc", self.clock)
         self._cells: dict[str, CellReader] = {}
         self._frames: dict[str, FrameReader] = {}

@@ -30,7 +30,7 @@ class DashboardNode:
         self._context = context
         self._settings = settings
         self._clock = context.clock
-        self.link = RobotLink(context.run_dir, context.clock)
+        self.link = RobotLink(context.run_dir, context.clock, robot=context.robot)
         self.app: FastAPI
         self.doors: tuple[Door, ...] = ()
         self._access: Access

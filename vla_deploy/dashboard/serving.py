@@ -12,6 +12,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.dashboard.live.wire import LiveProtocol
 from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.node import Node
 
@@ -96,7 +97,8 @@ def _config(app: ASGIApp, door: Door, settings: DashboardSettings) -> uvicorn.Co
         lifespan="off",
         loop="asyncio",
         http="h11",
-        ws="websockets-sansio",
+        ws=LiveProtocol,
+        ws_per_message_deflate=False,  # it would compress each message anew for each client
         proxy_headers=False,
         server_header=False,
         limit_concurrency=_MOST_CONNECTIONS,

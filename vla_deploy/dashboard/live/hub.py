@@ -1,0 +1,155 @@
+"""Bring live topics to clients: each message serialised once, nobody held up by anybody else.
+
+The hub looks only at topics that somebody is subscribed to. A client has an outbox and a task that
+empties it: what it does not take waits there, bounded, and one that takes nothing for `FROZEN_S` is
+dropped.
+"""
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from typing import Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.dashboard.live.feed import Feed
+from vla_deploy.dashboard.live.message import Message, Moment, json_message
+from vla_deploy.dashboard.live.outbox import Outbox
+
+Send = Callable[[Sequence[Message]], Awaitable[None]]
+STEP_S: Final = 0.05
+FROZEN_S: Final = 5.0
+ALIVE: Final = "alive"
+ALIVE_S: Final = 2.0
+"""Every client hears so often that the hub is there, however little it is subscribed to."""
+MOST_CLIENTS: Final = 100
+_log = logging.getLogger(__name__)
+
+
+class Client:
+    """Hold what one client wants and has yet to get."""
+
+    def __init__(self, send: Send, clock: Clock) -> None:
+        self.outbox = Outbox()
+        self.topics: frozenset[str] = frozenset()
+        self._send = send
+        self._clock = clock
+        self._filled = asyncio.Event()
+        self._sending_since_ns: int | None = None
+
+    def wake(self) -> None:
+        """Have what was put into the outbox sent."""
+        if self.outbox:
+            self._filled.set()
+
+    def is_frozen(self, now_ns: int) -> bool:
+        """Tell whether it has taken nothing for too long."""
+        since_ns = self._sending_since_ns
+        return since_ns is not None and now_ns - since_ns > FROZEN_S * NS_PER_S
+
+    async def deliver(self) -> None:
+        """Send what comes into the outbox until cancelled; waits for nobody but this client."""
+        while True:
+            await self._filled.wait()
+            self._filled.clear()
+            self._sending_since_ns = self._clock.now_ns()
+            await self._send(self.outbox.take())
+            self._sending_since_ns = None
+
+
+class LiveHub:
+    """Know the feeds and the clients, and look at what is wanted in each step."""
+
+    def __init__(self, feeds: Iterable[Feed], clock: Clock, wall_ns: Callable[[], int]) -> None:
+        self.failed_looks: Counter[str] = Counter()
+        self._feeds: dict[str, Feed] = {feed.topic: feed for feed in feeds}
+        self._clock = clock
+        self._wall_ns = wall_ns
+        self._clients: dict[Client, asyncio.Task[None]] = {}
+        self._due_ns: dict[str, int] = {}
+        self._alive_ns = 0
+
+    @property
+    def clock(self) -> Clock:
+        """Return the run's clock."""
+        return self._clock
+
+    @property
+    def topics(self) -> frozenset[str]:
+        """Return the names of all live topics."""
+        return frozenset(self._feeds)
+
+    @property
+    def is_full(self) -> bool:
+        """Tell whether no more clients are taken."""
+        return len(self._clients) >= MOST_CLIENTS
+
+    def add(self, feed: Feed) -> None:
+        """Offer another topic, or another feed of one."""
+        self._feeds[feed.topic] = feed
+
+    def join(self, client: Client) -> "asyncio.Task[None]":
+        """Take a client in; the task ends when it is dropped or its connection fails."""
+        self._clients[client] = asyncio.create_task(client.deliver())
+        return self._clients[client]
+
+    def leave(self, client: Client) -> None:
+        """Let a client go."""
+        self._clients.pop(client).cancel()
+
+    def subscribe(self, client: Client, topics: frozenset[str]) -> None:
+        """Bring a client these topics and no others; each begins with its newest value."""
+        for topic in client.topics - topics:
+            client.outbox.forget(topic)
+        for topic in (topics - client.topics) & self.topics:
+            if topic in self._due_ns:
+                self._look_at(self._feeds[topic], self._now())  # the others' events stay theirs
+            self._feeds[topic].begin()
+            self._due_ns[topic] = 0
+        client.topics = topics
+
+    def step(self) -> None:
+        """Look once at every topic that is wanted and due, and drop who is frozen."""
+        if not self._clients:
+            return
+        now = self._now()
+        wanted = frozenset[str]().union(*(client.topics for client in self._clients))
+        self._due_ns = {topic: due for topic, due in self._due_ns.items() if topic in wanted}
+        for topic, due_ns in list(self._due_ns.items()):
+            if now.run_ns >= due_ns:
+                self._look_at(self._feeds[topic], now)
+        self._tell_alive(now)
+        for client, task in self._clients.items():
+            client.wake()
+            if client.is_frozen(now.run_ns):
+                task.cancel()
+
+    def stop(self) -> None:
+        """Let every client go."""
+        for client in list(self._clients):
+            self.leave(client)
+
+    def _look_at(self, feed: Feed, now: Moment) -> None:
+        # A step may come a little early: the next one would be half a period late.
+        self._due_ns[feed.topic] = now.run_ns + round((feed.period_s - STEP_S / 2) * NS_PER_S)
+        try:
+            messages = feed.look(now)
+        except Exception:  # the live view's loop: one bad topic must not take the others along
+            self.failed_looks[feed.topic] += 1
+            if self.failed_looks[feed.topic] == 1:
+                _log.exception("live topic %s: it cannot be told", feed.topic)
+            return
+        for client in self._clients if messages else ():
+            if feed.topic in client.topics:
+                for message in messages:
+                    client.outbox.put(message)
+
+    def _tell_alive(self, now: Moment) -> None:
+        if now.run_ns >= self._alive_ns:
+            self._alive_ns = now.run_ns + round(ALIVE_S * NS_PER_S)
+            message = json_message(ALIVE, now.run_ns, now, {})
+            for client in self._clients:
+                client.outbox.put(message)
+
+    def _now(self) -> Moment:
+        return Moment(run_ns=self._clock.now_ns(), wall_ns=self._wall_ns())
