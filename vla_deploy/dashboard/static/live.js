@@ -22,6 +22,7 @@ let socket = null;
 let delay_ms = FIRST_DELAY_MS;
 let timer = null;
 let wanted = false;
+let isTelling = false;
 
 /** Open the connection and keep it open. */
 export function connect() {
@@ -94,10 +95,15 @@ function closed() {
   delay_ms = Math.min(2 * delay_ms, LONGEST_DELAY_MS);
 }
 
+/** Say once what is wanted, after a view has said all that it wants. */
 function tellTopics() {
-  if (socket?.readyState === WebSocket.OPEN) {
+  if (isTelling) return;
+  isTelling = true;
+  queueMicrotask(() => {
+    isTelling = false;
+    if (socket?.readyState !== WebSocket.OPEN) return;
     socket.send(JSON.stringify({ subscribe: [...listeners.keys()] }));
-  }
+  });
 }
 
 function received(event) {
