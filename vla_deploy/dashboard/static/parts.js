@@ -51,6 +51,11 @@ export function Badge({ tone = "quiet", icon, children }) {
   `;
 }
 
+/** A link to where there is more. */
+export function More({ href, children }) {
+  return html`<a class="more" href=${href}>${children}<${Icon} name="chevron" /></a>`;
+}
+
 /** Say that there is nothing, and what would bring something. */
 export function Empty({ icon, children }) {
   return html`<p class="empty">${icon && html`<${Icon} name=${icon} />`}<span>${children}</span></p>`;

@@ -61,6 +61,16 @@ const CAUSES = {
   obstacle_approach: "It approaches something",
 };
 
+const REACTIONS = {
+  base_slow: "Base slowed down",
+  base_block: "Base kept from going there",
+  base_ramp: "Base brought to rest",
+  protective_stop: "Protective stop, ends with its cause",
+  hold: "Stop category 2: it stands under power",
+  base_off: "It stands under power, the wheels without",
+  group_stop: "Stop by the category of each joint group",
+};
+
 /** Return `{title, tone, icon, means, cause}` of a control status that is live, else of silence. */
 export function safetyWords(control, stale) {
   if (!control || stale) return { ...SILENT, cause: "" };
@@ -71,6 +81,11 @@ export function safetyWords(control, stale) {
 /** Return a cause as a sentence. */
 export function causeWords(cause) {
   return cause ? (CAUSES[cause] ?? sentence(cause)) : "";
+}
+
+/** Return what is done about a cause, in words. */
+export function reactionWords(reaction) {
+  return REACTIONS[reaction] ?? sentence(reaction);
 }
 
 /** Return what the rules leave the base: lines, none where they leave it everything. */

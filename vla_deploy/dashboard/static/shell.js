@@ -87,7 +87,7 @@ function ThemeSwitch() {
 
 function User() {
   const session = useSession();
-  if (!session?.user || session.user === "local") return null;
+  if (session?.way !== "session") return null;
   return html`
     <button type="button" class="button" data-kind="plain" onClick=${logout} title="Log out">
       <span class="user-name">${session.user} · ${session.role}</span><${Icon} name="leave" />

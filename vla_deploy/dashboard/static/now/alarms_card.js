@@ -2,7 +2,7 @@
 
 import { AlarmRow } from "../events/alarm_row.js";
 import { gravestFirst, useAlarms } from "../events/alarms.js";
-import { Card, Empty } from "../parts.js";
+import { Card, Empty, More } from "../parts.js";
 import { html } from "../ui.js";
 
 const SHOWN = 4;
@@ -12,7 +12,7 @@ export function AlarmsCard() {
   const shown = gravestFirst(open).slice(0, SHOWN);
   const more = open.length - shown.length;
   return html`
-    <${Card} title="Alarms" note=${open.length ? `${open.length} open` : ""} stale=${stale ? true : undefined} actions=${html`<a class="button" data-kind="plain" href="#/events/alarms">All</a>`}>
+    <${Card} title="Alarms" note=${open.length ? `${open.length} open` : ""} stale=${stale ? true : undefined} actions=${html`<${More} href="#/events/alarms">All<//>`}>
       ${shown.length === 0 && html`<${Empty} icon="check">No open alarm.<//>`}
       <ul class="alarms">${shown.map((alarm) => html`<${AlarmRow} key=${alarm.id} alarm=${alarm} isShort=${true} />`)}</ul>
       ${more > 0 && html`<p class="quiet small">and ${more} more</p>`}

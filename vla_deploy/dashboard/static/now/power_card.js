@@ -2,7 +2,7 @@
 
 import { number, words } from "../format.js";
 import { useTopic } from "../following.js";
-import { Bar, Card, Empty } from "../parts.js";
+import { Bar, Card, Empty, More } from "../parts.js";
 import { html } from "../ui.js";
 
 const SHOWN = ["cpu_ratio", "memory_mb", "gpu_memory_mb", "power_w", "temperature_c", "disk_free_mb"];
@@ -20,7 +20,7 @@ export function PowerCard() {
   const joints = useTopic("control_status").data?.joints;
   const rows = (data?.rows ?? []).filter((row) => !row.process && SHOWN.includes(row.metric));
   return html`
-    <${Card} title="Power and load" stale=${stale} age_s=${age_s} actions=${html`<a class="button" data-kind="plain" href="#/budgets">Budgets</a>`}>
+    <${Card} title="Power and load" stale=${stale} age_s=${age_s} actions=${html`<${More} href="#/budgets">Budgets<//>`}>
       ${rows.length === 0 && html`<${Empty}>The supervisor tells nothing yet.<//>`}
       <div class="loads">
         <${Supply} joints=${joints} />

@@ -1,10 +1,10 @@
 /** Say in one glance whether the robot may move; if not: why, who, which value, which limit. */
 
-import { duration, sentence, significant } from "../format.js";
+import { duration, sentence, significant, words } from "../format.js";
 import { useTopic } from "../following.js";
 import { Icon } from "../icons.js";
 import { Freshness } from "../parts.js";
-import { boundsWords, safetyWords, unitOf } from "../safety_words.js";
+import { boundsWords, reactionWords, safetyWords, unitOf } from "../safety_words.js";
 import { html } from "../ui.js";
 import { Acts } from "./acts.js";
 
@@ -36,11 +36,11 @@ function Numbers({ control, stale }) {
   const unit = unitOf(control.cause);
   const withUnit = (value) => (value === null || value === undefined ? null : `${significant(value)} ${unit}`.trim());
   const cells = [
-    ["What", control.subject],
+    ["What", words(control.subject)],
     ["Measured", withUnit(control.measured)],
     ["Limit", withUnit(control.limit)],
     ["Age when judged", control.age_s ? duration(control.age_s) : null],
-    ["Reaction", sentence(control.reaction)],
+    ["Reaction", reactionWords(control.reaction)],
     ["Base", boundsWords(control).join("; ")],
   ].filter(([, value]) => value);
   return html`

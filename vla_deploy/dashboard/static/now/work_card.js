@@ -5,16 +5,16 @@ import { STATES } from "../command/story.js";
 import { Timeline } from "../command/timeline.js";
 import { words } from "../format.js";
 import { useTopic } from "../following.js";
-import { Badge, Card, Empty } from "../parts.js";
+import { Badge, Card, Empty, More } from "../parts.js";
 import { html } from "../ui.js";
 
 export function WorkCard() {
   const { data, stale, age_s } = useTopic("executor_status");
   const commands = useCommands();
   const command = openCommand(commands) ?? commands[0];
-  const link = html`<a class="button" data-kind="plain" href="#/command">Command</a>`;
+  const more = html`<${More} href="#/command">Command<//>`;
   return html`
-    <${Card} title="Work" note=${data && !stale ? words(data.skill ?? data.state) : ""} stale=${stale} age_s=${age_s} actions=${link} span="2">
+    <${Card} title="Work" note=${data && !stale ? words(data.skill ?? data.state) : ""} stale=${stale} age_s=${age_s} actions=${more}>
       <div class="stack">
         ${command ? html`<${Work} command=${command} />` : html`<${Empty} icon="speech">No command in this run yet.<//>`}
         ${data && html`<${Hands} holding=${data.holding} />`}
@@ -31,7 +31,7 @@ function Work({ command }) {
       <span class="said-words grow">${command.text || story.plan?.goal || "A plan as JSON"}</span>
       <${Badge} tone=${tone} icon=${icon}>${text}<//>
     </p>
-    ${story.asked && html`<p><strong>${story.asked.question}</strong> <a href="#/command">Answer</a></p>`}
+    ${story.asked && html`<p><strong>${story.asked.question}</strong> <${More} href="#/command">Answer<//></p>`}
     ${story.why && story.state !== "done" && html`<p class="step-why">${story.why}</p>`}
     <${Timeline} actions=${story.actions} />
   `;

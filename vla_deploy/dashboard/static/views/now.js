@@ -13,13 +13,11 @@ export function View() {
     <h1 class="out-of-sight">Now</h1>
     <div class="now">
       <${SafetyCard} />
-      <div class="grid">
-        <${WorkCard} />
-        <${AlarmsCard} />
-        <${PowerCard} />
-        <${PlaceCard} />
-        <${SensesCard} />
-        <${ProcessesCard} />
+      <div class="now-columns">
+        <div class="stack"><${WorkCard} /><${SensesCard} /></div>
+        <div class="stack"><${AlarmsCard} /><${PlaceCard} /></div>
+        <div class="stack"><${PowerCard} /></div>
+        <div class="stack"><${ProcessesCard} /></div>
       </div>
     </div>
   `;
