@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from vla_deploy.dashboard import page
 from vla_deploy.dashboard.access import routes as access
 from vla_deploy.dashboard.api import commands, files, logs, operate, profile, state
-from vla_deploy.dashboard.live import endpoint
+from vla_deploy.dashboard.live import endpoint, routes
 
 API_PREFIX: Final = "/api/v1"
 
@@ -21,6 +21,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     files.router,
     logs.router,
     endpoint.router,
+    routes.router,
 )
 # At the root: the page, and what has its place by convention.
 ROOT_ROUTERS: Final[tuple[APIRouter, ...]] = (page.router, state.health)

@@ -4,6 +4,9 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vla_deploy.ipc import Announcer, ClaimBook
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.path_planning import PathPlanner
@@ -32,7 +35,9 @@ class Held:
 class SkillContext:
     """Carry everything a skill may use; `hands` is the executor's memory of each hand.
 
-    `say` shows a text, `voice` has it heard; `notes` are what results say beside their status.
+    `say` shows a text, `voice` has it heard; `notes` are what results say beside their status;
+    `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
+    follows none.
     """
 
     robot: RobotDescription
@@ -44,6 +49,7 @@ class SkillContext:
     claims: ClaimBook
     hands: dict[str, Held | None] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    way_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
 
     def note(self, text: str) -> None:
         """Have the result of the acting action say something, whatever its status."""

@@ -81,12 +81,16 @@ def follow(
     """
     follower = PathFollower(points, limits_of(context, speed_m_s), final_yaw_rad)
     patience = _Patience(context)
-    while follower.phase is not Phase.ARRIVED and not until():
-        pose = context.link.pose
-        twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
-        hindrance = _hindrance(context, twist, _distance(pose, points[-1]))
-        context.link.drive(patience.pass_on(twist, hindrance))
-        yield
+    context.way_m = points
+    try:
+        while follower.phase is not Phase.ARRIVED and not until():
+            pose = context.link.pose
+            twist = follower.step(pose.x_m, pose.y_m, pose.yaw_rad)
+            hindrance = _hindrance(context, twist, _distance(pose, points[-1]))
+            context.link.drive(patience.pass_on(twist, hindrance))
+            yield
+    finally:
+        context.way_m = points[:0]
     context.link.drive(AT_REST)
     yield from stand_still(context)
 

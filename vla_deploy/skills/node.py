@@ -19,6 +19,7 @@ from vla_deploy.skills.link import RobotLink
 from vla_deploy.skills.resources import body_of
 
 STATUS_PERIOD_NS = NS_PER_S // 10
+_SHOWN_POINTS = 200
 
 
 class ExecutorNode:
@@ -146,6 +147,7 @@ class ExecutorNode:
                 "command_id": self._command_id if execution else None,
                 "action_id": active.action.id if active else None,
                 "skill": active.action.skill if active else None,
+                "way_m": self._skills.way_m[:_SHOWN_POINTS].round(3).tolist(),
                 "holding": {
                     hand: held.kind if held else None for hand, held in self._skills.hands.items()
                 },
