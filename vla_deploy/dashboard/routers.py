@@ -6,6 +6,7 @@ from fastapi import APIRouter
 
 from vla_deploy.dashboard import page
 from vla_deploy.dashboard.access import routes as access
+from vla_deploy.dashboard.alarms import routes as alarms
 from vla_deploy.dashboard.api import commands, files, logs, operate, profile, state
 from vla_deploy.dashboard.live import endpoint, routes
 
@@ -20,6 +21,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     profile.router,
     files.router,
     logs.router,
+    alarms.router,
     endpoint.router,
     routes.router,
 )

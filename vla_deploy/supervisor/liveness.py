@@ -16,11 +16,16 @@ WINDOW_S = 5.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vital:
-    """Report one watched topic; `rate_hz` is None until a window is full."""
+    """Report one watched topic; `rate_hz` is None until a window is full, `least_hz` is its limit.
+
+    `faults` are what is in it and cannot be; `alarms` say all that is wrong, for people.
+    """
 
     topic: str
     age_s: float
     rate_hz: float | None
+    least_hz: float = 0.0
+    faults: tuple[str, ...] = ()
     alarms: tuple[str, ...] = ()
 
 
@@ -99,8 +104,16 @@ class _Pulse:
                 f"{self._name}: rate {rate_hz:.1f} Hz, limit {least_hz:.1f} Hz of "
                 f"{declared_hz:g} Hz declared"
             )
-        alarms += [f"{self._name}.{fault}" for fault in faults_of(sample)]
-        return Vital(topic=self._row.topic, age_s=age_s, rate_hz=rate_hz, alarms=tuple(alarms))
+        faults = faults_of(sample)
+        alarms += [f"{self._name}.{fault}" for fault in faults]
+        return Vital(
+            topic=self._row.topic,
+            age_s=age_s,
+            rate_hz=rate_hz,
+            least_hz=least_hz,
+            faults=faults,
+            alarms=tuple(alarms),
+        )
 
     def _declared_hz(self) -> float:
         """Return the rate of the profile in force, which may change while this runs."""

@@ -97,4 +97,6 @@ def _topic(vital: Vital) -> dict[str, Any]:
         "topic": vital.topic,
         "age_s": round(vital.age_s, 3),
         "rate_hz": None if vital.rate_hz is None else round(vital.rate_hz, 1),
+        "least_hz": round(vital.least_hz, 1),
+        "faults": list(vital.faults),
     }

@@ -1,0 +1,166 @@
+"""Let alarms be kept through restarts, seen by people, and told by the API and to pages."""
+
+import json
+
+import pytest
+
+from vla_deploy.dashboard.alarms.alarm_file import AlarmFile
+from vla_deploy.dashboard.alarms.desk import AlarmDesk
+from vla_deploy.dashboard.alarms.live_feed import AlarmFeed
+from vla_deploy.dashboard.alarms.told import Told, Word
+from vla_deploy.dashboard.live.message import Moment
+
+ARMED = {"state": "armed", "cause": "", "estop_latched": False, "buses": {}, "detail": ""}
+STOPPED = {
+    **ARMED,
+    "state": "stopped",
+    "cause": "estop",
+    "reaction": "group_stop",
+    "subject": "page",
+    "measured": None,
+    "limit": None,
+    "age_s": 0.0,
+    "estop_latched": True,
+}
+
+
+def told(status):
+    judged = {"tick": 10, "judged_tick": 10}
+    return Told(words={"control_status": Word(age_s=0.01, document={**status, **judged})})
+
+
+class Office:
+    """A desk over a file, on a clock that the test moves."""
+
+    def __init__(self, path, clock, run="run-1"):
+        self.now = told(ARMED)
+        self.clock = clock
+        self.desk = AlarmDesk(run, lambda: self.now, AlarmFile(path), clock, clock.wall_ns)
+
+    def look_for(self, seconds):
+        for _ in range(round(2 * seconds)):
+            self.clock.pass_s(0.5)
+            self.desk.step()
+
+    def alarms(self):
+        return self.desk.document()["alarms"]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "state" / "alarms.json"
+
+
+@pytest.fixture
+def office(path, hand_clock):
+    return Office(path, hand_clock)
+
+
+def test_a_stop_is_an_alarm_at_once_and_ends_when_it_is_reset(office):
+    office.look_for(2)
+    assert office.alarms() == []
+    office.now = told(STOPPED)
+    office.look_for(0.5)
+    (alarm,) = office.alarms()
+    assert (alarm["process"], alarm["field"], alarm["subject"]) == ("control", "estop", "page")
+    assert alarm["text"] == "estop (page): control is stopped"
+    assert alarm["since_s"] == office.clock.wall_ns() / 1e9
+    office.now = told(ARMED)
+    office.look_for(2.5)
+    assert office.alarms()[0]["ended_s"] is None
+    office.look_for(1)
+    assert office.alarms()[0]["ended_s"] is not None
+
+
+def test_alarms_and_who_has_seen_them_outlive_a_restart_of_the_dashboard(office, path, hand_clock):
+    office.now = told(STOPPED)
+    office.look_for(1)
+    office.desk.acknowledge("1", "anna")
+    before = office.alarms()
+    again = Office(path, hand_clock)  # the first was killed: it had no time to write anything
+    assert again.alarms() == before
+    again.now = told(STOPPED)
+    again.look_for(10)
+    (alarm,) = again.alarms()
+    assert (alarm["id"], alarm["count"], alarm["acknowledged_by"]) == ("1", 1, "anna")
+    assert alarm["ended_s"] is None
+
+
+def test_what_was_mended_while_the_dashboard_was_away_ends(office, path, hand_clock):
+    office.now = told(STOPPED)
+    office.look_for(1)
+    again = Office(path, hand_clock)
+    again.look_for(4)
+    assert again.alarms()[0]["ended_s"] is not None
+
+
+def test_a_new_run_of_the_robot_begins_without_the_alarms_of_the_last(office, path, hand_clock):
+    office.now = told(STOPPED)
+    office.look_for(1)
+    (alarm,) = Office(path, hand_clock, run="run-2").alarms()
+    assert alarm["ended_s"] == hand_clock.wall_ns() / 1e9
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", '{"alarms": [{"id": "1"}], "run": "run-1", "next": 2}', "\x00"]
+)
+def test_a_spoilt_file_is_begun_anew(path, hand_clock, text):
+    path.parent.mkdir()
+    path.write_text(text)
+    office = Office(path, hand_clock)
+    assert office.alarms() == []
+    office.now = told(STOPPED)
+    office.look_for(1)
+    assert json.loads(path.read_text())["alarms"][0]["field"] == "estop"
+
+
+def test_a_disk_that_refuses_costs_no_alarm(tmp_path, hand_clock, caplog):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    office = Office(blocked / "alarms.json", hand_clock)
+    office.now = told(STOPPED)
+    office.look_for(3)
+    office.desk.stop()
+    assert len(office.alarms()) == 1
+    assert [record.message for record in caplog.records if "outlive" in record.message]
+
+
+def test_numbers_that_change_are_told_but_cost_no_write(office, path):
+    office.now = told(STOPPED)
+    office.look_for(1)
+    written = path.stat().st_mtime_ns
+    revision = office.desk.revision
+    office.now = told({**STOPPED, "age_s": 1.0})
+    office.look_for(1)
+    assert office.desk.revision > revision
+    assert path.stat().st_mtime_ns == written
+
+
+def test_pages_are_told_on_change_alone(office, hand_clock):
+    feed = AlarmFeed(office.desk)
+    now = Moment(run_ns=hand_clock.now_ns(), wall_ns=hand_clock.wall_ns())
+    feed.begin()
+    assert len(feed.look(now)) == 1
+    assert feed.look(now) == ()
+    office.now = told(STOPPED)
+    office.look_for(1)
+    (message,) = feed.look(now)
+    assert json.loads(message.content)["data"]["alarms"][0]["field"] == "estop"
+
+
+def test_the_api_lists_alarms_and_notes_who_has_seen_one(dashboard):
+    dashboard.robot.control_is(
+        "stopped", **{name: STOPPED[name] for name in STOPPED if name != "state"}, tick=1,
+        judged_tick=1,
+    )  # fmt: skip
+    dashboard.app.state.alarms.step()
+    (alarm,) = dashboard.get("alarms")["alarms"]
+    assert (alarm["severity"], alarm["acknowledged_by"]) == ("error", None)
+    seen = dashboard.post(f"alarms/{alarm['id']}/acknowledge", 200)
+    assert seen["acknowledged_by"] == "local"
+    assert dashboard.get("alarms")["alarms"][0]["acknowledged_s"] == seen["acknowledged_s"]
+
+
+@pytest.mark.parametrize(("alarm_id", "status"), [("99", 404), ("x", 422), ("1" * 30, 422)])
+def test_an_alarm_that_is_not_there_cannot_be_seen(dashboard, alarm_id, status):
+    assert "error" in dashboard.post(f"alarms/{alarm_id}/acknowledge", status)

@@ -1,0 +1,1 @@
+"""Say which part of the robot failed and why: conditions found, alarms raised, seen by whom."""
