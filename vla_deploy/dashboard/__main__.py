@@ -33,7 +33,7 @@ class Dashboard:
         """Serve until `should_stop()`; `node` is the built one, wrapped."""
         try:
             node.start()
-            serve(self._node.app, self._node.doors, self._settings, node, clock, should_stop)
+            serve(self._node.app, self._node.doors, node, clock, should_stop)
         finally:
             node.stop()
 

@@ -3,6 +3,7 @@
 DashboardError
 ├── SettingsInvalid    dashboard.toml has faults, all of them are listed: mend the file
 ├── PortTaken          another program listens there: end it, or choose another port
+├── TlsUnusable        certificate or key cannot be used: mend the files, or the settings
 └── Refused            a request cannot be carried out: the one who asked is told why, as JSON
 """
 
@@ -23,6 +24,10 @@ class SettingsInvalid(DashboardError):
 
 class PortTaken(DashboardError):
     """Say that no connection can be taken at the wanted address."""
+
+
+class TlsUnusable(DashboardError):
+    """Say what is wrong with certificate or key, and what to try."""
 
 
 class Refused(DashboardError):

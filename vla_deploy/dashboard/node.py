@@ -11,6 +11,7 @@ from vla_deploy.dashboard.doors import SOCKET_NAME, open_port, open_socket
 from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.serving import Door
 from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.dashboard.tls import server_context
 from vla_deploy.ipc import CellWriter
 from vla_deploy.node import NodeContext
 
@@ -43,13 +44,16 @@ class DashboardNode:
 
         Raises:
             PortTaken: somebody else listens there.
+            TlsUnusable: certificate or key cannot be used.
         """
+        settings = self._settings
+        certificate, key = settings.tls_certificate, settings.tls_key
+        tls = server_context(certificate, key) if certificate else None
         twin = self._context.devices_dir is not None  # runs on one computer share its ports
         before = (self.link.document(STATUS_TOPIC) or {}).get("port")
-        settings = self._settings
         tcp = open_port(settings.host, settings.port, search=twin, before=before)
         unix = open_socket(self._context.run_dir / SOCKET_NAME)
-        self.doors = (Door(TCP, tcp, settings.scheme == "https"), Door(UNIX, unix))
+        self.doors = (Door(TCP, tcp, tls), Door(UNIX, unix))
         self._status = self.link.space.cell_writer(STATUS_TOPIC)
         self._access = Access.of_base(self._context.run_dir.parent, _rules(settings), self._clock)
         self.app = create_app(self.link, settings, self._access)

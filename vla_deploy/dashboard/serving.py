@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import socket
+import ssl
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -13,22 +14,26 @@ from starlette.types import ASGIApp
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.dashboard.live.wire import LiveProtocol
-from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.dashboard.access.connections import (
+    HEAD_BYTES,
+    BoundedWebSocket,
+    Connections,
+    bounded_by,
+)
 from vla_deploy.node import Node
 
 GOODBYE_S: Final = 1  # for requests that are under way at the end
 _KEEP_ALIVE_S: Final = 10
-_MOST_CONNECTIONS: Final = 256
 _MOST_MESSAGE_BYTES: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """Name a listening socket; whether it speaks TLS is the settings' matter."""
+    """Name a listening socket, and what it encrypts with."""
 
     name: str
     listener: socket.socket
-    is_encrypted: bool = False
+    tls: ssl.SSLContext | None = None
 
 
 class _Server(uvicorn.Server):
@@ -42,24 +47,24 @@ class _Server(uvicorn.Server):
 def serve(
     app: ASGIApp,
     doors: Sequence[Door],
-    settings: DashboardSettings,
     node: Node,
     clock: Clock,
     should_stop: Callable[[], bool],
+    connections: Connections | None = None,
 ) -> None:
     """Answer requests and step a started node until `should_stop()`."""
-    asyncio.run(_serve(app, doors, settings, node, clock, should_stop))
+    asyncio.run(_serve(app, doors, node, clock, should_stop, connections or Connections()))
 
 
 async def _serve(
     app: ASGIApp,
     doors: Sequence[Door],
-    settings: DashboardSettings,
     node: Node,
     clock: Clock,
     should_stop: Callable[[], bool],
+    connections: Connections,
 ) -> None:
-    servers = [_Server(_config(app, door, settings)) for door in doors]
+    servers = [_Server(_config(app, door, connections)) for door in doors]
     serving = [
         asyncio.create_task(server.serve([door.listener]))
         for server, door in zip(servers, doors, strict=True)
@@ -82,13 +87,8 @@ async def _step(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> No
         await asyncio.sleep((deadline_ns - clock.now_ns()) / NS_PER_S)
 
 
-def _config(app: ASGIApp, door: Door, settings: DashboardSettings) -> uvicorn.Config:
-    encrypted: dict[str, Any] = {}
-    if door.is_encrypted:
-        encrypted = {
-            "ssl_certfile": settings.tls_certificate,
-            "ssl_keyfile": settings.tls_key,
-        }
+def _config(app: ASGIApp, door: Door, connections: Connections) -> uvicorn.Config:
+    tls = door.tls
     return uvicorn.Config(
         _named(app, door.name),
         log_config=None,
@@ -101,11 +101,11 @@ def _config(app: ASGIApp, door: Door, settings: DashboardSettings) -> uvicorn.Co
         ws_per_message_deflate=False,  # it would compress each message anew for each client
         proxy_headers=False,
         server_header=False,
-        limit_concurrency=_MOST_CONNECTIONS,
+        h11_max_incomplete_event_size=HEAD_BYTES,
         timeout_keep_alive=_KEEP_ALIVE_S,
         timeout_graceful_shutdown=GOODBYE_S,
         ws_max_size=_MOST_MESSAGE_BYTES,
-        **encrypted,
+        ssl_context_factory=None if tls is None else lambda *_: tls,
     )
 
 

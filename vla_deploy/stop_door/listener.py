@@ -5,8 +5,9 @@ import ssl
 from typing import Final
 
 from vla_deploy.dashboard.doors import open_port
-from vla_deploy.dashboard.errors import PortTaken
+from vla_deploy.dashboard.errors import PortTaken, TlsUnusable
 from vla_deploy.dashboard.settings import DashboardSettings
+from vla_deploy.dashboard.tls import server_context
 from vla_deploy.stop_door.errors import DoorClosed
 
 _MAPPED: Final = "::ffff:"
@@ -63,13 +64,7 @@ def open_listener(
 
 
 def _tls(settings: DashboardSettings) -> ssl.SSLContext:
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.minimum_version = ssl.TLSVersion.TLSv1_2
     try:
-        context.load_cert_chain(settings.tls_certificate, settings.tls_key)
-    except OSError as error:  # ssl.SSLError is one
-        raise DoorClosed(
-            f"tls_certificate {settings.tls_certificate}, tls_key {settings.tls_key}: "
-            f"{error.strerror or error}; expected PEM files that belong together and may be read"
-        ) from error
-    return context
+        return server_context(settings.tls_certificate, settings.tls_key)
+    except TlsUnusable as error:
+        raise DoorClosed(str(error)) from error

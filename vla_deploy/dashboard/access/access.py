@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final, Self
 
 from starlette.requests import cookie_parser
+from starlette.types import Receive, Send
 
 from drivers.clock import Clock
 from vla_deploy.aside import background
@@ -37,6 +38,7 @@ from vla_deploy.dashboard.access.passwords import DEFAULT_COST, Cost
 from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.access.rules import AccessRules
 from vla_deploy.dashboard.access.sessions import Sessions
+from vla_deploy.dashboard.access.tenure import Tenure
 
 CSRF_HEADER: Final = "x-csrf-token"
 _COOKIE: Final = "vla_session"
@@ -63,6 +65,7 @@ class Access:
         self.rules = rules
         self.accounts = accounts
         self.audit = audit
+        self._clock = clock
         self.sessions = Sessions(rules.session_idle_s, rules.session_longest_s, clock)
         self.logins = Logins(accounts, self.sessions, clock, cost)
         self._now_s = now_s
@@ -118,6 +121,10 @@ class Access:
             return self._by_token(asked, authorization)
         return self._by_session(asked) or self._by_place(asked)
 
+    def tenure(self, asked: Asked, receive: Receive, send: Send) -> Tenure:
+        """Return the messages of a WebSocket, which end when its owner's role does."""
+        return Tenure(receive, send, lambda: self._role_now(asked), self._clock)
+
     def cookie_name(self) -> str:
         """Return the cookie's name; under https one that no other host can have set."""
         return f"__Host-{_COOKIE}" if self.rules.is_https else _COOKIE
@@ -129,6 +136,12 @@ class Access:
             if found:
                 return found
         return ""
+
+    def _role_now(self, asked: Asked) -> Role:
+        try:
+            return self.identify(asked).role
+        except RequestRefused:
+            return Role.ANYONE
 
     def _by_token(self, asked: Asked, authorization: str) -> Identity:
         is_bearer = authorization.lower().startswith(_BEARER)

@@ -4,7 +4,6 @@ AccessError
 ├── AccountsUnusable     the file of accounts cannot be used: mend it, or its rights
 ├── AccountRefused       a user or token is not as the act needs it: name another one
 ├── AuditUnusable        the audit log cannot be read: mend its rights
-├── TlsUnusable          certificate or key cannot be used: mend the settings or the files
 └── RequestRefused       answered to whoever asked, with a status of HTTP; nothing was done
     ├── LoginNeeded      401: log in, or send a token
     ├── LoginFailed      401: user and password do not fit together
@@ -38,10 +37,6 @@ class AccountRefused(AccessError):
 
 class AuditUnusable(AccessError):
     """Say why the audit log cannot be read."""
-
-
-class TlsUnusable(AccessError):
-    """Say what is wrong with certificate or key, and what to try."""
 
 
 class RequestRefused(AccessError):

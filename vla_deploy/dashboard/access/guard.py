@@ -6,7 +6,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from vla_deploy.dashboard.access.access import Access
 from vla_deploy.dashboard.access.answers import refuse
-from vla_deploy.dashboard.access.asked import Asked, asked_of
+from vla_deploy.dashboard.access.asked import WEBSOCKET, Asked, asked_of
 from vla_deploy.dashboard.access.body import read_body, read_stop_body, replay
 from vla_deploy.dashboard.access.errors import RequestRefused
 from vla_deploy.dashboard.access.identity import IDENTITY, nobody
@@ -34,7 +34,11 @@ class AccessGuard:
             await refuse(refusal, scope, receive, witness.send)
             return
         with witness:
-            await self._app(scope, receive, witness.send)
+            if asked.method == WEBSOCKET:
+                tenure = self._access.tenure(asked, receive, witness.send)
+                await self._app(scope, tenure.receive, tenure.send)
+            else:
+                await self._app(scope, receive, witness.send)
 
     async def _admit(self, scope: Scope, receive: Receive, asked: Asked) -> Receive:
         if asked.is_stop:
