@@ -13,13 +13,12 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.dashboard.live.wire import LiveProtocol
 from vla_deploy.dashboard.access.connections import (
     HEAD_BYTES,
-    BoundedWebSocket,
     Connections,
     bounded_by,
 )
+from vla_deploy.dashboard.live.wire import LiveProtocol
 from vla_deploy.node import Node
 
 GOODBYE_S: Final = 1  # for requests that are under way at the end
@@ -96,7 +95,7 @@ def _config(app: ASGIApp, door: Door, connections: Connections) -> uvicorn.Confi
         access_log=False,
         lifespan="off",
         loop="asyncio",
-        http="h11",
+        http=bounded_by(connections),
         ws=LiveProtocol,
         ws_per_message_deflate=False,  # it would compress each message anew for each client
         proxy_headers=False,

@@ -162,7 +162,7 @@ def test_a_certificate_that_cannot_be_used_is_named(doorway, tmp_path):
     node.start()
     told = doorway.told()
     assert not told["open"]
-    assert f"tls_certificate {tmp_path}, tls_key missing.pem" in told["why"]
+    assert f"tls_certificate {tmp_path}: Is a directory" in told["why"]
 
 
 def test_the_door_imports_nothing_that_could_hold_it_up() -> None:

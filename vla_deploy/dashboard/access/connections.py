@@ -35,10 +35,15 @@ class Connections:
         self._most_per_home = most_per_home
         self._by_home: Counter[str] = Counter()
 
+    @property
+    def held(self) -> int:
+        """Return how many there are, those of this computer left out."""
+        return self._by_home.total()
+
     def enter(self, peer: Peer) -> bool:
         """Count one more, or return False where there are enough."""
         if not (peer.is_loopback or peer.is_socket):
-            is_full = self._by_home.total() >= self._most
+            is_full = self.held >= self._most
             if is_full or self._by_home[peer.home] >= self._most_per_home:
                 return False
             self._by_home[peer.home] += 1
@@ -69,12 +74,12 @@ class Place:
 class BoundedHttp(H11Protocol):
     """Speak HTTP/1.1; hang up on who does not finish a request's head in time."""
 
-    connections: Connections
+    bounds: Connections
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take a place, or hang up at once."""
         super().connection_made(transport)
-        self._place = Place(self.connections, self)
+        self._place = Place(self.bounds, self)
         self._head_timer: asyncio.TimerHandle | None = None
         if self._place.is_held:
             self._await_head()
@@ -111,9 +116,7 @@ class BoundedHttp(H11Protocol):
         if is_answering or self.transport.is_closing():
             self._stop_waiting()
         elif self._head_timer is None and self.transport.get_protocol() is self:
-            self._head_timer = self.loop.call_later(
-                self.connections.head_within_s, self.transport.abort
-            )
+            self._head_timer = self.loop.call_later(self.bounds.head_within_s, self.transport.abort)
 
     def _stop_waiting(self) -> None:
         if self._head_timer is not None:
@@ -135,4 +138,4 @@ class BoundedWebSocket(WebSocketsSansIOProtocol):
 
 def bounded_by(connections: Connections) -> type[BoundedHttp]:
     """Return the protocol of HTTP whose connections are counted together."""
-    return type("BoundedHttp", (BoundedHttp,), {"connections": connections})
+    return type("BoundedHttp", (BoundedHttp,), {"bounds": connections})

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from fastapi import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.utils import ClientDisconnected
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from vla_deploy.dashboard.access.connections import BoundedWebSocket
 from vla_deploy.dashboard.live.hub import Send
 from vla_deploy.dashboard.live.message import Message
 
@@ -22,7 +22,7 @@ FROZEN: Final = 1008
 _CLOSING_S: Final = 1.0
 
 
-class LiveProtocol(WebSocketsSansIOProtocol):
+class LiveProtocol(BoundedWebSocket):
     """Be uvicorn's protocol, but take whole frames, and close at once where that is asked.
 
     Frames are the same for all clients as long as nothing is compressed: it takes its place

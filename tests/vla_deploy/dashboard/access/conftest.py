@@ -1,10 +1,11 @@
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fastapi import Depends, FastAPI, WebSocket
+from fastapi import Depends, FastAPI, WebSocket, WebSocketDisconnect
 from starlette.testclient import TestClient
 
 from vla_deploy.dashboard.access import (
@@ -55,6 +56,13 @@ def small_app(access: Access) -> FastAPI:
         await socket.accept()
         await socket.send_json({"user": who.user})
         await socket.close()
+
+    @app.websocket("/api/v1/echo")
+    async def echo(socket: WebSocket, who: Viewer) -> None:
+        await socket.accept()
+        with suppress(WebSocketDisconnect):
+            while True:
+                await socket.send_text(await socket.receive_text())
 
     app.include_router(router, prefix="/api/v1")
     guard(app, access)
