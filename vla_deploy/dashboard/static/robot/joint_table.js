@@ -11,7 +11,8 @@ const HEADS = ["Joint", "Position", "In its range", "Setpoint", "Velocity", "Eff
 /** Show every joint; `joints` maps a name to its kind and range. */
 export function JointTable({ joints, chosen, onChoose }) {
   const state = useSampled("joint_state");
-  const rows = state.data ? rowsOf(state.data, joints) : [];
+  const slow = useSampled("control_status", 1000).data?.joints;
+  const rows = state.data ? rowsOf(state.data, joints, slow) : [];
   return html`
     <${Card} title="Joints" span="all" stale=${state.stale} age_s=${state.age_s} note=${summary(rows)}>
       ${rows.length === 0
@@ -27,7 +28,7 @@ function Table({ rows, chosen, onChoose }) {
       <table class="joints">
         <thead>
           <tr>
-            ${HEADS.map((head, at) => html`<th scope="col" class=${at ? "number" : null}>${head}</th>`)}
+            ${HEADS.map((head, at) => html`<th scope="col" class=${at ? "numeric" : null}>${head}</th>`)}
           </tr>
         </thead>
         <tbody>
@@ -47,14 +48,14 @@ function Row({ row, chosen, onChoose }) {
           ${words(row.name)}
         </button>
       </th>
-      <td class="number">${written(row.position, writing)}<span class="unit">${writing.unit}</span></td>
+      <td class="numeric">${written(row.position, writing)}<span class="unit">${writing.unit}</span></td>
       <td><${Travel} row=${row} /></td>
-      <td class="number">${written(row.setpoint, writing)}<span class="unit">${writing.unit}</span></td>
-      <td class="number">${written(row.velocity, writing)}<span class="unit">${writing.rate}</span></td>
-      <td class="number" data-tone=${effortTone(row.effort_ratio)}>${effort(row)}</td>
-      <td class="number">${temperature(row)}</td>
-      <td class="number">${row.torque ? html`<${Badge} tone="ok">on<//>` : html`<${Badge}>off<//>`}</td>
-      <td class="number">${row.errors.length ? html`<${Badge} tone="bad">${row.errors.join(", ")}<//>` : html`<span class="quiet">none</span>`}</td>
+      <td class="numeric">${written(row.setpoint, writing)}<span class="unit">${writing.unit}</span></td>
+      <td class="numeric">${written(row.velocity, writing)}<span class="unit">${writing.rate}</span></td>
+      <td class="numeric" data-tone=${effortTone(row.effort_ratio)}>${effort(row)}</td>
+      <td class="numeric">${temperature(row)}</td>
+      <td class="numeric">${row.torque ? html`<${Badge} tone="ok">on<//>` : html`<${Badge}>off<//>`}</td>
+      <td class="numeric">${row.errors.length ? html`<${Badge} tone="bad">${row.errors.join(", ")}<//>` : html`<span class="quiet">none</span>`}</td>
     </tr>
   `;
 }
@@ -68,7 +69,7 @@ function Travel({ row }) {
       <span class="travel-goal" style=${{ insetInlineStart: `${100 * goal}%` }}></span>
       <span class="travel-at" style=${{ insetInlineStart: `${100 * at}%` }}></span>
     </span>
-    <span class="unseen">${percent(at)} of its range</span>
+    <span class="out-of-sight">${percent(at)} of its range</span>
   `;
 }
 
@@ -79,7 +80,7 @@ function effort(row) {
 
 function temperature({ temperature_c }) {
   if (temperature_c !== null) return html`${temperature_c.toFixed(0)}<span class="unit">°C</span>`;
-  return html`<span class="quiet" title="control does not publish the servos' temperatures">missing</span>`;
+  return html`<span class="quiet" title="The servo has not told it yet">missing</span>`;
 }
 
 function summary(rows) {

@@ -35,8 +35,15 @@ export function effortTone(ratio) {
   return EFFORT_TONES.find(([least]) => Math.abs(ratio) >= least)?.[1] ?? "";
 }
 
-/** Return a row for each joint; `joints` of the robot's model, by name, tell kind and limits. */
-export function rowsOf(state, joints) {
+/** Return each joint of the robot's model by its name: {kind, range}. */
+export function jointsByName(model) {
+  const joints = (model?.links ?? []).flatMap((link) => link.joints ?? []);
+  return new Map(joints.map((joint) => [joint.name, joint]));
+}
+
+/** Return a row for each joint; `joints` by name tell kind and range, `slow` of
+ * `control_status` what servos tell now and then. */
+export function rowsOf(state, joints, slow = {}) {
   return state.names.map((name, at) => {
     const joint = joints.get(name) ?? {};
     const writing = WRITING[joint.kind] ?? WRITING[name.includes("gripper") ? "slide" : "hinge"];
@@ -47,8 +54,9 @@ export function rowsOf(state, joints) {
       setpoint: state.setpoint[at],
       velocity: state.velocity[at],
       effort_ratio: state.effort_ratio[at],
-      temperature_c: state.temperature_c?.[at] ?? null,
-      current_a: state.current_a?.[at] ?? null,
+      temperature_c: slow.temperature_c?.[at] ?? null,
+      voltage_v: slow.voltage_v?.[at] ?? null,
+      current_a: slow.current_a?.[at] ?? null,
       age_s: state.age_s?.[at] ?? null,
       torque: Boolean(state.torque_enabled[at]),
       errors: errorWords(state.error[at]),
