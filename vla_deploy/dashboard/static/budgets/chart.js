@@ -21,7 +21,7 @@ export function makeChart(place, { unit, digits, curves, colours, describe }) {
       legend: { show: false },
       padding: [8, 8, 0, 0],
       scales: { x: { time: true }, y: { range: (_, low, high) => range(low, high, curves) } },
-      axes: [axis(colours, 28), { ...axis(colours, 52), values: (_, ticks) => ticks.map((one) => short(one, unit)) }],
+      axes: [{ ...axis(colours, 28), space: 64, values: (_, ticks) => ticks.map(clockWords) }, { ...axis(colours, 52), values: (_, ticks) => ticks.map((one) => short(one, unit)) }],
       series: [{}, ...curves.map((curve) => series(curve))],
       hooks: { draw: [(drawn) => drawLimits(drawn, curves, colours)], setCursor: [(at) => describe(told(at, curves, unit, digits))] },
     },
@@ -67,6 +67,13 @@ export function range(low, high, curves) {
   const top = Math.max(high ?? 0, ...limits.filter((limit) => limit < 4 * (high || 1)));
   const bottom = Math.min(0, low ?? 0);
   return [bottom, (top || 1) * (1 + PAD_RATIO)];
+}
+
+/** Return a time of day; seconds only where the tick falls between two minutes. */
+function clockWords(wall_s) {
+  const at = new Date(1000 * wall_s);
+  const second = at.getSeconds() ? "2-digit" : undefined;
+  return at.toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit", second });
 }
 
 function drawLimits(plot, curves, colours) {

@@ -1,11 +1,11 @@
 /** One chart with its legend, which is also its text: newest values, limits, what is missing. */
 
 import { useColours } from "../colours.js";
-import { clock } from "../format.js";
-import { Card, Empty } from "../parts.js";
-import { html, useEffect, useMemo, useRef, useState } from "../ui.js";
+import { clock, significant } from "../format.js";
+import { Card } from "../parts.js";
+import { html, useEffect, useRef, useState } from "../ui.js";
 import { makeChart, written } from "./chart.js";
-import { limitOf, missingReason, perSecond } from "./charts.js";
+import { limitOf, missingReason } from "./charts.js";
 
 const COLOURS = {
   muted: "--text-2",
@@ -13,24 +13,28 @@ const COLOURS = {
   limit: "--bad",
   ...Object.fromEntries([1, 2, 3, 4, 5, 6, 7, 8].map((at) => [`series${at}`, `--series-${at}`])),
 };
-const SERIES = 8;
 
-/** Show a chart; `history`, `budget` and `board` are null until they have come. */
-export function ChartCard({ chart, span_s, history, budget, board }) {
+/** Show a chart of `curves`, which `curvesOf` gives; what has none is told by `MissingCard`. */
+export function ChartCard({ chart, curves, span_s, end_s, budget, board }) {
   const [only, showOnly] = useState(null);
   const [pointed, point] = useState(null);
-  const curves = useMemo(() => curvesOf(chart, history), [chart, history]);
-  const known = curves.some((curve) => curve.values.some((value) => value !== null));
   const reason = missingReason(chart, board);
   return html`
     <${Card} title=${chart.title} note=${pointed ? clock(pointed.time_s) : ""}>
-      ${known
-        ? html`
-            <${Plot} chart=${chart} curves=${shown(curves, only)} span_s=${span_s} end_s=${history.end_s} budget=${budget} point=${point} />
-            <${Legend} chart=${chart} curves=${curves} only=${only} showOnly=${showOnly} pointed=${pointed} budget=${budget} />
-          `
-        : html`<${Empty} icon="question">${emptyWords(history, reason)}<//>`}
-      ${known && reason && html`<p class="small quiet">Missing now: ${reason}</p>`}
+      <${Plot} chart=${chart} curves=${shown(curves, only)} span_s=${span_s} end_s=${end_s} budget=${budget} point=${point} />
+      <${Legend} chart=${chart} curves=${curves} only=${only} showOnly=${showOnly} pointed=${pointed} budget=${budget} />
+      ${reason && html`<p class="small quiet">Now missing, ${reason}</p>`}
+    <//>
+  `;
+}
+
+/** List what this computer does not measure, each with the reason. */
+export function MissingCard({ charts, board }) {
+  return html`
+    <${Card} title="Not measured" note="missing is never shown as zero">
+      <dl class="missing">
+        ${charts.map((chart) => html`<dt>${chart.title}</dt><dd>${missingReason(chart, board) || "nothing was kept of it in this span"}</dd>`)}
+      </dl>
     <//>
   `;
 }
@@ -69,7 +73,7 @@ function Legend({ chart, curves, only, showOnly, pointed, budget }) {
         const limit = limitOf(chart, curve.label, budget);
         const words = html`
           <span class="key" data-series=${curve.colour} aria-hidden="true"></span>${curve.label}
-          <b>${value}</b>${limit !== undefined && html`<span class="quiet">of ${written(limit, chart.unit, 0)}</span>`}
+          <b>${value}</b>${limit !== undefined && html`<span class="quiet">of ${significant(limit)} ${chart.unit}</span>`}
         `;
         if (curves.length === 1) return html`<li key=${curve.label}>${words}</li>`;
         return html`
@@ -84,15 +88,6 @@ function Legend({ chart, curves, only, showOnly, pointed, budget }) {
   `;
 }
 
-function curvesOf(chart, history) {
-  const told = history?.series.get(chart.metric) ?? [];
-  return told.map(({ label, times_s, values }, at) => {
-    const plain = chart.rate ? perSecond(times_s, values) : values;
-    const scaled = chart.scale ? plain.map((value) => (value === null ? null : value * chart.scale)) : plain;
-    return { label, times_s, values: scaled, colour: (at % SERIES) + 1 };
-  });
-}
-
 function shown(curves, only) {
   const chosen = curves.filter((curve) => curve.label === only);
   return chosen.length ? chosen : curves;
@@ -100,9 +95,4 @@ function shown(curves, only) {
 
 function newest(values) {
   return values.at(-1) ?? null;
-}
-
-function emptyWords(history, reason) {
-  if (reason) return `Missing: ${reason}`;
-  return history ? "Missing: nothing was kept of it in this span." : "Asking for what was kept …";
 }

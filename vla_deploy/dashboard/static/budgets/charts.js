@@ -19,6 +19,7 @@ export const CHARTS = [
 ];
 
 const TOTAL = "total";
+const COLOURS = 8;
 
 /** Return the limit of one curve, or undefined; `budget` is the live document. */
 export function limitOf(chart, label, budget) {
@@ -39,5 +40,16 @@ export function perSecond(times_s, values) {
     const before = at > 0 ? values[at - 1] : null;
     if (value === null || before === null || value < before) return null;
     return (value - before) / (times_s[at] - times_s[at - 1]);
+  });
+}
+
+/** Return the curves of a chart, as it is written, each with the number of its colour. */
+export function curvesOf(chart, history) {
+  const told = history?.series.get(chart.metric) ?? [];
+  const known = told.filter(({ values }) => values.some((value) => value !== null));
+  return known.map(({ label, times_s, values }, at) => {
+    const plain = chart.rate ? perSecond(times_s, values) : values;
+    const scaled = chart.scale ? plain.map((value) => (value === null ? null : value * chart.scale)) : plain;
+    return { label, times_s, values: scaled, colour: (at % COLOURS) + 1 };
   });
 }

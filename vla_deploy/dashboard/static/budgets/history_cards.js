@@ -2,9 +2,9 @@
 
 import { useTopic } from "../following.js";
 import { Choice, Failure } from "../parts.js";
-import { html, useEffect, useState } from "../ui.js";
-import { ChartCard } from "./chart_card.js";
-import { CHARTS } from "./charts.js";
+import { html, useEffect, useMemo, useState } from "../ui.js";
+import { ChartCard, MissingCard } from "./chart_card.js";
+import { CHARTS, curvesOf } from "./charts.js";
 import { SPANS, fetchHistory } from "./history.js";
 
 /** Show every chart over the chosen span. */
@@ -21,10 +21,22 @@ export function HistoryCards() {
       <${Choice} name="Span of time" choices=${choices} value=${span} onChange=${setSpan} />
     </div>
     ${error && html`<${Failure} error=${error} />`}
+    ${history ? html`<${Charts} span_s=${span.span_s} history=${history} budget=${budget} board=${board} />` : html`<p class="empty" aria-busy="true">Asking for what was kept …</p>`}
+  `;
+}
+
+function Charts({ span_s, history, budget, board }) {
+  const drawn = useMemo(() => CHARTS.map((chart) => ({ chart, curves: curvesOf(chart, history) })), [history]);
+  const known = drawn.filter(({ curves }) => curves.length > 0);
+  const missing = drawn.filter(({ curves }) => curves.length === 0).map(({ chart }) => chart);
+  return html`
     <div class="charts">
-      ${CHARTS.map(
-        (chart) => html`<${ChartCard} key=${chart.metric} chart=${chart} span_s=${span.span_s} history=${history} budget=${budget} board=${board} />`,
+      ${known.map(
+        ({ chart, curves }) => html`
+          <${ChartCard} key=${chart.metric} chart=${chart} curves=${curves} span_s=${span_s} end_s=${history.end_s} budget=${budget} board=${board} />
+        `,
       )}
+      ${missing.length > 0 && html`<${MissingCard} charts=${missing} board=${board} />`}
     </div>
   `;
 }

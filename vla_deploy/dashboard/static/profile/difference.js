@@ -24,6 +24,7 @@ export function partsOf(keys) {
 /** Return a value of a profile as text. */
 export function written(value) {
   if (value === null || value === undefined) return NOTHING;
+  if (value === "") return "none";
   if (Array.isArray(value)) return value.map(written).join(", ") || "none";
   if (typeof value === "object") return Object.entries(value).map(([key, one]) => `${key} ${written(one)}`).join(", ");
   return String(value);

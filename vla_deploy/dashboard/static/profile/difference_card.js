@@ -82,7 +82,6 @@ function Acts({ wanted, count, current, onAsked }) {
         <input type="checkbox" checked=${may_restart} onChange=${(event) => permit(event.target.checked)} />
         Processes may be restarted where they cannot change while they run
       </label>
-      <span class="grow"></span>
       <${Button} needs="admin" busy=${busy} disabled=${changing} onClick=${() => act(true)}>Try without changing<//>
       <${Button} kind="main" needs="admin" busy=${busy} disabled=${changing || count === 0} onClick=${() => act(false)}>Switch to it<//>
     </div>

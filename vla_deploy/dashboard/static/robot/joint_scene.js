@@ -5,7 +5,7 @@ import { RobotGraph } from "./robot_graph.js";
 
 const LEAST_MS = 1000 / 20;
 const MIDDLE = new Vector3(0, 0, 0.62);
-const FAR_M = 2.3;
+const FAR_M = 2.05;
 const TURN_RAD = 0.15;
 const FROM = {
   front: new Vector3(1, 0.45, 0.3),
@@ -39,6 +39,9 @@ export class JointScene {
   #observers;
   #shown = () => this.#request();
   #pressed = (event) => this.#key(event);
+  #wheels = () => {
+    this.#controls.enableZoom = document.activeElement === this.#canvas; // else the page scrolls
+  };
 
   /** Raises Error where the browser has no WebGL. */
   constructor(canvas, model, colours) {
@@ -50,12 +53,14 @@ export class JointScene {
     this.#furnish();
     this.#camera.up.set(0, 0, 1);
     this.#controls = new OrbitControls(this.#camera, canvas);
-    Object.assign(this.#controls, { enablePan: false, enableZoom: true, minDistance: 0.6, maxDistance: 6 });
+    Object.assign(this.#controls, { enablePan: false, enableZoom: false, minDistance: 0.6, maxDistance: 6 });
     this.#controls.addEventListener("change", this.#shown);
     this.#observers = [new ResizeObserver(() => this.#resize()), new IntersectionObserver(([entry]) => this.#cross(entry))];
     for (const observer of this.#observers) observer.observe(canvas);
     document.addEventListener("visibilitychange", this.#shown);
     canvas.addEventListener("keydown", this.#pressed);
+    canvas.addEventListener("focus", this.#wheels);
+    canvas.addEventListener("blur", this.#wheels);
     this.lookFrom("front");
   }
 
@@ -85,6 +90,8 @@ export class JointScene {
     for (const observer of this.#observers) observer.disconnect();
     document.removeEventListener("visibilitychange", this.#shown);
     this.#canvas.removeEventListener("keydown", this.#pressed);
+    this.#canvas.removeEventListener("focus", this.#wheels);
+    this.#canvas.removeEventListener("blur", this.#wheels);
     cancelAnimationFrame(this.#frame);
     clearTimeout(this.#timer);
     this.#seen = false;
@@ -153,7 +160,7 @@ export class JointScene {
 
 /** Return colours as three.js reads them: CSS has more ways to write one than it knows. */
 function rgb(colours) {
-  const context = new OffscreenCanvas(1, 1).getContext("2d");
+  const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
   const read = (colour) => {
     context.fillStyle = colour;
     context.fillRect(0, 0, 1, 1);

@@ -6,7 +6,17 @@ import { useSampled } from "../sampled.js";
 import { html } from "../ui.js";
 import { effortTone, rangeRatio, rowsOf, written } from "./joint_values.js";
 
-const HEADS = ["Joint", "Position", "In its range", "Setpoint", "Velocity", "Effort", "Temperature", "Torque", "Errors"];
+const HEADS = [
+  ["Joint", null],
+  ["Position", "numeric"],
+  ["In its range", "travel-cell"],
+  ["Setpoint", "numeric"],
+  ["Velocity", "numeric"],
+  ["Effort", "numeric"],
+  ["Temperature", "numeric"],
+  ["Torque", "numeric"],
+  ["Errors", "numeric"],
+];
 
 /** Show every joint; `joints` maps a name to its kind and range. */
 export function JointTable({ joints, chosen, onChoose }) {
@@ -28,7 +38,7 @@ function Table({ rows, chosen, onChoose }) {
       <table class="joints">
         <thead>
           <tr>
-            ${HEADS.map((head, at) => html`<th scope="col" class=${at ? "numeric" : null}>${head}</th>`)}
+            ${HEADS.map(([head, kind]) => html`<th scope="col" class=${kind}>${head}</th>`)}
           </tr>
         </thead>
         <tbody>
@@ -49,7 +59,7 @@ function Row({ row, chosen, onChoose }) {
         </button>
       </th>
       <td class="numeric">${written(row.position, writing)}<span class="unit">${writing.unit}</span></td>
-      <td><${Travel} row=${row} /></td>
+      <td class="travel-cell"><${Travel} row=${row} /></td>
       <td class="numeric">${written(row.setpoint, writing)}<span class="unit">${writing.unit}</span></td>
       <td class="numeric">${written(row.velocity, writing)}<span class="unit">${writing.rate}</span></td>
       <td class="numeric" data-tone=${effortTone(row.effort_ratio)}>${effort(row)}</td>

@@ -16,7 +16,7 @@ export async function loadPicture(blob) {
 /** Return a canvas with every cell in the colour of what it holds. */
 export function coloured(picture, colours) {
   const canvas = new OffscreenCanvas(picture.width, picture.height);
-  const context = canvas.getContext("2d");
+  const context = canvas.getContext("2d", { willReadFrequently: true });
   const shades = [colours.wall, colours.unknown, colours.floor].map((colour) => bytes(context, colour));
   const painted = context.createImageData(picture.width, picture.height);
   for (let at = 0; at < picture.data.length; at += 4) {
