@@ -76,6 +76,9 @@ RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
     ("recorder", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
     ("recorder", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
     ("recorder", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGKILL): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGSTOP): Rule(rest_s=None, ready_s=70.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGTERM): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
     ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
     ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
     # An orderly end takes the power: the arms sink until they lie on the base.

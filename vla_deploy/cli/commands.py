@@ -23,6 +23,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "hear": Command("hear", "tell what is understood of a recording, or of what you say now"),
     "plan": Command("plan", "tell what would be done for a command, and who planned it"),
     "status": Command("status", "tell what runs and how the robot is"),
+    "dashboard": Command("dashboard", "tell where the robot's page is, and who may use it"),
     "scene": Command("scene", "tell what the robot knows of the things around it"),
     "memory": Command("memory", "tell what the robot remembers, and have it forget"),
     "budget": Command(

@@ -7,7 +7,7 @@ from drivers.clock import Clock
 from vla_deploy.dashboard.errors import DashboardError
 from vla_deploy.dashboard.node import DashboardNode
 from vla_deploy.dashboard.serving import serve
-from vla_deploy.dashboard.settings import DashboardSettings, read_settings
+from vla_deploy.dashboard.settings import read_settings
 from vla_deploy.node import Node, NodeContext
 from vla_deploy.process_main import main
 
@@ -17,7 +17,6 @@ class Dashboard:
 
     def __init__(self) -> None:
         self._node: DashboardNode
-        self._settings: DashboardSettings
 
     def build(self, context: NodeContext) -> DashboardNode:
         """Build the node from what the process was started with.
@@ -25,8 +24,7 @@ class Dashboard:
         Raises:
             SettingsInvalid: dashboard.toml has faults.
         """
-        self._settings = read_settings(context.run_dir.parent)
-        self._node = DashboardNode(context, self._settings)
+        self._node = DashboardNode(context, read_settings(context.run_dir.parent))
         return self._node
 
     def run(self, node: Node, clock: Clock, should_stop: Callable[[], bool]) -> None:

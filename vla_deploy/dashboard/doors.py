@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from vla_deploy.dashboard.errors import PortTaken
+from vla_deploy.ipc.doorbell import short_path
 
 SOCKET_NAME: Final = "dashboard.sock"
 _BACKLOG: Final = 128
@@ -48,7 +49,8 @@ def open_socket(path: Path) -> socket.socket:
     door = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         path.unlink(missing_ok=True)  # an earlier instance of this run left it
-        door.bind(str(path))
+        with short_path(path.parent) as folder:
+            door.bind(f"{folder}/{path.name}")
         path.chmod(_SOCKET_MODE)
     except OSError as error:
         door.close()

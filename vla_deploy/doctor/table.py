@@ -8,6 +8,7 @@ from vla_deploy.doctor import (
     camera,
     clocks,
     computer,
+    dashboard,
     devices,
     limits,
     power,
@@ -67,6 +68,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Software", "OpenGL (EGL)", software.open_gl, live=True),
     Check("Software", "ROS", software.ros),
     Check("Software", "service", software.service),
+    Check("Software", "dashboard", dashboard.dashboard, live=True),
 )
 
 

@@ -28,7 +28,7 @@ class Doorbell:
         self._path.unlink(missing_ok=True)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        with _short_path(folder) as short:
+        with short_path(folder) as short:
             self._socket.bind(f"{short}/{self._path.name}")
         self._close = weakref.finalize(self, _close, self._socket, self._path)
 
@@ -61,7 +61,7 @@ def ring_bells(directory: Path, topic: str) -> int:
         return 0
     if not names:
         return 0
-    with _short_path(folder) as short, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+    with short_path(folder) as short, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
         sender.setblocking(False)
         return sum(not _ring(sender, f"{short}/{name}") for name in names)
 
@@ -82,8 +82,8 @@ def _folder(directory: Path, topic: str) -> Path:
 
 
 @contextlib.contextmanager
-def _short_path(folder: Path) -> Iterator[str]:
-    # A socket address ends at 107 bytes, run directories may be longer.
+def short_path(folder: Path) -> Iterator[str]:
+    """Give a folder a short name: a socket address ends at 107 bytes, a run directory may not."""
     fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         yield f"/proc/self/fd/{fd}"

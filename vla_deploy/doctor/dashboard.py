@@ -1,0 +1,58 @@
+"""Check that the dashboard and its stop door can listen, and whom they let in how."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from vla_deploy.dashboard.doors import open_port
+from vla_deploy.dashboard.errors import PortTaken, SettingsInvalid
+from vla_deploy.dashboard.settings import SETTINGS_FILE, DashboardSettings, read_settings
+from vla_deploy.doctor.context import Context
+from vla_deploy.doctor.finding import Finding, fail, ok, warn
+from vla_deploy.state_dir import config_dir_of
+from vla_deploy.supervisor.runtime import default_base, running
+
+_NAME: Final = "dashboard"
+_LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
+
+
+def dashboard(context: Context) -> Iterator[Finding]:
+    """Check settings, ports and certificate of whoever runs the robot on this computer."""
+    base = default_base()
+    file = config_dir_of(base) / SETTINGS_FILE
+    try:
+        settings = read_settings(base)
+    except SettingsInvalid as error:
+        yield fail(_NAME, "; ".join(error.faults), f"sudoedit {file}")
+        return
+    yield from _ports(settings, is_running=running(base) is not None)
+    yield from _encryption(settings, file)
+
+
+def _ports(settings: DashboardSettings, *, is_running: bool) -> Iterator[Finding]:
+    for name, port in (("page", settings.port), ("stop door", settings.stop_port)):
+        label = f"{_NAME}, {name}"
+        if is_running:
+            yield ok(label, f"a robot runs; see: vla-deploy {_NAME}")
+            continue
+        try:
+            open_port(settings.host, port, search=False).close()
+        except PortTaken as error:
+            yield warn(label, str(error), f"sudo ss -ltnp 'sport = :{port}'")
+        else:
+            yield ok(label, f"{settings.host}:{port} is free")
+
+
+def _encryption(settings: DashboardSettings, file: Path) -> Iterator[Finding]:
+    """Check that passwords do not travel in the clear, and that the certificate can be read."""
+    if settings.scheme == "http":
+        if settings.host not in _LOOPBACK:
+            told = f"{settings.host} is reached from elsewhere without TLS: passwords can be read"
+            yield warn(f"{_NAME}, TLS", told, f"sudoedit {file}  # tls_certificate, tls_key")
+        return
+    for path in (settings.tls_certificate, settings.tls_key):
+        if os.access(path, os.R_OK):
+            yield ok(f"{_NAME}, TLS", f"{path} can be read")
+        else:
+            yield fail(f"{_NAME}, TLS", f"{path} cannot be read", f"ls -l {path}")
