@@ -1,0 +1,68 @@
+"""The dashboard commands and stops the robot, and the robot does not need the dashboard."""
+
+import json
+from http.client import HTTPConnection
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from sim_twin.process_stack import ProcessStack
+
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+
+MOVING_RAD_S = 1.0
+STANDSTILL_RAD_S = 0.05
+
+
+class Page:
+    """Ask the dashboard of a run as a page does."""
+
+    def __init__(self, stack: ProcessStack) -> None:
+        self._stack = stack
+        assert stack.wait_until(lambda: stack.document("dashboard_status", 3.0), 60.0)
+        self.url = stack.document("dashboard_status")["url"]
+
+    def ask(self, method: str, path: str, body: Any = None) -> Any:
+        connection = HTTPConnection(urlsplit(self.url).netloc, timeout=20)
+        headers = {"origin": self.url, "content-type": "application/json"}
+        content = None if body is None else json.dumps(body)
+        connection.request(method, f"/api/v1/{path}", content, headers)
+        with connection.getresponse() as answer:
+            told = json.load(answer)
+        connection.close()
+        assert answer.status < 300, told
+        return told
+
+    def state(self, command_id: str) -> str:
+        return str(self.ask("GET", f"commands/{command_id}")["state"])
+
+    def drive(self) -> str:
+        command_id: str = self.ask("POST", "commands", {"text": "go to the kitchen"})["command_id"]
+        moves = self._stack.wait_until(lambda: self._stack.fastest_rad_s() > MOVING_RAD_S)
+        assert moves, self.ask("GET", f"commands/{command_id}")
+        return command_id
+
+
+def test_it_stops_and_commands_the_robot_which_drives_on_when_it_is_killed(
+    twin_stack: ProcessStack,
+) -> None:
+    page = Page(twin_stack)
+    stopped_id = page.drive()
+    assert page.ask("POST", "stop", {"reason": "test"}) == {"pressed": True}
+    stands = twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() < STANDSTILL_RAD_S, 3.0)
+    assert stands, twin_stack.truth()
+    control = page.ask("GET", "state")["control"]
+    assert (control["estop_latched"], control["cause"]) == (True, "estop")
+    assert twin_stack.wait_until(lambda: page.state(stopped_id) == "failed")
+    assert page.ask("POST", "reset", {})["control"]["state"] == "disarmed"
+    assert page.ask("POST", "arm", {})["control"]["state"] == "armed"
+
+    command_id, pid = page.drive(), twin_stack.row("dashboard")["pid"]
+    twin_stack.kill("dashboard")
+    assert twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() > MOVING_RAD_S, 2.0)
+    assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["pid"] not in (pid, None))
+    assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["state"] == "ready", 60.0)
+    assert Page(twin_stack).url == page.url
+    assert twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
+    assert page.state(stopped_id) == "failed"
