@@ -1,4 +1,4 @@
-"""`vla-deploy dashboard`: where the robot's page is."""
+"""`vla-deploy dashboard`: where the robot's page is, and who may use it."""
 
 import argparse
 import json
@@ -6,12 +6,14 @@ import sys
 import webbrowser
 from typing import Any
 
+from vla_deploy.cli import dashboard_accounts, dashboard_audit, dashboard_tokens
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import Session, attach
 
 EXAMPLES = """  vla-deploy dashboard             print the page's address
   vla-deploy dashboard --open      open it in this computer's browser
+  vla-deploy dashboard password    make the first admin's account; see also users, token, audit
   curl --unix-socket /run/vla-deploy/current/dashboard.sock http://robot/api/v1/state
 """
 NAME = "dashboard"
@@ -23,6 +25,9 @@ def register(commands: Any) -> None:
     dashboard.add_argument("--open", action="store_true", help="open the page in the browser")
     dashboard.add_argument("--json", action="store_true", help="print the addresses as JSON")
     dashboard.set_defaults(run=run)
+    acts = dashboard.add_subparsers(dest="act", metavar="ACT")
+    for module in (dashboard_accounts, dashboard_tokens, dashboard_audit):
+        module.register(acts)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,13 +1,13 @@
 """Check that the dashboard and its stop door can listen, and whom they let in how."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 from vla_deploy.dashboard.doors import open_port
-from vla_deploy.dashboard.errors import PortTaken, SettingsInvalid
+from vla_deploy.dashboard.errors import PortTaken, SettingsInvalid, TlsUnusable
 from vla_deploy.dashboard.settings import SETTINGS_FILE, DashboardSettings, read_settings
+from vla_deploy.dashboard.tls import server_context
 from vla_deploy.doctor.context import Context
 from vla_deploy.doctor.finding import Finding, fail, ok, warn
 from vla_deploy.state_dir import config_dir_of
@@ -51,8 +51,9 @@ def _encryption(settings: DashboardSettings, file: Path) -> Iterator[Finding]:
             told = f"{settings.host} is reached from elsewhere without TLS: passwords can be read"
             yield warn(f"{_NAME}, TLS", told, f"sudoedit {file}  # tls_certificate, tls_key")
         return
-    for path in (settings.tls_certificate, settings.tls_key):
-        if os.access(path, os.R_OK):
-            yield ok(f"{_NAME}, TLS", f"{path} can be read")
-        else:
-            yield fail(f"{_NAME}, TLS", f"{path} cannot be read", f"ls -l {path}")
+    try:
+        server_context(settings.tls_certificate, settings.tls_key)
+    except TlsUnusable as error:
+        yield fail(f"{_NAME}, TLS", str(error), f"sudoedit {file}")
+    else:
+        yield ok(f"{_NAME}, TLS", f"{settings.tls_certificate} can be used")
