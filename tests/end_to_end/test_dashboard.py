@@ -40,7 +40,7 @@ class Page:
     def drive(self) -> str:
         command_id: str = self.ask("POST", "commands", {"text": "go to the kitchen"})["command_id"]
         moves = self._stack.wait_until(lambda: self._stack.fastest_rad_s() > MOVING_RAD_S)
-        assert moves, self.ask("GET", f"commands/{command_id}")
+        assert moves, self.ask("GET", f"commands/{command_id}")["events"][-1]
         return command_id
 
 
@@ -64,5 +64,6 @@ def test_it_stops_and_commands_the_robot_which_drives_on_when_it_is_killed(
     assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["pid"] not in (pid, None))
     assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["state"] == "ready", 60.0)
     assert Page(twin_stack).url == page.url
-    assert twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
+    is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
+    assert is_done, page.ask("GET", f"commands/{command_id}")["events"][-1]
     assert page.state(stopped_id) == "failed"
