@@ -47,6 +47,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "can": Command("can", "find CAN nodes and watch the traffic"),
     "fault": Command("fault", "make the twin's devices fail"),
     "flight": Command("flight", "look into what the flight recorder saved"),
+    "record": Command("record", "record what the robot does: rolling files, or one of your own"),
     "check": Command("check", "check a robot, a profile or a plan, and report all faults"),
     "schema": Command("check", "print the JSON Schema of a plan or of an analysis"),
     "map": Command("map", "record, look at, check and convert maps in the ROS format"),

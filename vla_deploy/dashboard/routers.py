@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from vla_deploy.dashboard import page
 from vla_deploy.dashboard.access import routes as access
 from vla_deploy.dashboard.alarms import routes as alarms
-from vla_deploy.dashboard.api import commands, files, logs, operate, profile, state
+from vla_deploy.dashboard.api import commands, files, logs, operate, profile, recordings, state
 from vla_deploy.dashboard.live import endpoint, routes
 
 API_PREFIX: Final = "/api/v1"
@@ -21,6 +21,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     profile.router,
     files.router,
     logs.router,
+    recordings.router,
     alarms.router,
     endpoint.router,
     routes.router,

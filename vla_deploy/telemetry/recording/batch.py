@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.ipc import BY_NAME, Frame, Kind, Record
+from vla_deploy.robots import load_robot
 from vla_deploy.telemetry.channels import TICKS, tick_text, value_text
 from vla_deploy.telemetry.history import Kept
 from vla_deploy.telemetry.images import compress
 from vla_deploy.telemetry.schemas.log_lines import LoggedLine
+from vla_deploy.telemetry.schemas.pictures import Pictures
 
 LOG_CHANNEL: Final = "view/log"
 _LINE_BYTES: Final = 300
@@ -50,30 +52,61 @@ class Message:
     stays: bool = False
 
 
-def messages_of(
-    batch: Batch, wall_offset_ns: int, wanted: Callable[[str], bool]
-) -> Iterator[Message]:
-    """Yield the wanted messages of a batch; `wall_offset_ns` turns stamps into wall clock."""
-    yield from _of_values((*batch.values, *_parts(batch.frames)), wall_offset_ns, wanted)
-    for record in batch.ticks if wanted(TICKS) else ():
-        text = tick_text(None, record.payload, record.writer_pid)
-        yield Message(channel=TICKS, stamp_ns=record.stamp_ns, text=text, sequence=record.sequence)
-    for line in batch.lines if wanted(LOG_CHANNEL) else ():
-        yield Message(channel=LOG_CHANNEL, stamp_ns=line.stamp_ns, text=line.text(wall_offset_ns))
+class Drafter:
+    """Turn batches into messages: of the topics themselves, and of the views of them."""
 
+    def __init__(self, robot: str, wanted: Callable[[str], bool]) -> None:
+        self._robot = robot
+        self._wanted = wanted
+        self._pictures: Pictures | None = None
 
-def _of_values(
-    values: Iterable[tuple[str, Kept]], wall_offset_ns: int, wanted: Callable[[str], bool]
-) -> Iterator[Message]:
-    for channel, kept in values:
-        if wanted(channel):
+    def messages(self, batch: Batch, wall_offset_ns: int) -> Iterator[Message]:
+        """Yield the wanted messages; `wall_offset_ns` turns stamps into wall clock."""
+        for channel, kept in (*batch.values, *_parts(batch.frames)):
+            if self._wanted(channel):
+                yield _of_value(channel, kept, wall_offset_ns)
+            yield from self._views(channel, kept, wall_offset_ns)
+        for record in batch.ticks if self._wanted(TICKS) else ():
+            text = tick_text(None, record.payload, record.writer_pid)
             yield Message(
-                channel=channel,
-                stamp_ns=kept.stamp_ns,
-                text=value_text(channel, kept, wall_offset_ns),
-                sequence=kept.sequence,
-                stays=channel in BY_NAME and BY_NAME[channel].kind is Kind.CELL,
+                channel=TICKS, stamp_ns=record.stamp_ns, text=text, sequence=record.sequence
             )
+        for line in batch.lines if self._wanted(LOG_CHANNEL) else ():
+            yield Message(
+                channel=LOG_CHANNEL, stamp_ns=line.stamp_ns, text=line.text(wall_offset_ns)
+            )
+
+    def still(self, now_ns: int, wall_offset_ns: int) -> Iterator[Message]:
+        """Yield what stays as it is while the robot runs."""
+        for channel, text in self._drawn().still(now_ns + wall_offset_ns, self._wanted):
+            yield Message(channel=channel, stamp_ns=now_ns, text=text)
+
+    def _views(self, channel: str, kept: Kept, wall_offset_ns: int) -> Iterator[Message]:
+        stamp_ns = kept.stamp_ns + wall_offset_ns
+        for view, text in self._drawn().of(channel, kept.payload, stamp_ns, self._wanted):
+            yield Message(
+                channel=view,
+                stamp_ns=kept.stamp_ns,
+                text=text,
+                sequence=kept.sequence,
+                stays=True,
+            )
+
+    def _drawn(self) -> Pictures:
+        """Return the views of the robot; its kinematics are loaded when they are first needed."""
+        if self._pictures is None:
+            self._pictures = Pictures(load_robot(self._robot))
+        return self._pictures
+
+
+def _of_value(channel: str, kept: Kept, wall_offset_ns: int) -> Message:
+    return Message(
+        channel=channel,
+        stamp_ns=kept.stamp_ns,
+        text=value_text(channel, kept, wall_offset_ns),
+        sequence=kept.sequence,
+        stays=channel in BY_NAME and BY_NAME[channel].kind is Kind.CELL,
+    )
 
 
 def _parts(frames: Iterable[tuple[str, Frame]]) -> Iterator[tuple[str, Kept]]:

@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.robots import load_robot
-from vla_deploy.telemetry.recording.batch import Batch, Message, messages_of
+from vla_deploy.telemetry.recording.batch import Batch, Drafter, Message
 from vla_deploy.telemetry.recording.folder import RecordingFolder
 from vla_deploy.telemetry.recording.recording_file import RecordedRun, RecordingFile
 from vla_deploy.telemetry.recording.request import RecordingWish
-from vla_deploy.telemetry.schemas.pictures import Pictures
 
 FLUSH_S: Final = 1.0
 RETRY_S: Final = 10.0
@@ -76,7 +74,7 @@ class Tape:
         self._limits = limits
         self._clock = clock
         self._wall_ns = wall_ns
-        self._pictures: Pictures | None = None
+        self._drafter = Drafter(run.robot, wish.selection.takes)
         self._file: RecordingFile | None = None
         self._lasting: dict[str, Message] = {}
         self._messages = self._files = self._unwritten = 0
@@ -106,26 +104,11 @@ class Tape:
 
     def _add(self, file: RecordingFile, batch: Batch) -> None:
         before = file.messages
-        for message in messages_of(batch, file.offset_ns, self._selection.takes):
-            self._put(file, message)
-        for topic, kept in batch.values:
-            stamp_ns = kept.stamp_ns + file.offset_ns
-            views = self._drawn().of(topic, kept.payload, stamp_ns, self._selection.takes)
-            for channel, text in views:
-                shown = Message(
-                    channel=channel,
-                    stamp_ns=kept.stamp_ns,
-                    text=text,
-                    sequence=kept.sequence,
-                    stays=True,
-                )
-                self._put(file, shown)
+        for message in self._drafter.messages(batch, file.offset_ns):
+            if message.stays:
+                self._lasting[message.channel] = message
+            file.add((message,))
         self._messages += file.messages - before
-
-    def _put(self, file: RecordingFile, message: Message) -> None:
-        if message.stays:
-            self._lasting[message.channel] = message
-        file.add((message,))
 
     def _next_file(self) -> RecordingFile | None:
         """Begin a file, unless it is too soon after a failure, or the disk is too full."""
@@ -146,9 +129,7 @@ class Tape:
     def _begin(self, file: RecordingFile, now_ns: int) -> None:
         """Write what was so before, and what stays as it is."""
         file.add(self._lasting.values())
-        stamp_ns = now_ns + file.offset_ns
-        for channel, text in self._drawn().still(stamp_ns, self._selection.takes):
-            file.add((Message(channel=channel, stamp_ns=now_ns, text=text),))
+        file.add(self._drafter.still(now_ns, file.offset_ns))
         self._messages += file.messages
         self._files += 1
         self._look(file)
@@ -185,11 +166,6 @@ class Tape:
         if self.report.state is not TapeState.FAILED:
             _log.error("nothing is recorded: %s; tried again every %.0f s", reason, RETRY_S)
         self._tell(TapeState.FAILED, reason)
-
-    def _drawn(self) -> Pictures:
-        if self._pictures is None:
-            self._pictures = Pictures(load_robot(self._run.robot))
-        return self._pictures
 
     def _tell(self, state: TapeState, why: str, size_bytes: int = 0) -> None:
         self.report = TapeReport(
