@@ -12,6 +12,7 @@ BENCHMARKS = {
     "bus": "16-servo cycle against dynamixel-sdk on the same emulated bus",
     "contact": "torque that no contact explains while the robot works, against its limits",
     "control": "where the CPU time of a control tick goes, as shares of the period",
+    "dashboard": "what clients cost control and the dashboard, one of them frozen; --part",
     "estop": "emergency stop: from the request to the wire under load, and to standstill",
     "perception": "how well, how fast and at what cost the robot sees; int8 beside fp32; --part",
     "planner": "commands understood, other talk left alone, attacks refused, time to plan; --part",
@@ -33,7 +34,9 @@ def register(commands: Any) -> None:
     bench.add_argument("benchmark", choices=sorted(BENCHMARKS), help=listed)
     bench.add_argument("--json", action="store_true", help="print the figures as JSON")
     bench.add_argument(
-        "--part", action="append", help="of perception, planner, speech: only this, repeatable"
+        "--part",
+        action="append",
+        help="of dashboard, perception, planner, speech: only this, repeatable",
     )
     bench.set_defaults(run=run)
 

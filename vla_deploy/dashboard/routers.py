@@ -8,7 +8,7 @@ from vla_deploy.dashboard import page
 from vla_deploy.dashboard.access import routes as access
 from vla_deploy.dashboard.alarms import routes as alarms
 from vla_deploy.dashboard.api import commands, files, logs, operate, profile, recordings, state
-from vla_deploy.dashboard.live import endpoint, routes
+from vla_deploy.dashboard.live import endpoint, microphone, routes
 
 API_PREFIX: Final = "/api/v1"
 
@@ -24,6 +24,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     recordings.router,
     alarms.router,
     endpoint.router,
+    microphone.router,
     routes.router,
 )
 # At the root: the page, and what has its place by convention.

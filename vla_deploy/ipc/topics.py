@@ -39,6 +39,7 @@ class Topic:
     `owner` is the only process that writes it; "any" marks a ring, or a document
     changed in turns, with many writers.
     `rate_hz` 0 means "on change"; `deadline_s` is the age above which a reader calls it stale.
+    What a `private` topic carries is kept by no recording.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Topic:
     deadline_s: float = 0.0
     slots: int = 4
     slot_bytes: int = 0
+    private: bool = False
 
 
 def _joint(name: str, dtype: str, unit: str) -> Field:
@@ -352,6 +354,15 @@ TOPICS: tuple[Topic, ...] = (
         deadline_s=3.0,
         summary="where the stop door listens and how often it was used, as JSON",
         fields=(Field("document", "json", 1024),),
+    ),
+    Topic(
+        name="page_sound",
+        kind=Kind.RECORD,
+        owner="dashboard",
+        summary="what a person says into a browser's microphone, and how their turn ends",
+        slots=64,
+        slot_bytes=8192,
+        private=True,
     ),
     Topic(
         name="twin_status",

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -39,6 +39,15 @@ class Heard:
         return "" if reading is None else reading.text
 
 
+@dataclass(frozen=True, slots=True)
+class Room:
+    """Hold what is known of where a microphone stands."""
+
+    floor: NoiseFloor = field(default_factory=NoiseFloor)
+    music: Music = field(default_factory=Music)
+    gate: EchoGate = field(default_factory=EchoGate)
+
+
 class Hearing:
     """Hold what hearing remembers between two blocks."""
 
@@ -50,9 +59,7 @@ class Hearing:
         hot_words: Callable[[], str],
     ) -> None:
         self.readings = readings
-        self.floor = NoiseFloor()
-        self.music = Music()
-        self.gate = EchoGate()
+        self.enter(Room())
         self.counts: Counter[str] = Counter()
         self._activity = voice_activity
         self._hot_words = hot_words
@@ -62,6 +69,10 @@ class Hearing:
         self._own_ns = 0
         self._barge_ns: int | None = None
         self._told: list[Heard] = []
+
+    def enter(self, room: Room) -> None:
+        """Listen elsewhere from the next block on; what was known of a room is kept in it."""
+        self.floor, self.music, self.gate = room.floor, room.music, room.gate
 
     @property
     def settings(self) -> SpeechSettings:

@@ -18,9 +18,10 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.speech.choosing import Ears, ears_of
 from vla_deploy.speech.companions import Playing, StreamListener, Voice
 from vla_deploy.speech.errors import SpeechError, SpeechMissing
-from vla_deploy.speech.hearing import Heard, Hearing
+from vla_deploy.speech.hearing import Heard, Hearing, Room
 from vla_deploy.speech.hot_words import HotWords
 from vla_deploy.speech.microphone import Microphone, OpenInput
+from vla_deploy.speech.page_microphone import PageMicrophone
 from vla_deploy.speech.readings import Readings
 from vla_deploy.speech.sound import SoundBlock
 from vla_deploy.speech.telling import Telling
@@ -75,6 +76,10 @@ class SpeechNode:
             self._microphone = Microphone("microphone", microphone, context.clock)
             self._deaf = ""
         self._hearing: Hearing | None = None
+        self._page: PageMicrophone
+        self._rooms = {False: Room(), True: Room()}
+        self._in_page = False
+        self._opened_ears = False
         self._loading: Future[Ears] | None = None
         self._status_due_ns = 0
 
@@ -82,18 +87,21 @@ class SpeechNode:
         """Open topics and companions; microphone and recogniser follow beside the steps."""
         self._status: CellWriter = self._space.cell_writer("speech_status")
         self._telling = Telling(self._space, self._clock)
+        self._page = PageMicrophone(self._space.record_reader("page_sound"), self._clock)
         for companion in self._companions():
             companion.start(self._space)
         if self._microphone is not None:
             self._open_ears()
 
     def step(self) -> None:
-        """Speak, hear what the microphone has, and tell what was understood."""
+        """Speak, hear what the microphones have, and tell what was understood."""
         if self._voice is not None:
             self._voice.step()
         block = self._poll()
         if block is not None and self._voice is not None:
             block = self._voice.cleaned(block)
+        for said in self._page.poll(self._profile.speech.unfinished_silence_s):
+            self._hear_page(said)
         if block is not None:
             self._hear(block)
         self._take_loaded()
@@ -139,6 +147,7 @@ class SpeechNode:
         return self._listeners if self._voice is None else (self._voice, *self._listeners)
 
     def _open_ears(self) -> None:
+        self._opened_ears = True
         try:
             activity = open_voice_activity(self._clock)
         except (InferenceError, SpeechError) as error:
@@ -147,6 +156,7 @@ class SpeechNode:
         hot_words = HotWords(self._robot.places, self._space.cell_reader("scene"))
         readings = Readings(self._executor, self._clock)
         self._hearing = Hearing(activity, readings, self._profile.speech, hot_words.text)
+        self._hearing.enter(self._rooms[False])
         self._loading = self._executor.submit(ears_of, self._shelf, self._profile, 0)
 
     def _close_ears(self) -> None:
@@ -178,12 +188,29 @@ class SpeechNode:
         self._deaf = why
 
     def _hear(self, block: SoundBlock) -> None:
+        """Hear the room; while a person speaks into the page, only the listeners do."""
         for listener in self._listeners:
             listener.feed(block)
+        if not self._page.is_open:
+            self._understand(block, self._playing(), in_page=False)
+
+    def _hear_page(self, block: SoundBlock) -> None:
+        """Hear a person who holds the page's button: the robot falls silent for them."""
+        if not self._opened_ears:
+            self._open_ears()
+        if not self._in_page and self._voice is not None and self._playing() is not None:
+            self._voice.barge_in(block.stamp_ns)
+        self._understand(block, None, in_page=True)
+
+    def _understand(self, block: SoundBlock, playing: Playing | None, *, in_page: bool) -> None:
         if self._hearing is None:
             return
+        if in_page is not self._in_page:
+            self._in_page = in_page
+            self._hearing.enter(self._rooms[in_page])
+            block = replace(block, follows=False)
         try:
-            barged_ns = self._hearing.feed(block, self._playing())
+            barged_ns = self._hearing.feed(block, playing)
         except InferenceError as error:
             self._go_deaf(one_line(error))
             self._close_ears()
@@ -220,6 +247,7 @@ class SpeechNode:
             "why": why,
             "speaking": self._playing() is not None,
             "microphone": {} if microphone is None else microphone.document(),
+            "page": self._page.document(),
             "room": {} if hearing is None else hearing.document(),
             "model": {} if recogniser is None else recogniser.document(),
             "heard": self._telling.document(),

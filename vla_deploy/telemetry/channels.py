@@ -43,7 +43,9 @@ class Channel:
 
 
 def channels_of(topic: Topic) -> tuple[Channel, ...]:
-    """Return what a topic becomes in the file: one channel, two for images with depth."""
+    """Return what a topic becomes in the file: one channel, two for images, none if private."""
+    if topic.private:
+        return ()
     if topic.kind is Kind.FRAME:
         return tuple(
             Channel(

@@ -20,6 +20,7 @@ from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc.page_sound import PageSound, Step
 from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.speech.companions import Playing
@@ -92,6 +93,7 @@ class Bench:
         self.clock = clock
         self.format = format_
         self.plugged = True
+        self.turn = 0
         self.device: PushedInput | None = None
         self.listener = Listener()
         self.voice = RobotVoice()
@@ -143,6 +145,29 @@ class Bench:
         samples = (gain * 32_768 * wave).clip(-32_768, 32_767).astype(np.int16)
         self.play(np.repeat(samples[:, None], self.format.channels, axis=1))
         self.quiet(1.0)
+
+    def hold(
+        self,
+        text: str,
+        last: Step | None = Step.ENDED,
+        rate_hz: int = 48_000,
+        share: float = 1.0,
+    ) -> None:
+        """Let a person say something into the page, or a share of it, as fast as they speak."""
+        wave = arrival(text, Talker(engine=EspeakEngine()), rate_hz, Acoustics()).sound.wave
+        samples = (32_768 * wave).clip(-32_768, 32_767).astype(np.int16)
+        samples = samples[: round(share * len(samples))]
+        records = self.space.record_writer("page_sound")
+        self.turn += 1
+        turn, size = self.turn, rate_hz // 10
+        for at in range(0, len(samples), size):
+            sound = PageSound(
+                turn=turn, rate_hz=rate_hz, step=Step.SOUND, samples=samples[at : at + size]
+            )
+            records.append(sound.packed())
+            self.quiet(0.1)
+        if last is not None:
+            records.append(PageSound(turn=turn, rate_hz=rate_hz, step=last).packed())
 
     def told(self, topic: str) -> list[dict[str, Any]]:
         return [dict(event.payload) for event in self._rings[topic].drain()]
@@ -382,3 +407,84 @@ def test_a_sentence_that_cannot_be_all_is_waited_for(bench: MakeBench) -> None:
     waited_s = (heard["told_ns"] - heard["ended_ns"]) / NS_PER_S
     settings = load_profile("desktop").speech
     assert settings.end_silence_s + 0.1 < waited_s < settings.unfinished_silence_s + 0.1
+
+
+@pytest.mark.parametrize("rate_hz", [16_000, 48_000])
+def test_what_is_said_into_the_page_is_understood_as_soon_as_the_button_is_let_go(
+    bench: MakeBench, rate_hz: int
+) -> None:
+    rig = bench()
+    rig.quiet(1.0)
+    rig.hold(TEXT, rate_hz=rate_hz)
+    rig.quiet(0.1)
+    assert [one["text"] for one in rig.told("utterance")] == [TEXT]
+    page = rig.status()["page"]
+    assert (page["turns"], page["cut"], page["lost_samples"]) == (1, 0, 0)
+
+
+def test_a_phrase_that_is_cut_off_is_not_carried_out(bench: MakeBench) -> None:
+    rig = bench()
+    rig.quiet(1.0)
+    rig.hold(TEXT, last=Step.CUT, share=0.5)
+    rig.quiet(3.0)
+    assert rig.told("heard") == rig.told("utterance") == []
+    rig.say(TEXT)
+    assert len(rig.told("utterance")) == 1, "the robot's own ears hear again"
+
+
+def test_a_page_that_falls_silent_gives_the_ears_back_after_seconds(bench: MakeBench) -> None:
+    rig = bench()
+    rig.quiet(1.0)
+    rig.hold(TEXT, last=None, share=0.5)
+    rig.quiet(4.0)
+    assert rig.told("utterance") == []
+    assert (rig.status()["page"]["speaking"], rig.status()["page"]["cut"]) == (False, 1)
+
+
+def test_while_a_person_speaks_into_the_page_the_room_is_heard_for_stop_words_only(
+    bench: MakeBench,
+) -> None:
+    rig = bench()
+    rig.quiet(1.0)
+    records, heard = rig.space.record_writer("page_sound"), len(rig.listener.blocks)
+    silence = np.zeros(1600, np.int16)
+    sound = PageSound(turn=9, rate_hz=16_000, step=Step.SOUND, samples=silence).packed()
+    for _ in range(3):
+        records.append(sound)
+        rig.say(TEXT)
+    assert rig.told("heard") == []
+    assert len(rig.listener.blocks) - heard > 100
+
+
+def test_the_robot_falls_silent_for_whoever_holds_the_button(bench: MakeBench) -> None:
+    rig = bench()
+    rig.quiet(1.0)
+    rig.voice.playing = Playing(say_id="1", text="I am on my way", level_db=-20.0)
+    rig.hold(TEXT)
+    rig.quiet(0.1)
+    assert len(rig.voice.barged) == 1
+    assert [one["text"] for one in rig.told("utterance")] == [TEXT]
+
+
+def test_noise_of_the_robots_room_is_none_of_the_browsers(bench: MakeBench) -> None:
+    rig = bench()
+    loud = np.random.default_rng(2).standard_normal((4 * 16_000, 1))
+    rig.play((3_000 * loud).astype(np.int16))
+    assert rig.status()["room"]["noise_floor_db"] > -55
+    silence = np.zeros(1600, np.int16)
+    sound = PageSound(turn=9, rate_hz=16_000, step=Step.SOUND, samples=silence)
+    rig.space.record_writer("page_sound").append(sound.packed())
+    rig.quiet(0.3)
+    assert rig.status()["room"]["noise_floor_db"] < -59
+
+
+def test_without_pyav_a_turn_at_another_rate_is_told_and_dropped(
+    bench: MakeBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = bench()
+    monkeypatch.setitem(sys.modules, "av", None)
+    rig.quiet(1.0)
+    rig.hold(TEXT)
+    rig.quiet(0.5)
+    assert "pip install" in rig.status()["page"]["why"]
+    assert rig.told("utterance") == []

@@ -59,7 +59,7 @@ class Detections:
         map_from_base = np.eye(4)
         map_from_base[:3, :3] = _turned(yaw_rad)
         map_from_base[:2, 3] = x_m, y_m
-        inverse: Array = np.linalg.inv(map_from_base @ base_from_camera)
+        inverse: Array = np.asarray(np.linalg.inv(map_from_base @ base_from_camera), np.float64)
         return inverse
 
     def _box(self, corners: Array, frame: Frame) -> list[float] | None:

@@ -10,6 +10,7 @@ from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.live.camera import CameraFeed
 from vla_deploy.dashboard.live.detections import Detections
 from vla_deploy.dashboard.live.hub import LiveHub
+from vla_deploy.dashboard.live.microphone import PageMicrophones
 from vla_deploy.dashboard.live.path_feed import PathFeed
 from vla_deploy.dashboard.live.still import Still
 from vla_deploy.dashboard.live.topic_feeds import RingFeed, topic_feeds
@@ -42,7 +43,7 @@ class Live:
 
 
 def live(app: FastAPI) -> Live:
-    """Return the part; routes and other parts find `live`, `camera` and `still` in the app's state.
+    """Return the part; what routes and other parts need of it lies in the app's state.
 
     Raises:
         RobotFileError: the robot's description has faults.
@@ -56,4 +57,5 @@ def live(app: FastAPI) -> Live:
     table = TopicTable(link.space, rings)
     hub = LiveHub([*feeds, camera, path, table], link.clock, time.time_ns)
     app.state.live, app.state.camera, app.state.still = hub, camera, still
+    app.state.microphones = PageMicrophones(link)
     return Live(hub, path, link.clock)

@@ -19,6 +19,7 @@ from vla_deploy.dashboard.live.message import Message
 FRAMES: Final = "vla_deploy.frames"
 """The extension of ASGI by which the protocol says that it takes `frames`, and `abort`."""
 FROZEN: Final = 1008
+LOST: Final = 1006
 _CLOSING_S: Final = 1.0
 
 
@@ -50,6 +51,12 @@ class LiveProtocol(BoundedWebSocket):
             self.transport.write(message["frames"])
         else:
             await super().send(message)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Tell a connection that was lost from one that was closed: uvicorn calls both 1005."""
+        if self.handshake_complete and self.conn.close_rcvd is None:
+            self.queue.put_nowait({"type": "websocket.disconnect", "code": LOST})
+        super().connection_lost(exc)
 
     def keepalive_timeout(self) -> None:
         """Cut off a client that answers no ping: it would not read a farewell either."""

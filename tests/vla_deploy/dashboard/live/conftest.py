@@ -94,11 +94,15 @@ def serve() -> Any:
     """Serve a hub at a port of this computer, as the process does."""
 
     @contextlib.asynccontextmanager
-    async def serving(hub: LiveHub, protocol: Any = LiveProtocol) -> AsyncIterator[Served]:
+    async def serving(
+        hub: LiveHub, protocol: Any = LiveProtocol, prepare: Any = None
+    ) -> AsyncIterator[Served]:
         app = FastAPI()
         app.state.live = hub
         app.include_router(endpoint.router)
         app.dependency_overrides[require(Role.VIEWER)] = lambda: None
+        if prepare is not None:
+            prepare(app)
         config = uvicorn.Config(
             app, log_config=None, lifespan="off", ws=protocol, ws_per_message_deflate=False
         )
