@@ -1,5 +1,7 @@
 """Keep the dashboard's own state, and tell how it is."""
 
+import logging
+from collections import Counter
 from typing import Final
 
 from fastapi import FastAPI
@@ -9,6 +11,7 @@ from vla_deploy.dashboard.access import Access, AccessRules
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.doors import SOCKET_NAME, open_port, open_socket
 from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.dashboard.parts import Part
 from vla_deploy.dashboard.serving import Door
 from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.dashboard.tls import server_context
@@ -19,7 +22,9 @@ STATUS_TOPIC: Final = "dashboard_status"
 TCP: Final = "tcp"
 UNIX: Final = "unix"
 _TELL_NS: Final = NS_PER_S // 2
+_TOLD_FAILURES: Final = frozenset({1, 10, 100, 1000, 10_000})
 _EVERYWHERE: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+_log = logging.getLogger(__name__)
 
 
 class DashboardNode:
@@ -34,7 +39,9 @@ class DashboardNode:
         self.link = RobotLink(context.run_dir, context.clock, robot=context.robot)
         self.app: FastAPI
         self.doors: tuple[Door, ...] = ()
-        self._access: Access
+        self._parts: list[Part] = []
+        self._failures: Counter[str] = Counter()
+        self._access: Access | None = None
         self._status: CellWriter
         self._due_ns = 0
         self._url = ""
@@ -57,28 +64,38 @@ class DashboardNode:
         self._status = self.link.space.cell_writer(STATUS_TOPIC)
         self._access = Access.of_base(self._context.run_dir.parent, _rules(settings), self._clock)
         self.app = create_app(self.link, settings, self._access)
+        self._parts = self.app.state.parts
         self._port = tcp.getsockname()[1]
         self._url = f"{settings.scheme}://{_reachable(settings.host)}:{self._port}"
 
     def step(self) -> None:
         """Step the parts, and tell twice a second where the page is."""
-        for part in self.app.state.parts:
-            part.step()
+        for part in self._parts:
+            self._step(part)
         now_ns = self._clock.now_ns()
         if now_ns >= self._due_ns:
             self._due_ns = now_ns + _TELL_NS
             told = {"url": self._url, "port": self._port, "host": self._settings.host}
-            self._status.put_document(told)
+            self._status.put_document(told | {"failures": dict(self._failures)})
 
     def stop(self) -> None:
         """Stop the parts and close everything."""
-        for part in self.app.state.parts if self.doors else ():
+        for part in self._parts:
             part.stop()
         for door in self.doors:
             door.listener.close()
-        if self.doors:
+        if self._access is not None:
             self._access.close()
         self.link.close()
+
+    def _step(self, part: Part) -> None:
+        try:
+            part.step()
+        except Exception:  # this process' main loop: a broken part takes neither page nor others
+            name = type(part).__name__
+            self._failures[name] += 1
+            if self._failures[name] in _TOLD_FAILURES:
+                _log.exception("%s has failed %d times", name, self._failures[name])
 
 
 def _rules(settings: DashboardSettings) -> AccessRules:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy.ipc import Event
+from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.rules import is_stop
 
 VOICE: Final = "voice"
-MOST_CHARACTERS: Final = 1000
 _ID_CHARACTERS: Final = 128
 
 

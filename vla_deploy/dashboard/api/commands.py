@@ -10,7 +10,7 @@ from vla_deploy.dashboard.access import Role, require
 from vla_deploy.dashboard.commands.history import MOST_COMMANDS, CommandHistory
 from vla_deploy.dashboard.commands.record import CommandRecord
 from vla_deploy.dashboard.errors import Refused
-from vla_deploy.planning.inbox import MOST_CHARACTERS
+from vla_deploy.planning.bounds import MOST_CHARACTERS
 
 router = APIRouter(prefix="/commands", tags=["commands"])
 

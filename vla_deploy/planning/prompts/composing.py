@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from vla_deploy.model_servers.chat import Chat, Message
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.inbox import MOST_CHARACTERS
+from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.prompts.fitting import fitted
 from vla_deploy.planning.prompts.instructions import filled, limits_in_words, skills_in_words
 from vla_deploy.planning.prompts.quoting import as_data, plain
