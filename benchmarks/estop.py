@@ -20,14 +20,11 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
-import can
-
 from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
 from benchmarks.live_robot import arm, await_change, live_robot
-from drivers.can_hub import HubBus
-from drivers.canopen.cia402 import ControlCommand
-from drivers.clock import NS_PER_S, MonotonicClock
+from benchmarks.stop_witness import NoStop, StopWitness
+from drivers.clock import NS_PER_S
 from platforms import load_profile
 from sim_twin.campaigns.phases import Phase, Stage
 from sim_twin.stack import LockstepControl
@@ -35,18 +32,10 @@ from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
-from vla_deploy.robots import load_robot
 
-_RPDO1: Final = 0x200
-_COMMAND_BITS: Final = 0x0F
-_ANSWER_S: Final = 1.0
 _PERIOD_NS: Final = NS_PER_S / load_profile("desktop").control_rate_hz
 _LONGEST_S: Final = 5.0
 _LOOK_S: Final = 0.004
-
-
-class NoStop(Exception):
-    """Say that a stop was asked for and nothing came: worse than late."""
 
 
 def measure(requests: int, seed: int) -> dict[str, Any]:
@@ -86,50 +75,22 @@ def _ask_again_and_again(session: Session, requests: int, draw: random.Random) -
 
     The busy machine itself may stop the robot before it is asked to: such a request is left out.
     """
-    line = load_robot("butler").can_bus
-    cob_id = _RPDO1 + line.drives[0].node_id
     ticks = []
     with (
         closing(SharedSpace(session.run_dir / "ipc", session.clock)) as space,
         closing(StopButton(space, "bench", session.clock)) as button,
-        HubBus(channel=str(session.run_dir / "dev" / line.device)) as bus,
+        closing(StopWitness(session.run_dir)) as witness,
     ):
         for _ in range(requests):
             arm(session)
             session.pause(draw.uniform(0.02, 0.1))
-            if not _operates(bus, cob_id):
+            if not witness.operates():
                 continue
             asked_ns = session.clock.now_ns()
             button.press()
-            ticks.append((_stop_frame_ns(bus, cob_id) - asked_ns) / _PERIOD_NS)
+            ticks.append((witness.stop_frame_ns() - asked_ns) / _PERIOD_NS)
             await_change(session, "armed")
     return ticks
-
-
-def _operates(bus: can.BusABC, cob_id: int) -> bool:
-    """Forget what was on the wire so far, and tell whether the drive was last told to operate."""
-    operates = False
-    while (frame := bus.recv(0.0)) is not None:
-        if frame.arbitration_id == cob_id:
-            operates = _lets_operate(frame)
-    return operates
-
-
-def _lets_operate(frame: can.Message) -> bool:
-    return int(frame.data[0]) & _COMMAND_BITS == ControlCommand.ENABLE_OPERATION
-
-
-def _stop_frame_ns(bus: can.BusABC, cob_id: int) -> int:
-    """Return when the drive was first told anything but to operate."""
-    clock = MonotonicClock()
-    deadline_ns = clock.now_ns() + round(_ANSWER_S * NS_PER_S)
-    while clock.now_ns() < deadline_ns:
-        frame = bus.recv(_ANSWER_S)
-        if frame is None or frame.arbitration_id != cob_id:
-            continue
-        if not _lets_operate(frame):
-            return clock.now_ns()
-    raise NoStop(f"no stop on the wire within {_ANSWER_S:g} s of the request")
 
 
 def standstill_s(phase: Phase) -> float:

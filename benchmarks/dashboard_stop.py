@@ -1,0 +1,203 @@
+"""Measure the stop of the dashboard's page: from the press to the frame on the wire.
+
+Real processes on a twin, with `clients` pages connected to the dashboard's live data and every core
+kept busy by others. A press is what the page sends: a request to each door, over connections of
+their own. It counts from before they are opened, to the first frame by which control no longer
+lets the first wheel drive operate. `both` presses both doors, as the page does, `page` and `door`
+one alone; `blocked` and `killed` press both while the dashboard's process is frozen for up to 10 s,
+which blocks its event loop and all else of it, and after it was killed. A browser's own time to
+notice a finger is not in it.
+"""
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.core import REALTIME_PRIORITY, busy_cores, realtime
+from benchmarks.live_robot import arm, await_change, live_robot
+from benchmarks.stop_witness import NoStop, StopWitness
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.cli.session import Session
+
+CLIENTS: Final = 20
+BOTH: Final = ("page", "door")
+BLOCKED_S: Final = 10.0
+KILLS: Final = 3
+_PATHS: Final = {"page": "/api/v1/stop", "door": "/stop"}
+_TOPICS: Final = "control_status,process_table,joint_state,pose,scan,scene"
+_SETTLED_S: Final = 8.0  # of a frozen dashboard's 10 s, so that a press never meets the thaw
+_START_S: Final = 90.0
+_NS_PER_MS: Final = 1e6
+
+
+def measure(requests: int = 100, seed: int = 0) -> dict[str, Any]:
+    """Return the times of each way in ms.
+
+    Raises:
+        NoStop: a press had no effect.
+        NotReached: control is not to be armed.
+    """
+    with (
+        tempfile.TemporaryDirectory(prefix="vla-") as folder,
+        realtime() as permitted,  # who measures must not wait for whom it keeps busy
+        live_robot(Path(folder), REALTIME_PRIORITY if permitted else 0) as session,
+        closing(_Presser(session, random.Random(seed))) as presser,
+        busy_cores(),
+    ):
+        with _pages(presser.address("page")):
+            figures = {
+                "both": presser.presses(requests, BOTH),
+                "page": presser.presses(requests // 4, ("page",)),
+                "door": presser.presses(requests // 4, ("door",)),
+                "blocked": _while_frozen(presser, requests // 4),
+            }
+        figures["killed"] = _after_kills(presser)
+    report: dict[str, Any] = {"clients": CLIENTS, "realtime": permitted}
+    for way, times_ms in figures.items():
+        report |= _figures(way, times_ms)
+    return report
+
+
+def _figures(way: str, times_ms: list[float]) -> dict[str, Any]:
+    if not times_ms:
+        raise NoStop(f"{way}: the robot stopped by itself before each press")
+    ordered = sorted(times_ms)
+    return {
+        f"{way}_presses": len(ordered),
+        f"{way}_to_frame_ms_p50": ordered[len(ordered) // 2],
+        f"{way}_to_frame_ms_p99": ordered[min(len(ordered) - 1, round(0.99 * len(ordered)))],
+        f"{way}_to_frame_ms_max": ordered[-1],
+    }
+
+
+class _Presser:
+    """Arm, press by some doors, and see when the wire tells."""
+
+    def __init__(self, session: Session, draw: random.Random) -> None:
+        self.session = session
+        self._draw = draw
+        self._witness = StopWitness(session.run_dir)
+
+    def address(self, door: str) -> tuple[str, int]:
+        """Return where a door was told to be, also once it is gone."""
+        topic = {"page": "dashboard_status", "door": "stop_door_status"}[door]
+        deadline_ns = self.session.clock.now_ns() + round(_START_S * NS_PER_S)
+        while (told := self.session.document(topic)) is None:
+            if self.session.clock.now_ns() > deadline_ns:
+                raise NoStop(f"nobody tells where the {door} is; see `vla-deploy status`")
+            self.session.pause()
+        return "127.0.0.1", int(told["port"])
+
+    def presses(
+        self, count: int, doors: Sequence[str], goes_on: Callable[[], bool] = lambda: True
+    ) -> list[float]:
+        """Return how long each press took, in ms; the busy machine may stop the robot before."""
+        pressed = (self._press(doors) for _ in range(count) if goes_on())
+        return [time_ms for time_ms in pressed if time_ms is not None]
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._witness.close()
+
+    def _press(self, doors: Sequence[str]) -> float | None:
+        addresses = {door: self.address(door) for door in doors}
+        arm(self.session)
+        self.session.pause(self._draw.uniform(0.02, 0.1))
+        if not self._witness.operates():
+            return None
+        with ExitStack() as opened:
+            asked_ns = self.session.clock.now_ns()
+            for door, address in addresses.items():
+                _send(opened, door, address)
+            time_ms = (self._witness.stop_frame_ns() - asked_ns) / _NS_PER_MS
+            await_change(self.session, "armed")
+        return time_ms
+
+
+def _send(opened: ExitStack, door: str, address: tuple[str, int]) -> None:
+    """Send a press without waiting for anything; who is gone refuses it."""
+    client = opened.enter_context(socket.socket())
+    host = f"{address[0]}:{address[1]}"
+    head = f"POST {_PATHS[door]} HTTP/1.1\r\nHost: {host}\r\nContent-Length: 0\r\n\r\n"
+    try:
+        client.connect(address)  # the kernel answers for a process that is frozen
+        client.sendall(head.encode())
+    except ConnectionError:
+        return  # as after a kill: the other door is pressed, too
+
+
+def _while_frozen(presser: _Presser, count: int) -> list[float]:
+    """Press while the dashboard is frozen, in turns with spans in which it goes on."""
+    times_ms: list[float] = []
+    clock = presser.session.clock
+    while len(times_ms) < count:
+        with _frozen(_pid(presser.session)):
+            found = presser.presses(count - len(times_ms), BOTH, _for(_SETTLED_S, clock))
+            presser.session.pause(max(0.0, BLOCKED_S - _SETTLED_S))
+        if not found:
+            break
+        times_ms += found
+        presser.session.pause(1.0)
+    return times_ms
+
+
+def _for(seconds: float, clock: Clock) -> Callable[[], bool]:
+    end_ns = clock.now_ns() + round(seconds * NS_PER_S)
+    return lambda: clock.now_ns() < end_ns
+
+
+@contextmanager
+def _frozen(pid: int) -> Iterator[None]:
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+def _after_kills(presser: _Presser) -> list[float]:
+    """Press right after each of a few kills, before the supervisor has the dashboard back."""
+    times_ms: list[float] = []
+    for _ in range(KILLS):
+        arm(presser.session)
+        os.kill(_pid(presser.session), signal.SIGKILL)
+        times_ms += presser.presses(1, BOTH)
+        presser.session.pause(BLOCKED_S)
+    return times_ms
+
+
+def _pid(session: Session) -> int:
+    """Return the running dashboard's pid."""
+    deadline_ns = session.clock.now_ns() + round(_START_S * NS_PER_S)
+    while session.clock.now_ns() < deadline_ns:
+        table = session.document("process_table") or {"processes": []}
+        for row in table["processes"]:
+            if row["name"] == "dashboard" and row["state"] == "ready":
+                return int(row["pid"])
+        session.pause()
+    raise NoStop("there is no dashboard to be without; see `vla-deploy status`")
+
+
+@contextmanager
+def _pages(address: tuple[str, int]) -> Iterator[None]:
+    """Keep pages connected, which take what the dashboard tells."""
+    words = [address[0], str(address[1]), str(CLIENTS), "0", _TOPICS]
+    with subprocess.Popen(
+        [sys.executable, "-m", "benchmarks.live_clients", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        if process.stdout.readline() != "ready\n":
+            raise NoStop("the pages could not connect")
+        yield
+        process.kill()
