@@ -12,6 +12,7 @@ from benchmarks.command import parser, show
 
 PARTS: Final[Mapping[str, str]] = {
     "clients": "what fifty clients, one of them frozen, cost control and the dashboard",
+    "stop": "from the page's stop to the wire: under load, dashboard blocked, dashboard killed",
 }
 
 
@@ -32,8 +33,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--part", action="append", choices=sorted(PARTS), help=f"all unless told: {listed}"
     )
     arguments.add_argument("--seconds", type=float, default=60.0, help="of each view of clients")
+    arguments.add_argument("--presses", type=int, default=100, help="of the page's stop")
+    arguments.add_argument("--seed", type=int, default=0)
     given = arguments.parse_args(argv)
-    options = {"clients": {"seconds": given.seconds}}
+    options = {
+        "clients": {"seconds": given.seconds},
+        "stop": {"requests": given.presses, "seed": given.seed},
+    }
     show(measure(given.part or list(PARTS), options), as_json=given.json)
     return 0
 
