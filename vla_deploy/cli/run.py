@@ -24,6 +24,9 @@ EXAMPLES = """  vla-deploy run --twin                 the robot butler in the fl
 """
 
 _STDERR = 2
+_READY = (
+    'ready; in another terminal: vla-deploy say "go to the kitchen"; the page: vla-deploy dashboard'
+)
 
 
 def register(commands: Any) -> None:
@@ -115,5 +118,5 @@ def _keep_running(options: RunOptions) -> None:
     with Supervisor(options) as supervisor:
         supervisor.start()
         if not supervisor.stop_requested:
-            print('ready; in another terminal: vla-deploy say "go to the kitchen"', flush=True)
+            print(_READY, flush=True)
         supervisor.run_until_stopped()
