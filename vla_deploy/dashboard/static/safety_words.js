@@ -88,8 +88,9 @@ export function reactionWords(reaction) {
   return REACTIONS[reaction] ?? sentence(reaction);
 }
 
-/** Return what the rules leave the base: lines, none where they leave it everything. */
+/** Return what the rules leave the base of an armed robot: lines, none for everything. */
 export function boundsWords(control) {
+  if (control.state !== "armed") return [];
   const lines = [];
   if (control.speed_ratio < 1) {
     lines.push(`Base at most ${Math.round(100 * control.speed_ratio)} % of its speed`);

@@ -5,11 +5,11 @@ import { useTopic } from "../following.js";
 
 const GRAVITY = ["critical", "error", "warning", "info"];
 
-/** Return `{all, open, stale}`; open is what nobody has acknowledged. */
+/** Return `{all, open, stale, known}`; open is what nobody has acknowledged. */
 export function useAlarms() {
   const { data, stale } = useTopic("alarms");
   const all = data?.alarms ?? [];
-  return { all, open: all.filter((alarm) => !alarm.acknowledged_by), stale };
+  return { all, open: all.filter((alarm) => !alarm.acknowledged_by), stale, known: data !== null };
 }
 
 /** Return alarms by gravity, the newest first among equals. */

@@ -5,7 +5,8 @@ import { Composer } from "../command/composer.js";
 import { History } from "../command/history.js";
 import { openCommand, useCommands } from "../command/store.js";
 import { useTopic } from "../following.js";
-import { Notice } from "../parts.js";
+import { sentence } from "../format.js";
+import { More, Notice } from "../parts.js";
 import { html, useState } from "../ui.js";
 
 export function View() {
@@ -30,6 +31,10 @@ export function View() {
 function Refusal() {
   const table = useTopic("process_table").data;
   const control = useTopic("control_status");
-  const why = table?.refusal || (!control.stale && control.data?.state !== "armed" && "The robot is not armed: see the view Now.");
-  return why ? html`<${Notice} tone="warn" icon="alert">No command is carried out now. ${why}<//>` : null;
+  const isUnarmed = !control.stale && control.data?.state !== "armed";
+  const why = table?.refusal || (isUnarmed && "The robot is not armed.");
+  if (!why) return null;
+  return html`
+    <${Notice} tone="warn" icon="alert" actions=${html`<${More} href="#/now">Now<//>`}>No command is carried out now. ${sentence(why)}<//>
+  `;
 }

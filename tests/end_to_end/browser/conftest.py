@@ -1,0 +1,173 @@
+"""One twin with its dashboard for all tests in a browser, and pages that somebody is logged in at.
+
+Loopback is not trusted here: every test goes through the doors that an operator goes through.
+"""
+
+import tempfile
+import wave
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+from playwright.sync_api import (
+    Browser,
+    BrowserContext,
+    ConsoleMessage,
+    Page,
+    Playwright,
+    Request,
+    ViewportSize,
+    expect,
+    sync_playwright,
+)
+
+from sim_twin.process_stack import ProcessStack
+from vla_deploy.dashboard.access import Role
+from vla_deploy.dashboard.access.accounts import User, wall_s
+from vla_deploy.dashboard.access.accounts_file import AccountsFile
+from vla_deploy.dashboard.access.passwords import stored_form
+from vla_deploy.dashboard.settings import SETTINGS_FILE
+from vla_deploy.speech.voice.espeak import EspeakEngine
+from vla_deploy.state_dir import config_dir_of
+
+CHROMIUM: Final = "/usr/bin/chromium"
+DESKTOP: Final = ViewportSize(width=1440, height=900)
+PHONE: Final = ViewportSize(width=390, height=844)
+ROLES: Final = {"anna": Role.ADMIN, "vera": Role.VIEWER}
+PASSWORD: Final = "five-words-that-nobody-guesses"
+SPOKEN: Final = "turn left"
+MICROPHONE_HZ: Final = 48_000
+
+OpenPage = Callable[..., Page]
+
+expect.set_options(timeout=30_000)  # the machine may be busy; what is quick is not slowed by this
+
+
+@pytest.fixture(scope="package")
+def stack() -> Iterator[ProcessStack]:
+    """The real processes on a twin, armed, with a dashboard that trusts nobody unknown."""
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
+        base = Path(folder) / "base"
+        settings = config_dir_of(base) / SETTINGS_FILE
+        settings.parent.mkdir(parents=True)
+        settings.write_text("trust_loopback = false\n", encoding="utf-8")
+        add_accounts(base)
+        stack = ProcessStack(base)
+        try:
+            stack.wait_until_armed()
+            assert stack.wait_until(lambda: stack.document("dashboard_status", 3.0), 60.0)
+            yield stack
+        finally:
+            stack.close()
+
+
+def add_accounts(base: Path) -> None:
+    stored = stored_form(PASSWORD)
+    for name, role in ROLES.items():
+        user = User(role=role, password=stored, changed_s=wall_s())
+        AccountsFile.of_base(base).change(
+            lambda accounts, name=name, user=user: (accounts.with_user(name, user), None)
+        )
+
+
+@pytest.fixture(scope="package")
+def url(stack: ProcessStack) -> str:
+    return str(stack.document("dashboard_status")["url"])
+
+
+@pytest.fixture(scope="package")
+def playwright() -> Iterator[Playwright]:
+    with sync_playwright() as started:
+        yield started
+
+
+@pytest.fixture(scope="package")
+def chromium(playwright: Playwright, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser whose microphone hears somebody say a command again and again."""
+    heard = tmp_path_factory.mktemp("voice") / "spoken.wav"
+    write_spoken(heard)
+    browser = playwright.chromium.launch(
+        executable_path=CHROMIUM,
+        args=[
+            "--no-sandbox",
+            "--use-fake-device-for-media-stream",
+            "--use-fake-ui-for-media-stream",
+            f"--use-file-for-fake-audio-capture={heard}",
+        ],
+    )
+    yield browser
+    browser.close()
+
+
+def write_spoken(path: Path) -> None:
+    """Write a command as sound, with the quiet before and after by which phrases are told apart."""
+    words = EspeakEngine().synthesise(SPOKEN).at_rate(MICROPHONE_HZ).wave
+    quiet = np.zeros(MICROPHONE_HZ * 3 // 2, np.float32)
+    sound = np.concatenate([quiet, 0.6 * words / np.abs(words).max(), quiet])
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(MICROPHONE_HZ)
+        file.writeframes(np.rint(32_000 * sound).astype("<i2").tobytes())
+
+
+@pytest.fixture
+def open_page(chromium: Browser, url: str) -> Iterator[OpenPage]:
+    """Open a page as a user; in the end none may have failed, or asked another host."""
+    contexts: list[BrowserContext] = []
+    faults: list[str] = []
+
+    def open_as(user: str | None = "anna", view: str = "now", size: ViewportSize = DESKTOP) -> Page:
+        contexts.append(chromium.new_context(viewport=size, accept_downloads=True))
+        page = contexts[-1].new_page()
+        watch(page, url, faults)
+        if user is not None:
+            log_in(contexts[-1], url, user)
+        page.goto(f"{url}/#/{view}")
+        return page
+
+    yield open_as
+    for context in contexts:
+        context.close()
+    assert faults == []
+
+
+def watch(page: Page, url: str, faults: list[str]) -> None:
+    def said(message: ConsoleMessage) -> None:
+        if message.type == "error" and "Failed to load resource" not in message.text:
+            faults.append(message.text)
+
+    def asked(request: Request) -> None:
+        if not request.url.startswith(("blob:", "data:", url.rpartition(":")[0])):
+            faults.append(f"asked another host: {request.url}")
+
+    page.on("console", said)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("request", asked)
+
+
+def log_in(context: BrowserContext, url: str, user: str) -> None:
+    answer = context.request.post(
+        f"{url}/api/v1/login",
+        data={"user": user, "password": PASSWORD},
+        headers={"Origin": url},
+    )
+    assert answer.ok, answer.text()
+
+
+@pytest.fixture
+def page(open_page: OpenPage) -> Page:
+    """The page of an admin, at the view Now, on a desk."""
+    return open_page()
+
+
+@pytest.fixture(autouse=True)
+def robot(stack: ProcessStack) -> ProcessStack:
+    """The robot of the tests, armed, whatever the test before has done."""
+    if stack.state() != "armed":
+        stack.ask("reset")
+        stack.ask("arm")
+        assert stack.wait_until(lambda: stack.state() == "armed"), stack.status()["control"]
+    return stack

@@ -1,0 +1,75 @@
+"""Type and say commands, watch their plans, read why one was refused, answer, cancel."""
+
+import re
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from sim_twin.process_stack import ProcessStack
+
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+
+STANDSTILL_RAD_S = 0.05
+LONGEST_HOLD_MS = 12_000
+
+
+@pytest.fixture
+def page(open_page) -> Page:
+    page: Page = open_page(view="command")
+    return page
+
+
+def give(page: Page, text: str) -> Locator:
+    """Type a command and return the card that shows it."""
+    page.get_by_label("Command in words").fill(text)
+    page.get_by_role("button", name="Send").click()
+    card = page.locator(".card", has=page.locator(".said-words", has_text=text))
+    expect(card.first).to_be_visible()
+    return card.first
+
+
+def test_a_typed_command_is_watched_to_its_end(page: Page, robot: ProcessStack) -> None:
+    before = robot.truth()["base"]["yaw_rad"]
+    card = give(page, "turn left 30 degrees")
+    step = card.get_by_label("Plan").get_by_role("listitem")
+    expect(step).to_contain_text("turn")
+    expect(step).to_contain_text("done")
+    expect(step).to_contain_text(re.compile(r"\d s|\d ms"))
+    expect(card.locator(".card-head")).to_contain_text("Done")
+    expect(page.get_by_role("button", name="turn left 30 degrees")).to_contain_text("Done")
+    assert robot.truth()["base"]["yaw_rad"] - before == pytest.approx(0.52, abs=0.2)
+
+
+def test_a_refusal_says_why_in_words(page: Page) -> None:
+    card = give(page, "bring me the moon")
+    expect(card).to_contain_text("Refused: nothing was done.")
+    expect(card.locator(".notice")).to_contain_text("moon")
+
+
+def test_what_the_robot_asks_is_answered_by_a_button(page: Page) -> None:
+    card = give(page, "pick up the cap")
+    question = card.get_by_label("The robot asks")
+    expect(question).to_contain_text("cup")
+    question.get_by_role("button", name="no", exact=True).click()
+    expect(question).to_have_count(0)
+
+
+def test_a_command_is_cancelled_and_the_robot_stays_ready(page: Page, robot: ProcessStack) -> None:
+    card = give(page, "go to the kitchen")
+    expect(card.locator("[data-status=active]")).to_be_visible()
+    card.get_by_role("button", name="Cancel").click()
+    expect(card.locator(".card-head")).to_contain_text("Cancelled")
+    assert robot.wait_until(lambda: robot.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
+    assert robot.state() == "armed"
+
+
+def test_a_command_said_into_the_browser_is_heard_and_carried_out(page: Page) -> None:
+    talk = page.get_by_role("button", name="Hold to talk")
+    talk.hover()
+    page.mouse.down()
+    expect(page.get_by_role("button", name="Listening")).to_be_visible()
+    heard = page.locator(".heard")
+    expect(heard).to_contain_text("turn left", timeout=LONGEST_HOLD_MS)
+    page.mouse.up()
+    expect(heard).to_contain_text("accepted")
+    expect(page.locator(".card", has_text="by voice").first).to_contain_text("turn")

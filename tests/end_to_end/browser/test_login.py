@@ -1,0 +1,30 @@
+"""Log in and out; the stop button needs neither."""
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from sim_twin.process_stack import ProcessStack
+
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+
+
+def test_who_is_unknown_sees_nothing_but_login_and_stop(open_page, robot: ProcessStack) -> None:
+    page: Page = open_page(None)
+    expect(page.get_by_label("User")).to_be_focused()
+    page.get_by_label("User").fill("anna")
+    page.get_by_label("Password").fill("guessed")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("alert")).not_to_be_empty()
+    expect(page.get_by_label("Safety state", exact=True)).to_have_count(0)
+    page.get_by_role("button", name="Stop", exact=True).click()
+    assert robot.wait_until(lambda: robot.document("control_status")["estop_latched"])
+
+
+def test_an_operator_logs_in_and_out(open_page) -> None:
+    page: Page = open_page(None)
+    page.get_by_label("User").fill("anna")
+    page.get_by_label("Password").fill("five-words-that-nobody-guesses")
+    page.get_by_role("button", name="Log in").click()
+    expect(page.get_by_label("Safety state", exact=True)).to_be_visible()
+    page.get_by_role("button", name="Log out").click()
+    expect(page.get_by_label("User")).to_be_visible()
