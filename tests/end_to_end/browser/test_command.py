@@ -14,8 +14,8 @@ LONGEST_HOLD_MS = 12_000
 
 
 @pytest.fixture
-def page(open_page) -> Page:
-    page: Page = open_page(view="command")
+def page(pages) -> Page:
+    page: Page = pages.of("anna", "command")
     return page
 
 

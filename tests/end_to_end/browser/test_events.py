@@ -11,11 +11,9 @@ from sim_twin.process_stack import ProcessStack
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
 
-def test_the_flight_of_a_stop_is_downloaded(
-    open_page, robot: ProcessStack, tmp_path: Path
-) -> None:
+def test_the_flight_of_a_stop_is_downloaded(pages, robot: ProcessStack, tmp_path: Path) -> None:
     robot.operate("estop")
-    page: Page = open_page(view="events/files")
+    page: Page = pages.of("anna", "events/files")
     link = page.get_by_role("link", name="Download").first
     expect(link).to_be_visible(timeout=60_000)
     with page.expect_download() as download:
@@ -28,8 +26,8 @@ def test_the_flight_of_a_stop_is_downloaded(
     assert "/control_status" in {channel.topic for channel in summary.channels.values()}
 
 
-def test_logs_are_filtered_by_process_level_and_words(open_page) -> None:
-    page: Page = open_page(view="events/logs")
+def test_logs_are_filtered_by_process_level_and_words(pages) -> None:
+    page: Page = pages.of("anna", "events/logs")
     lines = page.get_by_role("list", name="Log lines").get_by_role("listitem")
     expect(lines.first).to_be_visible()
     page.get_by_label("Process").select_option("supervisor")
@@ -40,9 +38,9 @@ def test_logs_are_filtered_by_process_level_and_words(open_page) -> None:
     expect(lines).to_have_count(0)
 
 
-def test_the_audit_is_for_admins_and_names_who_did_what(open_page) -> None:
-    page: Page = open_page(view="events/audit")
+def test_the_audit_is_for_admins_and_names_who_did_what(pages) -> None:
+    page: Page = pages.of("anna", "events/audit")
     expect(page.get_by_role("cell", name="anna").first).to_be_visible()
-    viewer: Page = open_page("vera", view="events/audit")
+    viewer: Page = pages.of("vera", "events/audit")
     expect(viewer.get_by_role("link", name="Logs")).to_be_visible()
     expect(viewer.get_by_role("link", name="Audit")).to_have_count(0)

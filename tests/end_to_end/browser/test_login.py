@@ -8,8 +8,8 @@ from sim_twin.process_stack import ProcessStack
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
 
-def test_who_is_unknown_sees_nothing_but_login_and_stop(open_page, robot: ProcessStack) -> None:
-    page: Page = open_page(None)
+def test_who_is_unknown_sees_nothing_but_login_and_stop(pages, robot: ProcessStack) -> None:
+    page: Page = pages.fresh()
     expect(page.get_by_label("User")).to_be_focused()
     page.get_by_label("User").fill("anna")
     page.get_by_label("Password").fill("guessed")
@@ -20,8 +20,8 @@ def test_who_is_unknown_sees_nothing_but_login_and_stop(open_page, robot: Proces
     assert robot.wait_until(lambda: robot.document("control_status")["estop_latched"])
 
 
-def test_an_operator_logs_in_and_out(open_page) -> None:
-    page: Page = open_page(None)
+def test_an_operator_logs_in_and_out(pages) -> None:
+    page: Page = pages.fresh()
     page.get_by_label("User").fill("anna")
     page.get_by_label("Password").fill("five-words-that-nobody-guesses")
     page.get_by_role("button", name="Log in").click()

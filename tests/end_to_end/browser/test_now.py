@@ -72,8 +72,8 @@ def test_a_page_whose_server_hangs_shows_no_value_as_live_and_still_stops(
     expect(page.get_by_text("No live data for")).to_be_hidden()
 
 
-def test_a_viewer_may_stop_and_nothing_else(open_page, robot: ProcessStack) -> None:
-    page = open_page("vera")
+def test_a_viewer_may_stop_and_nothing_else(pages, robot: ProcessStack) -> None:
+    page = pages.of("vera")
     disarm = safety(page).get_by_role("button", name="Disarm")
     expect(disarm).to_be_disabled()
     expect(disarm).to_have_attribute("title", "Needs the role operator")
