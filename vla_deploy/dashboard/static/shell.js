@@ -1,5 +1,6 @@
 /** Stand around every view: head with name and safety state, navigation, notices, content. */
 
+import { useAlarms } from "./events/alarms.js";
 import { duration } from "./format.js";
 import { useConnection, useTicking, useTopic } from "./following.js";
 import { Icon } from "./icons.js";
@@ -97,8 +98,7 @@ function User() {
 }
 
 function Navigation({ here }) {
-  const alarms = useTopic("alarms").data?.alarms ?? [];
-  const open = alarms.filter((alarm) => !alarm.acknowledged_by).length;
+  const open = useAlarms().open.length;
   return html`
     <nav class="nav" aria-label="Views">
       ${ROUTES.map(

@@ -17,15 +17,16 @@ export function AlarmRow({ alarm, isShort }) {
       <${Icon} name="alert" />
       <div class="grow">
         <p class="alarm-head">
-          <strong>${sentence(alarm.text ?? alarm.field)}</strong>
+          <strong>${sentence(alarm.text)}</strong>
           <${Badge} tone=${tone}>${alarm.severity}<//>
-          ${alarm.ended_s && html`<${Badge}>over<//>`}
+          ${alarm.ended_s && html`<${Badge}>over since ${clock(alarm.ended_s)}<//>`}
+          ${alarm.count > 1 && html`<span class="quiet small">${alarm.count} times</span>`}
         </p>
         <p class="quiet small"><${Facts} alarm=${alarm} /></p>
         ${alarm.advice && !isShort && html`<p class="small">${sentence(alarm.advice)}</p>`}
         ${alarm.acknowledged_by && html`<p class="quiet small">Seen by ${alarm.acknowledged_by}${alarm.acknowledged_s ? ` at ${clock(alarm.acknowledged_s)}` : ""}</p>`}
       </div>
-      ${!alarm.acknowledged_by && html`<${Button} needs="operator" icon="check" busy=${isBusy} onClick=${see} aria-label="Acknowledge: ${alarm.text ?? alarm.field}">${isShort ? "" : "Acknowledge"}<//>`}
+      ${!alarm.acknowledged_by && html`<${Button} needs="operator" icon="check" busy=${isBusy} onClick=${see} aria-label="Acknowledge: ${alarm.text}">${isShort ? "" : "Acknowledge"}<//>`}
     </li>
   `;
 }
@@ -35,7 +36,7 @@ function Facts({ alarm }) {
   const number = (name, value) => (Number.isFinite(value) ? `${name} ${significant(value)} ${unit}`.trim() : null);
   return [
     alarm.process && words(alarm.process),
-    alarm.subject,
+    alarm.subject && words(alarm.subject),
     number("measured", alarm.measured),
     number("limit", alarm.limit),
     Number.isFinite(alarm.age_s) && `age ${duration(alarm.age_s)}`,

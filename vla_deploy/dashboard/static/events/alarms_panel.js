@@ -1,29 +1,30 @@
-/** List the alarms: those that nobody has seen, then the others. */
+/** List the alarms: those that last, those that have ended unseen, those that somebody has seen. */
 
 import { useAct } from "../asking.js";
 import { Button, Card, Empty } from "../parts.js";
 import { html } from "../ui.js";
 import { AlarmRow } from "./alarm_row.js";
-import { acknowledge, gravestFirst, useAlarms } from "./alarms.js";
+import { acknowledge, useAlarms } from "./alarms.js";
 
 export function AlarmsPanel() {
-  const { all, open, stale, known } = useAlarms();
-  const seen = all.filter((alarm) => alarm.acknowledged_by);
-  const [seeAll, isBusy] = useAct(() => Promise.all(open.map(({ id }) => acknowledge(id))));
-  const actions = open.length > 1 && html`<${Button} needs="operator" icon="check" busy=${isBusy} onClick=${seeAll}>Acknowledge all<//>`;
+  const { open, over, seen, stale, known } = useAlarms();
   return html`
     <div class="stack">
-      <${Card} title="Open" note=${`${open.length}`} stale=${stale ? true : undefined} actions=${actions}>
-        <${List} alarms=${gravestFirst(open)} none=${known ? "No open alarm." : "Nobody tells of alarms."} />
-      <//>
-      <${Card} title="Seen" note=${`${seen.length}`}>
-        <${List} alarms=${seen.toSorted((a, b) => b.since_s - a.since_s)} none="Nothing yet." />
-      <//>
+      <${Group} title="Open" alarms=${open} stale=${stale ? true : undefined} none=${known ? "No open alarm." : "Nobody tells of alarms."} />
+      ${over.length > 0 && html`<${Group} title="Over, and seen by nobody" alarms=${over} />`}
+      ${seen.length > 0 && html`<${Group} title="Seen" alarms=${seen} />`}
     </div>
   `;
 }
 
-function List({ alarms, none }) {
-  if (!alarms.length) return html`<${Empty}>${none}<//>`;
-  return html`<ul class="alarms">${alarms.map((alarm) => html`<${AlarmRow} key=${alarm.id} alarm=${alarm} />`)}</ul>`;
+function Group({ title, alarms, stale, none }) {
+  const unseen = alarms.filter((alarm) => !alarm.acknowledged_by);
+  const [seeAll, isBusy] = useAct(() => Promise.all(unseen.map(({ id }) => acknowledge(id))));
+  const actions = unseen.length > 1 && html`<${Button} needs="operator" icon="check" busy=${isBusy} onClick=${seeAll}>Acknowledge all<//>`;
+  return html`
+    <${Card} title=${title} note=${`${alarms.length}`} stale=${stale} actions=${actions}>
+      ${alarms.length === 0 && html`<${Empty}>${none}<//>`}
+      <ul class="alarms">${alarms.map((alarm) => html`<${AlarmRow} key=${alarm.id} alarm=${alarm} />`)}</ul>
+    <//>
+  `;
 }

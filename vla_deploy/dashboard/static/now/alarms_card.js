@@ -1,7 +1,7 @@
 /** Show the gravest alarms that nobody has acknowledged. */
 
 import { AlarmRow } from "../events/alarm_row.js";
-import { gravestFirst, useAlarms } from "../events/alarms.js";
+import { useAlarms } from "../events/alarms.js";
 import { Card, Empty, More } from "../parts.js";
 import { html } from "../ui.js";
 
@@ -9,7 +9,7 @@ const SHOWN = 4;
 
 export function AlarmsCard() {
   const { open, stale, known } = useAlarms();
-  const shown = gravestFirst(open).slice(0, SHOWN);
+  const shown = open.slice(0, SHOWN);
   const more = open.length - shown.length;
   return html`
     <${Card} title="Alarms" note=${open.length ? `${open.length} open` : ""} stale=${stale ? true : undefined} actions=${html`<${More} href="#/events/alarms">All<//>`}>
