@@ -1,6 +1,7 @@
 """Type and say commands, watch their plans, read why one was refused, answer, cancel."""
 
 import re
+from typing import Any
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
@@ -13,7 +14,7 @@ STANDSTILL_RAD_S = 0.05
 
 
 @pytest.fixture
-def page(pages) -> Page:
+def page(pages: Any) -> Page:
     page: Page = pages.of("anna", "command")
     return page
 

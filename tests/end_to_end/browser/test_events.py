@@ -1,6 +1,7 @@
 """Read logs, download what was recorded, see who did what."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -11,7 +12,9 @@ from sim_twin.process_stack import ProcessStack
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
 
-def test_the_flight_of_a_stop_is_downloaded(pages, robot: ProcessStack, tmp_path: Path) -> None:
+def test_the_flight_of_a_stop_is_downloaded(
+    pages: Any, robot: ProcessStack, tmp_path: Path
+) -> None:
     robot.operate("estop")
     page: Page = pages.of("anna", "events/files")
     link = page.get_by_role("link", name="Download").first
@@ -26,7 +29,7 @@ def test_the_flight_of_a_stop_is_downloaded(pages, robot: ProcessStack, tmp_path
     assert "/control_status" in {channel.topic for channel in summary.channels.values()}
 
 
-def test_logs_are_filtered_by_process_level_and_words(pages) -> None:
+def test_logs_are_filtered_by_process_level_and_words(pages: Any) -> None:
     page: Page = pages.of("anna", "events/logs")
     lines = page.get_by_role("list", name="Log lines").get_by_role("listitem")
     expect(lines.first).to_be_visible()
@@ -38,7 +41,7 @@ def test_logs_are_filtered_by_process_level_and_words(pages) -> None:
     expect(lines).to_have_count(0)
 
 
-def test_the_audit_is_for_admins_and_names_who_did_what(pages) -> None:
+def test_the_audit_is_for_admins_and_names_who_did_what(pages: Any) -> None:
     page: Page = pages.of("anna", "events/audit")
     expect(page.get_by_role("cell", name="anna").first).to_be_visible()
     viewer: Page = pages.of("vera", "events/audit")

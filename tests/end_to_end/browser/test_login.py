@@ -1,5 +1,7 @@
 """Log in and out; the stop button needs neither."""
 
+from typing import Any
+
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -8,7 +10,7 @@ from sim_twin.process_stack import ProcessStack
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
 
-def test_who_is_unknown_sees_nothing_but_login_and_stop(pages, robot: ProcessStack) -> None:
+def test_who_is_unknown_sees_nothing_but_login_and_stop(pages: Any, robot: ProcessStack) -> None:
     page: Page = pages.fresh()
     expect(page.get_by_label("User")).to_be_focused()
     page.get_by_label("User").fill("anna")
@@ -20,7 +22,7 @@ def test_who_is_unknown_sees_nothing_but_login_and_stop(pages, robot: ProcessSta
     assert robot.wait_until(lambda: robot.document("control_status")["estop_latched"])
 
 
-def test_an_operator_logs_in_and_out(pages) -> None:
+def test_an_operator_logs_in_and_out(pages: Any) -> None:
     page: Page = pages.fresh()
     page.get_by_label("User").fill("anna")
     page.get_by_label("Password").fill("five-words-that-nobody-guesses")

@@ -1,6 +1,7 @@
 """Stop, reset and arm the robot from the view Now, and see why it stopped."""
 
 import re
+from typing import Any
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
@@ -72,7 +73,7 @@ def test_a_page_whose_server_hangs_shows_no_value_as_live_and_still_stops(
     expect(page.get_by_text("No live data for")).to_be_hidden()
 
 
-def test_a_viewer_may_stop_and_nothing_else(pages, robot: ProcessStack) -> None:
+def test_a_viewer_may_stop_and_nothing_else(pages: Any, robot: ProcessStack) -> None:
     page = pages.of("vera")
     disarm = safety(page).get_by_role("button", name="Disarm")
     expect(disarm).to_be_disabled()

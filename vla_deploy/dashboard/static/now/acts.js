@@ -11,7 +11,7 @@ const ACTS = {
   reset: {
     text: "Reset",
     icon: "reset",
-    done: "Reset is asked for.",
+    done: "It is reset, and stays disarmed.",
     question: {
       title: "Reset the emergency stop?",
       text: "Somebody pressed it for a reason. Reset when you see that the reason is gone. Nothing moves: arming is an act of its own.",
@@ -21,7 +21,7 @@ const ACTS = {
   arm: {
     text: "Arm",
     icon: "power",
-    done: "Arming is asked for.",
+    done: "It is armed.",
     question: {
       title: "Arm the robot?",
       text: "Its motors hold the pose that they have. Nothing moves now, but from then on a command does move it: see that nobody is within reach.",
@@ -31,7 +31,7 @@ const ACTS = {
   disarm: {
     text: "Disarm",
     icon: "power",
-    done: "Disarming is asked for.",
+    done: "It is disarmed.",
     kind: "danger",
     question: {
       title: "Disarm the robot?",
