@@ -61,3 +61,15 @@ def test_a_command_is_cancelled_and_the_robot_stays_ready(page: Page, robot: Pro
     expect(card.locator(".card-head")).to_contain_text("Cancelled")
     assert robot.wait_until(lambda: robot.fastest_rad_s() < STANDSTILL_RAD_S, 5.0)
     assert robot.state() == "armed"
+
+
+def test_a_command_said_into_the_browser_is_heard_and_planned(page: Page) -> None:
+    talk = page.get_by_role("button", name="Hold to talk")
+    talk.hover()
+    page.mouse.down()
+    expect(page.get_by_role("button", name="Listening")).to_be_visible()
+    heard = page.locator(".heard")
+    expect(heard).to_contain_text("left")
+    page.mouse.up()
+    expect(heard).to_contain_text("accepted")
+    expect(page.locator(".card", has_text="by voice").first).to_contain_text("turn")

@@ -26,12 +26,16 @@ export function HoldToTalk() {
     setPhase("idle");
     setLevel(0);
   };
+  const ended = (why) => {
+    release();
+    if (why) tell("warn", `The robot no longer listens: ${why}`);
+  };
   const press = async () => {
     if (why || held.current) return;
     held.current = true;
     setPhase("opening");
     try {
-      const opened = await openMicrophone({ onLevel: setLevel, onEnd: release });
+      const opened = await openMicrophone({ onLevel: setLevel, onEnd: ended });
       if (!held.current) return opened.close(); // it was let go meanwhile
       microphone.current = opened;
       setPhase("talking");

@@ -2,9 +2,10 @@
 
 import { address, post } from "../api.js";
 import { useAct, useAnswer } from "../asking.js";
-import { bytes, clock } from "../format.js";
+import { useTopic } from "../following.js";
+import { bytes, clock, duration, words } from "../format.js";
 import { Icon } from "../icons.js";
-import { Button, Card, Empty, Failure } from "../parts.js";
+import { Badge, Button, Card, Empty, Failure } from "../parts.js";
 import { html } from "../ui.js";
 
 const LOOK_MS = 4_000;
@@ -30,21 +31,49 @@ function Flights() {
 
 function Recordings() {
   const { data, error, again } = useAnswer("recordings", LOOK_MS);
-  const isOn = Boolean(data?.recording);
+  const status = useTopic("recording_status");
+  const isOn = Boolean(status.data) && status.data.state !== "off";
   const [toggle, isBusy] = useAct(async () => {
     await post(isOn ? "recordings/stop" : "recordings");
     await again();
   });
   const actions = html`
-    <${Button} needs="operator" kind=${isOn ? "danger" : "usual"} icon=${isOn ? "pause" : "record"} busy=${isBusy} onClick=${toggle}>
+    <${Button}
+      needs="operator"
+      kind=${isOn ? "danger" : "usual"}
+      icon=${isOn ? "pause" : "record"}
+      busy=${isBusy}
+      disabled=${status.stale}
+      title=${status.stale ? "The recorder is silent" : ""}
+      onClick=${toggle}
+    >
       ${isOn ? "Stop recording" : "Record"}
     <//>
   `;
   return html`
-    <${Card} title="Recordings" note=${isOn ? "under way" : ""} actions=${actions}>
+    <${Card} title="Recordings" stale=${status.stale} age_s=${status.age_s} actions=${actions}>
+      ${isOn && html`<${Recording} status=${status.data} />`}
+      ${status.data?.refused && html`<p class="quiet">Refused: ${status.data.refused}</p>`}
       ${error && html`<${Failure} error=${error} />`}
-      <${Files} files=${data?.recordings} folder="recordings" none="None yet: press Record, do something, stop." />
+      <${Files} files=${data} folder="recordings" none="None yet: press Record, do something, stop." />
     <//>
+  `;
+}
+
+/** Say what is being recorded, and what of it is lost. */
+function Recording({ status }) {
+  const facts = [
+    status.file,
+    bytes(status.file_bytes),
+    `${status.messages} messages`,
+    status.lost > 0 && `${status.lost} lost`,
+    status.left_s !== null && `${duration(status.left_s)} left`,
+  ];
+  return html`
+    <p class="row">
+      <${Badge} tone=${status.lost > 0 ? "warn" : "info"} icon="record">${words(status.state)}<//>
+      <span class="quiet small">${facts.filter(Boolean).join(" · ")}${status.why && `: ${status.why}`}</span>
+    </p>
   `;
 }
 
