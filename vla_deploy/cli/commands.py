@@ -48,6 +48,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "fault": Command("fault", "make the twin's devices fail"),
     "flight": Command("flight", "look into what the flight recorder saved"),
     "record": Command("record", "record what the robot does: rolling files, or one of your own"),
+    "replay": Command("replay", "show a recording or a flight as if it were happening; no robot"),
     "check": Command("check", "check a robot, a profile or a plan, and report all faults"),
     "schema": Command("check", "print the JSON Schema of a plan or of an analysis"),
     "map": Command("map", "record, look at, check and convert maps in the ROS format"),

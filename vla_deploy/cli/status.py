@@ -34,6 +34,7 @@ def as_text(status: dict[str, Any]) -> str:
     """Return the status as lines for a person."""
     return "\n".join(
         [
+            *_replay(status),
             *_processes(status),
             _profile(status),
             _control(status),
@@ -45,6 +46,15 @@ def as_text(status: dict[str, Any]) -> str:
             *_sight(status),
         ]
     )
+
+
+def _replay(status: dict[str, Any]) -> list[str]:
+    """Say that there is no robot."""
+    shown = status.get("replay")
+    if shown is None:
+        return []
+    place = f"{shown['position_s']:.0f} of {shown['duration_s']:.0f} s"
+    return [f"REPLAY of {shown['file']}, {shown['state']} at {place}: no robot runs here"]
 
 
 def _processes(status: dict[str, Any]) -> list[str]:

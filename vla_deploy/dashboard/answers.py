@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from vla_deploy.dashboard.errors import Refused
-from vla_deploy.ipc import BadPayload, IpcError
+from vla_deploy.ipc import BadPayload, IpcError, ReplayOnly
 
 _DESCRIPTION: Final = "see the API's description: /api/v1/openapi.json"
 _log = logging.getLogger(__name__)
@@ -30,6 +30,7 @@ def add_error_answers(app: FastAPI) -> None:
     app.add_exception_handler(Refused, _refused)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(BadPayload, _unfit)
+    app.add_exception_handler(ReplayOnly, _replayed)
     app.add_exception_handler(IpcError, _unreachable)
     app.add_exception_handler(HTTPException, _http)
     app.add_exception_handler(Exception, _broken)
@@ -52,6 +53,10 @@ async def _unfit(_: Request, error: Any) -> JSONResponse:
     return error_answer(
         HTTPStatus.UNPROCESSABLE_ENTITY, "unfit", str(error), "send plain text, and less of it"
     )
+
+
+async def _replayed(_: Request, error: Any) -> JSONResponse:
+    return error_answer(HTTPStatus.CONFLICT, "replay", str(error), "look only; no robot is here")
 
 
 async def _unreachable(_: Request, error: Any) -> JSONResponse:

@@ -23,6 +23,7 @@ def collect(link: RobotLink) -> dict[str, Any]:
         "scene": link.document("scene", age_limit_s=5.0),
         "speech": link.document("speech_status", age_limit_s=2.0),
         "profile": link.document("profile_status", age_limit_s=3.0),
+        "replay": link.document("replay_status", age_limit_s=3.0),
         "dashboard_url": None if dashboard is None else dashboard["url"],
     }
 

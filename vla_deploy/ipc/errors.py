@@ -5,6 +5,7 @@ IpcError
 ├── BadPayload          the payload does not fit the topic's declaration: fix the sender
 ├── SchemaMismatch      the file was made by another version: stop the whole run, start it again
 ├── SpaceUnavailable    the directory or its memory cannot be had: free memory, check permissions
+├── ReplayOnly          the run is a replay of a file: nothing can be asked of it
 └── ClaimRefused        a resource can never be granted as it was asked for: fix the claim
 """
 
@@ -31,3 +32,7 @@ class SpaceUnavailable(IpcError):
 
 class ClaimRefused(IpcError):
     """Say which resource can never be granted as it was asked for."""
+
+
+class ReplayOnly(IpcError):
+    """Say that a run only shows what was recorded, so that no act reaches any robot."""

@@ -10,6 +10,7 @@ from vla_deploy.ipc.errors import SpaceUnavailable, UnknownTopic
 from vla_deploy.ipc.frame_ring import FrameReader, FrameWriter
 from vla_deploy.ipc.pulse import PulseReader
 from vla_deploy.ipc.record_ring import RecordReader, RecordWriter
+from vla_deploy.ipc.replay_mark import refuse_in_replay
 from vla_deploy.ipc.ring import RingReader, RingWriter
 from vla_deploy.ipc.segment import Segment
 from vla_deploy.ipc.shared_document import SharedDocument
@@ -19,14 +20,23 @@ from vla_deploy.ipc.topics import TOPICS, Kind, Topic
 class SharedSpace:
     """Give access to the shared memory of one run; files are made by whoever comes first.
 
-    Every method but `doorbell` may raise `UnknownTopic`, `SchemaMismatch` or `SpaceUnavailable`.
+    Every method but `doorbell` may raise `UnknownTopic`, `SchemaMismatch` or `SpaceUnavailable`; in
+    a replay, which `is_replay` alone may write, every writer raises `ReplayOnly`.
 
     Raises:
         SpaceUnavailable: the directory cannot be made.
     """
 
-    def __init__(self, directory: Path, clock: Clock, topics: Iterable[Topic] = TOPICS) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        clock: Clock,
+        topics: Iterable[Topic] = TOPICS,
+        *,
+        is_replay: bool = False,
+    ) -> None:
         self._directory = directory
+        self._is_replay = is_replay
         self._clock = clock
         self._topics = {topic.name: topic for topic in topics}
         self._opened: list[Segment | Doorbell] = []
@@ -100,6 +110,8 @@ class SharedSpace:
         self._opened.clear()
 
     def _segment(self, topic: Topic, *, writable: bool) -> Segment:
+        if writable and not self._is_replay:
+            refuse_in_replay(self._directory, topic)
         segment = Segment(self._directory, topic, writable=writable)
         self._opened.append(segment)
         return segment

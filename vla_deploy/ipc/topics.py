@@ -163,6 +163,23 @@ TOPICS: tuple[Topic, ...] = (
         fields=(Field("document", "json", 4096),),
     ),
     Topic(
+        name="replay_request",
+        kind=Kind.RING,
+        owner="any",
+        summary="asks a replay to pause, to go on, to seek, to go at another speed",
+        slots=16,
+        slot_bytes=512,
+    ),
+    Topic(
+        name="replay_status",
+        kind=Kind.CELL,
+        owner="replay",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="which file is replayed, where it stands, at which speed, as JSON",
+        fields=(Field("document", "json", 1024),),
+    ),
+    Topic(
         name="motion_command",
         kind=Kind.RING,
         owner="executor",

@@ -4,6 +4,7 @@ TelemetryError
 ├── FlightMissing      there is no such file: list what there is
 ├── FlightUnreadable   the file is cut off, spoiled, or not ours: take another one
 ├── FlightForeign      it was recorded by a version with other rules: judge it with that one
+├── ReplayRefused      a replay cannot do what is asked: ask for something else
 ├── RecordingRefused   a recording cannot be made as it was asked for: ask for another
 └── SettingsInvalid    recording.toml has faults, all of them are listed: mend the file
 """
@@ -27,6 +28,10 @@ class FlightForeign(TelemetryError):
 
 class RecordingRefused(TelemetryError):
     """Say why nothing is recorded as it was asked for."""
+
+
+class ReplayRefused(TelemetryError):
+    """Say what a replay cannot do."""
 
 
 class SettingsInvalid(TelemetryError):
