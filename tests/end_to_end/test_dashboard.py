@@ -37,14 +37,27 @@ class Page:
     def state(self, command_id: str) -> str:
         return str(self.ask("GET", f"commands/{command_id}")["state"])
 
-    def drive(self) -> str:
-        command_id: str = self.ask("POST", "commands", {"text": "go to the kitchen"})["command_id"]
+    def alarms(self) -> list[str]:
+        return [alarm["field"] for alarm in self.ask("GET", "alarms")["alarms"]]
+
+    def drive(self, where: str = "the kitchen") -> str:
+        command_id: str = self.ask("POST", "commands", {"text": f"go to {where}"})["command_id"]
         moves = self._stack.wait_until(lambda: self._stack.fastest_rad_s() > MOVING_RAD_S)
         assert moves, self.ask("GET", f"commands/{command_id}")["events"][-1]
         return command_id
 
 
-def test_it_stops_and_commands_the_robot_which_drives_on_when_it_is_killed(
+def press_the_door(stack: ProcessStack) -> Any:
+    door = stack.document("stop_door_status")
+    connection = HTTPConnection(door["host"], door["port"], timeout=5)
+    connection.request("POST", "/stop")
+    with connection.getresponse() as answer:
+        told = json.load(answer)
+    connection.close()
+    return told
+
+
+def test_it_stops_and_commands_the_robot_which_drives_on_without_it_and_stops_by_the_stop_door(
     twin_stack: ProcessStack,
 ) -> None:
     page = Page(twin_stack)
@@ -67,3 +80,12 @@ def test_it_stops_and_commands_the_robot_which_drives_on_when_it_is_killed(
     is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
     assert is_done, page.ask("GET", f"commands/{command_id}")["events"][-1]
     assert page.state(stopped_id) == "failed"
+
+    page.drive("the charging station")
+    twin_stack.freeze("dashboard")
+    assert press_the_door(twin_stack)["pressed"] is True
+    stands = twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() < STANDSTILL_RAD_S, 3.0)
+    assert stands, twin_stack.truth()
+    assert press_the_door(twin_stack)["control"]["estop_latched"] is True
+    twin_stack.thaw("dashboard")
+    assert twin_stack.wait_until(lambda: "estop" in page.alarms(), 10.0)
