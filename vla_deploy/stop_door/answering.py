@@ -38,9 +38,8 @@ class Answering:
         return looked(request, self._words.newest()) if whole else self._refuse(_CUT_OFF)
 
     def _press(self, request: Request, peer: str) -> bytes:
-        word = self._words.newest()
         why_not = self._pressing.press(request, peer)
-        return not_pressed(request, why_not) if why_not else pressed(request, word)
+        return not_pressed(request, why_not) if why_not else pressed(request, self._words.newest())
 
     def _refuse(self, why: str) -> bytes:
         self.refused += 1

@@ -27,7 +27,7 @@ _STOP_HERE: Final = "POST /stop stops the robot, GET / shows a page with a stop 
 
 
 def pressed(request: Request, word: ControlWord | None) -> bytes:
-    """Answer a press that control will read in its next tick; `word` is from before that."""
+    """Answer a press that control will read in its next tick; `word` may be from before that."""
     if request.wants_page:
         page = stop_page("Stop demanded", in_words(word))
         return _answer(request, HTTPStatus.OK, page, _HTML)

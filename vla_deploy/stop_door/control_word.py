@@ -28,7 +28,7 @@ def in_words(word: ControlWord | None) -> str:
 
 
 class ControlWords:
-    """Read the newest word of control, None where there is none that young."""
+    """Read the newest word of control, None where there is none that young, or it is none."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
         self._clock = clock
@@ -39,9 +39,9 @@ class ControlWords:
         sample = self._status.latest()
         if sample is None or (age_s := sample.age_s(self._clock.now_ns())) > _AGE_LIMIT_S:
             return None
-        told = sample.document()
-        return ControlWord(
-            state=str(told["state"]),
-            estop_latched=bool(told["estop_latched"]),
-            age_s=round(max(age_s, 0.0), 3),
-        )
+        try:
+            told = sample.document()
+            state, latched = str(told["state"]), bool(told["estop_latched"])
+        except (KeyError, TypeError, ValueError):
+            return None  # as of another version: for the one who presses it is as good as silent
+        return ControlWord(state=state, estop_latched=latched, age_s=round(max(age_s, 0.0), 3))

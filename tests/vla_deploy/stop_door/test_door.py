@@ -37,6 +37,13 @@ def test_the_answer_tells_what_control_says_so_that_a_page_knows_when_to_stop_as
     assert json.loads(split(doorway.ask(PRESS))[2])["control"] is None
 
 
+@pytest.mark.parametrize("document", [{}, {"state": "armed"}])
+def test_a_control_that_tells_nonsense_does_not_keep_a_press_from_counting(doorway, document):
+    doorway.space.cell_writer("control_status").put_document(document)
+    assert json.loads(split(doorway.ask(PRESS))[2]) == {"pressed": True, "control": None}
+    assert len(doorway.pressed()) == 1
+
+
 @pytest.mark.parametrize("body", [b"{}", b'{"reason": "it leans"}', b"x" * 5000, b"\x00\xff"])
 def test_a_body_of_any_kind_changes_nothing(doorway, body):
     request = PRESS.replace(b"Length: 0", b"Length: %d" % len(body)) + body

@@ -1,6 +1,6 @@
 """List every rule by which conditions are found: pure functions of what was told."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
 from vla_deploy.dashboard.alarms import (
@@ -11,7 +11,7 @@ from vla_deploy.dashboard.alarms import (
     process_rules,
     topic_rules,
 )
-from vla_deploy.dashboard.alarms.finding import Finding, Key
+from vla_deploy.dashboard.alarms.finding import Finding, Key, Severity
 from vla_deploy.dashboard.alarms.told import Told
 
 Rule = Callable[[Told], Iterator[Finding]]
@@ -37,4 +37,20 @@ RULES: Final[tuple[Rule, ...]] = (
 
 def find(told: Told) -> dict[Key, Finding]:
     """Return every condition that holds."""
-    return {finding.key: finding for rule in RULES for finding in rule(told)}
+    return {finding.key: finding for rule in RULES for finding in _judged(rule, told)}
+
+
+def _judged(rule: Rule, told: Told) -> Iterable[Finding]:
+    """Return what a rule finds; one that does not understand what it reads is found itself."""
+    try:
+        return tuple(rule(told))
+    except (KeyError, TypeError, ValueError) as error:
+        name = rule.__name__.replace("_", " ")
+        found = Finding(
+            process="dashboard",
+            field=rule.__name__,
+            text=f"nobody judges {name}: what is told has another form than expected ({error!r})",
+            severity=Severity.ERROR,
+            advice="processes of two versions run beside each other: start the run anew",
+        )
+        return (found,)

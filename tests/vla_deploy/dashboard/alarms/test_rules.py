@@ -310,6 +310,15 @@ def test_what_a_silent_part_said_last_is_not_believed(words):
     assert [one.field for one in words.findings()] == ["speech_status"]
 
 
+def test_a_form_that_no_rule_knows_is_told_and_costs_no_other_alarm():
+    words = Words("estop")
+    words.documents["speech_status"] = {"state": "listening"}
+    found = {one.process: one for one in words.findings()}
+    assert set(found) == {"control", "dashboard"}
+    assert found["dashboard"].text.startswith("nobody judges hearing: ")
+    assert "KeyError('stop_words')" in found["dashboard"].text
+
+
 def test_every_finding_says_what_to_try():
     for case in WORDS:
         for finding in Words(case).findings():
