@@ -9,6 +9,7 @@ from fastapi import FastAPI
 from vla_deploy.dashboard.alarms.part import alarm_desk
 from vla_deploy.dashboard.commands.history import CommandHistory
 from vla_deploy.dashboard.live import live
+from vla_deploy.dashboard.metering import metering
 
 
 class Part(Protocol):
@@ -31,4 +32,4 @@ def _commands(app: FastAPI) -> Part:
 
 # Each is made with the app, finds `link` and `settings` in its state, and puts there what routes
 # want to find.
-PARTS: Final[tuple[Callable[[FastAPI], Part], ...]] = (live, _commands, alarm_desk)
+PARTS: Final[tuple[Callable[[FastAPI], Part], ...]] = (live, _commands, alarm_desk, metering)

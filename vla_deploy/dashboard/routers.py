@@ -9,6 +9,7 @@ from vla_deploy.dashboard.access import routes as access
 from vla_deploy.dashboard.alarms import routes as alarms
 from vla_deploy.dashboard.api import commands, files, logs, operate, profile, recordings, state
 from vla_deploy.dashboard.live import endpoint, microphone, routes
+from vla_deploy.dashboard.metering import routes as metering
 
 API_PREFIX: Final = "/api/v1"
 
@@ -26,6 +27,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     endpoint.router,
     microphone.router,
     routes.router,
+    metering.router,
 )
 # At the root: the page, and what has its place by convention.
-ROOT_ROUTERS: Final[tuple[APIRouter, ...]] = (page.router, state.health)
+ROOT_ROUTERS: Final[tuple[APIRouter, ...]] = (page.router, state.health, metering.scraped)

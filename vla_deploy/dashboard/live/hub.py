@@ -80,6 +80,11 @@ class LiveHub:
         return frozenset(self._feeds)
 
     @property
+    def client_count(self) -> int:
+        """Return how many clients there are."""
+        return len(self._clients)
+
+    @property
     def is_full(self) -> bool:
         """Tell whether no more clients are taken."""
         return len(self._clients) >= MOST_CLIENTS

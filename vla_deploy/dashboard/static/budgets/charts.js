@@ -15,7 +15,7 @@ export const CHARTS = [
   { title: "Power", metric: "vla_power_watts", unit: "W", digits: 1, line: "power_w", reading: "power_w" },
   { title: "Temperature", metric: "vla_temperature_celsius", unit: "°C", digits: 1, line: "temperature_c", reading: "temperature_c" },
   { title: "Disk free", metric: "vla_disk_free_bytes", unit: "MB", digits: 0, scale: 1e-6, line: "disk_free_mb", reading: "disk_free_bytes" },
-  { title: "Late ticks of control", metric: "vla_control_late_ticks_total", unit: "per s", digits: 2, rate: true },
+  { title: "Late ticks of control", metric: "vla_control_late_ticks_total", unit: "per s", digits: 2 },
 ];
 
 const TOTAL = "total";

@@ -1,0 +1,9 @@
+"""Ask the dashboard from another host."""
+
+import pytest
+from starlette.testclient import TestClient
+
+
+@pytest.fixture
+def stranger(dashboard):
+    return TestClient(dashboard.app, "http://127.0.0.1:8088", client=("192.0.2.7", 50_000))
