@@ -1,11 +1,13 @@
 """Metrics and their history are asked for over HTTP; what is missing says why."""
 
+from typing import Any
+
 from prometheus_client.parser import text_string_to_metric_families
 
 BOARD = {"readings": {"power_w": 9.5}, "missing": {"gpu_load_ratio": "missing, because no GPU"}}
 
 
-def test_a_scraper_gets_what_the_processes_tell(dashboard) -> None:
+def test_a_scraper_gets_what_the_processes_tell(dashboard: Any) -> None:
     dashboard.robot.shows("board", **BOARD)
     answer = dashboard.client.get("/metrics")
     assert answer.headers["content-type"].startswith("text/plain; version=")
@@ -14,26 +16,26 @@ def test_a_scraper_gets_what_the_processes_tell(dashboard) -> None:
     assert "vla_gpu_load_ratio" not in families
 
 
-def test_openmetrics_is_spoken_to_those_who_ask_for_it(dashboard) -> None:
+def test_openmetrics_is_spoken_to_those_who_ask_for_it(dashboard: Any) -> None:
     accept = {"accept": "application/openmetrics-text; version=1.0.0"}
     answer = dashboard.client.get("/metrics", headers=accept)
     assert answer.headers["content-type"].startswith("application/openmetrics-text")
     assert answer.text.endswith("# EOF\n")
 
 
-def test_whoever_comes_from_afar_without_a_token_gets_no_metrics(stranger) -> None:
+def test_whoever_comes_from_afar_without_a_token_gets_no_metrics(stranger: Any) -> None:
     for path in ("/metrics", "/api/v1/metrics", "/api/v1/history?series=vla_power_watts"):
         assert stranger.get(path).status_code == 401
 
 
-def test_reasons_are_told_in_words(dashboard) -> None:
+def test_reasons_are_told_in_words(dashboard: Any) -> None:
     dashboard.robot.shows("board", **BOARD)
     missing = dashboard.get("metrics")["missing"]
     assert missing["vla_gpu_load_ratio"]["text"] == "missing, because no GPU"
     assert missing["vla_control_state"]["why"] == "silent"
 
 
-def test_the_history_of_a_metric_has_all_its_series_with_labels(dashboard) -> None:
+def test_the_history_of_a_metric_has_all_its_series_with_labels(dashboard: Any) -> None:
     row = {"name": "control", "memory_mb": 50.0, "state": "ready", "restarts": 0, "alarms": []}
     head = {"robot": "butler", "profile": "desktop", "twin": True, "refusal": ""}
     dashboard.robot.shows("process_table", **head, processes=[row])
@@ -41,14 +43,16 @@ def test_the_history_of_a_metric_has_all_its_series_with_labels(dashboard) -> No
     told = dashboard.get("history", series="vla_process_memory_bytes", span_s=60)
     (series,) = told["series"]
     assert (series["labels"], series["unit"]) == ({"process": "control"}, "bytes")
-    assert series["values"][-2:].count(50e6) == 1
+    assert series["values"].count(50e6) == 1
     assert len(series["values"]) == len(told["times_s"]) == 60
     assert told["times_s"][-1] <= told["end_s"] + 1.0
     listed = dashboard.get("history/series")
     assert "vla_process_memory_bytes/control" in [one["series"] for one in listed["series"]]
 
 
-def test_a_metric_without_history_yet_says_why_and_an_unknown_name_is_refused(dashboard) -> None:
+def test_a_metric_without_history_yet_says_why_and_an_unknown_name_is_refused(
+    dashboard: Any,
+) -> None:
     dashboard.robot.shows("board", **BOARD)
     dashboard.app.state.metering.step()
     told = dashboard.get("history", series="vla_gpu_load_ratio", span_s=600)
@@ -59,13 +63,13 @@ def test_a_metric_without_history_yet_says_why_and_an_unknown_name_is_refused(da
     assert dashboard.get("history", 422, series="vla_power_watts", span_s=1e9)
 
 
-def test_diagnostics_are_told_for_who_bridges_to_ros(dashboard) -> None:
+def test_diagnostics_are_told_for_who_bridges_to_ros(dashboard: Any) -> None:
     dashboard.robot.shows("board", **BOARD)
     array = dashboard.get("diagnostics")
     assert {status["level"] for status in array["status"]} <= {0, 1, 2, 3}
 
 
-def test_without_a_place_for_it_the_reason_takes_the_history_s_place(dashboard) -> None:
+def test_without_a_place_for_it_the_reason_takes_the_history_s_place(dashboard: Any) -> None:
     part = dashboard.app.state.metering
     part.stop()
     part.why_not = "/var/log: no space left"

@@ -32,7 +32,8 @@ def fill(store: TrendStore, seconds: int, start_s: int = START_S) -> None:
 
 
 def mean(store: TrendStore, level: int, wall_s: float, span_s: float = 1e9) -> list[float]:
-    return store.read(["a"], level, wall_s, span_s).series["a"].mean.tolist()
+    told: list[float] = store.read(["a"], level, wall_s, span_s).series["a"].mean.tolist()
+    return told
 
 
 def test_each_level_has_least_mean_and_most_of_its_steps(open_store: Open) -> None:
