@@ -3,7 +3,7 @@
 /**
  * Each row is a chart. `metric` names series of the history, `by` the label that tells its curves
  * apart, `line` the metric of the budget whose limits it is held against, `reading` the reading of
- * the computer whose absence is told with its reason, `rate` that a counter is shown per second.
+ * the computer whose absence is told with its reason. The history holds counters as their rates.
  */
 export const CHARTS = [
   { title: "CPU by process", metric: "vla_process_cpu_cores", by: "process", unit: "cores", digits: 2, line: "cpu_ratio" },
@@ -34,22 +34,12 @@ export function missingReason(chart, board) {
   return board.missing?.[chart.reading] ?? "";
 }
 
-/** Return values per second of a counter; null where it began anew or is not known. */
-export function perSecond(times_s, values) {
-  return values.map((value, at) => {
-    const before = at > 0 ? values[at - 1] : null;
-    if (value === null || before === null || value < before) return null;
-    return (value - before) / (times_s[at] - times_s[at - 1]);
-  });
-}
-
 /** Return the curves of a chart, as it is written, each with the number of its colour. */
 export function curvesOf(chart, history) {
   const told = history?.series.get(chart.metric) ?? [];
   const known = told.filter(({ values }) => values.some((value) => value !== null));
   return known.map(({ label, times_s, values }, at) => {
-    const plain = chart.rate ? perSecond(times_s, values) : values;
-    const scaled = chart.scale ? plain.map((value) => (value === null ? null : value * chart.scale)) : plain;
+    const scaled = chart.scale ? values.map((value) => (value === null ? null : value * chart.scale)) : values;
     return { label, times_s, values: scaled, colour: (at % COLOURS) + 1 };
   });
 }

@@ -12,19 +12,27 @@ export const SPANS = [
 
 /** Return the curves of `charts` over a span: {end_s, series: Map(metric -> [{label, times_s, values}])}. */
 export async function fetchHistory(charts, span_s) {
-  const names = charts.map((chart) => chart.metric).join(",");
-  const told = await get(`history?series=${encodeURIComponent(names)}&span_s=${span_s}`);
-  return read(told, charts);
+  const names = wanted(await get("history/series"), charts);
+  if (names.length === 0) return { end_s: Date.now() / 1000, series: new Map() };
+  return read(await get(`history?series=${encodeURIComponent(names.join(","))}&span_s=${span_s}`));
 }
 
-/** Read the answer of `GET history`. Pure. */
-export function read(told, charts) {
-  const series = new Map();
-  for (const { metric, by } of charts) {
-    const curves = told.series
-      .filter((one) => one.name === metric)
-      .map((one) => ({ label: one.labels?.[by] ?? "", times_s: one.times_s ?? told.times_s, values: one.values }));
-    series.set(metric, curves);
+/** Return which of the series that are kept belong to `charts`. Pure. */
+export function wanted(told, charts) {
+  const metrics = new Set(charts.map((chart) => chart.metric));
+  const kept = (told.series ?? told).map((one) => one.name ?? one);
+  return kept.filter((name) => metrics.has(name.split("/")[0]));
+}
+
+/** Read `GET history`: series are named metric/label, each with its mean in every step. Pure. */
+export function read({ start_s, step_s, series }) {
+  const curves = new Map();
+  let steps = 0;
+  for (const [name, { mean }] of Object.entries(series)) {
+    const [metric, label = ""] = name.split("/");
+    const times_s = mean.map((_, at) => start_s + at * step_s);
+    steps = Math.max(steps, mean.length);
+    curves.set(metric, [...(curves.get(metric) ?? []), { label, times_s, values: mean }]);
   }
-  return { end_s: told.end_s ?? Date.now() / 1000, series };
+  return { end_s: start_s + steps * step_s, series: curves };
 }
