@@ -59,7 +59,7 @@ function SafetyPill() {
   const { data, stale } = useTopic("control_status");
   const told = safetyWords(data, stale);
   return html`
-    <a class="state-pill" href="#/now" data-tone=${told.tone} aria-label="Safety state: ${told.title}. ${told.cause}">
+    <a class="state-pill" href="#/now" data-tone=${told.tone} aria-label="Safety state: ${told.title} ${told.cause}">
       <${Icon} name=${told.icon} /><span>${told.title}</span>
       ${told.cause && html`<span class="cause">${told.cause}</span>`}
     </a>

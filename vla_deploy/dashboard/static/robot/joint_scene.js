@@ -5,7 +5,7 @@ import { RobotGraph } from "./robot_graph.js";
 
 const LEAST_MS = 1000 / 20;
 const MIDDLE = new Vector3(0, 0, 0.62);
-const FAR_M = 2.05;
+const FAR_M = 2.25;
 const TURN_RAD = 0.15;
 const FROM = {
   front: new Vector3(1, 0.45, 0.3),
