@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
-from sim_twin.process_stack import ProcessStack
+from sim_twin.process_stack import ProcessStack, StackFailed
 
 VIEWS: Final = ("now", "robot", "command", "budgets", "events", "profile")
 SIZES: Final = {
@@ -25,6 +25,7 @@ MOST_BYTES: Final = 200_000
 SCALES: Final = (1.0, 0.85, 0.7, 0.6, 0.5)
 COMMAND: Final = "put the red cup into the box"
 CHROMIUM: Final = "/usr/bin/chromium"
+READY_S: Final = 120.0
 SETTLED_MS: Final = 6_000
 _log = logging.getLogger(__name__)
 
@@ -45,6 +46,10 @@ def main() -> None:
         stack = ProcessStack(Path(folder) / "base")
         try:
             stack.wait_until_armed()
+            if not stack.wait_until(lambda: stack.document("dashboard_status"), READY_S):
+                raise StackFailed(
+                    "the dashboard does not tell its address: vla-deploy logs dashboard"
+                )
             url = str(stack.document("dashboard_status")["url"])
             browser = playwright.chromium.launch(
                 executable_path=arguments.browser, args=["--no-sandbox"]
