@@ -26,6 +26,7 @@ SCALES: Final = (1.0, 0.85, 0.7, 0.6, 0.5)
 COMMAND: Final = "put the red cup into the box"
 CHROMIUM: Final = "/usr/bin/chromium"
 READY_S: Final = 120.0
+PATIENCE_MS: Final = 180_000  # without a graphics card the robot in 3-D is drawn slowly
 SETTLED_MS: Final = 6_000
 _log = logging.getLogger(__name__)
 
@@ -82,7 +83,7 @@ def take(page: Page, view: str) -> bytes:
         page.locator(".profile").nth(1).click()
     page.evaluate("() => { scrollTo(0, 0); document.activeElement.blur(); }")
     page.wait_for_timeout(SETTLED_MS)
-    return page.screenshot()
+    return page.screenshot(timeout=PATIENCE_MS)
 
 
 def write(png: bytes, path: Path) -> None:

@@ -29,11 +29,11 @@ export function ChartCard({ chart, curves, span_s, end_s, budget, board }) {
 }
 
 /** List what this computer does not measure, each with the reason. */
-export function MissingCard({ charts, board }) {
+export function MissingCard({ charts, board, history }) {
   return html`
     <${Card} title="Not measured" note="missing is never shown as zero">
       <dl class="missing">
-        ${charts.map((chart) => html`<dt>${chart.title}</dt><dd>${missingReason(chart, board) || "nothing was kept of it in this span"}</dd>`)}
+        ${charts.map((chart) => html`<dt>${chart.title}</dt><dd>${missingReason(chart, board, history) || "nothing was kept of it in this span"}</dd>`)}
       </dl>
     <//>
   `;

@@ -29,9 +29,8 @@ export function limitOf(chart, label, budget) {
 }
 
 /** Return why a chart has nothing to show, or "" when it should have. */
-export function missingReason(chart, board) {
-  if (!chart.reading || !board) return "";
-  return board.missing?.[chart.reading] ?? "";
+export function missingReason(chart, board, history) {
+  return board?.missing?.[chart.reading] ?? history?.missing?.[chart.metric] ?? "";
 }
 
 /** Return the curves of a chart, as it is written, each with the number of its colour. */

@@ -10,29 +10,18 @@ export const SPANS = [
   { span_s: 86_400, words: "24 h", again_ms: 60_000 },
 ];
 
-/** Return the curves of `charts` over a span: {end_s, series: Map(metric -> [{label, times_s, values}])}. */
+/** Return the curves of `charts` over a span, as `read` does. */
 export async function fetchHistory(charts, span_s) {
-  const names = wanted(await get("history/series"), charts);
-  if (names.length === 0) return { end_s: Date.now() / 1000, series: new Map() };
-  return read(await get(`history?series=${encodeURIComponent(names.join(","))}&span_s=${span_s}`));
+  const names = charts.map((chart) => chart.metric).join(",");
+  return read(await get(`history?series=${encodeURIComponent(names)}&span_s=${span_s}`), charts);
 }
 
-/** Return which of the series that are kept belong to `charts`. Pure. */
-export function wanted(told, charts) {
-  const metrics = new Set(charts.map((chart) => chart.metric));
-  const kept = (told.series ?? told).map((one) => one.name ?? one);
-  return kept.filter((name) => metrics.has(name.split("/")[0]));
-}
-
-/** Read `GET history`: series are named metric/label, each with its mean in every step. Pure. */
-export function read({ start_s, step_s, series }) {
-  const curves = new Map();
-  let steps = 0;
-  for (const [name, { mean }] of Object.entries(series)) {
-    const [metric, label = ""] = name.split("/");
-    const times_s = mean.map((_, at) => start_s + at * step_s);
-    steps = Math.max(steps, mean.length);
-    curves.set(metric, [...(curves.get(metric) ?? []), { label, times_s, values: mean }]);
-  }
-  return { end_s: start_s + steps * step_s, series: curves };
+/** Return {end_s, series: Map(metric -> [{label, times_s, values}]), missing} of `GET history`. Pure. */
+export function read(told, charts) {
+  const curvesOf = ({ metric, by }) =>
+    told.series
+      .filter((one) => one.name === metric)
+      .map((one) => ({ label: one.labels?.[by] ?? "", times_s: told.times_s, values: one.values }));
+  const series = new Map(charts.map((chart) => [chart.metric, curvesOf(chart)]));
+  return { end_s: told.end_s, series, missing: told.missing ?? {} };
 }

@@ -36,7 +36,7 @@ function Charts({ span_s, history, budget, board }) {
           <${ChartCard} key=${chart.metric} chart=${chart} curves=${curves} span_s=${span_s} end_s=${history.end_s} budget=${budget} board=${board} />
         `,
       )}
-      ${missing.length > 0 && html`<${MissingCard} charts=${missing} board=${board} />`}
+      ${missing.length > 0 && html`<${MissingCard} charts=${missing} board=${board} history=${history} />`}
     </div>
   `;
 }
