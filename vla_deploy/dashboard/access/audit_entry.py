@@ -60,7 +60,7 @@ class AuditEntry:
 
 def _bounded(details: Mapping[str, Any]) -> dict[str, Any]:
     """Return details that fit on a line; numbers stay numbers, everything else becomes text."""
-    kept = list(details.items())[:_MOST_DETAILS]
+    kept = [one for one in details.items() if one[1] not in ("", None)][:_MOST_DETAILS]
     return {str(name)[:40]: _short(value) for name, value in kept}
 
 

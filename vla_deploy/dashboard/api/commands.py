@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Path, Query, Request
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import Role, note, require
 from vla_deploy.dashboard.commands.history import MOST_COMMANDS, CommandHistory
 from vla_deploy.dashboard.commands.record import CommandRecord
 from vla_deploy.dashboard.errors import Refused
@@ -90,7 +90,9 @@ async def cancel(command_id: CommandId, request: Request) -> Given:
 
 
 def _uttered(request: Request, **utterance: Any) -> Given:
-    return Given(command_id=request.app.state.link.utter(**utterance))
+    command_id = request.app.state.link.utter(**utterance)
+    note(request, given=command_id, text=utterance.get("text", ""))
+    return Given(command_id=command_id)
 
 
 def _history(request: Request) -> CommandHistory:

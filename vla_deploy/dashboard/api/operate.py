@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import Role, note, require
 from vla_deploy.dashboard.acts import carried_out, why_not
 from vla_deploy.dashboard.errors import Refused
 from vla_deploy.ipc.stop_button import ESTOP
@@ -34,7 +34,9 @@ class Pressed(BaseModel):
 @router.post("/stop", dependencies=[Depends(require(Role.ANYONE))])
 async def stop(request: Request, why: Why | None = None) -> Pressed:
     """Press the software stop, which latches; it needs no login, and no body."""
-    request.app.state.link.operate(ESTOP, why.reason if why else "")
+    reason = why.reason if why else ""
+    request.app.state.link.operate(ESTOP, reason)
+    note(request, reason=reason)
     return Pressed()
 
 
@@ -58,7 +60,9 @@ async def disarm(request: Request, why: Why | None = None) -> dict[str, Any]:
 
 async def _act(request: Request, act: str, why: Why | None) -> dict[str, Any]:
     link = request.app.state.link
-    link.operate(act, why.reason if why else "")
+    reason = why.reason if why else ""
+    link.operate(act, reason)
+    note(request, reason=reason)
     is_done, status = await carried_out(link, act, _WITHIN_S)
     if not is_done:
         raise Refused(HTTPStatus.CONFLICT, f"no_{act}", why_not(status), "see the robot's state")

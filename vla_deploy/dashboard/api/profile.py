@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from platforms.profile import profile_names
 from platforms.profile_source import flat, read_source
-from vla_deploy.dashboard.access import Role, require
+from vla_deploy.dashboard.access import Role, note, require
 from vla_deploy.dashboard.errors import Refused
 from vla_deploy.supervisor.profile_choice import detect
 
@@ -88,6 +88,7 @@ async def use(wanted: Wanted, request: Request) -> Asked:
             "dry_run": wanted.dry_run,
         },
     )
+    note(request, profile=wanted.name, dry_run=wanted.dry_run)
     return Asked(request_id=request_id)
 
 

@@ -222,6 +222,10 @@ def test_who_may_operate_reaches_the_robot_by_what_fits(target):
     arrived = target.arrived()
     assert [event["act"] for event in arrived["operator"]] == ["arm"]
     assert [event["text"] for event in arrived["utterance"]] == ["wave"]
+    told, _ = target.app.state.access.audit.newest(2)
+    assert (told["user"], told["act"], told["details"]["text"]) == (
+        "token:operator", "POST /api/v1/commands", "wave"
+    )  # fmt: skip
 
 
 BODIES = [
