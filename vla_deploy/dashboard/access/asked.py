@@ -7,8 +7,9 @@ from typing import Any, Final
 from vla_deploy.dashboard.access.peer import Peer, peer_of
 
 WEBSOCKET: Final = "WEBSOCKET"
-STOP_PATH: Final = "/api/v1/stop"
-LOGIN_PATH: Final = "/api/v1/login"
+API_PREFIX: Final = "/api/v1"
+STOP_PATH: Final = f"{API_PREFIX}/stop"
+LOGIN_PATH: Final = f"{API_PREFIX}/login"
 _READS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _SECURE: Final = {"ws": "http", "wss": "https"}
 

@@ -6,11 +6,12 @@ from typing import Any, Final
 from starlette.requests import HTTPConnection
 from starlette.types import Message, Scope, Send
 
-from vla_deploy.dashboard.access.asked import WEBSOCKET, Asked
+from vla_deploy.dashboard.access.asked import API_PREFIX, WEBSOCKET, Asked
 from vla_deploy.dashboard.access.audit import STOP_FOLD_S, AuditLog
 from vla_deploy.dashboard.access.audit_entry import AuditEntry, Outcome, outcome_of
 from vla_deploy.dashboard.access.identity import IDENTITY, Identity, Role
 
+NO_ROUTE: Final = "(no route)"
 _DETAILS: Final = "audit_details"
 _REQUIRED: Final = "required_role"
 _CODE: Final = "refusal_code"
@@ -86,7 +87,10 @@ class Witness:
 
     def _act(self) -> str:
         """Return method and route: a path that is none could be as long and odd as one likes."""
-        route = self._scope.get("route")
         if self._asked.is_stop:
             return f"POST {self._asked.path}"
-        return f"{self._asked.method} {getattr(route, 'path', '(no route)')}"
+        path = getattr(self._scope.get("route"), "path", NO_ROUTE)
+        is_below = path != NO_ROUTE and self._asked.path.startswith(API_PREFIX)
+        if is_below and not path.startswith(API_PREFIX):  # routers know only what is below it
+            path = API_PREFIX + path
+        return f"{self._asked.method} {path}"
