@@ -24,6 +24,10 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "plan": Command("plan", "tell what would be done for a command, and who planned it"),
     "status": Command("status", "tell what runs and how the robot is"),
     "dashboard": Command("dashboard", "tell where the robot's page is, and who may use it"),
+    "top": Command("top", "show processes, budgets, control and topics on one screen, for ssh"),
+    "metrics": Command(
+        "metrics", "list what is measured; print alert rules or a Grafana dashboard"
+    ),
     "scene": Command("scene", "tell what the robot knows of the things around it"),
     "memory": Command("memory", "tell what the robot remembers, and have it forget"),
     "budget": Command(
