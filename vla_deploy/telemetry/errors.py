@@ -5,6 +5,7 @@ TelemetryError
 ├── FlightUnreadable   the file is cut off, spoiled, or not ours: take another one
 ├── FlightForeign      it was recorded by a version with other rules: judge it with that one
 ├── ReplayRefused      a replay cannot do what is asked: ask for something else
+├── ExtraMissing       an optional part is not installed, or cannot be served: the text says how
 ├── RecordingRefused   a recording cannot be made as it was asked for: ask for another
 └── SettingsInvalid    recording.toml has faults, all of them are listed: mend the file
 """
@@ -28,6 +29,10 @@ class FlightForeign(TelemetryError):
 
 class RecordingRefused(TelemetryError):
     """Say why nothing is recorded as it was asked for."""
+
+
+class ExtraMissing(TelemetryError):
+    """Say which optional part is missing, and how to get it."""
 
 
 class ReplayRefused(TelemetryError):
