@@ -1,4 +1,4 @@
-"""Read `recording.toml`: whether to record always, how much to keep, whether to serve viewers."""
+"""Read `recording.toml`: whether to record always, how much to keep, where to serve viewers."""
 
 import ipaddress
 import tomllib
@@ -54,11 +54,10 @@ class RecordingSettings(BaseModel):
 
 
 class FoxgloveSettings(BaseModel):
-    """Say whether viewers are served live, and where."""
+    """Say where viewers are served live, and what they see."""
 
     model_config = _STRICT
 
-    enabled: bool = False
     host: str = "127.0.0.1"
     port: int = Field(default=8765, ge=0, le=65535)
     open_to_network: bool = False
