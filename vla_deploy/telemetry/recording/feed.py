@@ -39,8 +39,13 @@ class Feed:
             return
         self._backlog.append((self._aside.submit(self._tape.write, batch), batch.size_bytes))
 
+    def give_up_backlog(self) -> None:
+        """Drop what waits to be written: the file is to be finished now."""
+        for future, _ in self._backlog:
+            future.cancel()
+
     def close(self) -> "Future[None]":
-        """Have the file finished; what waits is written first."""
+        """Have the file finished; what still waits is written first."""
         return self._aside.submit(self._tape.close)
 
     @property

@@ -74,7 +74,12 @@ class RollingRecorder:
             self._status.put_document(self.document(now_ns))
 
     def stop(self) -> None:
-        """Finish what is being written, unless the disk takes too long for that."""
+        """Finish what is being written, unless the disk takes too long for that.
+
+        What waits is dropped: there is time for a whole file or for the last values, not for both.
+        """
+        if self._feed is not None:
+            self._feed.give_up_backlog()
         closing = self._end()
         try:
             if closing is not None:

@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from vla_deploy.ipc import TOPICS
 from vla_deploy.telemetry.channels import channels_of
-from vla_deploy.telemetry.recording import feed
+from vla_deploy.telemetry.recording import feed, recorder
 from vla_deploy.telemetry.schemas.views import CHANNELS
 
 Usage = namedtuple("Usage", "total used free")
@@ -24,11 +24,15 @@ class Stuck(Executor):
     """Take work and never do it, as a disk does that hangs."""
 
     def __init__(self) -> None:
-        self.taken = 0
+        self.waiting: list[Future[Any]] = []
+
+    @property
+    def taken(self) -> int:
+        return len(self.waiting)
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        self.taken += 1
-        return Future()
+        self.waiting.append(Future())
+        return self.waiting[-1]
 
 
 def test_nothing_is_recorded_unless_it_is_wanted(rig: Any) -> None:
@@ -167,6 +171,21 @@ def test_a_disk_that_hangs_holds_nobody_up_and_what_is_lost_is_counted(
     assert 1000 < told["backlog_bytes"] <= 2000
     assert 50 < told["lost"] <= 100 - stuck.taken
     assert stuck.taken > 10
+
+
+def test_the_end_of_the_run_finishes_the_file_before_what_still_waits(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, "CLOSE_TIMEOUT_S", 0.0)
+    stuck = Stuck()
+    rig.begin(aside=stuck)
+    rig.ask(topics=["base_state"])
+    rig.run(0.5)
+    rig.recorder.stop()
+    *batches, closing = stuck.waiting
+    assert batches
+    assert all(batch.cancelled() for batch in batches)
+    assert not closing.cancelled()
 
 
 def test_a_disk_that_refuses_is_told_and_tried_again(
