@@ -2,7 +2,7 @@
 
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -24,8 +24,10 @@ from vla_deploy.planning.ladder import Answer
 from vla_deploy.planning.phrasing import Says, spoken_refusal
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
+from vla_deploy.planning.recovery import numbered, recover
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
+from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict
 from vla_deploy.planning.understanding.mentioned import mentions_of
 
@@ -53,6 +55,7 @@ class Desk:
         self._beside = Beside(aside, clock)
         self._clock = clock
         self._queue: deque[Command] = deque()
+        self._under_way = UnderWay()
 
     # --- what comes in --------------------------------------------------------------------------
 
@@ -86,10 +89,19 @@ class Desk:
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command; a plan that failed is not given again."""
+        self._under_way.ended(command_id)
         turn = self.dialogue.ended(command_id, success, error)
         self._telling.ended(command_id, success, error)
         if turn is not None and not success:
             self.planner.cache.forget(turn.said)
+
+    def set_back(self, command_id: str, told: Mapping[str, Any]) -> None:
+        """Plan a command anew whose plan has failed, before any other, or say that it ends."""
+        found = self._under_way.set_back(command_id, told)
+        if isinstance(found, str):
+            self._telling.gave_up(command_id, found)
+        else:
+            self._queue.appendleft(found)
 
     # --- what goes on ---------------------------------------------------------------------------
 
@@ -116,17 +128,34 @@ class Desk:
 
     def _begin(self, command: Command) -> None:
         request = self._request(command)
+        if command.recovers:
+            self._begin_recovery(command, request)
+            return
         if command.plan is not None:
             self._conclude(command, request, self.planner.check_given(command.plan, request))
             return
         deadline = Deadline.within(self._clock, self.planner.within_s, Event())
-        answer = self.planner.plan_at_once(request, deadline)
+        self._go_slowly(command, request, self.planner.plan_at_once(request, deadline), deadline)
+
+    def _go_slowly(
+        self, command: Command, request: Request, answer: Answer, deadline: Deadline
+    ) -> None:
+        """Ask those who take time, where nobody else has a plan."""
         if answer.is_final or not self.planner.slow_rungs:
             self._conclude(command, request, answer)
             return
         self._telling.planning(command, self.planner.slow_rungs)
         slowly = partial(self.planner.plan_slowly, request, deadline, answer)
         self._beside.begin(command, request, deadline, slowly)
+
+    def _begin_recovery(self, command: Command, request: Request) -> None:
+        carried = self._under_way.carried(command.command_id)
+        if carried is None:  # it has ended meanwhile
+            return
+        request = replace(request, failed=carried.history)
+        deadline = Deadline.within(self._clock, self.planner.within_s, Event())
+        answer = recover(carried, request, self.planner.check)
+        self._go_slowly(command, request, answer, deadline)
 
     def _look_after_work(self) -> None:
         done = self._beside.take_done()
@@ -161,6 +190,9 @@ class Desk:
                 raise Ambiguous(question)
             self._hand_on(command, request, answer, answer.plan)
         except Ambiguous as unclear:
+            if command.recovers:  # the robot stands in the middle of it: nobody is asked for long
+                self._refuse(command, unclear, answer)
+                return
             self.accounts.asked += 1
             waiting = self.dialogue.ask(command, request, answer, unclear)
             self._telling.asked(command, waiting.question, waiting.plan)
@@ -168,9 +200,13 @@ class Desk:
             self._refuse(command, error, answer)
 
     def _hand_on(self, command: Command, request: Request, answer: Answer, plan: Plan) -> None:
+        if command.recovers:
+            plan = numbered(plan, len(request.failed))
         self._telling.handed_on(command, plan, answer)
+        self._under_way.carry(command, plan, answer)
         self.accounts.planned += 1
-        self.planner.accepted(request, answer)
+        if not command.recovers:
+            self.planner.accepted(request, answer)
         self.dialogue.remember(
             Turn(
                 said=command.text,
@@ -190,6 +226,9 @@ class Desk:
         answer: Answer | None = None,
         outcome: Outcome = Outcome.REFUSED,
     ) -> None:
+        if command.recovers:
+            self._telling.gave_up(command.command_id, str(reason))
+            return
         self.accounts.refused += 1
         self._telling.refused(command, str(reason), answer)
         if outcome is not Outcome.CANCELLED or isinstance(reason, Says):

@@ -18,7 +18,8 @@ class Command:
     """Hold one utterance: words, or a `plan` made elsewhere.
 
     `heard_confidence`, 0 to 1, is how sure the recogniser is of the words; None for typed text.
-    With `is_answer` the words are no command of their own.
+    With `is_answer` the words are no command of their own; with `recovers` it is under way already,
+    and what is planned for it goes on after a failure.
     """
 
     command_id: str
@@ -28,6 +29,7 @@ class Command:
     plan: Any = None
     heard_confidence: float | None = None
     is_answer: bool = False
+    recovers: bool = False
 
     @property
     def is_spoken(self) -> bool:

@@ -13,10 +13,14 @@ _IN_WORK: Final = frozenset({"queued", "planning", "asked"})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeftOver:
-    """Hold utterances that nobody has answered, and ids of commands that were being planned."""
+    """Hold utterances that nobody has answered, and ids of commands that were being planned.
+
+    For those that are `set_back` the executor waits for another plan.
+    """
 
     unheard: tuple[Event, ...]
     in_work: tuple[str, ...]
+    set_back: tuple[str, ...] = ()
 
 
 def left_over(
@@ -28,4 +32,5 @@ def left_over(
     return LeftOver(
         unheard=tuple(one for one in utterances if command_id_of(one) not in answered),
         in_work=tuple(name for name, event in last.items() if event in _IN_WORK),
+        set_back=tuple(name for name, event in last.items() if event == "setback"),
     )

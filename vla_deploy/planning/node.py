@@ -129,6 +129,8 @@ class PlannerNode:
     def _take_up(self, before: LeftOver) -> None:
         for command_id in before.in_work:
             self._telling.refused(Command(command_id=command_id, told_ns=0), AWAY)
+        for command_id in before.set_back:
+            self._telling.gave_up(command_id, "the planner was started again meanwhile")
         for event in before.unheard:
             self._hear(event)
 
@@ -153,6 +155,8 @@ class PlannerNode:
 
     def _note(self, event: Event) -> None:
         told = event.payload
+        if told.get("event") == "setback":
+            self._desk.set_back(command_id_of(event), told)
         if told.get("event") == "finished":
             self._desk.has_ended(
                 command_id_of(event), bool(told.get("success")), str(told.get("error") or "")

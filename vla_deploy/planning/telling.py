@@ -77,6 +77,10 @@ class Telling:
         """Tell why nothing is done, and what every rung said."""
         self._tell(command, "rejected", reason=_bounded(reason), **_attempts(answer))
 
+    def gave_up(self, command_id: str, reason: str) -> None:
+        """Let the executor end a command for which there is no other plan."""
+        self._plans.publish({"command_id": command_id, "give_up": _bounded(reason)})
+
     def check_length(self, plan: Plan) -> None:
         """Accept a plan that can be told whole.
 
@@ -91,7 +95,8 @@ class Telling:
         """Give a plan to the executor, and tell who made it."""
         document = plan.model_dump(mode="json")
         told = {"command_id": command.command_id, "event": "plan", "plan": document}
-        self._tell(command, "accepted")
+        if not command.recovers:
+            self._tell(command, "accepted")
         self._events.publish(told | _maker(answer) | _attempts(answer))
         self._plans.publish({"command_id": command.command_id, "plan": document})
         if command.is_spoken:

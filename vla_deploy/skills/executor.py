@@ -1,7 +1,7 @@
 """Run one plan: actions as their dependencies allow, each bounded in time, some tried twice."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from drivers.clock import NS_PER_S
@@ -11,13 +11,32 @@ from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.graph import execution_order
 from vla_deploy.planning.plan import Action, ActionStatus, Plan
 from vla_deploy.planning.readiness import refusal_of
+from vla_deploy.planning.recovery import Cause
+from vla_deploy.planning.symbolic.state import State
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.errors import RobotNotReady, SkillFailed, TryAgain
+from vla_deploy.skills.errors import (
+    EffectMissing,
+    NotPossible,
+    PreconditionUnmet,
+    RobotNotReady,
+    SkillFailed,
+    TryAgain,
+)
 from vla_deploy.skills.resources import PRIORITIES, WAIT_LIMIT_S, needs_of
 from vla_deploy.skills.table import SKILL_FUNCTIONS
+from vla_deploy.skills.world_check import WorldCheck
 
 MAX_RETRIES = 1
 BACK_OFF_S = 1.0
+# How long an effect is looked for, and how often: two images of the camera.
+EFFECT_WAIT_S = 0.6
+EFFECT_LOOK_S = 0.1
+CAUSES = (
+    (PreconditionUnmet, Cause.PRECONDITION),
+    (EffectMissing, Cause.EFFECT),
+    (TryAgain, Cause.SKILL),
+    (NotPossible, Cause.SKILL),
+)
 FINAL = frozenset(ActionStatus) - {ActionStatus.PENDING, ActionStatus.ACTIVE}
 
 
@@ -32,6 +51,8 @@ class ActionRecord:
     error: str = ""
     retries: int = 0
     note: str = ""
+    cause: Cause | None = None
+    """By what it failed, where another plan may do better; None otherwise."""
 
     def document(self) -> dict[str, Any]:
         """Return the record as it is told in events and results."""
@@ -49,11 +70,16 @@ class ActionRecord:
 
 @dataclass(slots=True, kw_only=True)
 class _Branch:
-    """Hold one action under way; `skill` is None before its first step and between two tries."""
+    """Hold one action under way; `skill` is None before its first step and between two tries.
+
+    `done_ns` is when the skill came to its end; its effect is looked for from then on.
+    """
 
     record: ActionRecord
     skill: Skill | None = None
     resume_ns: int = 0
+    done_ns: int = 0
+    before: State = field(default_factory=State)
 
 
 class PlanExecution:
@@ -75,6 +101,7 @@ class PlanExecution:
         self._context = context
         self._tell = tell
         self._command_id = command_id
+        self._world = WorldCheck(context)
         self._branches: dict[str, _Branch] = {}
         self._asked: set[str] = set()
 
@@ -87,6 +114,11 @@ class PlanExecution:
     def succeeded(self) -> bool:
         """Tell whether every action succeeded."""
         return all(record.status is ActionStatus.SUCCEEDED for record in self.records)
+
+    @property
+    def setback(self) -> ActionRecord | None:
+        """Return the action that failed in a way that another plan may mend, or None."""
+        return next((one for one in self.records if one.cause is not None), None)
 
     @property
     def active(self) -> ActionRecord | None:
@@ -158,8 +190,8 @@ class PlanExecution:
         try:
             self._advance(branch)
         except StopIteration:
-            branch.skill = None
-            self._end(record, ActionStatus.SUCCEEDED, "")
+            branch.skill, branch.done_ns = None, now_ns
+            self._look_for_effect(branch, now_ns)
         except SkillFailed as error:
             self._failed(branch, error, now_ns)
         except IpcError as error:
@@ -176,9 +208,33 @@ class PlanExecution:
         if self._context.link.is_blind or self._context.link.is_paused:
             self._context.link.rest_base()
             return
+        if branch.done_ns:
+            self._look_for_effect(branch, self._context.link.clock.now_ns())
+            return
         if branch.skill is None:
+            unmet = self._world.unmet(action)
+            if unmet:
+                raise PreconditionUnmet(unmet)
+            branch.before = self._world.state(action)
             branch.skill = SKILL_FUNCTIONS[action.skill](self._context, action.parameters)
         next(branch.skill)
+
+    def _look_for_effect(self, branch: _Branch, now_ns: int) -> None:
+        """End an action as the world shows it; where that shows nothing in time, as its skill did.
+
+        Raises:
+            EffectMissing: the world shows that it has not come about.
+        """
+        if now_ns < branch.resume_ns:
+            return
+        why = self._world.missing_effect(branch.record.action, branch.before, branch.done_ns)
+        if why:
+            branch.done_ns = 0
+            raise EffectMissing(why)
+        if why is None and now_ns - branch.done_ns < EFFECT_WAIT_S * NS_PER_S:
+            branch.resume_ns = now_ns + round(EFFECT_LOOK_S * NS_PER_S)
+            return
+        self._end(branch.record, ActionStatus.SUCCEEDED, "")
 
     def _failed(self, branch: _Branch, error: SkillFailed, now_ns: int) -> None:
         record = branch.record
@@ -191,6 +247,7 @@ class PlanExecution:
             self._tell(record)
             branch.resume_ns = now_ns + round(BACK_OFF_S * NS_PER_S)
             return
+        record.cause = next((cause for kind, cause in CAUSES if isinstance(error, kind)), None)
         self._give_up(record, str(error))
 
     def _give_up(self, record: ActionRecord, error: str) -> None:

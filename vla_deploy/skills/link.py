@@ -16,6 +16,7 @@ from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.safety import Direction
 from vla_deploy.skills.errors import TryAgain
+from vla_deploy.world import SceneUnreadable, Snapshot, read_snapshot
 
 POSE_AGE_S = 0.5
 # A loaded machine may hold perception up for a moment.
@@ -178,6 +179,16 @@ class RobotLink:
             return {}
         told: Mapping[str, Mapping[str, Any]] = sample.document().get("hands", {})
         return told
+
+    def snapshot(self) -> Snapshot | None:
+        """Return the world as perception tells it now; None while it is silent or unreadable."""
+        sample = self._scene.latest()
+        if sample is None or sample.age_s(self.clock.now_ns()) > PATIENCE_S:
+            return None
+        try:
+            return read_snapshot(sample.document(), self.clock.now_ns())
+        except SceneUnreadable:  # a fault of perception, which tells of it itself
+            return None
 
     @property
     def scene_stamp_ns(self) -> int:

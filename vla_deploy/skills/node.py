@@ -5,25 +5,39 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
-from vla_deploy.ipc import Announcer, CellWriter, ClaimBook, RingReader, RingWriter, SharedSpace
+from vla_deploy.ipc import (
+    Announcer,
+    CellReader,
+    CellWriter,
+    ClaimBook,
+    RingReader,
+    RingWriter,
+    SharedSpace,
+)
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.plan import ActionStatus, Plan
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.robots import RobotDescription
 from vla_deploy.skills.arms import believe_fingers, recall_hands
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.executor import ActionRecord, PlanExecution
 from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.recovery import Recovery
 from vla_deploy.skills.resources import body_of
 
 STATUS_PERIOD_NS = NS_PER_S // 10
 _SHOWN_POINTS = 200
+PLANNER_AGE_S = 2.0
+_IDLE = {False: "idle", True: "recovering"}
 
 
 class ExecutorNode:
-    """Execute one plan at a time; a new plan is refused while one runs, a cancel ends it."""
+    """Execute one plan at a time; a new plan is refused while one runs, a cancel ends it.
+
+    Where a plan fails, the planner is asked for another way to the same goal, and waited for.
+    """
 
     def __init__(self, context: NodeContext, robot: RobotDescription, rate_hz: float) -> None:
         self.period_s = 1.0 / rate_hz
@@ -34,7 +48,9 @@ class ExecutorNode:
         self._plans: RingReader
         self._events: RingWriter
         self._status: CellWriter
+        self._planner: CellReader
         self._execution: PlanExecution | None = None
+        self._recovery = Recovery()
         self._command_id = ""
         self._status_ns = 0
         self._knows_hands = False
@@ -54,6 +70,7 @@ class ExecutorNode:
         self._plans = self._space.ring_reader("plan", from_start=False)
         self._events = self._space.ring_writer("task_event")
         self._status = self._space.cell_writer("executor_status")
+        self._planner = self._space.cell_reader("planner_status")
 
     def step(self) -> None:
         """Take new plans, advance the running one, tell the status."""
@@ -65,6 +82,8 @@ class ExecutorNode:
         if self._execution is not None:
             self._execution.step()
             self._conclude()
+        elif self._recovery.is_overdue(self._clock.now_ns()):
+            self._finish("the planner has no other plan in time")
         elif self._knows_hands:
             believe_fingers(
                 self._skills
@@ -73,9 +92,7 @@ class ExecutorNode:
 
     def stop(self) -> None:
         """Cancel what runs, so that nothing moves without its executor."""
-        if self._execution is not None:
-            self._execution.cancel("the executor was stopped")
-            self._conclude()
+        self._call_off("the executor was stopped")
         self._space.close()
 
     def prepare(self, profile: Profile, model_tier: int) -> float:
@@ -93,35 +110,80 @@ class ExecutorNode:
     def _take(self, message: Mapping[str, Any]) -> None:
         command_id = str(message["command_id"])
         if message.get("cancel"):
-            if self._execution is not None:
-                self._execution.cancel("cancelled on request")
-                self._conclude()
+            self._call_off("cancelled on request")
             self._skills.link.halt()
             self._tell(command_id, "finished", success=True, error=None, actions=[])
             return
+        goes_on = self._recovery.is_awaited and command_id == self._command_id
+        if "give_up" in message:
+            if goes_on:
+                self._finish(str(message["give_up"]))
+            return
         refusal = refusal_of(self._skills.link.control_status)
-        if refusal is None and self._execution is not None:
+        if goes_on and refusal is not None:
+            self._finish(refusal)
+            return
+        if refusal is None and self._is_busy and not goes_on:
             refusal = "the robot is busy with another command; wait, or: vla-deploy stop"
         if refusal is not None:
             self._tell(command_id, "rejected", reason=refusal)
             return
+        self._recovery = self._recovery.going_on() if goes_on else Recovery()
         self._command_id = command_id
         plan = Plan.model_validate(message["plan"])
         self._execution = PlanExecution(plan, self._skills, self._tell_action, command_id)
+
+    @property
+    def _is_busy(self) -> bool:
+        return self._execution is not None or self._recovery.is_awaited
+
+    def _call_off(self, reason: str) -> None:
+        """End what runs, or what waits for another plan."""
+        if self._execution is not None:
+            self._execution.cancel(reason)
+            self._conclude()
+        elif self._recovery.is_awaited:
+            self._finish(reason)
 
     def _conclude(self) -> None:
         execution = self._execution
         if execution is None or not execution.finished:
             return
-        errors = [record.error for record in execution.records if record.error]
+        setback, self._execution = execution.setback, None
+        self._recovery = self._recovery.after(execution.records)
+        if setback is None or not self._recovery.may_go_on or not self._planner_lives():
+            self._finish("", success=execution.succeeded)
+            return
+        self._recovery = self._recovery.awaiting(self._clock.now_ns())
+        done = [one.action.id for one in execution.records if one.status is ActionStatus.SUCCEEDED]
+        self._tell(
+            self._command_id,
+            "setback",
+            action_id=setback.action.id,
+            skill=setback.action.skill,
+            error=setback.error,
+            cause=str(setback.cause),
+            done=done,
+        )
+
+    def _finish(self, why_no_other: str, success: bool = False) -> None:
+        """Tell how the command ended; of plans that failed, all that was done counts."""
+        records, self._recovery = self._recovery.records, Recovery()
+        self._execution = None
+        errors = [one.error for one in reversed(records) if one.status is ActionStatus.ABORTED]
+        errors += [one.error for one in records if one.error]
+        error = "; ".join(one for one in (*errors[:1], why_no_other) if one) or None
         self._tell(
             self._command_id,
             "finished",
-            success=execution.succeeded,
-            error=errors[0] if errors else None,
-            actions=[record.document() for record in execution.records],
+            success=success,
+            error=None if success else error,
+            actions=[record.document() for record in records],
         )
-        self._execution = None
+
+    def _planner_lives(self) -> bool:
+        sample = self._planner.latest()
+        return sample is not None and sample.age_s(self._clock.now_ns()) < PLANNER_AGE_S
 
     def _tell_action(self, record: ActionRecord) -> None:
         document = record.document()
@@ -143,8 +205,8 @@ class ExecutorNode:
         active = execution.active if execution else None
         self._status.put_document(
             {
-                "state": "executing" if execution else "idle",
-                "command_id": self._command_id if execution else None,
+                "state": "executing" if execution else _IDLE[self._recovery.is_awaited],
+                "command_id": self._command_id if self._is_busy else None,
                 "action_id": active.action.id if active else None,
                 "skill": active.action.skill if active else None,
                 "way_m": self._skills.way_m[:_SHOWN_POINTS].round(3).tolist(),

@@ -1,0 +1,99 @@
+"""Read what the executor tells of a plan that failed, and hold what was tried before."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+from vla_deploy.planning.graph import execution_order
+from vla_deploy.planning.plan import Action, Plan
+
+
+class Cause(StrEnum):
+    """Say by what an action failed: the skill itself, or the world before or after it."""
+
+    PRECONDITION = "precondition"
+    SKILL = "skill"
+    EFFECT = "effect"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setback:
+    """Hold which action of a plan failed, why, and which had succeeded by then."""
+
+    action: Action
+    error: str
+    done: frozenset[str]
+    cause: Cause = Cause.SKILL
+
+    def __str__(self) -> str:
+        told = ", ".join(f"{name} {value}" for name, value in self.action.parameters.items())
+        return f"{self.action.skill}({told}) failed: {self.error}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Carried:
+    """Hold a command's plan that is being carried out, and what failed before it.
+
+    `used` are the strategies that answered each setback, "" where a planner did. A plan that came
+    `given` is whoever gave it to change.
+    """
+
+    plan: Plan
+    given: bool = False
+    setbacks: tuple[Setback, ...] = ()
+    used: tuple[str, ...] = ()
+
+    @property
+    def history(self) -> tuple[str, ...]:
+        """Return a sentence for each plan that failed, for planners that read."""
+        return tuple(
+            f"{setback}; then tried: {used}" if used else str(setback)
+            for setback, used in zip(self.setbacks, (*self.used, ""), strict=False)
+        )
+
+    @property
+    def left(self) -> tuple[Action, ...]:
+        """Return what the last setback has left undone, in order; it needs only each other."""
+        done = self.setbacks[-1].done
+        return tuple(
+            action.model_copy(
+                update={"depends_on": tuple(one for one in action.depends_on if one not in done)}
+            )
+            for action in execution_order(self.plan.actions)
+            if action.id not in done
+        )
+
+    def tried(self, strategy: str) -> bool:
+        """Tell whether a strategy has answered the same action's failure before."""
+        failed = self.setbacks[-1].action
+        return any(
+            used == strategy and _same(setback.action, failed)
+            for setback, used in zip(self.setbacks, self.used, strict=False)
+        )
+
+    def after(self, setback: Setback) -> "Carried":
+        """Return it with one setback more."""
+        return replace(self, setbacks=(*self.setbacks, setback))
+
+    def going_on(self, plan: Plan, strategy: str) -> "Carried":
+        """Return it with the plan that shall mend the last setback."""
+        return replace(self, plan=plan, used=(*self.used, strategy))
+
+
+def read_setback(told: Mapping[str, Any], plan: Plan) -> Setback | None:
+    """Return what failed of that plan; None where the event speaks of another one."""
+    action = next((one for one in plan.actions if one.id == told.get("action_id")), None)
+    if action is None:
+        return None
+    done = frozenset(str(one) for one in told.get("done", ()))
+    return Setback(
+        action=action,
+        error=str(told.get("error") or "no reason told"),
+        done=done,
+        cause=Cause(told.get("cause", Cause.SKILL)),
+    )
+
+
+def _same(one: Action, other: Action) -> bool:
+    return (one.skill, one.parameters) == (other.skill, other.parameters)
