@@ -14,6 +14,7 @@ from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
     RESTARTS,
+    believe_fingers,
     carry,
     lift,
     move_straight,
@@ -55,7 +56,7 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     """Put what is held `in` or `on` a destination within reach.
 
     Raises:
-        NotPossible: nothing is held any more, or the spot is out of reach.
+        NotPossible: nothing is held any more, or was lost on the way, or the spot is out of reach.
         TryAgain: the destination was not seen.
     """
     hand = context.holding_hand(parameters.get("arm"))
@@ -75,6 +76,9 @@ def _put_down(context: SkillContext, hand: str, held: Held, release: Release) ->
     down = context.arms[hand].forward(context.link.setpoints)
     down[:3, 3] = release.point_m
     yield from move_straight(context, hand, down, DOWN_SPEED_RATIO)
+    believe_fingers(context)
+    if context.hands[hand] is None:
+        raise NotPossible(f"the {hand} hand has lost the {held.kind} before it was put down")
     yield from set_opening(context, hand, held.width_m + LET_GO_M)
     context.hands[hand] = None
     yield from pause(context, 0.3)
