@@ -25,6 +25,8 @@ def line_of(event: Mapping[str, Any]) -> str | None:
             return _plan_line(event)
         case "action":
             return _action_line(event)
+        case "setback":
+            return "looking for another way ..."
         case "said":
             return f"robot says: {event['text']}"
         case "rejected":

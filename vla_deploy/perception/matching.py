@@ -46,9 +46,23 @@ def _still_costs(
     costs = distances2(now, [one.seen for one in sightings])
     for row, track in enumerate(tracks):
         for column, sighting in enumerate(sightings):
-            if costs[row, column] < GATE and not sighting.is_doubtful:
+            if costs[row, column] >= GATE:
+                continue
+            if track.cause and not _is_found(track, sighting):
+                costs[row, column] = GATE
+            elif not sighting.is_doubtful:
                 costs[row, column] += _unlikeness(track, sighting)
     return costs
+
+
+def _is_found(track: Track, sighting: Sighting) -> bool:
+    """Tell whether a sight shows a thing that was lost: it may be anywhere near, as much else is.
+
+    So nothing half seen, and nothing of another class or colour, is taken for it.
+    """
+    seen = sighting.detection
+    alike = (seen.class_name, seen.colour) == (track.class_name, track.colour)
+    return alike and not sighting.is_doubtful
 
 
 def _unlikeness(track: Track, sighting: Sighting) -> float:

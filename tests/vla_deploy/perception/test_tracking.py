@@ -339,3 +339,31 @@ def test_the_memory_of_tracks_is_bounded() -> None:
         watcher.image(spot, view=HIDDEN)
     assert len(watcher.tracker.tracks) <= 128
     assert len(watcher.tracker.objects) <= 64
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        seen("box", "brown", at=(1.05, 2.0, 0.4)),
+        seen("object", "red", at=(1.05, 2.0, 0.4)),
+        seen("cup", "blue", at=(1.05, 2.0, 0.4)),
+    ],
+    ids=["another thing", "no known thing", "another colour"],
+)
+def test_what_a_hand_has_lost_is_not_found_in_whatever_else_lies_there(other: Detection) -> None:
+    watcher = Watcher()
+    watcher.image(seen())
+    watcher.image(seen())
+    watcher.tracker.carry("left", "cup", (1.0, 2.0, 0.6), 500_000_000)
+    watcher.tracker.lose("left", "it slipped out")
+    for _ in range(3):
+        told = watcher.image(other, view=HIDDEN)
+    lost = next(one for one in told if one["id"] == "cup_1")
+    assert lost["cause"] == "it slipped out"
+    assert (lost["class"], lost["colour"]) == ("cup", "red")
+    assert lost["last_seen_ns"] == 500_000_000
+
+    found = watcher.image(seen(at=(1.1, 2.0, 0.4)), view=HIDDEN)
+    cup = next(one for one in found if one["id"] == "cup_1")
+    assert "cause" not in cup
+    assert cup["position_m"][0] == pytest.approx(1.1, abs=0.02)

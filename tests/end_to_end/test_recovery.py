@@ -1,0 +1,43 @@
+"""What goes wrong on the way is mended from the world as it is then, and told."""
+
+import pytest
+
+from sim_twin.stack import LockstepStack
+
+pytestmark = pytest.mark.gl
+
+COMMAND = "pick up the red cup and put it in the box"
+BACK_WHERE_IT_WAS = (2.2, 1.5, 0.4975, 0.0)
+
+
+@pytest.mark.timeout(300)
+def test_a_cup_that_is_taken_from_the_hand_is_fetched_again(stack: LockstepStack) -> None:
+    command_id = stack.give(text=COMMAND)
+
+    def puts_it_down() -> bool:
+        stack.outcome(command_id)
+        return any(
+            (one["event"], one.get("skill"), one.get("status")) == ("action", "place", "active")
+            for one in stack.events
+        )
+
+    assert stack.lockstep.run_until(puts_it_down, 120.0)
+    stack.lockstep.run_for(0.5)
+    stack.lockstep.twin.engine.place("red_cup", *BACK_WHERE_IT_WAS)
+    assert stack.lockstep.run_until(lambda: stack.outcome(command_id) is not None, 200.0)
+
+    outcome = stack.outcome(command_id)
+    assert outcome is not None
+    assert outcome["success"], outcome["error"]
+    assert stack.lockstep.inside("red_cup", "box")["inside"]
+    setbacks = [one for one in stack.events if one["event"] == "setback"]
+    assert [one["error"] for one in setbacks] == [
+        "the left hand has lost the cup before it was put down"
+    ]
+    plans = [one for one in stack.events if one["event"] == "plan"]
+    assert [(one["rung"], one.get("origin")) for one in plans] == [
+        ("rules", None),
+        ("recovery", "take again"),
+    ]
+    names = [one["id"] for one in outcome["actions"]]
+    assert len(set(names)) == len(names), "actions of both plans are told, each by its own id"
