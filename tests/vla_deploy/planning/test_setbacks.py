@@ -1,0 +1,106 @@
+"""A plan that fails is planned anew, seen from the topics: another plan, or why there is none."""
+
+from typing import Any
+
+from vla_deploy.planning.errors import Declined
+from vla_deploy.planning.recovery import MOST_RECOVERIES
+
+
+def set_back(desk: Any, plan: dict[str, Any], **changes: Any) -> list[dict[str, Any]]:
+    """Let the first action of a plan fail; return what the planner hands to the executor."""
+    action_id = plan["plan"]["actions"][0]["id"]
+    told = {"action_id": action_id, "error": "the way is blocked", "cause": "skill", "done": []}
+    desk.executor_tells(command_id=plan["command_id"], event="setback", **(told | changes))
+    desk.answers()
+    return desk.plans()
+
+
+def test_a_plan_that_failed_is_followed_by_another_for_the_same_command(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (first,) = desk.plans()
+    (second,) = set_back(desk, first)
+    assert second["command_id"] == "c1"
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
+    assert all(one["id"].startswith("r1_") for one in second["plan"]["actions"])
+
+
+def test_events_tell_who_made_the_other_plan_and_by_what_idea(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    failed = desk.plans()[0]["plan"]["actions"][0]["id"]
+    desk.executor_tells(command_id="c1", event="setback", action_id=failed, error="x", done=[])
+    told = [one for one in desk.answers() if one["event"] not in ("setback",)]
+    assert [(one["event"], one["rung"], one["origin"]) for one in told] == [
+        ("plan", "recovery", "wait")
+    ]
+
+
+def test_after_the_last_strategy_the_command_is_given_up_with_the_first_cause(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (second,) = set_back(desk, desk.plans()[0])
+    last = second["plan"]["actions"][-1]["id"]
+    (end,) = set_back(desk, second, action_id=last)
+    assert "the way is blocked" in end["give_up"]
+
+
+def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_times(
+    open_desk, rung, propose
+):
+    go = propose(("navigate_to", {"place": "bedroom"}))
+    model = rung("model", Declined("nothing"), go)
+    desk = open_desk(model)
+    desk.give(text="sing one")
+    assert desk.answers()[-1]["event"] == "rejected"
+    desk.give(command_id="c2", text="sing two")
+    desk.answers()
+    (plan,) = desk.plans()
+    for _ in range(MOST_RECOVERIES):
+        (plan,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
+        assert "plan" in plan
+    (end,) = set_back(desk, plan)
+    assert end["give_up"] == f"{MOST_RECOVERIES} other plans failed, too"
+    assert any("the way is blocked" in one for one in model.asked[-1].failed)
+
+
+def test_a_plan_that_came_as_one_is_not_changed(open_desk):
+    desk = open_desk()
+    plan = {"goal": "go", "actions": [
+        {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
+    ]}  # fmt: skip
+    desk.give(plan=plan)
+    desk.answers()
+    (end,) = set_back(desk, desk.plans()[0])
+    assert "given" in end["give_up"]
+
+
+def test_a_planner_that_was_started_again_has_no_other_plan(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (first,) = desk.plans()
+    desk.executor_tells(command_id="c1", event="setback", action_id="a1", error="x", done=[])
+    desk.start()
+    assert [one.get("give_up") for one in desk.plans()] == [
+        "the planner was started again meanwhile"
+    ]
+    assert first["command_id"] == "c1"
+
+
+def test_a_stop_ends_the_search_for_another_plan(open_desk, later, rung, propose):
+    desk = open_desk(rung("model", propose(("navigate_to", {"place": "bedroom"}))), aside=later)
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (second,) = set_back(desk, desk.plans()[0])
+    assert set_back(desk, second, action_id=second["plan"]["actions"][-1]["id"]) == []
+    desk.give(command_id="c2", text="stop")
+    desk.answers()
+    later.do_one()
+    desk.answers()
+    told = desk.plans()
+    assert [one for one in told if "plan" in one] == []
+    assert {"command_id": "c2", "cancel": True} in told
