@@ -10,6 +10,7 @@ export const STATES = {
   asked: { text: "Asks you", tone: "warn", icon: "question" },
   answered: { text: "Answer", tone: "quiet", icon: "check" },
   running: { text: "Running", tone: "info", icon: "play" },
+  mending: { text: "Seeks another way", tone: "warn", icon: "clock" },
   done: { text: "Done", tone: "ok", icon: "check" },
   cancelled: { text: "Cancelled", tone: "quiet", icon: "cross" },
   failed: { text: "Failed", tone: "bad", icon: "alert" },
@@ -18,7 +19,7 @@ export const STATES = {
 };
 
 /** States in which something is still to come. */
-export const OPEN_STATES = ["given", "queued", "planning", "asked", "running"];
+export const OPEN_STATES = ["given", "queued", "planning", "asked", "running", "mending"];
 
 const READERS = {
   queued: (story, { place }) => ({ ...story, state: "queued", place }),
@@ -28,6 +29,7 @@ const READERS = {
   accepted: (story) => ({ ...story, state: "running", asked: null }),
   plan: planned,
   action: acted,
+  setback: (story, { error }) => ({ ...story, state: "mending", why: error }),
   said: (story, { text }) => ({ ...story, said: [...story.said, text] }),
   rejected: (story, { reason, attempts }) => ({
     ...story,
@@ -61,7 +63,10 @@ function planned(story, event) {
   }));
   const { plan, rung, confidence, origin } = event;
   const attempts = event.attempts ?? story.attempts;
-  return { ...story, state: "running", asked: null, actions, plan, rung, confidence, origin, attempts };
+  // After a setback another plan goes on: what was done, and what failed, stays to be seen.
+  const before = story.actions.filter((action) => !isOpen(action) && action.status !== "cancelled");
+  const all = [...before, ...actions];
+  return { ...story, state: "running", asked: null, why: "", actions: all, plan, rung, confidence, origin, attempts };
 }
 
 function acted(story, { event, command_id, action_id, ...told }) {
