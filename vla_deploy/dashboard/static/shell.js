@@ -59,9 +59,9 @@ function SafetyPill() {
   const { data, stale } = useTopic("control_status");
   const told = safetyWords(data, stale);
   return html`
-    <a class="state-pill" href="#/now" data-tone=${told.tone} aria-label="Safety state: ${told.title} ${told.cause}">
-      <${Icon} name=${told.icon} /><span>${told.title}</span>
-      ${told.cause && html`<span class="cause">${told.cause}</span>`}
+    <a class="state-pill" href="#/now" data-tone=${told.tone}>
+      <${Icon} name=${told.icon} /><span class="out-of-sight">Safety state:${" "}</span><span>${told.title}</span>
+      ${told.cause && html`${" "}<span class="cause">${told.cause}</span>`}
     </a>
   `;
 }
