@@ -10,7 +10,8 @@ import { Timeline } from "./timeline.js";
 export function Question({ asked }) {
   const [words, setWords] = useState("");
   const [answer, isBusy] = useAct((text) => post("commands/answer", { text }));
-  const choices = asked.choices?.length ? asked.choices : asked.plan ? ["yes", "no"] : [];
+  const offered = asked.choices?.length ? asked.choices : asked.plan ? ["yes"] : [];
+  const choices = [...offered, "no"]; // what is asked for may be none of it
   const submit = (event) => {
     event.preventDefault();
     if (words.trim()) answer(words.trim());
