@@ -25,7 +25,7 @@ from playwright.sync_api import (
 
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.dashboard.access import Role
-from vla_deploy.dashboard.access.accounts import User, wall_s
+from vla_deploy.dashboard.access.accounts import Accounts, User, wall_s
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
 from vla_deploy.dashboard.access.passwords import stored_form
 from vla_deploy.dashboard.settings import SETTINGS_FILE
@@ -39,6 +39,7 @@ ROLES: Final = {"anna": Role.ADMIN, "vera": Role.VIEWER}
 PASSWORD: Final = "five-words-that-nobody-guesses"
 SPOKEN: Final = "turn left"
 MICROPHONE_HZ: Final = 48_000
+SLOWER: Final = 'inherits = "desktop"\nperception_rate_hz = 4\ncamera_rate_hz = 4\n'
 
 expect.set_options(timeout=30_000)  # the machine may be busy; what is quick is not slowed by this
 
@@ -52,7 +53,9 @@ def stack() -> Iterator[ProcessStack]:
         settings.parent.mkdir(parents=True)
         settings.write_text("trust_loopback = false\n", encoding="utf-8")
         add_accounts(base)
-        stack = ProcessStack(base)
+        profile = Path(folder) / "slower.toml"
+        profile.write_text(SLOWER, encoding="utf-8")
+        stack = ProcessStack(base, "--profile", str(profile))
         try:
             stack.wait_until_armed()
             assert stack.wait_until(lambda: stack.document("dashboard_status", 3.0), 60.0)
@@ -63,11 +66,14 @@ def stack() -> Iterator[ProcessStack]:
 
 def add_accounts(base: Path) -> None:
     stored = stored_form(PASSWORD)
-    for name, role in ROLES.items():
-        user = User(role=role, password=stored, changed_s=wall_s())
-        AccountsFile.of_base(base).change(
-            lambda accounts, name=name, user=user: (accounts.with_user(name, user), None)
-        )
+
+    def everybody(accounts: Accounts) -> tuple[Accounts, None]:
+        for name, role in ROLES.items():
+            user = User(role=role, password=stored, changed_s=wall_s())
+            accounts = accounts.with_user(name, user)
+        return accounts, None
+
+    AccountsFile.of_base(base).change(everybody)
 
 
 @pytest.fixture(scope="package")
@@ -146,7 +152,10 @@ class Pages:
 
 @pytest.fixture(scope="package")
 def all_pages(chromium: Browser, url: str) -> Pages:
-    return Pages(chromium, url)
+    pages = Pages(chromium, url)
+    for user in ROLES:
+        expect(pages.of(user).get_by_label("Safety state", exact=True)).to_be_visible()
+    return pages
 
 
 @pytest.fixture
@@ -187,10 +196,10 @@ def page(pages: Pages) -> Page:
 
 
 @pytest.fixture(autouse=True)
-def robot(stack: ProcessStack, chromium: Browser) -> ProcessStack:
-    """The robot of the tests, armed once the browser has started, whatever the last test did."""
+def robot(stack: ProcessStack, all_pages: Pages) -> ProcessStack:
+    """The robot of the tests, armed once the pages are there, whatever the last test did."""
     if stack.state() != "armed":
-        stack.ask("reset")
-        stack.ask("arm")
+        stack.ask("reset")  # which has nothing to do where nothing is latched
+        stack.operate("arm")
         assert stack.wait_until(lambda: stack.state() == "armed"), stack.status()["control"]
     return stack

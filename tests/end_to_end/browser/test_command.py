@@ -29,7 +29,7 @@ def give(page: Page, text: str) -> Locator:
 
 
 def test_a_typed_command_is_watched_to_its_end(page: Page, robot: ProcessStack) -> None:
-    before = robot.truth()["base"]["yaw_rad"]
+    before = robot.truth()["robot"]["yaw_rad"]
     card = give(page, "turn left 30 degrees")
     step = card.get_by_label("Plan").get_by_role("listitem")
     expect(step).to_contain_text("turn")
@@ -37,7 +37,7 @@ def test_a_typed_command_is_watched_to_its_end(page: Page, robot: ProcessStack) 
     expect(step).to_contain_text(re.compile(r"\d s|\d ms"))
     expect(card.locator(".card-head")).to_contain_text("Done")
     expect(page.get_by_role("button", name="turn left 30 degrees")).to_contain_text("Done")
-    assert robot.truth()["base"]["yaw_rad"] - before == pytest.approx(0.52, abs=0.2)
+    assert robot.truth()["robot"]["yaw_rad"] - before == pytest.approx(0.52, abs=0.2)
 
 
 def test_a_refusal_says_why_in_words(page: Page) -> None:

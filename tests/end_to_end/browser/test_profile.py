@@ -1,16 +1,18 @@
 """Take the running robot to another profile from the view Profile."""
 
 import re
-from typing import Any
+from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from sim_twin.process_stack import ProcessStack
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
-OTHER = "jetson_orin_nano_8gb"
+OTHER: Final = "jetson_orin_nano_8gb"
+KEPT: Final = "desktop"
+SWITCH_MS: Final = 90_000
 
 
 def choose(page: Page, name: str) -> None:
@@ -33,19 +35,36 @@ def test_the_difference_is_shown_before_anything_changes(view: Page, robot: Proc
     assert robot.document("profile_status")["profile"] == before
 
 
-def test_a_switch_is_confirmed_and_its_end_is_told_with_the_reason(
-    view: Page, robot: ProcessStack
-) -> None:
-    choose(view, OTHER)
+def switch(view: Page, name: str) -> Locator:
+    """Agree to the switch to a profile and return the card that tells its end."""
+    choose(view, name)
     view.get_by_role("button", name="Switch to it").click()
     dialog = view.get_by_role("dialog")
     expect(dialog).to_contain_text("go back to what is in force now")
     dialog.get_by_role("button", name="Switch", exact=True).click()
-    assert robot.wait_until(lambda: robot.document("profile_status")["last"], 90.0)
-    last = robot.document("profile_status")["last"]
-    told = view.get_by_role("region", name="Change of profile")
-    expect(told).to_contain_text(last["outcome"])
-    expect(told).to_contain_text(last["reason"].split("; ")[0][:60])
+    return view.get_by_role("region", name="Change of profile")
+
+
+def test_a_switch_that_the_computer_can_keep_changes_the_profile(
+    view: Page, robot: ProcessStack
+) -> None:
+    told = switch(view, KEPT)
+    expect(told).to_contain_text(f"{KEPT} kept", timeout=SWITCH_MS)
+    expect(view.get_by_role("region", name="This computer")).to_contain_text(KEPT)
+    assert robot.document("profile_status")["profile"] == KEPT
+    assert robot.state() == "armed"
+
+
+def test_a_switch_that_it_cannot_keep_is_refused_with_the_reason(
+    view: Page, robot: ProcessStack
+) -> None:
+    before = robot.document("profile_status")["profile"]
+    told = switch(view, OTHER)
+    expect(told).to_contain_text(f"{OTHER} refused", timeout=SWITCH_MS)
+    status = robot.document("profile_status")
+    expect(told).to_contain_text(status["last"]["reason"])
+    assert status["last"]["reason"]
+    assert status["profile"] == before
 
 
 def test_a_viewer_may_look_and_not_switch(pages: Any) -> None:
