@@ -28,9 +28,9 @@ from vla_deploy.skills.world_check import WorldCheck
 
 MAX_RETRIES = 1
 BACK_OFF_S = 1.0
-# How long an effect is looked for, and how often: two images of the camera.
-EFFECT_WAIT_S = 0.6
-EFFECT_LOOK_S = 0.1
+# How long needs and effects are looked for, and how often: two images of the camera.
+WORLD_WAIT_S = 0.6
+WORLD_LOOK_S = 0.1
 CAUSES = (
     (PreconditionUnmet, Cause.PRECONDITION),
     (EffectMissing, Cause.EFFECT),
@@ -79,6 +79,7 @@ class _Branch:
     skill: Skill | None = None
     resume_ns: int = 0
     done_ns: int = 0
+    unmet_ns: int = 0
     before: State = field(default_factory=State)
 
 
@@ -212,12 +213,26 @@ class PlanExecution:
             self._look_for_effect(branch, self._context.link.clock.now_ns())
             return
         if branch.skill is None:
-            unmet = self._world.unmet(action)
-            if unmet:
-                raise PreconditionUnmet(unmet)
+            if self._lacks_need(branch, self._context.link.clock.now_ns()):
+                return
             branch.before = self._world.state(action)
             branch.skill = SKILL_FUNCTIONS[action.skill](self._context, action.parameters)
         next(branch.skill)
+
+    def _lacks_need(self, branch: _Branch, now_ns: int) -> bool:
+        """Tell whether to wait for what the world denies at first: one image may miss a thing.
+
+        Raises:
+            PreconditionUnmet: the world still denies it.
+        """
+        unmet = self._world.unmet(branch.record.action)
+        if not unmet:
+            return False
+        branch.unmet_ns = branch.unmet_ns or now_ns
+        if now_ns - branch.unmet_ns >= WORLD_WAIT_S * NS_PER_S:
+            raise PreconditionUnmet(unmet)
+        branch.resume_ns = now_ns + round(WORLD_LOOK_S * NS_PER_S)
+        return True
 
     def _look_for_effect(self, branch: _Branch, now_ns: int) -> None:
         """End an action as the world shows it; where that shows nothing in time, as its skill did.
@@ -231,8 +246,8 @@ class PlanExecution:
         if why:
             branch.done_ns = 0
             raise EffectMissing(why)
-        if why is None and now_ns - branch.done_ns < EFFECT_WAIT_S * NS_PER_S:
-            branch.resume_ns = now_ns + round(EFFECT_LOOK_S * NS_PER_S)
+        if why is None and now_ns - branch.done_ns < WORLD_WAIT_S * NS_PER_S:
+            branch.resume_ns = now_ns + round(WORLD_LOOK_S * NS_PER_S)
             return
         self._end(branch.record, ActionStatus.SUCCEEDED, "")
 

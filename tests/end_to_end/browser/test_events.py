@@ -26,7 +26,7 @@ def test_the_flight_of_a_stop_is_downloaded(
     with saved.open("rb") as file:
         summary = make_reader(file).get_summary()
     assert summary is not None
-    assert "/control_status" in {channel.topic for channel in summary.channels.values()}
+    assert "control_status" in {channel.topic for channel in summary.channels.values()}
 
 
 def test_logs_are_filtered_by_process_level_and_words(pages: Any) -> None:
