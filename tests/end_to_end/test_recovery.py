@@ -3,6 +3,7 @@
 import pytest
 
 from sim_twin.stack import LockstepStack
+from vla_deploy.planning.recovery import MOST_RECOVERIES
 
 pytestmark = pytest.mark.gl
 
@@ -31,13 +32,14 @@ def test_a_cup_that_is_taken_from_the_hand_is_fetched_again(stack: LockstepStack
     assert outcome["success"], outcome["error"]
     assert stack.lockstep.inside("red_cup", "box")["inside"]
     setbacks = [one for one in stack.events if one["event"] == "setback"]
-    assert [one["error"] for one in setbacks] == [
-        "the left hand has lost the cup before it was put down"
-    ]
+    assert setbacks[0]["error"] == "the left hand has lost the cup before it was put down"
+    # What is known of a thing that was snatched is where it was last: that may have to be unlearnt.
+    assert len(setbacks) <= MOST_RECOVERIES
     plans = [one for one in stack.events if one["event"] == "plan"]
-    assert [(one["rung"], one.get("origin")) for one in plans] == [
+    assert [(one["rung"], one.get("origin")) for one in plans[:2]] == [
         ("rules", None),
         ("recovery", "take again"),
     ]
+    assert len(plans) == 1 + len(setbacks)
     names = [one["id"] for one in outcome["actions"]]
     assert len(set(names)) == len(names), "actions of both plans are told, each by its own id"

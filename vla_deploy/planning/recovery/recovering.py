@@ -1,5 +1,6 @@
 """Find the first strategy whose plan may run in the world as it is now."""
 
+import re
 from collections.abc import Mapping
 from typing import Final
 
@@ -14,6 +15,7 @@ MOST_RECOVERIES: Final = 3
 RECOVERY: Final = "recovery"
 _CONFIDENCE: Final = 0.8
 _ID_CHARACTERS: Final = 64
+_BEFORE: Final = re.compile(r"^(?:r\d+_)+")
 
 
 def recover(carried: Carried, request: Request, check: Check) -> Answer:
@@ -42,7 +44,8 @@ def recover(carried: Carried, request: Request, check: Check) -> Answer:
 
 def numbered(plan: Plan, number: int) -> Plan:
     """Return a recovery's plan whose actions no one takes for those of the plans before it."""
-    names = {one.id: f"r{number}_{one.id}"[:_ID_CHARACTERS] for one in plan.actions}
+    own = {one.id: _BEFORE.sub("", one.id) for one in plan.actions}
+    names = {name: f"r{number}_{short}"[:_ID_CHARACTERS] for name, short in own.items()}
     if len(set(names.values())) < len(names):
         names = {one.id: f"r{number}_{place}" for place, one in enumerate(plan.actions)}
     return plan.model_copy(update={"actions": tuple(_renamed(one, names) for one in plan.actions)})

@@ -120,6 +120,7 @@ def test_actions_of_a_recovery_are_never_taken_for_those_before(ask: Any):
     told = numbered(plan, 2)
     assert [one.id for one in told.actions] == ["r2_a0", "r2_a1"]
     assert told.actions[1].depends_on == ("r2_a0",)
+    assert [one.id for one in numbered(told, 3).actions] == ["r3_a0", "r3_a1"]
     long = plan.model_copy(
         update={"actions": tuple(
             one.model_copy(update={"id": f"{'x' * 63}{n}", "depends_on": ()})
