@@ -14,6 +14,7 @@ REALTIME_PROCESS: Final = "control"
 _LOCK_ALL: Final = 1 | 2  # MCL_CURRENT | MCL_FUTURE
 _CAP_IPC_LOCK: Final = 14
 _CAP_SYS_NICE: Final = 23
+_BEHIND: Final = 1  # of threads beside a real-time one: they may hold the interpreter it waits for
 _THREADS: Final = Path("/proc/self/task")
 
 
@@ -65,7 +66,9 @@ class HostSettings:
         policy = os.SCHED_FIFO if priority else os.SCHED_OTHER
         if (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) != (policy, priority):
             try:
-                os.sched_setscheduler(0, policy, os.sched_param(priority))
+                for thread in _threads():
+                    behind = priority if thread == os.getpid() else min(priority, _BEHIND)
+                    os.sched_setscheduler(thread, policy, os.sched_param(behind))
             except PermissionError:
                 if profile.realtime_required:
                     raise

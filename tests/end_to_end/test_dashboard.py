@@ -65,6 +65,7 @@ def test_it_stops_and_commands_the_robot_which_drives_on_without_it_and_stops_by
     assert page.ask("POST", "stop", {"reason": "test"}) == {"pressed": True}
     stands = twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() < STANDSTILL_RAD_S, 3.0)
     assert stands, twin_stack.truth()
+    assert twin_stack.wait_until(lambda: twin_stack.state() == "stopped", 3.0)
     control = page.ask("GET", "state")["control"]
     assert (control["estop_latched"], control["cause"]) == (True, "estop")
     assert twin_stack.wait_until(lambda: page.state(stopped_id) == "failed")

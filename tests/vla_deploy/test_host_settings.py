@@ -99,12 +99,21 @@ def test_only_control_asks_for_realtime_and_a_memory_lock(powerless, profile_of)
     assert HostSettings("planner").obstacles(profile) == ()
 
 
-def test_control_gets_the_profiles_realtime_priority(monkeypatch, profile_of):
-    asked = []
+def test_control_gets_the_profiles_realtime_priority_and_its_other_threads_go_behind(
+    monkeypatch, profile_of
+):
+    asked = {}
+    gate = threading.Event()
+    writer = threading.Thread(target=gate.wait)
+    writer.start()
     monkeypatch.setattr(host_settings, "_may", lambda _: True)
-    monkeypatch.setattr(os, "sched_setscheduler", lambda *given: asked.append(given))
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda thread, *given: asked.__setitem__(thread, given)
+    )
     assert HostSettings("control").apply(profile_of("realtime_priority = 40")) == ()
-    assert asked == [(0, os.SCHED_FIFO, os.sched_param(40))]
+    gate.set()
+    assert asked[os.getpid()] == (os.SCHED_FIFO, os.sched_param(40))
+    assert asked[writer.native_id] == (os.SCHED_FIFO, os.sched_param(1))
 
 
 SCRIPT = """

@@ -18,6 +18,7 @@ COMMAND_TIMEOUT_S: Final = 10.0
 UNLIMITED: Final = -1
 _TRIAL_PRIORITY: Final = 1
 _CAP_IPC_LOCK: Final = 14
+_CAP_SYS_NICE: Final = 23
 
 Asker = Callable[[Sequence[str]], str]
 """Run a command and return what it prints; raises Missing where it cannot be had."""
@@ -32,6 +33,7 @@ class Rights:
     realtime_priority_limit: int
     memory_lock_bytes: int
     may_lock_all: bool
+    may_raise_others: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +90,7 @@ def read_rights() -> Rights:
         realtime_priority_limit=priority,
         memory_lock_bytes=UNLIMITED if memory_lock == resource.RLIM_INFINITY else memory_lock,
         may_lock_all=bool(_capabilities() >> _CAP_IPC_LOCK & 1),
+        may_raise_others=bool(_capabilities() >> _CAP_SYS_NICE & 1),
     )
 
 

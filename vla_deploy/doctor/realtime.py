@@ -56,6 +56,18 @@ def fifo(context: Context) -> Iterator[Finding]:
     yield trouble(name, measured, remedy, fatal=_required(context))
 
 
+def serial_data(context: Context) -> Iterator[Finding]:
+    """Check that the kernel's workers which carry serial data may go before ordinary processes."""
+    if not _wanted(context):
+        yield ok("serial data", "as any ordinary process, as the profile has no real-time priority")
+    elif context.rights.may_raise_others:
+        yield ok("serial data", "its kernel workers may go before ordinary processes")
+    else:
+        measured = "servo answers wait behind ordinary processes under load: no CAP_SYS_NICE"
+        remedy = "sudo vla-deploy install   # the service has it; `vla-deploy bench serial` shows"
+        yield warn("serial data", measured, remedy)
+
+
 def realtime_share(context: Context) -> Iterator[Finding]:
     """Check how much of each period real-time processes may use."""
     runtime_us = context.tree.number("/proc/sys/kernel/sched_rt_runtime_us")

@@ -46,6 +46,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Devices", "spoken stop", speech.spoken_stop, live=True),
     Check("Real time", "kernel", realtime.preempt_rt),
     Check("Real time", "SCHED_FIFO", realtime.fifo, live=True),
+    Check("Real time", "serial data", realtime.serial_data, live=True),
     Check("Real time", "real-time share", realtime.realtime_share),
     Check("Real time", "RT_GROUP_SCHED", realtime.group_scheduling),
     Check("Real time", "memory lock", realtime.memory_lock, live=True),

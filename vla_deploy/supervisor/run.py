@@ -26,6 +26,7 @@ from vla_deploy.supervisor.profile_switch import ProfileSwitch
 from vla_deploy.supervisor.readiness import readiness_of
 from vla_deploy.supervisor.report import Report
 from vla_deploy.supervisor.runtime import Runtime, default_base
+from vla_deploy.supervisor.serial_workers import SerialWorkers
 from vla_deploy.supervisor.table import ProcessSpec
 
 _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -95,6 +96,7 @@ class Run:
             background(),
         )
         self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
+        self.serial_workers = SerialWorkers(clock)
         self.notifier = Notifier(notify, clock)
         self.crashes = CrashReports(
             crash_folder(self.runtime.state_dir), run_dir, options, self.space, clock
@@ -111,6 +113,7 @@ class Run:
         self.crew.kill_all()
         self.budgets.close()
         self.switch.close()
+        self.serial_workers.close()
         self.notifier.close()
         self.space.close()
         self._log.close()

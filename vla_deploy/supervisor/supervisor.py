@@ -186,6 +186,7 @@ class Supervisor:
             self._consequences.take(self._records, run.space)
         if changed or now_ns >= self._report_due_ns:
             self._report(now_ns)
+        run.serial_workers.step(wanted=self.profile.realtime_priority > 0)
         run.notifier.step(
             ready=self._is_ready(),
             stopping=stopping,

@@ -18,6 +18,7 @@ ALL_RIGHTS = Rights(
     realtime_priority_limit=80,
     memory_lock_bytes=UNLIMITED,
     may_lock_all=False,
+    may_raise_others=False,
 )
 
 
@@ -113,6 +114,7 @@ def without_rights(context: Context) -> Context:
             realtime_priority_limit=0,
             memory_lock_bytes=8 << 20,
             may_lock_all=False,
+            may_raise_others=False,
         ),
     )
 

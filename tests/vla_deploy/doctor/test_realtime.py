@@ -48,6 +48,14 @@ def test_memory_lock_is_judged_by_limit_or_capability(computer, limit, may_lock_
     assert finding.level is level
 
 
+@pytest.mark.parametrize(("allowed", "level"), [(True, Level.OK), (False, Level.WARN)])
+def test_serial_data_waits_where_kernel_workers_may_not_be_raised(computer, allowed, level) -> None:
+    context = computer.context("robot")
+    rights = replace(context.rights, may_raise_others=allowed)
+    (finding,) = checks.serial_data(replace(context, rights=rights))
+    assert finding.level is level
+
+
 @pytest.mark.parametrize(
     ("version", "profile", "level"),
     [
