@@ -7,7 +7,16 @@ from fastapi import APIRouter
 from vla_deploy.dashboard import page
 from vla_deploy.dashboard.access import routes as access
 from vla_deploy.dashboard.alarms import routes as alarms
-from vla_deploy.dashboard.api import commands, files, logs, operate, profile, recordings, state
+from vla_deploy.dashboard.api import (
+    commands,
+    files,
+    logs,
+    operate,
+    profile,
+    recordings,
+    replay,
+    state,
+)
 from vla_deploy.dashboard.live import endpoint, microphone, routes
 from vla_deploy.dashboard.metering import routes as metering
 
@@ -23,6 +32,7 @@ API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     files.router,
     logs.router,
     recordings.router,
+    replay.router,
     alarms.router,
     endpoint.router,
     microphone.router,

@@ -1,14 +1,17 @@
 """Run the real process: it serves at both doors, ends in order, and says why it cannot start."""
 
 import json
+import shutil
 import socket
+import ssl
 import subprocess
 import sys
 import tempfile
-from http.client import HTTPConnection
+from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from pathlib import Path
 
 import pytest
+from websockets.sync.client import connect
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.ipc import SharedSpace
@@ -105,3 +108,41 @@ def test_a_taken_port_and_a_faulty_file_are_for_a_person_to_mend(base):
     (config_dir_of(base) / "dashboard.toml").write_text("port = 0")
     code, words = Process(base).end_by_itself()
     assert (code, "expected a port, 1 to 65535, got 0" in words) == (2, True)
+
+
+@pytest.fixture
+def certified(base):
+    """A certificate for 127.0.0.1 and its key, as settings and as whom a client trusts."""
+    openssl = shutil.which("openssl")
+    assert openssl is not None, "scripts/system-packages installs openssl"
+    folder = base.parent
+    certificate, key = folder / "robot.pem", folder / "robot.key"
+    words = ["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
+    words += ["-days", "1", "-subj", "/CN=robot", "-addext", "subjectAltName=IP:127.0.0.1"]
+    command = [openssl, *words, "-keyout", str(key), "-out", str(certificate)]
+    subprocess.run(command, check=True, capture_output=True)
+    key.chmod(0o600)
+    settings = f'tls_certificate = "{certificate}"\ntls_key = "{key}"\n'
+    return settings, ssl.create_default_context(cafile=str(certificate))
+
+
+def test_with_a_certificate_everything_goes_by_tls_and_nothing_without(base, certified):
+    settings, trusting = certified
+    set_port(base, free_port(), settings)
+    process = Process(base)
+    host, port = process.url()
+    secure = HTTPSConnection(host, port, timeout=10, context=trusting)
+    secure.request("GET", "/api/v1/state")
+    answer = secure.getresponse()
+    assert json.load(answer)["dashboard_url"] == f"https://{host}:{port}"
+    with connect(
+        f"wss://{host}:{port}/api/v1/live", ssl=trusting, origin=f"https://{host}:{port}"
+    ) as live:
+        live.send(json.dumps({"subscribe": ["dashboard_status"]}))
+        assert json.loads(live.recv(timeout=10))["topic"] == "dashboard_status"
+    plain = HTTPConnection(host, port, timeout=10)
+    with pytest.raises((HTTPException, ConnectionError)):
+        plain.request("GET", "/api/v1/state")
+        plain.getresponse()
+    secure.close()
+    assert process.end() == (0, "")

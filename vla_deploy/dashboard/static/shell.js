@@ -5,6 +5,7 @@ import { duration } from "./format.js";
 import { useConnection, useTicking, useTopic } from "./following.js";
 import { Icon } from "./icons.js";
 import { Notice } from "./parts.js";
+import { ReplayBar } from "./replay_bar.js";
 import { ROUTES, useRoute } from "./router.js";
 import { safetyWords } from "./safety_words.js";
 import { logout, useSession } from "./session.js";
@@ -31,6 +32,7 @@ export function Shell() {
       <${Navigation} here=${route.name} />
       <main id="content" class="content" ref=${content} tabindex="-1">
         <${Gone} />
+        <${ReplayBar} />
         <${ViewPlace} key=${route.name} route=${route} />
       </main>
     </div>

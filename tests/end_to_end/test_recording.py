@@ -1,0 +1,158 @@
+"""The main job is recorded; any reader opens the file, and its replay drives the dashboard."""
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+import jsonschema_rs
+import pytest
+from mcap.reader import make_reader
+from websockets.sync.client import connect
+
+from sim_twin.process_stack import ProcessStack
+from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
+
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
+
+JOB = "pick up the red cup and put it in the box"
+SPEED = 8
+UNHEARD: Final = frozenset(
+    # What nobody says while all goes well: stops, another profile, a replay, talk into the page.
+    {
+        "budget_stop",
+    }
+)
+
+
+@pytest.fixture
+def recording(twin_stack: ProcessStack, tmp_path: Path) -> Path:
+    """What the recorder has made of the main job, in a folder of its own."""
+    begun = json.loads(twin_stack.ask("record", "start", "--json").stdout)
+    assert begun["state"] == "recording"
+    assert twin_stack.say(JOB)["success"]
+    assert json.loads(twin_stack.ask("record", "stop", "--json").stdout)["lost"] == 0
+    (made,) = json.loads(twin_stack.ask("record", "list", "--json").stdout)
+    (file,) = twin_stack.base.parent.rglob(made["name"])
+    kept: Path = file.rename(tmp_path / made["name"])
+    twin_stack.close()  # a replay wants the cores for itself
+    return kept
+
+
+class Replay:
+    """Run `vla-deploy replay` with its page, and look at the page's data."""
+
+    def __init__(self, base: Path, file: Path) -> None:
+        command = [sys.executable, "-m", "vla_deploy.cli", "--runtime-base", str(base)]
+        self.process = subprocess.Popen(
+            [*command, "replay", str(file), "--speed", str(SPEED)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        told = (line for line in self.process.stdout if line.startswith("dashboard: "))
+        self.url = next(told).partition(" ")[2].strip()
+
+    def ask(self, method: str, path: str, body: Any = None) -> tuple[int, Any]:
+        connection = HTTPConnection(urlsplit(self.url).netloc, timeout=20)
+        headers = {"origin": self.url, "content-type": "application/json"}
+        connection.request(method, f"/api/v1/{path}", body and json.dumps(body), headers)
+        with connection.getresponse() as answer:
+            told = answer.status, json.load(answer)
+        connection.close()
+        return told
+
+    def close(self) -> None:
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(30) == 0
+
+
+@pytest.fixture
+def replay(recording: Path) -> Iterator[Replay]:
+    with tempfile.TemporaryDirectory(prefix="vla-") as folder:
+        replay = Replay(Path(folder) / "base", recording)
+        yield replay
+        replay.close()
+
+
+def validated(file: Path) -> dict[str, int]:
+    """Count each channel's messages; every one of them fits the schema that the file declares."""
+    with file.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        counts = {channel.topic: 0 for channel in summary.channels.values()}
+        validators = {
+            number: jsonschema_rs.validator_for(json.loads(schema.data))
+            for number, schema in summary.schemas.items()
+        }
+        for schema, channel, message in reader.iter_messages():
+            assert schema is not None
+            validators[schema.id].validate(json.loads(message.data))
+            counts[channel.topic] += 1
+    return counts
+
+
+class Watcher:
+    """Gather what the page of a replay is sent until the file has ended."""
+
+    def __init__(self, replay: Replay) -> None:
+        self.states: set[str] = set()
+        self.actions: list[tuple[str, str]] = []
+        self.heights: list[float] = []
+        self.pictures = 0
+        self.outcome: dict[str, Any] = {}
+        address = urlsplit(replay.url)
+        with connect(f"ws://{address.netloc}/api/v1/live", origin=replay.url) as live:
+            live.send(json.dumps({"subscribe": [*self.takers, "camera", "replay_status"]}))
+            for message in live:
+                if isinstance(message, bytes):
+                    self.pictures += 1
+                elif self._take(json.loads(message)):
+                    break
+
+    def _take(self, told: dict[str, Any]) -> bool:
+        if told["topic"] in self.takers:
+            self.takers[told["topic"]](self, told["data"])
+        return told["topic"] == "replay_status" and told["data"]["state"] == "ended"
+
+    def _control(self, data: dict[str, Any]) -> None:
+        self.states.add(data["state"])
+
+    def _task(self, data: dict[str, Any]) -> None:
+        if data["event"] == "action":
+            self.actions.append((data["skill"], data["status"]))
+        elif data["event"] == "finished":
+            self.outcome = data
+
+    def _joints(self, data: dict[str, Any]) -> None:
+        self.heights.append(data["position_rad"][0])
+
+    takers: Final = {"control_status": _control, "task_event": _task, "joint_state": _joints}
+
+
+def test_a_recorded_main_job_opens_anywhere_and_its_replay_drives_the_dashboard(
+    recording: Path, replay: Replay
+) -> None:
+    counts = validated(recording)
+    assert set(counts) == {channel.topic for channel in ALL_CHANNELS}
+    assert {topic for topic, count in counts.items() if count == 0} <= UNHEARD, counts
+
+    seen = Watcher(replay)
+    assert ("pick_up", "succeeded") in seen.actions, seen.actions
+    assert ("place", "succeeded") in seen.actions, seen.actions
+    assert seen.outcome["success"] is True
+    assert "armed" in seen.states
+    assert seen.pictures > 0
+    assert max(seen.heights) - min(seen.heights) > 0.1
+    _, state = replay.ask("GET", "state")
+    assert state["replay"]["file"] == recording.name
+    assert state["replay"]["unfit"] == 0
+    status, refusal = replay.ask("POST", "commands", {"text": "go to the kitchen"})
+    assert (status, refusal["error"]["code"]) == (409, "replay")
