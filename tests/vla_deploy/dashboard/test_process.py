@@ -139,10 +139,12 @@ def test_with_a_certificate_everything_goes_by_tls_and_nothing_without(base, cer
         f"wss://{host}:{port}/api/v1/live", ssl=trusting, origin=f"https://{host}:{port}"
     ) as live:
         live.send(json.dumps({"subscribe": ["dashboard_status"]}))
-        assert json.loads(live.recv(timeout=10))["topic"] == "dashboard_status"
+        topics = (json.loads(live.recv(timeout=10))["topic"] for _ in range(5))
+        assert "dashboard_status" in topics
     plain = HTTPConnection(host, port, timeout=10)
     with pytest.raises((HTTPException, ConnectionError)):
         plain.request("GET", "/api/v1/state")
         plain.getresponse()
+    plain.close()
     secure.close()
     assert process.end() == (0, "")

@@ -24,7 +24,10 @@ from vla_deploy.telemetry.replay.source import Recorded
 
 _OWN: Final = frozenset({"replay_request", "replay_status"})
 _LEVELS: Final = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL")
+_LOOK_NS: Final = NS_PER_S // 10  # a recorder looks that seldom, at the most
 _IMAGE_PARTS: Final = ("colour", "depth")
+LASTING: Final = (Kind.CELL, Kind.FRAME)
+"""Topics whose value is so until the next one comes."""
 _log = logging.getLogger(__name__)
 
 
@@ -48,11 +51,22 @@ class Feeder:
         self._topics = {topic.name: topic for topic in fed_topics()}
         self._puts: dict[str, Callable[[Recorded], None]] = {}
         self._images: dict[str, tuple[int, dict[str, bytes]]] = {}
+        self._lasting: dict[str, Recorded] = {}
         logs.mkdir(parents=True, exist_ok=True)
+
+    def hold(self, at_ns: int) -> None:
+        """Show what was in time at a moment of the file as in time again: the file stands there."""
+        for message in tuple(self._lasting.values()):
+            deadline_s = self._topics[message.channel.partition("/")[0]].deadline_s
+            allowed_ns = deadline_s * NS_PER_S + _LOOK_NS
+            if not deadline_s or at_ns - message.at_ns <= allowed_ns:
+                self.feed(message)
 
     def feed(self, message: Recorded) -> None:
         """Put one message into its topic; what no longer fits the topic is left out, counted."""
         topic, _, _ = message.channel.partition("/")
+        if topic in self._topics and self._topics[topic].kind in LASTING:
+            self._lasting[message.channel] = message
         try:
             if message.channel == LOG_CHANNEL:
                 self._log_line(message)

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc import Kind, SharedSpace
+from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.replay_mark import mark_replay
 from vla_deploy.logs import LOGS_DIR
 from vla_deploy.one_line import one_line
 from vla_deploy.telemetry.channels import channels_of
 from vla_deploy.telemetry.errors import ReplayRefused
-from vla_deploy.telemetry.replay.feeder import Feeder, fed_topics
+from vla_deploy.telemetry.replay.feeder import LASTING, Feeder, fed_topics
 from vla_deploy.telemetry.replay.pace import Pace
 from vla_deploy.telemetry.replay.source import Recorded, Source
 
@@ -73,6 +73,8 @@ class ReplayNode:
         if now_ns >= self._status_due_ns:
             self._status_due_ns = now_ns + _STATUS_EVERY_NS
             self._status.put_document(self.document(now_ns))
+            if self.pace.is_paused or self._next is None:
+                self._feeder.hold(position_ns)
 
     def stop(self) -> None:
         """Close the file and the topics."""
@@ -110,7 +112,7 @@ class ReplayNode:
         lasting = [
             channel.topic
             for topic in fed_topics()
-            if topic.kind in (Kind.CELL, Kind.FRAME)
+            if topic.kind in LASTING
             for channel in channels_of(topic)
         ]
         for message in self._source.before(at_ns, lasting):

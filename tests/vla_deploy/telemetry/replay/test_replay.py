@@ -19,9 +19,10 @@ from vla_deploy.telemetry.recording.once import OneRecording
 from vla_deploy.telemetry.recording.recording_file import RecordedRun
 from vla_deploy.telemetry.recording.request import RecordingWish
 from vla_deploy.telemetry.replay.decoding import shifted
+from vla_deploy.telemetry.replay.feeder import Feeder
 from vla_deploy.telemetry.replay.node import ReplayNode
 from vla_deploy.telemetry.replay.pace import Pace
-from vla_deploy.telemetry.replay.source import Source
+from vla_deploy.telemetry.replay.source import Recorded, Source
 
 FLIGHT = Path(__file__).parents[1] / "flights" / "estop_while_driving.mcap"
 
@@ -103,6 +104,35 @@ def test_nobody_can_ask_anything_of_a_replay(shown: Shown) -> None:
         with pytest.raises(ReplayOnly, match="this is a replay of estop_while_driving"):
             act()
     shown.link.space.cell_writer("dashboard_status").put_document({"url": "x"})
+
+
+def test_what_stands_still_stays_fresh(shown: Shown) -> None:
+    shown.run(0.2)
+    shown.requests.publish({"act": "pause"})
+    shown.run(20.0)
+    for topic in ("control_status", "joint_state"):
+        assert shown.link.fresh(topic, 0.5) is not None, topic
+    shown.requests.publish({"act": "resume"})
+    shown.run(20.0)
+    assert shown.told()["state"] == "ended"
+    assert shown.link.fresh("control_status", 0.5) is not None
+
+
+def test_what_was_late_where_the_file_stands_is_not_made_young(tmp_path: Path) -> None:
+    clock = StepClock()
+    space = SharedSpace(tmp_path / "ipc", clock, is_replay=True)
+    feeder, cell = Feeder(space, tmp_path / "logs", clock), space.cell_reader("pose")
+    fields = {"stamp_ns": 1, "x_m": 2.0}
+    feeder.feed(
+        Recorded(channel="pose", at_ns=0, stamp_ns=0, sequence=1, text=json.dumps(fields).encode())
+    )
+    for at_s, is_fresh in ((0.1, True), (5.0, False)):
+        clock.time_ns += 2 * NS_PER_S
+        feeder.hold(round(at_s * NS_PER_S))
+        sample = cell.latest()
+        assert sample is not None
+        assert (sample.age_s(clock.now_ns()) < 1.0) is is_fresh
+    space.close()
 
 
 def test_what_was_so_before_is_shown_from_any_moment_on(shown: Shown) -> None:
