@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from drivers.clock import Clock
+from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.document import decode, encode
 from vla_deploy.ipc.doorbell import ring_bells
 from vla_deploy.ipc.segment import Segment
 from vla_deploy.ipc.slot import SlotReader, SlotWriter
 from vla_deploy.ipc.topics import Topic
+
+_PATIENCE_NS = NS_PER_S // 100  # writers hold a ring for microseconds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,9 +42,30 @@ class RingWriter:
         """
         data = encode(payload, self._topic, self._segment.layout.capacity_bytes)
         with self._segment.locked():
-            sequence = self._segment.newest + 1
-            self._slots.write(sequence, self._clock.now_ns(), data)
-            self._segment.newest = sequence
+            sequence = self._append(data, 1)
+        return self._announce(sequence)
+
+    def force(self, payload: Mapping[str, Any]) -> int:
+        """Publish as well where another writer holds the ring for long, as one that is frozen does.
+
+        The slot that it may be writing is left to it; readers count that event as torn or lost.
+
+        Raises:
+            BadPayload: not a JSON object, or longer than a slot.
+        """
+        data = encode(payload, self._topic, self._segment.layout.capacity_bytes)
+        with self._segment.locked_within(_PATIENCE_NS, self._clock) as is_held:
+            sequence = self._append(data, 1 if is_held else 2)
+        return self._announce(sequence)
+
+    def _append(self, data: bytes, step: int) -> int:
+        sequence = self._segment.newest + step
+        self._slots.write(sequence, self._clock.now_ns(), data)
+        # Meanwhile somebody may have gone past a writer that was frozen here.
+        self._segment.newest = max(self._segment.newest, sequence)
+        return sequence
+
+    def _announce(self, sequence: int) -> int:
         self.unheard += ring_bells(self._segment.path.parent, self._topic.name)
         return sequence
 

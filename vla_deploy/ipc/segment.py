@@ -9,7 +9,9 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc.errors import SchemaMismatch, SpaceUnavailable
 from vla_deploy.ipc.layout import VERSION, Layout, file_name, layout_of, schema_hash
 from vla_deploy.ipc.topics import Topic
@@ -17,6 +19,7 @@ from vla_deploy.ipc.topics import Topic
 _MAGIC = b"VLAIPC\x00\x01"
 _HEADER = struct.Struct("<8sIIQ36s")  # magic, version, schema hash, file size, boot id
 _NEWEST_WORD = 12  # the newest sequence lies in the 13th 64-bit word, on a cache line of its own
+_LOCK_POLL_NS = NS_PER_S // 5000
 _SHM = Path("/dev/shm")
 
 
@@ -33,8 +36,9 @@ class Segment:
         self.layout = layout_of(topic)
         self._fd = _open(self.path)
         self._close_fd = weakref.finalize(self, os.close, self._fd)
-        with self.locked():
-            _create_or_check(self._fd, self.path, topic, self.layout)
+        if not _is_laid_out(self._fd, topic, self.layout):
+            with self.locked():
+                _create_or_check(self._fd, self.path, topic, self.layout)
         access = mmap.ACCESS_WRITE if writable else mmap.ACCESS_READ
         self.memory = mmap.mmap(self._fd, self.layout.file_bytes, access=access)
         # A 64-bit word is loaded and stored whole; struct would go byte by byte.
@@ -58,6 +62,27 @@ class Segment:
         finally:
             fcntl.flock(self._fd, fcntl.LOCK_UN)
 
+    @contextmanager
+    def locked_within(self, patience_ns: int, clock: Clock) -> Iterator[bool]:
+        """Exclude other writers where the holder lets go in time; yield whether it did."""
+        is_held = self._lock_until(clock.now_ns() + patience_ns, clock)
+        try:
+            yield is_held
+        finally:
+            if is_held:
+                fcntl.flock(self._fd, fcntl.LOCK_UN)
+
+    def _lock_until(self, end_ns: int, clock: Clock) -> bool:
+        while True:
+            try:
+                fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                if clock.now_ns() >= end_ns:
+                    return False
+                clock.sleep_until(clock.now_ns() + _LOCK_POLL_NS)
+            else:
+                return True
+
     def close(self) -> None:
         """Unmap the file; closing twice is allowed."""
         self._words.release()
@@ -77,9 +102,22 @@ def _open(path: Path) -> int:
         ) from error
 
 
+def _is_laid_out(fd: int, topic: Topic, layout: Layout) -> bool:
+    """Tell whether the file is as expected: its header is written last, so nobody need be asked."""
+    is_whole = os.fstat(fd).st_size == layout.file_bytes
+    return is_whole and _header(fd) == _expected_header(topic, layout)
+
+
+def _expected_header(topic: Topic, layout: Layout) -> tuple[object, ...]:
+    return (_MAGIC, VERSION, schema_hash(topic), layout.file_bytes, _boot_id())
+
+
+def _header(fd: int) -> tuple[Any, ...]:
+    return _HEADER.unpack(os.pread(fd, _HEADER.size, 0).ljust(_HEADER.size, b"\0"))
+
+
 def _create_or_check(fd: int, path: Path, topic: Topic, layout: Layout) -> None:
-    expected = (_MAGIC, VERSION, schema_hash(topic), layout.file_bytes, _boot_id())
-    found = _HEADER.unpack(os.pread(fd, _HEADER.size, 0).ljust(_HEADER.size, b"\0"))
+    expected, found = _expected_header(topic, layout), _header(fd)
     # A blank header is a creator that was killed; another boot's file has no living writer.
     if found[0] == bytes(len(_MAGIC)) or found[4] != expected[4]:
         _create(fd, path, layout, _HEADER.pack(*expected))

@@ -1,7 +1,8 @@
 """Press the software emergency stop: the one way in for every source, spoken, shown or wired.
 
 A press is an event in shared memory that control reads in its next tick. It needs no planner, no
-model, no executor and no network, and nothing here imports any.
+model, no executor and no network, and nothing here imports any; nor does it wait for a process that
+was frozen while it wrote to the same ring.
 """
 
 from typing import Final
@@ -42,7 +43,7 @@ class StopButton:
         if recent and self._newest_act == ESTOP:
             return False
         words = {"source": self.source, "reason": reason[:_REASON_LETTERS]}
-        self._out.publish({"act": ESTOP} | words)
+        self._out.force({"act": ESTOP} | words)
         return True
 
     def close(self) -> None:

@@ -3,10 +3,12 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from drivers.clock import NS_PER_S
+from vla_deploy.control.operator_desk import Act, OperatorDesk
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
 
@@ -69,6 +71,33 @@ def test_sources_share_one_press(space: SharedSpace, clock: StepClock) -> None:
     assert StopButton(space, "voice", clock).press()
     assert not StopButton(space, "page", clock).press()
     assert len(acts(space)) == 1
+
+
+def test_a_press_waits_for_no_writer_that_is_frozen_in_the_middle(
+    space: SharedSpace, clock: StepClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frozen, press = space.ring_writer("operator"), StopButton(space, "page", clock).press
+    desk = OperatorDesk(space.ring_reader("operator", from_start=False))
+    go_on = frozen._slots.write
+
+    def freeze(*slot: Any) -> None:
+        began_ns = clock.now_ns()
+        assert press()
+        assert clock.now_ns() - began_ns < NS_PER_S // 50
+        desk.listen()
+        assert desk.estop_source is not None
+        go_on(*slot)
+
+    monkeypatch.setattr(frozen._slots, "write", freeze)
+    frozen.publish({"act": "arm", "source": "cli", "reason": ""})
+    space.ring_writer("operator").publish({"act": "reset", "source": "cli", "reason": ""})
+    desk.listen()
+    assert desk.next_act() is Act.RESET
+
+
+def test_a_writer_of_a_ring_that_is_there_is_held_up_by_nobody_else(space: SharedSpace) -> None:
+    with space.ring_writer("operator")._segment.locked():
+        assert space.ring_writer("operator") is not None
 
 
 @pytest.mark.parametrize("act", ["reset", "arm", "disarm"])

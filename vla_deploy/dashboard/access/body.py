@@ -42,10 +42,11 @@ async def read_stop_body(receive: Receive) -> bytes:
     """Return what a stop says as its reason; one that is wrong, late or too long is left out."""
     try:
         said = json.loads(await _whole(receive, _STOP_BYTES, _STOP_WITHIN_S))
-        reason = said["reason"][:_REASON_LETTERS].encode(errors="replace").decode()
-    except (BodyTooLarge, BodyTooSlow, ValueError, RecursionError, TypeError, KeyError):
-        reason = ""
-    return json.dumps({"reason": reason}).encode()
+    except (BodyTooLarge, BodyTooSlow, ValueError, RecursionError):
+        said = None
+    given = said.get("reason") if isinstance(said, dict) else None
+    told = given[:_REASON_LETTERS] if isinstance(given, str) else ""
+    return json.dumps({"reason": told.encode(errors="replace").decode()}).encode()
 
 
 def replay(body: bytes, receive: Receive) -> Receive:

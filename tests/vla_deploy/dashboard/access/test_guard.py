@@ -97,7 +97,11 @@ def test_a_stranger_opens_no_websocket(world):
 
 @pytest.mark.parametrize(
     "body",
-    [b"", b"{", b'{"reason": 3}', b'{"reason": "\\ud800"}', b"[" * 100_000, b"x" * 300_000, b"[1]"],
+    [
+        *(b"", b"{", b"[1]", b"null", b'"stop"', b"[" * 100_000, b"x" * 300_000),
+        *(b'{"reason": 3}', b'{"reason": []}', b'{"reason": {}}', b'{"reason": null}'),
+        b'{"reason": "\\ud800"}',
+    ],
 )
 @pytest.mark.parametrize(
     "asked",
