@@ -54,6 +54,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "record": Command("record", "record what the robot does: rolling files, or one of your own"),
     "replay": Command("replay", "show a recording or a flight as if it were happening; no robot"),
     "foxglove": Command("foxglove", "let viewers such as Foxglove watch the run live, read-only"),
+    "rerun": Command("rerun", "look at a recording, a flight or the run live in Rerun"),
     "check": Command("check", "check a robot, a profile or a plan, and report all faults"),
     "schema": Command("check", "print the JSON Schema of a plan or of an analysis"),
     "map": Command("map", "record, look at, check and convert maps in the ROS format"),

@@ -3,12 +3,12 @@
 import argparse
 import signal
 import time
-from pathlib import Path
 from typing import Any
 
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import attach
-from vla_deploy.node import NodeContext, run_node
+from vla_deploy.cli.watched_run import watched_run
+from vla_deploy.node import run_node
 from vla_deploy.telemetry.foxglove import FoxgloveNode
 from vla_deploy.telemetry.recording.settings import read_settings
 
@@ -30,15 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings = read_settings(session.base).foxglove
     if arguments.port is not None:
         settings = type(settings).model_validate({**settings.model_dump(), "port": arguments.port})
-    head = session.document("process_table") or session.document("replay_status") or {}
-    context = NodeContext(
-        run_dir=Path(session.run_dir),
-        robot=str(head.get("robot", "butler")),
-        profile=str(head.get("profile", "")),
-        devices_dir=None,
-        clock=session.clock,
-    )
-    node = FoxgloveNode(context, settings, time.time_ns)
+    node = FoxgloveNode(watched_run(session), settings, time.time_ns)
     stops: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _frame: stops.append(got))

@@ -5,19 +5,17 @@ import json
 import os
 import shutil
 import signal
-from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_top_command
+from vla_deploy.cli.recorded_file import find_recorded
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.logs import LOGS_DIR, RUN_ID_VARIABLE
 from vla_deploy.node import run_node
 from vla_deploy.supervisor.process import ChildProcess
 from vla_deploy.supervisor.runtime import Runtime, default_base
-from vla_deploy.telemetry.folder import FlightFolder, folder_of
-from vla_deploy.telemetry.recording.folder import RecordingFolder, recordings_dir_of
 from vla_deploy.telemetry.replay.node import ReplayNode
 from vla_deploy.telemetry.replay.source import Source
 
@@ -67,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace) -> int:
     base = arguments.runtime_base or default_base()
-    source = Source(_find(base, arguments.file))
+    source = Source(find_recorded(base, arguments.file))
     runtime = Runtime(base)
     stops: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -127,17 +125,6 @@ def _page(runtime: Runtime, source: Source) -> ChildProcess:
     command += ["--devices-dir", str(run_dir / "dev")]
     environment = {**os.environ, RUN_ID_VARIABLE: runtime.run_id}
     return ChildProcess(command, environment, run_dir / LOGS_DIR / "dashboard.out")
-
-
-def _find(base: Path, name: str) -> Path:
-    """Return the file of that name, the recording of that number, or the newest of both kinds."""
-    folders = (RecordingFolder(recordings_dir_of(base)), FlightFolder(folder_of(base)))
-    if Path(name).is_file():
-        return Path(name)
-    for folder in folders:
-        if (name == "latest" and folder.files()) or name in {path.name for path in folder.files()}:
-            return folder.find(name)
-    return folders[0].find(name)
 
 
 def _acts(arguments: argparse.Namespace) -> list[tuple[str, float]]:

@@ -1,0 +1,1 @@
+"""Show recordings and runs in Rerun: what viewers are shown anyway, as its entities."""
