@@ -17,12 +17,16 @@ Required = Callable[[HTTPConnection], Identity]
 
 
 class Require:
-    """Let through who has a role; a test finds by it the routes that ask for none."""
+    """Let through who has a role; a test finds by it the routes that ask for none.
+
+    It is a coroutine, so that no request, and the stop least of all, waits for a thread for it:
+    there are 40 of them, and answers that read slow disks may hold them all.
+    """
 
     def __init__(self, role: Role) -> None:
         self.role = role
 
-    def __call__(self, connection: HTTPConnection) -> Identity:
+    async def __call__(self, connection: HTTPConnection) -> Identity:
         """Return who asks.
 
         Raises:

@@ -1,6 +1,9 @@
 """Acts reach control's ring, and are answered by what control then shows."""
 
+import anyio
 import pytest
+from anyio.to_thread import current_default_thread_limiter
+from httpx import ASGITransport, AsyncClient
 
 from vla_deploy.dashboard.api import operate
 
@@ -12,6 +15,20 @@ def test_stop_presses_the_button_of_every_other_source(dashboard, body):
     assert dashboard.robot.hears("operator") == [
         {"act": "estop", "source": "page", "reason": reason}
     ]
+
+
+async def pressed_while_every_thread_is_held(app):
+    threads = current_default_thread_limiter()
+    for slow_answer in range(int(threads.total_tokens)):
+        threads.acquire_on_behalf_of_nowait(slow_answer)
+    async with AsyncClient(transport=ASGITransport(app), base_url="http://robot") as client:
+        with anyio.fail_after(2.0):
+            return await client.post("/api/v1/stop")
+
+
+def test_a_stop_waits_for_no_thread_that_slow_answers_hold(dashboard):
+    assert anyio.run(pressed_while_every_thread_is_held, dashboard.app).status_code == 200
+    assert [told["act"] for told in dashboard.robot.hears("operator")] == ["estop"]
 
 
 @pytest.mark.parametrize(
