@@ -1,0 +1,80 @@
+"""Every settings file that the documentation shows is one that the program takes."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from platforms import load_profile
+from vla_deploy.dashboard.settings import faults_of
+from vla_deploy.inference.manifest_schema import manifest_faults
+from vla_deploy.model_servers.servers_file import read_servers
+from vla_deploy.robots import schema
+from vla_deploy.robots.loader import NAMED, SINGLE
+from vla_deploy.telemetry.recording.settings import TelemetrySettings
+
+DOCS = Path(__file__).parents[2] / "docs"
+BLOCK = re.compile(r"^```toml\n([\s\S]*?)^```|((?:^ {4}\[[\w.]+\]\n)(?:^ {4}.*\n)+)", re.M)
+
+
+def shown(*pages: str) -> list[tuple[str, dict[str, Any]]]:
+    """Return text and content of every TOML file on these pages."""
+    texts = []
+    for page in pages:
+        found = BLOCK.finditer((DOCS / f"{page}.md").read_text(encoding="utf-8"))
+        texts += [match[1] or re.sub("^    ", "", match[2], flags=re.M) for match in found]
+    return [(text, tomllib.loads(text)) for text in texts]
+
+
+def test_dashboard_toml() -> None:
+    files = shown("dashboard", "dashboard-access")
+    assert len(files) == 3
+    assert [fault for _, document in files for fault in faults_of(document)] == []
+
+
+def test_recording_toml() -> None:
+    ((_, document),) = shown("recording")
+    assert TelemetrySettings.model_validate(document).recording.always
+
+
+def test_servers_toml(tmp_path: Path) -> None:
+    ((text, _),) = shown("model-servers")
+    (tmp_path / "servers.toml").write_text(text)
+    assert set(read_servers(tmp_path / "servers.toml")) == {"bench", "cloud"}
+
+
+@pytest.mark.parametrize("page", ["profiles", "planning", "models", "language-models", "budgets"])
+def test_profiles(page: str, tmp_path: Path) -> None:
+    files = [text for text, document in shown(page) if "role" not in document]
+    assert files
+    for text in files:
+        inherits = "" if "inherits" in text else 'inherits = "desktop"\n'
+        (tmp_path / "mine.toml").write_text(inherits + text)
+        assert load_profile(tmp_path / "mine.toml").name == "mine"
+
+
+@pytest.mark.parametrize(("page", "name"), [("models", "mugs"), ("speech", "mine")])
+def test_manifests(page: str, name: str) -> None:
+    ((text, _),) = [one for one in shown(page) if one[1].get("name") == name]
+    whole = tomllib.loads(text.replace('sha256 = "..."', f'sha256 = "{"0" * 64}"'))
+    faults = [one for one in manifest_faults(whole, name) if one.key != "parts"]  # shows one file
+    assert faults == []
+
+
+@pytest.mark.parametrize("page", ["sensors", "voice", "zones", "can"])
+def test_tables_of_robot_toml(page: str) -> None:
+    files = shown(page)
+    assert files
+    for _, document in files:
+        for key, table in document.items():
+            records = [table] if key in SINGLE else table.values()
+            for record in records:
+                shape = SINGLE.get(key) or NAMED[key]
+                assert schema.check_record(record, key, shape) == ()
+
+
+def test_every_table_of_robot_toml_is_told() -> None:
+    page = (DOCS / "robots.md").read_text(encoding="utf-8")
+    assert [key for key in schema.ROBOT if f"`{key}`" not in page] == ["name", "mjcf"]
