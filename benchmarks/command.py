@@ -8,11 +8,13 @@ from typing import Any
 
 def parser(name: str, doc: str | None) -> argparse.ArgumentParser:
     """Return the arguments that all benchmarks have; `doc` is the module's own."""
+    # Those with an underscore are parts of others, or stand beside what `vla-deploy bench` lists.
+    command = f"python -m benchmarks.{name}" if "_" in name else f"vla-deploy bench {name}"
     made = argparse.ArgumentParser(
         prog=f"bench {name}",
         description=doc,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog=f"example:\n  vla-deploy bench {name} --json",
+        epilog=f"example:\n  {command} --json",
     )
     made.add_argument("--json", action="store_true", help="print the figures as JSON")
     return made

@@ -16,6 +16,11 @@ def test_every_benchmark_has_a_help_text_with_an_example(
     assert "vla-deploy bench kettle --json" in told
 
 
+def test_what_vla_deploy_bench_does_not_list_is_started_as_a_module() -> None:
+    told = parser("kettle_lid", "Measure the lid.").format_help()
+    assert "  python -m benchmarks.kettle_lid --json" in told
+
+
 def test_a_report_is_json_or_a_line_per_figure(capsys: pytest.CaptureFixture[str]) -> None:
     report = {"cycles": 3, "boil_ratio": 0.123456789, "missing": None}
     show(report, as_json=True)

@@ -3,9 +3,9 @@
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_command, add_top_command
@@ -14,18 +14,19 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words, sentence_of
 from vla_deploy.supervisor.runtime import default_base
 
-EXAMPLES = """  vla-deploy memory list
-  vla-deploy memory search "where did the keys go"
-  vla-deploy memory things --kind keys
-  vla-deploy memory export memory.jsonl
-  vla-deploy memory erase 12
-  vla-deploy memory erase --all --yes
-"""
+EXAMPLES: Final[Mapping[str, str]] = {
+    "list": "  vla-deploy memory list\n",
+    "search": '  vla-deploy memory search "where did the keys go"\n',
+    "things": "  vla-deploy memory things --kind keys\n",
+    "export": "  vla-deploy memory export memory.jsonl\n",
+    "erase": "  vla-deploy memory erase 12\n  vla-deploy memory erase --all --yes\n",
+}
 
 
 def register(commands: Any) -> None:
     """Add the command."""
-    acts = add_top_command(commands, "memory", EXAMPLES).add_subparsers(required=True)
+    memory = add_top_command(commands, "memory", "".join(EXAMPLES.values()))
+    acts = memory.add_subparsers(required=True)
     listed = _act(acts, "list", "the last commands and what came of them", list_episodes)
     listed.add_argument("--count", type=int, default=20, help="how many (default: 20)")
     found = _act(acts, "search", "what is remembered that fits some words", find)
@@ -43,7 +44,7 @@ def register(commands: Any) -> None:
 
 
 def _act(acts: Any, name: str, summary: str, run: Any) -> argparse.ArgumentParser:
-    act = add_command(acts, name, summary, f"  vla-deploy memory {name} --help\n")
+    act = add_command(acts, name, summary, EXAMPLES[name])
     act.add_argument("--json", action="store_true", help="print JSON")
     act.set_defaults(run=run)
     return act
