@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Final
 
 from platforms.board import identify
-from vla_deploy.state_dir import state_dir_of
+from vla_deploy.state_dir import library_dir_of
 from vla_deploy.supervisor.runtime import default_base
 
-_SYSTEM_STATE: Final = Path("/var/lib/vla-deploy")
 _NAME: Final = "profile.json"
 _FALLBACK: Final = "desktop"
 
@@ -43,10 +42,8 @@ class ProfileChoice:
 
 
 def choice_of(runtime_base: Path | None) -> ProfileChoice:
-    """Return where the choice is kept: with what outlives the runs, or /var/lib of the system."""
-    base = runtime_base or default_base()
-    system = os.getuid() == 0 and runtime_base is None
-    return ProfileChoice((_SYSTEM_STATE if system else state_dir_of(base)) / _NAME)
+    """Return where the choice for the runs of a runtime directory is kept, whoever asks."""
+    return ProfileChoice(library_dir_of(runtime_base or default_base()) / _NAME)
 
 
 def start_profile(runtime_base: Path | None, root: Path = Path("/")) -> tuple[str, str]:

@@ -81,6 +81,12 @@ def test_a_chosen_profile_is_the_next_starts(vla, base, mine):
     assert f"the next start takes {mine}" in vla("detect")[1]
 
 
+def test_root_chooses_for_the_service_whether_it_names_its_folder_or_not(monkeypatch):
+    monkeypatch.setattr("os.getuid", lambda: 0)
+    assert choice_of(None).path == choice_of(Path("/run/vla-deploy")).path
+    assert choice_of(None).path == Path("/var/lib/vla-deploy/profile.json")
+
+
 def test_a_dry_run_chooses_nothing(vla, base, mine):
     assert vla("use", mine, "--dry-run")[0] == 0
     assert choice_of(base).load() is None
