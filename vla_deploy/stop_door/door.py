@@ -1,5 +1,6 @@
 """Listen, and let every client be served beside all others: one thread, no client is waited for."""
 
+import errno
 import logging
 import selectors
 import socket
@@ -13,6 +14,7 @@ from vla_deploy.stop_door.listener import Listener
 
 MAX_CONNECTIONS: Final = 128
 _ACCEPTED_AT_ONCE: Final = 32
+_FULL: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 _log = logging.getLogger(__name__)
 
 
@@ -24,6 +26,7 @@ class Door:
         self.accepted = 0
         self.crowded_out = 0
         self.expired = 0
+        self.lost = 0
         self._listener = listener
         self._answer = answer
         self._clock = clock
@@ -64,10 +67,13 @@ class Door:
                 client, peer = self._listener.accept()
             except BlockingIOError:
                 return
-            except OSError as error:  # it has gone before it was taken, or no descriptor is left
-                _log.warning("a connection was lost: %s", error)
-                self._make_room()
-                return
+            except OSError as error:
+                if error.errno in _FULL:
+                    _log.warning("no room for a connection: %s", error)
+                    self._make_room()
+                    return
+                self.lost += 1  # it has gone before it was taken
+                continue
             self.accepted += 1
             if self.connections >= MAX_CONNECTIONS:
                 self._make_room()

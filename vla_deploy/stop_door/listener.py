@@ -37,7 +37,7 @@ class Listener:
         client, address = self.socket.accept()
         client.setblocking(False)
         if self._tls is not None:
-            client = self._tls.wrap_socket(client, server_side=True, do_handshake_on_connect=False)
+            client = _secured(client, self._tls)
         return client, str(address[0]).removeprefix(_MAPPED)
 
     def close(self) -> None:
@@ -61,6 +61,15 @@ def open_listener(
     except (PortTaken, OSError) as error:
         raise DoorClosed(f"stop_port: {error}") from error
     return Listener(listening, tls)
+
+
+def _secured(client: socket.socket, tls: ssl.SSLContext) -> ssl.SSLSocket:
+    try:
+        client.getpeername()
+    except OSError:  # it has gone: to wrap it would fail, too, but leave it open
+        client.close()
+        raise
+    return tls.wrap_socket(client, server_side=True, do_handshake_on_connect=False)
 
 
 def _tls(settings: DashboardSettings) -> ssl.SSLContext:

@@ -123,7 +123,7 @@ class StopDoorNode:
 
 
 def _traffic(door: Door | None) -> dict[str, int]:
-    names = ("connections", "accepted", "expired", "crowded_out")
+    names = ("connections", "accepted", "expired", "lost", "crowded_out")
     return {name: 0 if door is None else getattr(door, name) for name in names}
 
 

@@ -115,14 +115,31 @@ def certificate(tmp_path):
     return made
 
 
-def test_with_a_certificate_it_speaks_tls_alone(doorway, certificate):
+@pytest.fixture
+def secured(doorway, certificate):
     doorway.node.stop()
     settings = DashboardSettings(
         stop_port=0, tls_certificate=str(certificate[0]), tls_key=str(certificate[1])
     )
-    secure = StopDoorNode(doorway.space, doorway.clock, lambda: settings)
-    doorway.node = secure
-    secure.start()
+    doorway.node = StopDoorNode(doorway.space, doorway.clock, lambda: settings)
+    doorway.node.start()
+    return doorway
+
+
+def test_who_breaks_off_before_tls_begins_costs_nobody_else_their_place(secured):
+    with closing(secured.call()):
+        secured.node.step()
+        for _ in range(20):
+            hasty = secured.call()
+            hasty.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
+            hasty.close()
+        secured.node.step()
+        told = secured.tell()
+        assert (told["connections"], told["crowded_out"]) == (1, 0)
+
+
+def test_with_a_certificate_it_speaks_tls_alone(secured, certificate):
+    doorway = secured
     assert doorway.told()["scheme"] == "https"
     assert doorway.ask(PRESS) == b""
     assert doorway.pressed() == []
