@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.telemetry.rerun.entity import WORLD, Entity, child_path, frame_path
-from vla_deploy.telemetry.schemas.geometry import Json
+from vla_deploy.telemetry.schemas.geometry import CAMERA, Json
 
 _POINT_TYPES: Final = {7: "<f4", 8: "<f8"}  # foxglove.NumericType
 _COLOUR_PARTS: Final = 4
@@ -18,11 +18,12 @@ _POINT_M: Final = 0.015
 
 
 def transforms(message: Json) -> Iterator[Entity]:
-    """Yield every frame in its parent, with axes that can be seen."""
+    """Yield every frame in its parent, with axes that can be seen; of a camera its lens is."""
     for one in message["transforms"]:
         path = child_path(one["parent_frame_id"], one["child_frame_id"])
         yield _placed(path, one["translation"], one["rotation"])
-        yield _axes(path)
+        if one["child_frame_id"] != CAMERA:
+            yield _axes(path)
 
 
 def heading(message: Json) -> Iterator[Entity]:
@@ -69,18 +70,20 @@ def obstacles(message: Json) -> Iterator[Entity]:
 
 
 def grid(message: Json) -> Iterator[Entity]:
-    """Yield a map of coloured cells; an image begins at the top, the message at the bottom."""
+    """Yield the map; an image begins at the top, the message at the bottom."""
     columns = message["column_count"]
     cells = np.frombuffer(base64.b64decode(message["data"]), np.uint8)
-    rows = cells.reshape(-1, columns, _COLOUR_PARTS)
+    # Our maps are grey, so that one part of each colour tells it; the viewer flags maps of four.
+    rows = cells.reshape(-1, columns, _COLOUR_PARTS)[..., 0]
     values = {
         "data": rows[::-1].tobytes(),
         "format": {
             "width": columns,
             "height": len(rows),
-            "color_model": "RGBA",
+            "color_model": "L",
             "channel_datatype": "U8",
         },
+        "colormap": "Grayscale",
         "cell_size": message["cell_size"]["x"],
         "translation": xyz(message["pose"]["position"]),
     }
