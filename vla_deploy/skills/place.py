@@ -33,8 +33,11 @@ from vla_deploy.skills.surfaces import free_spots
 from vla_deploy.skills.swing import heights_above
 
 ABOVE_M = 0.10
-# A thing put into a container is let go this far below the rim; one put on something, just above.
+# A thing put into a container is let go this far below the rim: less where others lie in it, which it
+# must not be pressed on, and where the container is low. One put on something is let go just above.
 BELOW_RIM_M = 0.03
+DEEP_BELOW_RIM_M = 0.075
+ABOVE_FLOOR_M = 0.04
 ABOVE_SURFACE_M = 0.008
 YAWS_RAD = tuple(2 * math.pi * step / 16 for step in range(16))
 LOST_OPENING_M = 0.012
@@ -132,9 +135,18 @@ def _over_object(
     top_m = z_m + float(seen["size_m"][2]) / 2
     if relation == "in" and seen["class"] != "box":
         raise NotPossible(f"a {seen['class']} is no container; put things in a box")
-    lower_m = BELOW_RIM_M if relation == "in" else -ABOVE_SURFACE_M
+    lower_m = _below_rim_m(context, seen) if relation == "in" else -ABOVE_SURFACE_M
     point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
     return _solve_above(context, hand, point_m, held)
+
+
+def _below_rim_m(context: SkillContext, container: Mapping[str, Any]) -> float:
+    """Return how deep a thing is lowered into a container: what falls far may topple or break."""
+    rests = (one.get("rests", {}) for one in context.link.objects)
+    if any(rest.get("of") == container["id"] for rest in rests):
+        return BELOW_RIM_M
+    spare_m = float(container["size_m"][2]) - ABOVE_FLOOR_M
+    return min(max(spare_m, BELOW_RIM_M), DEEP_BELOW_RIM_M)
 
 
 def _solve_above(

@@ -180,7 +180,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         ready_topic="dashboard_status",
         ready_files=("ready/dashboard",),
         ready_timeout_s=60.0,
-        watched=(Watched(topic="dashboard_status", silence_limit_s=20.0),),
+        watched=(Watched(topic="dashboard_status", silence_limit_s=15.0),),
         giving_up=GivingUp.CARRY_ON,  # the stop door and the command line go on
     ),
 )
