@@ -33,8 +33,8 @@ from vla_deploy.skills.surfaces import free_spots
 from vla_deploy.skills.swing import heights_above
 
 ABOVE_M = 0.10
-# A thing put into a container is let go this far below the rim: less where others lie in it, which it
-# must not be pressed on, and where the container is low. One put on something is let go just above.
+# A thing put into a container is let go this far below the rim: less where others lie in it, which
+# it must not be pressed on, and where the container is low. One put on something: just above.
 BELOW_RIM_M = 0.03
 DEEP_BELOW_RIM_M = 0.075
 ABOVE_FLOOR_M = 0.04
