@@ -64,11 +64,12 @@ class OperatorDesk:
     def _recall(self, last_status: Sample | None) -> str | None:
         """Return who asked for a stop that no control has seen to its end."""
         told_ns = -1 if last_status is None else last_status.stamp_ns
-        since = [event for event in self._ring.drain() if event.stamp_ns > told_ns]
+        held = self._ring.drain()
+        since = [event for event in held if event.stamp_ns > told_ns]
         pressed = [event for event in since if event.payload.get("act") == Act.ESTOP.value]
         if pressed:
             return str(pressed[-1].payload.get("source", UNKNOWN))
-        if self._ring.lost and since and since[0].sequence == self._ring.lost + 1:
+        if self._ring.lost and since and since[0] is held[0]:
             return LOST
         latched = last_status is not None and last_status.document().get("estop_latched")
         return LATCHED_BEFORE if latched else None

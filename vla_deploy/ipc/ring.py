@@ -12,6 +12,7 @@ from vla_deploy.ipc.slot import SlotReader, SlotWriter
 from vla_deploy.ipc.topics import Topic
 
 _PATIENCE_NS = NS_PER_S // 100  # writers hold a ring for microseconds
+_AHEAD = 8  # of a frozen writer, and of those that follow it once it goes on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,27 +43,36 @@ class RingWriter:
         """
         data = encode(payload, self._topic, self._segment.layout.capacity_bytes)
         with self._segment.locked():
-            sequence = self._append(data, 1)
+            sequence = self._append(data)
         return self._announce(sequence)
 
     def force(self, payload: Mapping[str, Any]) -> int:
         """Publish as well where another writer holds the ring for long, as one that is frozen does.
 
-        The slot that it may be writing is left to it; readers count that event as torn or lost.
+        The slots that it and the next may be writing are left to them; readers count those as torn
+        or lost.
 
         Raises:
             BadPayload: not a JSON object, or longer than a slot.
         """
         data = encode(payload, self._topic, self._segment.layout.capacity_bytes)
         with self._segment.locked_within(_PATIENCE_NS, self._clock) as is_held:
-            sequence = self._append(data, 1 if is_held else 2)
+            sequence = self._append(data) if is_held else self._go_past(data)
         return self._announce(sequence)
 
-    def _append(self, data: bytes, step: int) -> int:
-        sequence = self._segment.newest + step
+    def _append(self, data: bytes) -> int:
+        sequence = self._segment.newest + 1
         self._slots.write(sequence, self._clock.now_ns(), data)
-        # Meanwhile somebody may have gone past a writer that was frozen here.
-        self._segment.newest = max(self._segment.newest, sequence)
+        self._segment.newest = sequence
+        return sequence
+
+    def _go_past(self, data: bytes) -> int:
+        """Append without the lock, again where so many went on meanwhile that none would see it."""
+        is_ahead = False
+        while not is_ahead:
+            sequence = self._segment.newest + _AHEAD
+            self._slots.write(sequence, self._clock.now_ns(), data)
+            is_ahead = self._segment.force_newest(sequence)
         return sequence
 
     def _announce(self, sequence: int) -> int:

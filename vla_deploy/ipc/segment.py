@@ -18,7 +18,10 @@ from vla_deploy.ipc.topics import Topic
 
 _MAGIC = b"VLAIPC\x00\x01"
 _HEADER = struct.Struct("<8sIIQ36s")  # magic, version, schema hash, file size, boot id
-_NEWEST_WORD = 12  # the newest sequence lies in the 13th 64-bit word, on a cache line of its own
+# The newest sequence lies in the 13th 64-bit word, on a cache line of its own; next to it the newest
+# of those that went past whoever held the lock: the holder so never takes it back.
+_NEWEST_WORD = 12
+_FORCED_WORD = 13
 _LOCK_POLL_NS = NS_PER_S // 5000
 _SHM = Path("/dev/shm")
 
@@ -42,16 +45,21 @@ class Segment:
         access = mmap.ACCESS_WRITE if writable else mmap.ACCESS_READ
         self.memory = mmap.mmap(self._fd, self.layout.file_bytes, access=access)
         # A 64-bit word is loaded and stored whole; struct would go byte by byte.
-        self._words = memoryview(self.memory)[: (_NEWEST_WORD + 1) * 8].cast("Q")
+        self._words = memoryview(self.memory)[: (_FORCED_WORD + 1) * 8].cast("Q")
 
     @property
     def newest(self) -> int:
         """Return the newest published sequence, 0 before the first."""
-        return int(self._words[_NEWEST_WORD])
+        return int(max(self._words[_NEWEST_WORD], self._words[_FORCED_WORD]))
 
     @newest.setter
     def newest(self, sequence: int) -> None:
         self._words[_NEWEST_WORD] = sequence
+
+    def force_newest(self, sequence: int) -> bool:
+        """Publish a sequence without the lock; False where its holders have come as far already."""
+        self._words[_FORCED_WORD] = sequence
+        return bool(self._words[_NEWEST_WORD] < sequence)
 
     @contextmanager
     def locked(self) -> Iterator[None]:

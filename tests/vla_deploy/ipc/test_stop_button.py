@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.control.operator_desk import Act, OperatorDesk
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc.segment import Segment
 from vla_deploy.ipc.stop_button import StopButton
 
 FORBIDDEN = (
@@ -93,6 +95,51 @@ def test_a_press_waits_for_no_writer_that_is_frozen_in_the_middle(
     space.ring_writer("operator").publish({"act": "reset", "source": "cli", "reason": ""})
     desk.listen()
     assert desk.next_act() is Act.RESET
+
+
+def test_a_writer_that_is_frozen_as_it_tells_of_its_event_does_not_take_the_press_back(
+    space: SharedSpace, clock: StepClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    press = StopButton(space, "page", clock).press
+    desk = OperatorDesk(space.ring_reader("operator", from_start=False))
+    newest, tell = Segment.newest, Segment.newest.fset
+    assert tell is not None
+
+    def freeze(segment: Segment, sequence: int) -> None:
+        monkeypatch.setattr(Segment, "newest", newest)
+        assert press()
+        tell(segment, sequence)
+
+    monkeypatch.setattr(Segment, "newest", property(newest.fget, freeze))
+    space.ring_writer("operator").publish({"act": "arm", "source": "cli", "reason": ""})
+    desk.listen()
+    assert desk.estop_source is not None
+    assert desk.next_act() is None
+
+
+@pytest.mark.parametrize("passing", [1, 7, 8, 20])
+def test_a_press_that_is_frozen_itself_counts_though_others_went_on(
+    space: SharedSpace, clock: StepClock, monkeypatch: pytest.MonkeyPatch, passing: int
+) -> None:
+    button, other = StopButton(space, "page", clock), space.ring_writer("operator")
+    desk = OperatorDesk(space.ring_reader("operator", from_start=False))
+    go_on = button._out._slots.write
+    other_writes = ExitStack()
+
+    def freeze(*slot: Any) -> None:
+        monkeypatch.setattr(button._out._slots, "write", go_on)
+        other_writes.close()
+        for _ in range(passing):
+            other.publish({"act": "disarm", "source": "cli", "reason": ""})
+        desk.listen()
+        assert desk.estop_source is None
+        go_on(*slot)
+
+    monkeypatch.setattr(button._out._slots, "write", freeze)
+    other_writes.enter_context(other._segment.locked())
+    assert button.press()
+    desk.listen()
+    assert desk.estop_source is not None
 
 
 def test_a_writer_of_a_ring_that_is_there_is_held_up_by_nobody_else(space: SharedSpace) -> None:
