@@ -18,8 +18,8 @@ from vla_deploy.ipc.topics import Topic
 
 _MAGIC = b"VLAIPC\x00\x01"
 _HEADER = struct.Struct("<8sIIQ36s")  # magic, version, schema hash, file size, boot id
-# The newest sequence lies in the 13th 64-bit word, on a cache line of its own; next to it the newest
-# of those that went past whoever held the lock: the holder so never takes it back.
+# The newest sequence lies in the 13th 64-bit word, on a cache line of its own; next to it that of
+# whoever went past the lock, so that its holder cannot take it back.
 _NEWEST_WORD = 12
 _FORCED_WORD = 13
 _LOCK_POLL_NS = NS_PER_S // 5000

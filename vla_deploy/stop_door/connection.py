@@ -1,5 +1,6 @@
 """Serve one client: read a head, write the answer, let it be read; never wait for the client."""
 
+import re
 import selectors
 import socket
 import ssl
@@ -14,7 +15,8 @@ MAX_HEAD_BYTES: Final = 16_384
 READ_NS: Final = 2 * NS_PER_S
 WRITE_NS: Final = 2 * NS_PER_S
 LINGER_NS: Final = NS_PER_S
-_HEAD_END: Final = b"\r\n\r\n"
+_HEAD_END: Final = re.compile(rb"\r?\n\r?\n")  # as a person types it, too
+_LINE_END: Final = b"\n"
 _CHUNK_BYTES: Final = 16_384
 """As much as a TLS record holds, so that none is left over where no selector sees it."""
 _ACTS_AT_ONCE: Final = 8
@@ -70,7 +72,7 @@ class Connection:
 
     def expire(self, now_ns: int) -> None:
         """Answer a press whose head never became whole; close everything else."""
-        if self.stage is Stage.READING and b"\r\n" in self._head:
+        if self.stage is Stage.READING and _LINE_END in self._head:
             self._conclude(now_ns, whole=False)
             self.proceed(now_ns)
         else:
@@ -96,7 +98,7 @@ class Connection:
     def _read(self, now_ns: int) -> None:
         received = self.socket.recv(_CHUNK_BYTES)
         self._head += received
-        if _HEAD_END in self._head:
+        if _HEAD_END.search(self._head):
             self._conclude(now_ns, whole=True)
         elif len(self._head) > MAX_HEAD_BYTES:
             self._conclude(now_ns, whole=False)
@@ -104,7 +106,7 @@ class Connection:
             self.expire(now_ns)
 
     def _conclude(self, now_ns: int, *, whole: bool) -> None:
-        head, _, _ = bytes(self._head).partition(_HEAD_END)
+        head = _HEAD_END.split(self._head, 1)[0]
         self._head.clear()
         self._unsent = memoryview(self._answer(head, whole))
         self.stage, self.deadline_ns = Stage.ANSWERING, now_ns + WRITE_NS

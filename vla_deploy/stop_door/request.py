@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 from urllib.parse import urlsplit
 
+_LINE_END: Final = re.compile(r"\r?\n")
 _KNOWN: Final = frozenset({"host", "origin", "accept"})
 _PAGE: Final = "text/html"
 _ORIGIN: Final = re.compile(r"https?://[A-Za-z0-9._:\[\]-]+")  # it is written into an answer
@@ -57,7 +58,7 @@ def read_head(head: bytes) -> Request:
     Raises:
         Malformed: the first line is not that of HTTP/1.x.
     """
-    first, *rest = head.decode("latin-1").split("\r\n")
+    first, *rest = _LINE_END.split(head.decode("latin-1"))
     words = first.split(" ")
     if len(words) != 3 or not words[2].startswith("HTTP/1."):
         raise Malformed(f"request line {first[:60]!r}: expected METHOD PATH HTTP/1.1")

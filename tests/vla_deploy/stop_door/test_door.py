@@ -145,6 +145,19 @@ def test_a_press_with_too_long_a_head_counts(doorway):
     assert len(doorway.pressed()) == 1
 
 
+def test_a_press_that_is_typed_with_bare_line_ends_counts_at_once(doorway):
+    assert doorway.ask(b"POST /stop HTTP/1.1\nHost: robot\n\n").startswith(b"HTTP/1.1 200")
+    assert len(doorway.pressed()) == 1
+
+
+def test_a_typed_press_that_ends_after_its_first_line_counts(doorway):
+    with closing(doorway.call()) as client:
+        client.sendall(b"POST /stop HTTP/1.1\n")
+        client.shutdown(socket.SHUT_WR)
+        assert doorway.answer(client).startswith(b"HTTP/1.1 200")
+    assert len(doorway.pressed()) == 1
+
+
 def test_a_press_of_a_client_that_hangs_up_at_once_counts(doorway):
     with closing(doorway.call()) as client:
         client.sendall(PRESS)

@@ -24,6 +24,11 @@ def test_headers_that_are_none_hide_nothing():
     assert (request.is_press, request.host, request.wants_page) == (True, "robot:8089", True)
 
 
+def test_lines_end_as_a_person_types_them_too():
+    request = read_head(b"POST /stop HTTP/1.1\nHost: robot\nAccept: text/html")
+    assert (request.is_press, request.host, request.wants_page) == (True, "robot", True)
+
+
 @pytest.mark.parametrize(
     "head", [b"", b"\r\nPOST /stop HTTP/1.1", b"POST /stop", b"\x16\x03\x01\x02", b"A B C D"]
 )
@@ -46,7 +51,7 @@ def test_what_is_no_http_is_refused(head):
         ("robot:8089", "", False),
         ("", "http://robot:8088", False),
         ("[::1", "http://[::1", False),
-        ("robot:8089", "http://robot\nSet-Cookie: a=b", False),
+        ("robot:8089", "http://robot\rSet-Cookie: a=b", False),
         ("robot:8089", "http://robot:8088/", False),
     ],
 )
