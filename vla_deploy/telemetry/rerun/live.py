@@ -47,7 +47,11 @@ class RerunNode:
         self._drafter = Drafter(self._context.robot, self._wanted)
 
     def step(self) -> None:
-        """Show what is new."""
+        """Show what is new.
+
+        Raises:
+            ExtraMissing: the viewer was closed, or the file cannot be written any more.
+        """
         now_ns = self._clock.now_ns()
         offset_ns = self._wall_ns() - now_ns
         batch = self._collector.batch(now_ns, self._following.fresh())
@@ -57,6 +61,7 @@ class RerunNode:
             self._still_due_ns = now_ns + _STILL_EVERY_NS
             for message in self._drafter.still(now_ns, offset_ns):
                 self._showing.add(message.channel, message.stamp_ns + offset_ns, message.text)
+            self._showing.flush()
 
     def stop(self) -> None:
         """Let the topics go."""

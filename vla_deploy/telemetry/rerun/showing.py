@@ -31,6 +31,14 @@ class Stream(Protocol):
         """Take one entity."""
         ...
 
+    def flush(self) -> None:
+        """Wait until everything is where it belongs.
+
+        Raises:
+            ExtraMissing: it cannot be.
+        """
+        ...
+
 
 class Showing:
     """Show the messages of one file or of one run.
@@ -54,6 +62,14 @@ class Showing:
                 self._log(entity)
         except ODD as error:
             self.leave_out(channel, error)
+
+    def flush(self) -> None:
+        """Wait until everything that was added is where it belongs.
+
+        Raises:
+            ExtraMissing: it cannot be, as with a viewer that was closed.
+        """
+        self._stream.flush()
 
     def leave_out(self, what: str, error: Exception) -> None:
         """Count something that cannot be shown; the first of its kind is told."""

@@ -116,6 +116,7 @@ class Taken:
 
     def __init__(self) -> None:
         self.entities: list[tuple[int, int | None, Entity]] = []
+        self.flushed = 0
         self._moment: tuple[int, int | None] = (0, None)
 
     def at(self, stamp_ns: int, tick: int | None) -> None:
@@ -123,6 +124,9 @@ class Taken:
 
     def log(self, entity: Entity) -> None:
         self.entities.append((*self._moment, entity))
+
+    def flush(self) -> None:
+        self.flushed = len(self.entities)
 
     @property
     def counts(self) -> Counter[str]:

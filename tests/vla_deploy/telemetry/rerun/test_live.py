@@ -36,6 +36,7 @@ def test_a_run_is_shown_as_it_goes_on(run: Any, taken: Any) -> None:
     assert showing.shown["world/map"] == 1
     stamps = [stamp_ns for stamp_ns, _, one in taken.entities if one.path == "plots/pose/x_m"]
     assert stamps[-1] == run.clock.wall_ns()
+    assert len(taken.entities) / 2 < taken.flushed < len(taken.entities)
 
 
 def test_only_what_is_wanted_is_shown(run: Any, taken: Any) -> None:
