@@ -52,6 +52,24 @@ class LiveProtocol(BoundedWebSocket):
         else:
             await super().send(message)
 
+    async def receive(self) -> Any:
+        """Return the next event, which lets more of them come."""
+        event = await super().receive()
+        if not self.writable.is_set():
+            self.transport.pause_reading()
+        return event
+
+    def pause_writing(self) -> None:
+        """Hear nothing from a client that takes nothing: it would be owed a pong for each ping."""
+        super().pause_writing()
+        self.transport.pause_reading()
+
+    def resume_writing(self) -> None:
+        """Hear the client again, unless an event of it still waits."""
+        super().resume_writing()
+        if not self.read_paused:
+            self.transport.resume_reading()
+
     def connection_lost(self, exc: Exception | None) -> None:
         """Tell a connection that was lost from one that was closed: uvicorn calls both 1005."""
         if self.handshake_complete and self.conn.close_rcvd is None:

@@ -1,6 +1,7 @@
 """What uvicorn itself lets through, over real sockets."""
 
 import contextlib
+import select
 import socket
 import threading
 import time
@@ -20,6 +21,7 @@ from vla_deploy.dashboard.serving import Door, serve
 
 FAR = peer_at("192.168.1.7")
 HEAD_WITHIN_S = 0.3
+FAR_TOO_MUCH = 40 * 2**20  # what the kernel keeps for both ends is less
 
 
 class Idle:
@@ -223,3 +225,18 @@ def test_addresses_of_one_home_count_together():
         True, True, False
     ]  # fmt: skip
     assert bounds.enter(peer_at("2001:db8:0:1::1"))
+
+
+def test_a_client_that_pings_without_end_and_reads_nothing_is_not_heard_without_end(robot):
+    ping = b"\x89\xfd" + bytes(4) + b"x" * 125
+    with robot.call() as called:
+        called.sendall(
+            b"GET /api/v1/echo HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\n"
+            b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+            b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        )
+        assert called.recv(65536).startswith(b"HTTP/1.1 101")
+        taken = 0
+        while select.select([], [called], [], 0.5)[1] and taken < FAR_TOO_MUCH:
+            taken += called.send(500 * ping)
+        assert taken < FAR_TOO_MUCH
