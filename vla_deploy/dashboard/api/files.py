@@ -1,5 +1,6 @@
 """List and hand out what the flight recorder has saved; names lead to nothing else."""
 
+import contextlib
 from collections.abc import Iterable
 from http import HTTPStatus
 from pathlib import Path
@@ -20,7 +21,7 @@ MCAP: Final = "application/octet-stream"
 @router.get("/flights")
 def flights(request: Request) -> list[dict[str, Any]]:
     """Return the saved flights, the newest first."""
-    return [described(path) for path in reversed(_flights(request))]
+    return described(reversed(_flights(request)))
 
 
 @router.get("/flights/{name}", response_class=FileResponse)
@@ -29,10 +30,18 @@ def flight(name: str, request: Request) -> FileResponse:
     return handed_out(name, _flights(request), "see GET /api/v1/flights")
 
 
-def described(path: Path) -> dict[str, Any]:
-    """Return what a list says of a file; `saved_s` is in Unix seconds."""
-    found = path.stat()
-    return {"name": path.name, "bytes": found.st_size, "saved_s": round(found.st_mtime, 3)}
+def described(paths: Iterable[Path]) -> list[dict[str, Any]]:
+    """Return what a list says of files; `saved_s` is in Unix seconds.
+
+    One that has made room for a newer one meanwhile is left out.
+    """
+    told = []
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError):
+            found = path.stat()
+            saved_s = round(found.st_mtime, 3)
+            told.append({"name": path.name, "bytes": found.st_size, "saved_s": saved_s})
+    return told
 
 
 def handed_out(name: str, known: Iterable[Path], where: str) -> FileResponse:

@@ -43,7 +43,7 @@ class Asked(BaseModel):
 @router.get("/recordings", dependencies=[_Viewer])
 def recordings(request: Request) -> list[dict[str, Any]]:
     """Return the finished recordings, the newest first."""
-    return [described(path) for path in reversed(_folder(request).files())]
+    return described(reversed(_folder(request).files()))
 
 
 @router.get("/recordings/status", dependencies=[_Viewer])

@@ -26,6 +26,13 @@ def test_a_flight_is_listed_and_comes_whole(dashboard, folder):
     assert answer.headers["content-disposition"] == f'attachment; filename="{NAME}"'
 
 
+def test_a_flight_that_goes_while_it_is_listed_is_left_out(dashboard, folder):
+    (folder / "000010-gone.mcap").symlink_to(folder / "nothing")
+    names = [one["name"] for one in dashboard.get("flights")]
+    assert NAME in names
+    assert "000010-gone.mcap" not in names
+
+
 @pytest.mark.parametrize(
     "name",
     [
