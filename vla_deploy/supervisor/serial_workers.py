@@ -7,7 +7,7 @@ reader's own priority is. `vla-deploy bench serial` measures it.
 
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +15,7 @@ from drivers.clock import NS_PER_S, Clock
 
 PRIORITY: Final = 1  # above every ordinary process, below everything else of real time
 UNBOUND_WORKER: Final = "kworker/u"  # Documentation/core-api/workqueue.rst: kworker/u<pool>:<id>
+_NOT_YET_NAMED: Final = "kthreadd"  # whose child it is, for a moment
 _PERIOD_NS: Final = NS_PER_S
 _PROC: Final = Path("/proc")
 _log = logging.getLogger(__name__)
@@ -23,37 +24,52 @@ _log = logging.getLogger(__name__)
 class SerialWorkers:
     """Keep the kernel's unbound workers above ordinary processes; closing lets them sink again.
 
-    The kernel makes and ends them as it needs them, so it is looked again every second.
+    The kernel makes and ends them as it needs them: whenever something new has begun to run, by the
+    newest pid that it tells, and at least once a second, it is looked again.
     """
 
     def __init__(self, clock: Clock, proc: Path = _PROC) -> None:
         self._clock = clock
         self._proc = proc
-        self._due_ns: int | None = None
+        self._due_ns = 0
+        self._newest = ""
         self._known: frozenset[int] = frozenset()
         self._raised: set[int] = set()
         self._refused = False
 
     def step(self, *, wanted: bool) -> None:
-        """Raise those that are new, at most once a second; not `wanted` lets all sink again."""
+        """Raise those that are new; not `wanted` lets all sink again."""
         if not wanted:
             self.close()
-            return
-        now_ns = self._clock.now_ns()
-        if self._refused or (self._due_ns is not None and now_ns < self._due_ns):
-            return
-        self._due_ns = now_ns + _PERIOD_NS
+        elif not self._refused and self._is_due():
+            self._look()
+
+    def _is_due(self) -> bool:
+        newest, now_ns = self._newest_pid(), self._clock.now_ns()
+        if newest == self._newest and now_ns < self._due_ns:
+            return False
+        self._newest, self._due_ns = newest, now_ns + _PERIOD_NS
+        return True
+
+    def _newest_pid(self) -> str:
+        """Return what proc_loadavg(5) tells last: the pid most recently made, of a thread also."""
+        return (self._proc / "loadavg").read_text().rpartition(" ")[2]
+
+    def _look(self) -> None:
         pids = frozenset(int(path.name) for path in self._proc.iterdir() if path.name.isdecimal())
-        for pid in unbound_workers(sorted(pids - self._known), self._proc):
-            self._raise(pid)
-        self._known = pids
+        names = dict(_names(sorted(pids - self._known), self._proc))
+        for pid, name in names.items():
+            if name.startswith(UNBOUND_WORKER):
+                self._raise(pid)
+        self._known = pids - {pid for pid, name in names.items() if name == _NOT_YET_NAMED}
 
     def close(self) -> None:
         """Give every worker that was raised its ordinary priority back."""
-        for pid in self._raised & set(unbound_workers(sorted(self._raised), self._proc)):
-            _schedule(pid, os.SCHED_OTHER, 0)
+        for pid, name in _names(sorted(self._raised), self._proc):
+            if name.startswith(UNBOUND_WORKER):
+                _schedule(pid, os.SCHED_OTHER, 0)
         self._raised.clear()
-        self._known, self._due_ns = frozenset(), None
+        self._known, self._due_ns = frozenset(), 0
 
     def _raise(self, pid: int) -> None:
         try:
@@ -70,15 +86,12 @@ class SerialWorkers:
             )
 
 
-def unbound_workers(pids: list[int], proc: Path = _PROC) -> Iterator[int]:
-    """Give those of some processes that are workers of the kernel bound to no processor."""
+def _names(pids: Iterable[int], proc: Path) -> Iterator[tuple[int, str]]:
     for pid in pids:
         try:
-            name = (proc / str(pid) / "comm").read_text()
+            yield pid, (proc / str(pid) / "comm").read_text().strip()
         except OSError:
             continue  # it has ended, or is hidden
-        if name.startswith(UNBOUND_WORKER):
-            yield pid
 
 
 def _schedule(pid: int, policy: int, priority: int) -> bool:

@@ -34,6 +34,7 @@ class Computer:
         self.proc = proc
         self.clock = StepClock()
         self.started: list[subprocess.Popen[bytes]] = []
+        (proc / "loadavg").write_text("0.15 0.10 0.04 1/180 2\n")
         self.workers = SerialWorkers(self.clock, proc)
 
     def begin(self, name: str) -> int:
@@ -41,8 +42,14 @@ class Computer:
         process = subprocess.Popen(command)
         self.started.append(process)
         (self.proc / str(process.pid)).mkdir()
-        (self.proc / str(process.pid) / "comm").write_text(f"{name}\n")
+        self.name(process.pid, name)
         return process.pid
+
+    def name(self, pid: int, name: str) -> None:
+        (self.proc / str(pid) / "comm").write_text(f"{name}\n")
+
+    def tell_newest(self, pid: int) -> None:
+        (self.proc / "loadavg").write_text(f"0.15 0.10 0.04 1/180 {pid}\n")
 
     def look(self, *, wanted: bool = True, after_s: float = 1.0) -> None:
         self.clock.time_ns += round(after_s * NS_PER_S)
@@ -80,6 +87,18 @@ def test_one_that_the_kernel_makes_later_is_raised_within_a_second(computer: Com
     computer.look(after_s=0.5)
     assert scheduling(worker) == ORDINARY
     computer.look(after_s=0.5)
+    assert scheduling(worker) == RAISED
+
+
+def test_one_that_the_kernel_tells_of_is_raised_at_once(computer: Computer) -> None:
+    computer.look()
+    worker = computer.begin("kthreadd")
+    computer.tell_newest(worker)
+    computer.look(after_s=0.05)
+    assert scheduling(worker) == ORDINARY
+    computer.name(worker, "kworker/u8:4-events_unbound")
+    computer.tell_newest(worker + 1)
+    computer.look(after_s=0.05)
     assert scheduling(worker) == RAISED
 
 
