@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.computer import HELD_UP_S, StillnessWatch
+
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -15,6 +17,37 @@ settings.load_profile("any machine")
 
 # Whichever test loads onnxruntime first: it phones home otherwise.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+
+WATCH = pytest.StashKey[StillnessWatch]()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Try a failed test of the wall clock again, if the computer stood still during it."""
+
+    def stood_still() -> bool:
+        held_up_s = config.stash[WATCH].worst_s()
+        void = held_up_s > HELD_UP_S
+        if void:
+            print(f"void: this computer stood still for {held_up_s:.3f} s; again")
+        return void
+
+    on_the_wall_clock = [item for item in items if item.get_closest_marker("stack")]
+    for item in on_the_wall_clock:
+        item.add_marker(pytest.mark.flaky(reruns=2, condition=stood_still))
+    if on_the_wall_clock and WATCH not in config.stash:
+        config.stash[WATCH] = StillnessWatch()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if WATCH in item.config.stash:
+        item.config.stash[WATCH].worst_s()
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if WATCH in config.stash:
+        config.stash[WATCH].close()
+
 
 TREES = Path(__file__).parent / "platforms" / "trees"
 
