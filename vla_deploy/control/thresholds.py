@@ -70,7 +70,7 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         environment_clearance_m=robot.protection.clearance.floor_m,
         approach_m_s=_APPROACH_M_S,
         tip_margin_ratio=tip_over.min_ratio if tip_over else 0.0,
-        external_torque_nm=_contact_torque(robot),
+        external_torque_nm=contact_torque(robot),
     )
 
 
@@ -89,7 +89,7 @@ def _following_error(robot: RobotDescription) -> Floats:
     )
 
 
-def _contact_torque(robot: RobotDescription) -> Floats:
+def contact_torque(robot: RobotDescription) -> Floats:
     """Return each joint's contact limit; a joint for which none is declared is not judged."""
     contact = robot.protection.contact
     declared = {} if contact is None else contact.torque_nm

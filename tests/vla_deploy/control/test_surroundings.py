@@ -17,6 +17,8 @@ SWING = {"left_shoulder_pitch": 1.5, "left_elbow": 0.6}
 BLOCKING_NM = 50.0
 # Servos without an integral part run over the setpoint that they stop at.
 OVERSHOOT_M = 0.002
+# What half of the contact's torque stretches a servo by, and friction.
+SETTLES_RAD = 0.05
 
 
 def test_an_arm_that_swings_freely_feels_no_contact(armed: Any) -> None:
@@ -35,6 +37,25 @@ def test_an_arm_that_is_blocked_on_its_way_stops_before_its_following_error(arme
     assert armed.state == "stopped"
     assert armed.status["cause"] == "collision"
     assert armed.joint("left_shoulder_pitch") < 1.4
+
+
+def test_an_arm_that_a_contact_stopped_presses_no_more_and_is_reset(armed: Any) -> None:
+    armed.go(1, **SWING)
+    assert armed.lockstep.run_until(lambda: armed.joint("left_shoulder_pitch") > 0.7, 3.0)
+    model = armed.lockstep.twin.engine.model
+    blocked = model.joint("left_shoulder_pitch").dofadr[0]
+    freely_nm = model.dof_frictionloss[blocked]
+    model.dof_frictionloss[blocked] = BLOCKING_NM
+    armed.run(1.0)
+    assert armed.status["cause"] == "collision"
+    armed.run(0.5)
+    freed_from = armed.joint("left_shoulder_pitch")
+    assert abs(armed.joint("left_shoulder_pitch", "setpoint") - freed_from) < SETTLES_RAD
+    armed.ask("reset", "arm")
+    assert armed.state == "armed", armed.status["detail"]
+    model.dof_frictionloss[blocked] = freely_nm
+    armed.run(1.0)
+    assert armed.joint("left_shoulder_pitch") == pytest.approx(freed_from, abs=SETTLES_RAD)
 
 
 def test_an_arm_on_its_way_into_the_body_is_stopped_where_they_touch_at_most(armed: Any) -> None:
