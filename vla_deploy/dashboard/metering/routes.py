@@ -1,11 +1,14 @@
 """Give metrics to scrapers, their history to pages, and the reason for what is missing."""
 
+import asyncio
+import json
+from collections.abc import AsyncIterator
 from http import HTTPStatus
 from typing import Annotated, Any, Final
 
 import numpy as np
 from fastapi import APIRouter, Depends, Query, Request
-from fastapi.responses import Response
+from fastapi.responses import Response, StreamingResponse
 from numpy.typing import NDArray
 
 from vla_deploy.dashboard.access import Role, require
@@ -81,7 +84,7 @@ async def get_history(
     request: Request,
     series: Annotated[str, Query(max_length=4096, description="names, by commas; a metric: all")],
     span_s: Annotated[float, Query(gt=0, le=_LONGEST_SPAN_S)] = 600.0,
-) -> dict[str, Any]:
+) -> StreamingResponse:
     """Return series over the last `span_s`: mean (`values`), least and most of each step.
 
     Counters come as what they gained per second. `null` is a step in which nothing is known.
@@ -92,14 +95,23 @@ async def get_history(
     trends = store.read(names, level_for(span_s), wall_s, span_s)
     missing = request.app.state.metering.readings().missing
     asked = {name.partition("/")[0] for name in series.split(",")}
-    return {
+    head = {
         "span_s": span_s,
         "step_s": trends.step_s,
         "end_s": wall_s,
         "times_s": _times_s(trends, len(next(iter(trends.series.values())).mean) if names else 0),
-        "series": [_document(name, trends) for name in names],
         "missing": {one.metric: one.text for one in missing if one.metric in asked},
     }
+    return StreamingResponse(_told(head, names, trends), media_type="application/json")
+
+
+async def _told(head: dict[str, Any], names: list[str], trends: Trends) -> AsyncIterator[str]:
+    """Tell series one by one: all their numbers at once would hold everybody else up."""
+    yield json.dumps(head).removesuffix("}") + ', "series": ['
+    for place, name in enumerate(names):
+        yield (", " if place else "") + json.dumps(_document(name, trends))
+        await asyncio.sleep(0)
+    yield "]}"
 
 
 def _store(request: Request) -> TrendStore:

@@ -1,10 +1,13 @@
 """Metrics and their history are asked for over HTTP; what is missing says why."""
 
+import asyncio
 from typing import Any
 
+import httpx
 from prometheus_client.parser import text_string_to_metric_families
 
 BOARD = {"readings": {"power_w": 9.5}, "missing": {"gpu_load_ratio": "missing, because no GPU"}}
+MANY = 40
 
 
 def test_a_scraper_gets_what_the_processes_tell(dashboard: Any) -> None:
@@ -77,3 +80,28 @@ def test_without_a_place_for_it_the_reason_takes_the_history_s_place(dashboard: 
     answer = dashboard.get("history", 503, series="vla_power_watts")
     assert answer["error"]["what"] == "/var/log: no space left"
     assert dashboard.client.get("/metrics").status_code == 200
+
+
+def test_a_long_history_lets_others_have_their_turns(dashboard: Any) -> None:
+    rows = [
+        {"name": f"p{n}", "memory_mb": 1.0, "state": "ready", "restarts": 0, "alarms": []}
+        for n in range(MANY)
+    ]
+    head = {"robot": "butler", "profile": "desktop", "twin": True, "refusal": ""}
+    dashboard.robot.shows("process_table", **head, processes=rows)
+    dashboard.app.state.metering.step()
+    told, turns = asyncio.run(asked_beside_others(dashboard.app, "vla_process_memory_bytes"))
+    assert len(told["series"]) == MANY
+    assert turns > MANY
+
+
+async def asked_beside_others(app: Any, series: str) -> tuple[Any, int]:
+    """Return a metric's history, and how often another task had its turn meanwhile."""
+    transport = httpx.ASGITransport(app, client=("127.0.0.1", 50_000))
+    async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:8088") as client:
+        asking = asyncio.create_task(client.get("/api/v1/history", params={"series": series}))
+        turns = 0
+        while not asking.done():
+            turns += 1
+            await asyncio.sleep(0)
+        return asking.result().json(), turns
