@@ -31,17 +31,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             print(f"void: this computer stood still for {held_up_s:.3f} s; again")
         return void
 
-    on_the_wall_clock = [item for item in items if item.get_closest_marker("stack")]
-    for item in on_the_wall_clock:
-        item.add_marker(pytest.mark.flaky(reruns=2, condition=stood_still))
-    if on_the_wall_clock and WATCH not in config.stash:
-        config.stash[WATCH] = StillnessWatch()
+    for item in items:
+        if item.get_closest_marker("stack"):
+            item.add_marker(pytest.mark.flaky(reruns=2, condition=stood_still))
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    if WATCH in item.config.stash:
-        item.config.stash[WATCH].worst_s()
+    if not item.get_closest_marker("stack"):
+        return
+    if WATCH not in item.config.stash:
+        item.config.stash[WATCH] = StillnessWatch()
+    item.config.stash[WATCH].worst_s()
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
