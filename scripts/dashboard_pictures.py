@@ -23,9 +23,13 @@ SIZES: Final = {
 THEMES: Final = {"phone": "light", "desktop": "dark"}
 MOST_BYTES: Final = 200_000
 SCALES: Final = (1.0, 0.85, 0.7, 0.6, 0.5)
-COMMAND: Final = "put the red cup into the box"
+COMMANDS: Final = {
+    "phone": "put the red cup into the box",
+    "desktop": "pick up the blue ball and put it on the coffee table",
+}
 CHROMIUM: Final = "/usr/bin/chromium"
 READY_S: Final = 120.0
+WORK_S: Final = 300.0
 PATIENCE_MS: Final = 180_000  # without a graphics card the robot in 3-D is drawn slowly
 SETTLED_MS: Final = 6_000
 _log = logging.getLogger(__name__)
@@ -51,24 +55,32 @@ def main() -> None:
                 raise StackFailed(
                     "the dashboard does not tell its address: vla-deploy logs dashboard"
                 )
-            url = str(stack.document("dashboard_status")["url"])
             browser = playwright.chromium.launch(
                 executable_path=arguments.browser, args=["--no-sandbox"]
             )
-            take_all(browser, url, arguments.out, arguments.views)
+            take_all(stack, browser, arguments.out, arguments.views)
             browser.close()
         finally:
             stack.close()
 
 
-def take_all(browser: Browser, url: str, out: Path, views: tuple[str, ...]) -> None:
-    """Give the command, and write a picture of each view at each size."""
+def take_all(stack: ProcessStack, browser: Browser, out: Path, views: tuple[str, ...]) -> None:
+    """Give a command, and write a picture of each view, at each size.
+
+    Raises:
+        StackFailed: the robot does not come to the end of its command.
+    """
+    url = stack.document("dashboard_status")["url"]
     for device, size in SIZES.items():
+        if not stack.wait_until(
+            lambda: stack.document("executor_status")["state"] == "idle", WORK_S
+        ):
+            raise StackFailed(f"the robot still works after {WORK_S:g} s: vla-deploy status")
         dark = THEMES[device] == "dark"
         context = browser.new_context(viewport=size, color_scheme="dark" if dark else "light")
         page = context.new_page()
         page.goto(f"{url}/#/command")
-        page.get_by_label("Command in words").fill(COMMAND)
+        page.get_by_label("Command in words").fill(COMMANDS[device])
         page.get_by_label("Command in words").press("Enter")
         for view in views:
             write(take(page, view), out / f"{view}-{device}.png")
