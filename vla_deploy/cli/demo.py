@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.action_words import action_words
 from vla_deploy.cli.aloud import USUAL_VOICE
 from vla_deploy.cli.demo_sound import MotionWatch, SpokenCommand, await_ears
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_top_command
-from vla_deploy.cli.narrate import action_words, line_of
+from vla_deploy.cli.narrate import line_of
 from vla_deploy.cli.referee import SteppingClock, ask_referee
 from vla_deploy.cli.run import add_robot_arguments
 from vla_deploy.cli.session import Session
@@ -154,7 +155,9 @@ class Demo:
             if line:
                 self._tell(line)
             if event["event"] == "action" and event["status"] == "active":
-                self._film_op(session, "caption", text=action_words(event))
+                self._film_op(
+                    session, "caption", text=action_words(event["skill"], event["parameters"])
+                )
 
     def _judge(self, session: Session) -> dict[str, Any]:
         """Ask the referee where the plan's object ended, when it was to end in a box."""

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from vla_deploy.action_words import action_words
+
 SIGNS: Mapping[str, str] = {
     "active": "…",
     "succeeded": "✓",
@@ -37,22 +39,15 @@ def line_of(event: Mapping[str, Any]) -> str | None:
 
 
 def _plan_line(event: Mapping[str, Any]) -> str:
-    steps = "; ".join(action_words(action) for action in event["plan"]["actions"])
+    actions = event["plan"]["actions"]
+    steps = "; ".join(action_words(one["skill"], one["parameters"]) for one in actions)
     rung = event.get("rung", "")
     return f"plan: {steps}" + (f"  (by {rung})" if rung not in ("", "rules", "given") else "")
 
 
-def action_words(action: Mapping[str, Any]) -> str:
-    """Return an action in words: "pick up red cup"."""
-    values = [
-        f"{value:g}" if isinstance(value, float) else str(value)
-        for value in action["parameters"].values()
-    ]
-    return " ".join([action["skill"].replace("_", " "), *values])
-
-
 def _action_line(event: Mapping[str, Any]) -> str:
-    line = f"{SIGNS.get(event['status'], event['status'])} {action_words(event)}"
+    words = action_words(event["skill"], event["parameters"])
+    line = f"{SIGNS.get(event['status'], event['status'])} {words}"
     if event["status"] != "active":
         line += f"  ({event['execution_time_s']:.1f} s)"
     told = event["error"] or event.get("note")

@@ -9,9 +9,9 @@ from typing import Any, Final
 
 from drivers.clock import MonotonicClock
 from platforms import load_profile
+from vla_deploy.action_words import action_words
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
-from vla_deploy.cli.narrate import action_words
 from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.planning.asking import Request
@@ -87,7 +87,10 @@ def as_text(answer: Answer) -> str:
     """Return an answer as lines for a person."""
     lines = [_attempt_line(one) for one in answer.attempts]
     if answer.plan is not None:
-        lines += [f"  {one.id:<14} {action_words(one.model_dump())}" for one in answer.plan.actions]
+        lines += [
+            f"  {one.id:<14} {action_words(one.skill, one.parameters)}"
+            for one in answer.plan.actions
+        ]
     if answer.proposal is not None and answer.proposal.read_back:
         lines.append(f"robot would ask: {answer.proposal.read_back}")
     if isinstance(answer.error, Ambiguous):

@@ -1,6 +1,7 @@
 import pytest
 
-from vla_deploy.cli.narrate import action_words, line_of
+from vla_deploy.action_words import action_words
+from vla_deploy.cli.narrate import line_of
 
 PICK = {"skill": "pick_up", "parameters": {"object": "red cup"}}
 
@@ -46,4 +47,9 @@ def test_every_event_is_told_in_one_line_or_not_at_all(event, line):
 
 
 def test_numbers_of_an_action_are_told_short():
-    assert action_words({"skill": "turn", "parameters": {"angle_rad": 1.5707963}}) == "turn 1.5708"
+    assert action_words("turn", {"angle_rad": 1.5707963}) == "turn 1.5708"
+
+
+def test_a_relation_goes_before_what_it_relates_to():
+    placed = {"object": "cup", "destination": "box", "relation": "in"}
+    assert action_words("place", placed) == "place cup in box"

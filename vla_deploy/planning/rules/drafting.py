@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from vla_deploy.action_words import action_words
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.planning.plan import Action, Plan
@@ -234,8 +235,5 @@ def _chain(steps: Sequence[tuple[Step, Intent]]) -> tuple[Action, ...]:
 def _summary(steps: Sequence[tuple[Step, Intent]]) -> str:
     """Return the intents and the steps in words."""
     intents = ", ".join(dict.fromkeys(intent.value for _, intent in steps))
-    said = ", ".join(
-        " ".join([skill.replace("_", " "), *(str(value) for value in parameters.values())])
-        for (skill, parameters), _ in steps
-    )
+    said = ", ".join(action_words(skill, parameters) for (skill, parameters), _ in steps)
     return f"{intents}: {said}"

@@ -14,9 +14,11 @@ const STATUSES = {
   lost: "lost",
 };
 
-/** Return an action in words: "pick up red cup". */
+/** Return an action in words: "pick up red cup", "place in box". */
 export function actionWords({ skill, parameters }) {
-  return [words(skill), ...Object.values(parameters ?? {}).map(valueWords)].join(" ");
+  const { destination, ...others } = parameters ?? {};
+  const values = destination === undefined ? others : { ...others, destination };
+  return [words(skill), ...Object.values(values).map(valueWords)].join(" ");
 }
 
 /** Return what an action's status means. */

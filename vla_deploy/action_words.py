@@ -1,0 +1,13 @@
+"""Say a plan's action in a few words, as terminal and plan summaries do."""
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def action_words(skill: str, parameters: Mapping[str, Any]) -> str:
+    """Return an action in words: "pick up red cup", "place in box"."""
+    values = dict(parameters)
+    if "relation" in values and "destination" in values:
+        values["destination"] = values.pop("destination")  # "in" goes before "box"
+    told = (f"{value:g}" if isinstance(value, float) else str(value) for value in values.values())
+    return " ".join([skill.replace("_", " "), *told])
