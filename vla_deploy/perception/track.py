@@ -161,9 +161,11 @@ def absorb(track: Track, sighting: Sighting, stamp_ns: int, *, was_moved: bool) 
     else:
         looks = DOUBTFUL_LOOKS if sighting.is_doubtful else 1.0
         track.estimate = corrected(track.estimate, sighting.seen, looks)
-    track.size_m = _blend(track.size_m, detection.size_m, gain)
-    track.yaw_rad = half_turn(track.yaw_rad + gain * half_turn(detection.yaw_rad - track.yaw_rad))
     if detection.class_name == track.class_name:
+        # What is taken for another kind was cut out of the image in another way.
+        track.size_m = _blend(track.size_m, detection.size_m, gain)
+        turn_rad = half_turn(detection.yaw_rad - track.yaw_rad)
+        track.yaw_rad = half_turn(track.yaw_rad + gain * turn_rad)
         track.confidence += gain * (detection.confidence - track.confidence)
 
 

@@ -228,6 +228,20 @@ def test_a_half_hidden_second_sight_of_a_box_is_no_second_box() -> None:
     assert [one["id"] for one in boxes] == ["box_1"]
 
 
+def test_half_hidden_sights_of_its_box_make_a_cup_neither_larger_nor_move_it() -> None:
+    watcher = Watcher()
+    cup, box = seen(), seen("box", "orange", size_m=(0.24, 0.24, 0.13))
+    watcher.image(cup, box)
+    watcher.image(cup, box)
+    wall = seen("box", "orange", at=(1.03, 2.0, 0.5), size_m=(0.23, 0.15, 0.126), occluded=True)
+    shard = seen("object", "orange", at=(1.02, 2.0, 0.5), size_m=(0.16, 0.08, 0.1), truncated=True)
+    for _ in range(30):
+        objects = watcher.image(box, wall, shard, view=HIDDEN)
+    kept = {one["id"]: one for one in objects}
+    assert kept["cup_1"]["size_m"] == [0.066, 0.066, 0.095]
+    assert kept["cup_1"]["position_m"][0] < 1.01
+
+
 def test_crossing_sights_of_two_alike_things_are_shared_out_as_a_whole() -> None:
     """The nearest pair alone would leave the second thing without its sight."""
     watcher = Watcher()
