@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests.computer import HELD_UP_S, StillnessWatch
+from sim_twin.stillness import HELD_UP_S, StillnessWatch
 
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile(

@@ -18,6 +18,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.machine import Machine
 from sim_twin.campaigns.report import Case, Report, told
 from sim_twin.campaigns.robot_service import NotReady, RobotService
+from sim_twin.stillness import HELD_UP_S, StillnessWatch
 from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
 
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
@@ -32,7 +33,6 @@ _REST_FOR_S: Final = 0.3
 _POLL_S: Final = 0.02
 _SETTLE_S: Final = 1.0
 _TRIES: Final = 3
-_HELD_UP_S: Final = 0.02
 """With no answer for so much longer, control may rightly take the bus for lost."""
 
 
@@ -129,14 +129,17 @@ class KillCampaign:
         self._clock = MonotonicClock()
         self._mover = ""
         self._machine = Machine(folder / "machine", self._clock, robot=robot, seed=seed)
+        self._stillness = StillnessWatch()
         try:
             self._robot = RobotService(folder / "run", self._machine.devices_dir, self._clock)
         except BaseException:
+            self._stillness.close()
             self._machine.close()
             raise
 
     def inject(self, injection: Injection) -> Case:
         """Do one and judge it."""
+        self._stillness.worst_s()
         self._robot.make_ready()
         job = self._robot.begin("say", injection.command)
         self._clock.sleep_until(self._clock.now_ns() + round(injection.after_s * NS_PER_S))
@@ -161,14 +164,15 @@ class KillCampaign:
         )
 
     def held_up_s(self) -> float:
-        """Return for how long the last injection's devices stood still, as real ones never do."""
-        return self._machine.held_up_s()
+        """Return for how long a core or the devices stood still, as those of a robot never do."""
+        return max(self._machine.held_up_s(), self._stillness.worst_s())
 
     def close(self) -> None:
         """End the robot, then its machine."""
         try:
             self._robot.close()
         finally:
+            self._stillness.close()
             self._machine.close()
 
     def _follow(self, began_ns: int, rule: Rule, process: str, pid: int) -> tuple[float, float]:
@@ -222,16 +226,16 @@ def inject_all(chosen: Sequence[Injection], seed: int, tell: Callable[[str], Non
 
 
 def _tried(campaign: KillCampaign, injection: Injection, tell: Callable[[str], None]) -> Case:
-    """Do an injection, again where the devices themselves stood still: real ones never do."""
+    """Do an injection, again where the computer itself stood still: a robot's own never does."""
     for left in reversed(range(_TRIES)):
         try:
             case = campaign.inject(injection)
         except NotReady as error:
             case = Case(name=injection.name, failures=(str(error),))
         held_up_s = campaign.held_up_s()
-        if not case.failures or held_up_s < _HELD_UP_S or not left:
+        if not case.failures or held_up_s < HELD_UP_S or not left:
             break
-        tell(f"{case.row}\n  void: this computer held the devices up for {held_up_s:.3f} s; again")
+        tell(f"{case.row}\n  void: this computer stood still for {held_up_s:.3f} s; again")
     return case
 
 

@@ -14,8 +14,8 @@ from typing import Final
 # Above the serial workers and control; below the kernel's own watchdogs at 99.
 PRIORITY: Final = 90
 STEP_NS: Final = 2_000_000
-# As in the campaign of kills: two periods of the control loop.
 HELD_UP_S: Final = 0.02
+"""What a robot need not stand: servos that are silent for 0.05 s count as lost."""
 
 
 class StillnessWatch:
@@ -25,7 +25,7 @@ class StillnessWatch:
         """Start to watch; where the kernel grants no real-time priority, nothing is ever told."""
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(
-            [sys.executable, __file__], stdin=pipe, stdout=pipe, text=True
+            [sys.executable, "-m", "sim_twin.stillness"], stdin=pipe, stdout=pipe, text=True
         )
 
     def worst_s(self) -> float:
@@ -60,7 +60,8 @@ def _main() -> None:
     for core in os.sched_getaffinity(0):
         threading.Thread(target=_watch, args=(core, worst_ns), daemon=True).start()
     for _ in sys.stdin:
-        print(max(worst_ns.values(), default=0) / 1e9, flush=True)
+        sys.stdout.write(f"{max(worst_ns.values(), default=0) / 1e9}\n")
+        sys.stdout.flush()
         worst_ns.clear()
 
 
