@@ -13,7 +13,7 @@ from typing import Final
 
 # Above the serial workers and control; below the kernel's own watchdogs at 99.
 PRIORITY: Final = 90
-STEP_NS: Final = 2_000_000
+STEP_NS: Final = 4_000_000
 HELD_UP_S: Final = 0.02
 """What a robot need not stand: servos that are silent for 0.05 s count as lost."""
 
