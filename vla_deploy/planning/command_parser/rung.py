@@ -27,6 +27,7 @@ from vla_deploy.planning.command_parser.planning import Steps
 from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
+    asks_about_speaker,
     foreign_share,
     plain_words,
 )
@@ -87,6 +88,9 @@ class CommandParser:
         actions = Steps(parsed.words, request).actions(parsed.steps)
         if confidence < self._weights.decline_below:
             raise Declined(f"I am not sure of it ({confidence:.2f})")
+        if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
+            # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.
+            raise Declined("it asks about the one who speaks")
         asked = question(parsed.steps)
         plan = Plan(
             goal=request.text.strip(),

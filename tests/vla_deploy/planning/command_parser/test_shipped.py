@@ -71,6 +71,13 @@ def test_plain_commands_are_read(
     assert list(parser.parse(text, soon()).steps) == steps
 
 
+def test_a_question_about_the_speaker_is_a_command_only_for_a_thing(parser: CommandParser) -> None:
+    with pytest.raises(Declined, match="the one who speaks"):
+        parser.propose(request("Can I stay up a bit longer, please?"), soon())
+    handed = parser.propose(request("Can I have the red cup, please?"), soon())
+    assert "pick_up" in [one.skill for one in handed.plan.actions]
+
+
 def test_a_plan_of_it_passes_grounding_and_validation(parser: CommandParser) -> None:
     asked = request("I'd like you to head over to the kitchen")
     proposal = parser.propose(asked, soon())
