@@ -16,6 +16,7 @@ LIMITS_FILE: Final = "/etc/security/limits.d/90-vla-deploy.conf"
 MEMORY_LOCK_BYTES: Final = 512 << 20
 WAKE_UP_TEST_S: Final = 1.0
 LATE_RATIO: Final = 0.2  # of the period: a tick this late counts as late
+FAIR_SERVER: Final = "/sys/kernel/debug/sched/fair_server"
 _QUANTILE: Final = 0.99
 _SWITCH: Final = "CONFIG_RT_GROUP_SCHED=y"
 
@@ -79,6 +80,22 @@ def realtime_share(context: Context) -> Iterator[Finding]:
         yield fail("real-time share", "0 %: no real-time process may run", remedy)
     else:
         yield ok("real-time share", f"{100 * runtime_us / period_us:.0f} % of each period")
+
+
+def fair_server(context: Context) -> Iterator[Finding]:
+    """Check how long ordinary processes may take a core from real-time ones at a stretch.
+
+    Linux 6.12 and newer has a server of `runtime` ns in every `period` for them, which goes before
+    SCHED_FIFO (Documentation/scheduler/sched-deadline.rst).
+    """
+    cores = context.tree.names(FAIR_SERVER) or ("cpu0",)
+    runtimes_ns = [context.tree.number(f"{FAIR_SERVER}/{core}/runtime") for core in cores]
+    longest_ms = max(runtimes_ns) / 1e6
+    if longest_ms <= 0.0 or not _wanted(context):
+        yield ok("fair server", f"{longest_ms:.0f} ms")
+        return
+    measured = f"ordinary processes may take a core from control for {longest_ms:.0f} ms"
+    yield warn("fair server", measured, f"echo 0 | sudo tee {FAIR_SERVER}/cpu*/runtime")
 
 
 def group_scheduling(context: Context) -> Iterator[Finding]:

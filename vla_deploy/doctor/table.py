@@ -48,6 +48,7 @@ CHECKS: tuple[Check, ...] = (
     Check("Real time", "SCHED_FIFO", realtime.fifo, live=True),
     Check("Real time", "serial data", realtime.serial_data, live=True),
     Check("Real time", "real-time share", realtime.realtime_share),
+    Check("Real time", "fair server", realtime.fair_server),
     Check("Real time", "RT_GROUP_SCHED", realtime.group_scheduling),
     Check("Real time", "memory lock", realtime.memory_lock, live=True),
     Check("Real time", "wake-up", realtime.wake_up, live=True),

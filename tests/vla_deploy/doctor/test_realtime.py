@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from platforms.tree import Missing
 from vla_deploy.doctor import Level
 from vla_deploy.doctor import realtime as checks
 from vla_deploy.doctor.context import UNLIMITED
@@ -86,6 +87,21 @@ def test_the_real_time_share_is_told(computer, runtime_us, level, words) -> None
     (finding,) = checks.realtime_share(computer.context())
     assert finding.level is level
     assert words in finding.measured
+
+
+@pytest.mark.parametrize(("runtime_ns", "level"), [("50000000", Level.WARN), ("0", Level.OK)])
+def test_a_fair_server_that_may_hold_control_up_is_told(computer, runtime_ns, level) -> None:
+    for core in ("cpu0", "cpu1"):
+        computer.write(f"{checks.FAIR_SERVER}/{core}/runtime", "0")
+    computer.write(f"{checks.FAIR_SERVER}/cpu1/runtime", runtime_ns)
+    (finding,) = checks.fair_server(computer.context("robot"))
+    assert finding.level is level
+    assert f"{int(runtime_ns) // 1_000_000} ms" in finding.measured
+
+
+def test_a_kernel_that_hides_its_fair_server_is_not_judged(computer) -> None:
+    with pytest.raises(Missing, match="fair_server/cpu0/runtime"):
+        list(checks.fair_server(computer.context("robot")))
 
 
 @pytest.mark.parametrize(
