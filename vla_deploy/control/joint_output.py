@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.control.axes import Flags, Floats, any_of
-from vla_deploy.control.gravity import GravityOffset, stiffness
+from vla_deploy.control.gravity import GravityOffset
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionResult, MotionSet
 from vla_deploy.control.payload import Payload
@@ -16,6 +16,8 @@ from vla_deploy.robots.model import RobotModel
 
 # Of the torque that counts as contact: what a stopped joint may go on pressing with.
 EASED_RATIO: Final = 0.5
+# Of the joint's top speed: slower than what counts as motion while the robot has to stand.
+EASING_RATIO: Final = 0.05
 
 
 class JointOutput:
@@ -29,7 +31,8 @@ class JointOutput:
         self._payload = payload
         self._gate = SetpointGate(robot.position_min, robot.position_max, robot.velocity_max)
         self._gravity = GravityOffset(robot, RobotModel(robot).gravity)
-        self._eased = EASED_RATIO * contact_torque(robot) / stiffness(robot)
+        self._eased_nm = EASED_RATIO * contact_torque(robot)
+        self._easing_rad_s = EASING_RATIO * robot.velocity_max
 
     @property
     def sent(self) -> Floats:
@@ -60,16 +63,19 @@ class JointOutput:
         self.motions.place(begin, joints)
         self._gate.place(begin, joints)
 
-    def ease_off(self) -> None:
-        """Let no joint press hard on what it has met: bring its setpoint near to where it is.
+    def ease_off(self, external_torque_nm: Floats, period_s: float) -> None:
+        """Take back, slowly, setpoints by which joints at rest press hard on what they have met.
 
-        What carries the arm's own weight is added later, and stays.
+        A setpoint goes no further than to where its joint is, and only while the torque that is
+        felt agrees that it presses that way; what carries the arm's own weight is added later.
         """
-        position = self._servos.state.position_rad
-        eased = np.minimum(np.maximum(self.sent, position - self._eased), position + self._eased)
-        pressing = np.isfinite(position) & (eased != self.sent)
-        self.motions.place(eased, pressing)
-        self._gate.place(eased, pressing)
+        error = self.sent - self._servos.state.position_rad
+        presses = (np.abs(external_torque_nm) > self._eased_nm) & (error * external_torque_nm < 0.0)
+        if any_of(presses):
+            step = self._easing_rad_s * period_s
+            eased = self.sent - np.minimum(np.maximum(error, -step), step)
+            self.motions.place(eased, presses)
+            self._gate.place(eased, presses)
 
     def place_all(self) -> None:
         """Let every setpoint begin where its joint is."""

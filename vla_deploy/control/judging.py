@@ -29,6 +29,7 @@ class Judging:
         self.state = SafetyState()
         self.verdict: Verdict = CLEAR
         self.tick = 0
+        self.external_torque_nm: Floats | None = None
         self.watch = Watch(space, servos, wheels, clock)
         self._servos = servos
         self._wheels = wheels
@@ -59,6 +60,7 @@ class Judging:
             wheels.w_rad_s,
             powered=energised and all_of(joints.torque_on),
         )
+        self.external_torque_nm = around.external_torque_nm
         inputs = self.watch.inputs(
             energised=energised,
             estop_source=estop_source,

@@ -30,6 +30,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import NodeContext
 from vla_deploy.power_off import power_off_asked
 from vla_deploy.robots import RobotDescription
+from vla_deploy.safety import Cause
 
 _SHUTDOWN_NS = 3 * NS_PER_S
 _STANDSTILL_MODES = (Mode.STOPPED, Mode.PAUSED)
@@ -106,6 +107,7 @@ class ControlNode:
         self._judge(now_ns)
         self._change_mode()
         self._take_commands()
+        self._ease_off(period_s)
         self._telemetry.tell_results(self._joints.move(period_s))
         self._move_base(period_s)
         self._tell()
@@ -213,6 +215,13 @@ class ControlNode:
         if any_of(jumped):
             self._joints.place(jumped)
             self._telemetry.tell_results(self._motions.stop(self._judging.verdict.text))
+
+    def _ease_off(self, period_s: float) -> None:
+        """Let an arm that a contact has stopped not go on pressing on whoever it has met."""
+        torque_nm = self._judging.external_torque_nm
+        met = self._judging.verdict.cause is Cause.COLLISION
+        if met and torque_nm is not None and self._modes.mode is Mode.STOPPED:
+            self._joints.ease_off(torque_nm, period_s)
 
     def _take_commands(self) -> None:
         verdict, latched = self._judging.verdict, self._judging.state.estop_latched

@@ -62,18 +62,14 @@ class Stopping:
         return ended
 
     def end(self) -> None:
-        """Take the power, at rest, from what a stop of this reaction leaves without.
-
-        What keeps its power does not go on pressing on what it has met.
-        """
-        self._joints.ease_off()
-        self._take_power()
+        """Take the power, at rest, from what a stop of this reaction leaves without."""
+        self._servos.remove_power(self._plan.unpowered_at_rest(self._reaction, self._holding()))
 
     def insist(self) -> None:
         """Take the power again from joints that have not confirmed that they gave it up."""
         powered = self._servos.state.torque_on
         if self._reaction is Reaction.GROUP_STOP and powered[self._plan.released()].any():
-            self._take_power()
+            self.end()
 
     def release(self) -> None:
         """Leave power only to groups whose stop category keeps it, and to hands that hold."""
@@ -91,9 +87,6 @@ class Stopping:
         confirmed = self._servos.remove_power(self._plan.every_joint)
         self._wheels.disable()
         return "" if confirmed else self._servos.failure
-
-    def _take_power(self) -> None:
-        self._servos.remove_power(self._plan.unpowered_at_rest(self._reaction, self._holding()))
 
     def _holding(self) -> frozenset[str]:
         state = self._servos.state

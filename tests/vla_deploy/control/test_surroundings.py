@@ -48,14 +48,26 @@ def test_an_arm_that_a_contact_stopped_presses_no_more_and_is_reset(armed: Any) 
     model.dof_frictionloss[blocked] = BLOCKING_NM
     armed.run(1.0)
     assert armed.status["cause"] == "collision"
-    armed.run(0.5)
+    armed.run(1.5)
     freed_from = armed.joint("left_shoulder_pitch")
     assert abs(armed.joint("left_shoulder_pitch", "setpoint") - freed_from) < SETTLES_RAD
+    assert armed.joint("left_shoulder_pitch", "setpoint") > freed_from  # no further than to there
     armed.ask("reset", "arm")
     assert armed.state == "armed", armed.status["detail"]
     model.dof_frictionloss[blocked] = freely_nm
     armed.run(1.0)
     assert armed.joint("left_shoulder_pitch") == pytest.approx(freed_from, abs=SETTLES_RAD)
+
+
+def test_a_stop_for_another_cause_moves_no_setpoint_back(armed: Any) -> None:
+    armed.go(1, **SWING)
+    armed.run(0.6)
+    armed.lockstep.faults.inject("servo_bus", None, "stuck")
+    armed.run(1.0)
+    assert (armed.state, armed.status["cause"]) == ("stopped", "following_error")
+    before = armed.joint("left_shoulder_pitch", "setpoint")
+    armed.run(1.0)
+    assert armed.joint("left_shoulder_pitch", "setpoint") == before
 
 
 def test_an_arm_on_its_way_into_the_body_is_stopped_where_they_touch_at_most(armed: Any) -> None:
