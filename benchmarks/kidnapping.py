@@ -35,7 +35,7 @@ def kidnap(
     times_s = []
     for _ in range(times):
         hidden = _crowd(random) if crowded else np.zeros(360, dtype=np.bool_)
-        moved.carry_to(_somewhere(planner, random))
+        moved.carry_to(somewhere(planner, random))
         watch = _Watch(moved, localiser, hidden, random)
         watch.look(SEARCH_S, Twist(0.0, 0.0))
         if localiser.state is not PlaceState.TRACKING:
@@ -108,7 +108,8 @@ def _crowd(random: np.random.Generator) -> np.ndarray:
     return hidden
 
 
-def _somewhere(planner: PathPlanner, random: np.random.Generator) -> Pose2D:
+def somewhere(planner: PathPlanner, random: np.random.Generator) -> Pose2D:
+    """Return a random pose in the flat where the robot may stand."""
     while True:
         x_m, y_m = random.uniform(0.0, 8.0), random.uniform(0.0, 6.0)
         if planner.is_free(x_m, y_m):
