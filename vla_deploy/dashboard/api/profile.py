@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from platforms.errors import ProfileError
 from platforms.profile import profile_names
 from platforms.profile_source import flat, read_source
 from vla_deploy.dashboard.access import Role, note, require
@@ -54,7 +55,8 @@ def difference(name: str, request: Request) -> dict[str, Any]:
     """Return per key what is in force and what the named profile says, where they differ.
 
     Raises:
-        Refused: there is no such profile, or nobody tells which one is in force.
+        Refused: there is no such profile, nobody tells which one is in force, or a file of theirs
+            cannot be read, as that of an own profile that was moved meanwhile.
     """
     _check(name)
     told = request.app.state.link.document("profile_status", age_limit_s=3.0)
@@ -65,7 +67,7 @@ def difference(name: str, request: Request) -> dict[str, Any]:
             "the supervisor does not tell which profile is in force",
             "vla-deploy status",
         )
-    mine, its = (dict(flat(read_source(one).values)) for one in (told["profile"], name))
+    mine, its = (_values(one) for one in (told["profile"], name))
     keys = sorted(key for key in mine | its if mine.get(key) != its.get(key))
     return {
         "current": told["profile"],
@@ -90,6 +92,15 @@ async def use(wanted: Wanted, request: Request) -> Asked:
     )
     note(request, profile=wanted.name, dry_run=wanted.dry_run)
     return Asked(request_id=request_id)
+
+
+def _values(name: str) -> dict[str, Any]:
+    try:
+        return dict(flat(read_source(name).values))
+    except ProfileError as error:
+        raise Refused(
+            HTTPStatus.CONFLICT, "profile_unreadable", str(error), f"vla-deploy profile show {name}"
+        ) from error
 
 
 def _names() -> list[str]:

@@ -28,6 +28,13 @@ def test_without_a_supervisor_nothing_is_compared(dashboard):
     assert dashboard.get("profile/desktop/difference", status=503)["error"]["code"] == "no_profile"
 
 
+def test_a_profile_in_force_whose_file_is_gone_is_told(dashboard):
+    gone = "/etc/vla-deploy/gone.toml"
+    dashboard.robot.shows("profile_status", profile=gone, phase="", target="", last={})
+    error = dashboard.get("profile/desktop/difference", status=409)["error"]
+    assert (error["code"], gone in error["what"]) == ("profile_unreadable", True)
+
+
 def test_a_switch_asks_the_supervisor(on_desktop):
     wanted = {"name": "jetson_thor", "may_restart": True}
     request_id = on_desktop.post("profile", body=wanted)["request_id"]
