@@ -8,6 +8,7 @@ PlanningError
 │   └── DependsOnView say what it stands on, in or next to
 ├── CannotBeDone      ask for something else: a planner has seen that this cannot be done
 │   └── NotAble       nor can any other planner: the robot lacks what it takes
+│       └── NotThere  say it of what is there: "there are only two books"
 ├── Declined          ask the next rung of the ladder: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
 ├── NotReady          reset and arm the robot first
@@ -72,6 +73,10 @@ class CannotBeDone(PlanningError):
 
 class NotAble(CannotBeDone):
     """Say what the robot lacks for such a thing, however it is said and whoever plans it."""
+
+
+class NotThere(NotAble):
+    """Say that of the things in sight none is the one described, and what there is."""
 
 
 class Declined(PlanningError):

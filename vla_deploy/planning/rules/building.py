@@ -36,8 +36,10 @@ _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
 _PUT_RELATION: Final = re.compile(
-    r"(?:^| )(?:back )?(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
+    r"(?:^| )(?:(?:back|over|up|down) )?"
+    r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
 )
+_WAY: Final = re.compile(r"^(?:back|over|up|down) ")
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 
 
@@ -82,7 +84,7 @@ def put(groups: Groups, request: Request) -> list[Step]:
     bare = match_place(destination, request.world.places)
     if said in _TOWARDS and bare is not None and bare not in request.world.furniture:
         return [*pick({**groups, "object": moved}, request), ("navigate_to", {"place": bare})]
-    relation = "in" if said.removeprefix("back ") in _INTO else "on"
+    relation = "in" if _WAY.sub("", said) in _INTO else "on"
     where = {"destination": destination, "relation": relation, **_arm(groups)}
     return [("place", {"object": part, **where}) for part in parts_of(moved)]
 

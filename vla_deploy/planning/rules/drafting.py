@@ -9,6 +9,7 @@ from vla_deploy.action_words import action_words
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotUnderstood
 from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.rules.asides import straightened
 from vla_deploy.planning.rules.building import Groups, Step, is_one, parts_of, split_put
 from vla_deploy.planning.rules.clauses import (
     MOST_CLAUSES,
@@ -68,7 +69,7 @@ def draft_plan(request: Request) -> Plan:
     text = request.text
     if len(text) > MOST_LETTERS:
         raise NotUnderstood(f"{text[:60]}...")
-    said = polite_off(text)
+    said = straightened(polite_off(text), request)
     helped = _HELP.fullmatch(said)
     parts = segments(said if helped is None else helped["own"])
     if not parts or len(parts) > MOST_CLAUSES:

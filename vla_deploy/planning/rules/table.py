@@ -147,6 +147,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:pick|lift)(?: up)? {_OBJECT}(?: up)?", building.pick),
     (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove)"
      rf"(?: hold of)? {_OBJECT}", building.pick),
+    (Intent.MANIPULATION, rf"bring {_OBJECT}", building.bring),
     # --- the rest
     (Intent.ASSIST, r"(?:(?:say|announce|repeat after me)[:,]?|tell [a-z]+(?= that))(?: that)? "
      r"(?P<text>.+)", building.speak),

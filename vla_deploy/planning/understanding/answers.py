@@ -1,9 +1,10 @@
 """Take what is said next as the answer to a question: "the red one", "left", "the second", "no".
 
 expired, or words of something else   -> a command of its own
-never mind                            -> the waiting command is dropped
+never mind, neither                   -> the waiting command is dropped
 yes, for a question of yes or no      -> it goes on
 words that one candidate alone has    -> that one
+not the red one                       -> the one that is left
 words that several have, or none      -> not clear: ask once more
 """
 
@@ -13,6 +14,15 @@ from enum import StrEnum
 from typing import Final
 
 from vla_deploy.planning.understanding.conversation import Candidate, Conversation, Question
+from vla_deploy.planning.understanding.phrases import (
+    EXTREMES,
+    NUMBERS,
+    ORDER_WORDS,
+    ORDINALS,
+    SIDES,
+)
+from vla_deploy.planning.understanding.questions import from_side
+from vla_deploy.world.query import ORDERS
 
 
 class Verdict(StrEnum):
@@ -40,7 +50,9 @@ class Reply:
 
 NO_WORDS: Final = re.compile(
     r"(?:no|nope|nah|never ?mind|forget (?:it|about it|that)|cancel|neither|none|nothing|"
-    r"don'?t|do not|leave it|none of (?:them|those)|no thanks?|no thank you)(?: (?:one|please))?"
+    r"don'?t|do not|leave it|no thanks?|no thank you|"
+    r"(?:none|neither|not any|nor any) of (?:them|those|these|the (?:two|three|four))|"
+    r"neither (?:one|the one nor the other))(?: (?:one|please|thanks|thank you))*"
 )
 YES_WORDS: Final = re.compile(
     r"(?:yes|yeah|yep|yup|sure|ok|okay|right|correct|exactly|of course|please do|do it|do that|"
@@ -51,24 +63,34 @@ ANY_WORDS: Final = re.compile(
     r"(?:either|any|whichever|any one|anyone|i don'?t care|doesn'?t matter|"
     r"it doesn'?t matter|you choose|your choice|whatever)(?: (?:one|of them|will do|is fine))*"
 )
-ORDINALS: Final = {
-    "first": 0, "1st": 0, "former": 0, "second": 1, "2nd": 1, "latter": 1, "third": 2, "3rd": 2,
-    "fourth": 3, "4th": 3, "fifth": 4, "last": -1,
-}  # fmt: skip
-NUMBERS: Final = {"one": 0, "two": 1, "three": 2, "four": 3, "five": 4,
-                  "1": 0, "2": 1, "3": 2, "4": 3, "5": 4}  # fmt: skip
+# Places in the row of the candidates, from 1.
+PLACES: Final = {**ORDINALS, "former": 1, "latter": 2}
 # What says nothing of which one is meant.
 _SILENT: Final = frozenset(
     {
         "the", "a", "an", "one", "ones", "please", "i", "mean", "meant", "want", "take", "pick",
         "it", "is", "its", "that", "this", "thing", "on", "in", "at", "to", "of", "with", "my",
         "your", "side", "and", "uh", "um", "er", "well", "just", "give", "me", "bring", "use",
-        "from", "yes", "no", "not", "rather",
+        "from", "yes", "no", "rather", "other", "are", "which", "there", "over",
+        "that's", "it's",
     }
 )  # fmt: skip
 # Words of the questions themselves.
 _FILL: Final = frozenset({"the", "one", "on", "in", "a", "an"})
+Candidates = tuple[Candidate, ...]
 _WORD: Final = re.compile(r"[a-z0-9_']+")
+_PIECE: Final = re.compile(r"\s*(?:[,;.!?]|\s-+\s)\s*")
+_NOT: Final = re.compile(
+    r"(?:no )?(?P<any>(?:any|either|anything|whichever)(?: one| of them)? )?(?:the one )?"
+    r"(?:but not|but|not|except|other than|apart from|(?:that |which )?is(?:n'?t| not)|"
+    r"i (?:don'?t|do not) (?:want|mean)) (?P<not>.+?)(?: but (?P<rest>.+))?"
+)
+_OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
+# Words of an answer even where they tell no candidate from the others.
+_COMPARING: Final = frozenset({*EXTREMES, *SIDES, *ORDERS, *ORDER_WORDS, *ORDINALS, "furthest"})
+_FROM_SIDE: Final = re.compile(
+    rf"\b({'|'.join(ORDINALS)})(?: one)?(?: counting| counted)? (?:from|on) (?:the )?(left|right)\b"
+)
 
 
 def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
@@ -106,32 +128,73 @@ def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | No
     agrees = YES_WORDS.fullmatch(said) is not None
     if agrees and len(question.candidates) == 1:
         return Verdict.CHOSEN, question.candidates[0]
-    verdict, chosen = _picked(question.candidates, said)
+    verdict, chosen = _judged(question.candidates, text.lower())
     # "right" is the one on the right where there is one; of several a yes picks none.
     return (Verdict.UNCLEAR if agrees and verdict is Verdict.ANEW else verdict), chosen
 
 
-def _picked(candidates: tuple[Candidate, ...], said: str) -> tuple[Verdict, Candidate | None]:
+def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
+    """Take what is said not to be meant from the candidates; let the rest pick one of those left.
+
+    Where it is said to be any of them, it is the first.
+    """
+    left, rest, any_will_do = list(candidates), list[str](), False
+    for piece in _PIECE.split(text):
+        said = " ".join(_WORD.findall(piece))
+        found = _NOT.fullmatch(said)
+        if found is None:
+            rest.append(said)
+            continue
+        named = [_telling(candidates, one) for one in _OR.split(found["not"])]
+        if not all(words and _known(candidates).issuperset(words) for words in named):
+            return (Verdict.ANEW if all(named) else Verdict.UNCLEAR), None
+        left = [one for one in left if not any(one.features.issuperset(it) for it in named)]
+        rest.append(found["rest"] or "")
+        any_will_do = any_will_do or bool(found["any"])
+    said = " ".join(part for part in rest if part)
+    if len(left) == len(candidates):
+        return _picked(candidates, said)
+    if not left:
+        return Verdict.NO, None
+    if _telling(candidates, said):
+        return _picked(tuple(left), said)
+    is_clear = any_will_do or len(left) == 1
+    return (Verdict.CHOSEN, left[0]) if is_clear else (Verdict.UNCLEAR, None)
+
+
+def _picked(candidates: Candidates, said: str) -> tuple[Verdict, Candidate | None]:
     by_name = [one for one in candidates if said == one.name]
     if len(by_name) == 1:
         return Verdict.CHOSEN, by_name[0]
-    known = frozenset[str]().union(*(one.features for one in candidates))
-    words = [word for word in said.split() if word not in _SILENT or word in known - _FILL]
-    place = _place_of(said, words)
+    words = _telling(candidates, said)
+    place = _place_of(candidates, said, words)
     if place is not None:
-        in_row = place < len(candidates)
-        return (Verdict.CHOSEN, candidates[place]) if in_row else (Verdict.UNCLEAR, None)
+        in_row = place <= len(candidates)
+        at = place - 1 if place > 0 else place
+        return (Verdict.CHOSEN, candidates[at]) if in_row else (Verdict.UNCLEAR, None)
     if not words:
         return Verdict.UNCLEAR, None
-    if any(word not in known for word in words):
+    if not (_known(candidates) | _COMPARING).issuperset(words):
         return Verdict.ANEW, None
     fitting = [one for one in candidates if one.features.issuperset(words)]
     return (Verdict.CHOSEN, fitting[0]) if len(fitting) == 1 else (Verdict.UNCLEAR, None)
 
 
-def _place_of(said: str, words: list[str]) -> int | None:
+def _known(candidates: Candidates) -> frozenset[str]:
+    return frozenset[str]().union(*(one.features for one in candidates))
+
+
+def _telling(candidates: Candidates, said: str) -> list[str]:
+    """Return the words of an answer that may tell candidates apart."""
+    known = _known(candidates)
+    said = _FROM_SIDE.sub(lambda found: from_side(found[1], found[2]), said)
+    return [word for word in said.split() if word not in _SILENT or word in known - _FILL]
+
+
+def _place_of(candidates: Candidates, said: str, words: list[str]) -> int | None:
     """Return the place in the row that "the second" or "number two" names, or None."""
-    if len(words) == 1 and words[0] in ORDINALS:
-        return ORDINALS[words[0]]
     number = re.fullmatch(r"(?:the )?(?:number|option) (\w+)", said)
-    return NUMBERS.get(number[1]) if number else None
+    if number:
+        return NUMBERS.get(number[1])
+    apart = [word for word in words if not all(word in one.features for one in candidates)]
+    return PLACES.get(apart[0]) if len(apart) == 1 else None

@@ -1,26 +1,34 @@
 """Read a referring expression: "the other red one", "both cups", "the ball on my left", "it".
 
     expression = pronoun | [all | both | any | a | the] [other] [side] [extreme] query [on the side]
+               | expression [but expression] [nearest expression] with a place in a row
 
-What remains after pronouns, quantity, side and extremes is a query of the world's own grammar
-(`vla_deploy.world.query`). Words that are not known are compared with those that are.
+Roundabout words are made plain first (`wordings`), and what singles a thing out is parted from it
+(`parting`). What remains after pronouns, quantity, side and extremes is a query of the world's own
+grammar (`vla_deploy.world.query`). Words that are not known are compared with those that are.
 """
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.understanding import phrases
+from vla_deploy.planning.understanding.known_words import (
+    is_kind,
+    known_words,
+    likely_words,
+    relation_words,
+    single,
+)
 from vla_deploy.planning.understanding.names import Match, closest
+from vla_deploy.planning.understanding.parting import Parted, Place, parted, side_behind
+from vla_deploy.planning.understanding.wordings import reworded
 from vla_deploy.world import Query, UnknownWord, parse_query
-from vla_deploy.world.query import ORDERS
-from vla_deploy.world.query import PHRASES as RELATION_PHRASES
-from vla_deploy.world.vocabulary import ARTICLES, COLOURS, FILLERS, OBJECT_CLASSES, SYNONYMS
-from vla_deploy.world.words import COMPARED, FORMS
+from vla_deploy.world.vocabulary import ANY_CLASS, ARTICLES, OBJECT_CLASSES
 
 
 class Scope(StrEnum):
@@ -36,8 +44,11 @@ class Expression:
     """Hold what an expression says; `said` is its words, in lower case and without articles.
 
     `side` is left, right or middle, from the speaker's view where `by_speaker`. `support` names
-    the furniture that a generic word such as "table" stands for. `corrections` are words taken for
-    others, `doubts` those that only sound like a known one.
+    the furniture that a generic word such as "table" stands for. `place` is where in a row it is,
+    `besides` what it is not, `near` what it is the nearest to, or the farthest from, as `order`
+    says. `among` is of how many things it is one. `kinds` are those that a word such as "round"
+    fits, the best first. `corrections` are words taken for others, `doubts` those that only sound
+    like a known one.
     """
 
     said: str
@@ -51,26 +62,31 @@ class Expression:
     extreme: str = ""
     is_other: bool = False
     support: frozenset[str] = frozenset()
+    place: Place | None = None
+    besides: "tuple[Expression, ...]" = ()
+    near: "Expression | None" = None
+    order: str = ""
+    among: int = 0
+    kinds: tuple[frozenset[str], ...] = ()
     corrections: tuple[Match, ...] = ()
     doubts: tuple[Match, ...] = ()
     words: tuple[str, ...] = field(default=(), repr=False)
 
+    @property
+    def is_relative(self) -> bool:
+        """Tell whether only the things around tell which one it is: a row, or what it is not."""
+        return bool(self.place or self.besides or self.near or self.kinds)
+
 
 MOST_LETTERS: Final = 200
-_SHORT: Final = 4
 _ID: Final = re.compile(r"[a-z]+_\d+")
 _TOKEN: Final = re.compile(r"[a-z0-9_]+")
-_SIDE_BEHIND: Final = re.compile(
-    r"(?P<own>.*?) ?(?:that is )?(?:on|to|at) (?P<whose>the|your|my|its) (?P<side>left|right)"
-    r"(?: hand)?(?: side)?"
-)
 _TO_WHOM: Final = re.compile(
     r"\b(nearest|closest|nearer|closer|farthest|furthest) to (you|yourself|robot|the robot|me)\b"
 )
 # Where one takes a thing from is where it is.
 _FROM: Final = ((re.compile(r"\b(?:from|off(?: of)?) (?!me\b)"), "on "),
                 (re.compile(r"\bout of "), "in "))  # fmt: skip
-_MIDDLE_BEHIND: Final = re.compile(r"(?P<own>.+?) (?:in|at) the (?P<side>middle|centre|center)")
 _IN_HAND: Final = re.compile(
     r"(?:what|whatever|the thing|the one|the object|everything)(?: that)?"
     r"(?: you (?:are holding|hold|have|have got|carry|are carrying)"
@@ -109,8 +125,7 @@ def read_expression(text: str, furniture: Mapping[str, str] | None = None) -> Ex
 def _read(text: str, named: tuple[tuple[str, str], ...]) -> Expression | None:
     """Return what an expression says, None where it says nothing that is known."""
     furniture = dict(named)
-    said = " ".join(_TOKEN.findall(text.lower().replace("'s", "").replace("-", "")))
-    said, by_speaker = _order_by_whom(said)
+    said, by_speaker = _order_by_whom(" ".join(_TOKEN.findall(_plain(text.lower()))))
     key = " ".join(word for word in said.split() if word not in ARTICLES) or said
     pronoun = phrases.PRONOUNS.get(said) or phrases.PRONOUNS.get(key, "")
     if pronoun:
@@ -118,10 +133,18 @@ def _read(text: str, named: tuple[tuple[str, str], ...]) -> Expression | None:
     in_hand = _IN_HAND.fullmatch(said)
     if in_hand:
         return Expression(said=key, query=Query(), pronoun=phrases.HELD, hand=in_hand["hand"] or "")
-    said = _WHERE_IT_IS.sub(r"\1", said)
-    rest, scope, count = _quantity(said)
-    rest, side, my_side = _side_behind(rest)
-    words = _compounds(rest).split()
+    said, to_me = _order_by_whom(" ".join(_TOKEN.findall(_plain(reworded(text, furniture)))))
+    parts = parted(_WHERE_IT_IS.sub(r"\1", said))
+    read = _description(parts, key, by_speaker or to_me, furniture)
+    return None if read is None else _compared(read, parts, named)
+
+
+def _description(
+    parts: Parted, key: str, by_speaker: bool, furniture: Mapping[str, str]
+) -> Expression | None:
+    """Return what a description says by itself, without what it was parted from."""
+    rest, scope, count = _quantity(parts.own)
+    rest, side, my_side = side_behind(rest)
     read = Expression(
         said=key,
         query=Query(),
@@ -129,15 +152,46 @@ def _read(text: str, named: tuple[tuple[str, str], ...]) -> Expression | None:
         count=count,
         side=side,
         by_speaker=by_speaker or my_side,
+        place=parts.place,
+        among=parts.among,
     )
-    read = _pointing(words, read)
+    read = _pointing(_compounds(rest).split(), read)
     read = _generic_support(read, furniture)
     read = _known_words(read, furniture)
     try:
         query = parse_query(" ".join(read.words), furniture)
     except UnknownWord:
         return None
-    return replace(read, query=query) if _means_things(query, said) else None
+    fits = _of_kinds(replace(read, query=query))
+    return fits if _means_things(query, parts.own) else None
+
+
+def _compared(
+    read: Expression, parts: Parted, named: tuple[tuple[str, str], ...]
+) -> Expression | None:
+    """Return it with the things that it is compared with; None where one of them is unknown."""
+    others = [_read(one, named) or _read(f"the one {one}", named) for one in parts.besides]
+    others += [_read(parts.near, named)] if parts.near else []
+    known = [one for one in others if one is not None and _can_compare(one)]
+    if len(known) < len(others):
+        return None
+    besides = known[: len(parts.besides)]
+    return replace(
+        read,
+        besides=tuple(one for one in besides if not one.pronoun),
+        near=known[-1] if parts.near else None,
+        order=phrases.ORDER_WORDS.get(parts.order, parts.order),
+        is_other=read.is_other or any(one.pronoun for one in besides),
+        by_speaker=read.by_speaker or (parts.place is not None and parts.place.by_speaker),
+        scope=Scope.ONE if parts.is_one_of else read.scope,
+        corrections=tuple(match for one in (read, *known) for match in one.corrections),
+        doubts=tuple(match for one in (read, *known) for match in one.doubts),
+    )
+
+
+def _can_compare(read: Expression) -> bool:
+    """Tell whether another thing can be compared with it: "it" is one thing, "them" are not."""
+    return read.pronoun in ("", phrases.IT) and not read.is_relative
 
 
 def _means_things(query: Query, said: str) -> bool:
@@ -146,6 +200,10 @@ def _means_things(query: Query, said: str) -> bool:
         return True
     words = said.split()
     return "one" in words or "ones" in words or (words[:1] == ["the"] and len(words) > 1)
+
+
+def _plain(text: str) -> str:
+    return text.replace("'s", "").replace("-", "")
 
 
 def _order_by_whom(said: str) -> tuple[str, bool]:
@@ -165,15 +223,6 @@ def _quantity(said: str) -> tuple[str, Scope, int]:
             count = phrases.COUNTS.get(found.groupdict().get("count") or "", 0)
             return found["own"], scope, count
     return said, Scope.ONE, 0
-
-
-def _side_behind(rest: str) -> tuple[str, str, bool]:
-    """Return the expression without "on the left" at its end, the side, and whether it is mine."""
-    found = _SIDE_BEHIND.fullmatch(rest)
-    if found:
-        return found["own"] or "one", found["side"], found["whose"] == "my"
-    found = _MIDDLE_BEHIND.fullmatch(rest)
-    return (found["own"], "middle", False) if found else (rest, "", False)
 
 
 def _compounds(rest: str) -> str:
@@ -197,18 +246,31 @@ def _pointing(words: list[str], read: Expression) -> Expression:
         elif word in ("other", "another", "different"):
             changes["is_other"] = True
             changes |= {"scope": Scope.ANY} if word == "another" else {}
-        elif word in phrases.SILENT or (word in phrases.MODIFIERS and _is_kind(following)):
+        elif word == "ones":
+            changes.setdefault("scope", Scope.ALL if read.scope is Scope.ONE else read.scope)
+        elif word in phrases.FITTING_KINDS:
+            changes["kinds"] = phrases.FITTING_KINDS[word]
+            kept += ["object"] if word in phrases.KIND_NOUNS else []
+        elif word in phrases.SILENT or (word in phrases.MODIFIERS and is_kind(following)):
             continue
         else:
-            single = _single(word)
-            if single != word and not _has_relation(kept):
+            one = single(word)
+            if one != word and not _has_relation(kept):
                 changes.setdefault("scope", Scope.ALL if read.scope is Scope.ONE else read.scope)
-            kept.append(phrases.ORDER_WORDS.get(single, single))
+            kept.append(phrases.ORDER_WORDS.get(one, one))
     return replace(read, words=tuple(kept), **changes)  # type: ignore[arg-type]
 
 
+def _of_kinds(read: Expression) -> Expression | None:
+    """Let "round" say nothing more of a cup; None where it is nothing that a kind can be."""
+    kind = read.query.kind
+    if not read.kinds or kind == ANY_CLASS:
+        return read
+    return replace(read, kinds=()) if any(kind in kinds for kinds in read.kinds) else None
+
+
 def _has_relation(kept: list[str]) -> bool:
-    return any(word in _relation_words() for word in kept)
+    return any(word in relation_words() for word in kept)
 
 
 def _generic_support(read: Expression, furniture: Mapping[str, str]) -> Expression:
@@ -226,9 +288,9 @@ def _generic_support(read: Expression, furniture: Mapping[str, str]) -> Expressi
 
 def _known_words(read: Expression, furniture: Mapping[str, str]) -> Expression:
     """Put known words in the place of misspelt ones; note those that only sound alike."""
-    known = _known() | frozenset(word for name in furniture for word in name.split())
+    known = known_words() | frozenset(word for name in furniture for word in name.split())
     matches = [
-        None if word in known or _ID.fullmatch(word) else closest(word, _likely())
+        None if word in known or _ID.fullmatch(word) else closest(word, likely_words())
         for word in read.words
     ]
     return replace(
@@ -240,31 +302,3 @@ def _known_words(read: Expression, furniture: Mapping[str, str]) -> Expression:
         corrections=tuple(one for one in matches if one and one.is_sure),
         doubts=tuple(one for one in matches if one and not one.is_sure),
     )
-
-
-def _single(word: str) -> str:
-    """Return the singular of a plural of a known kind, else the word."""
-    if word in _known() or not word.endswith("s"):
-        return word
-    return next((one for one in (word[:-2], word[:-1]) if _is_kind(one)), word)
-
-
-def _is_kind(word: str) -> bool:
-    return SYNONYMS.get(word, word) in OBJECT_CLASSES
-
-
-@cache
-def _likely() -> tuple[str, ...]:
-    """Return the words that a name may be a slip of; short words are like too many others."""
-    return (*OBJECT_CLASSES, *COLOURS, *(word for word in SYNONYMS if len(word) > _SHORT))
-
-
-@cache
-def _relation_words() -> frozenset[str]:
-    return frozenset(word for phrase in RELATION_PHRASES for word in phrase.split())
-
-
-@cache
-def _known() -> frozenset[str]:
-    groups = (OBJECT_CLASSES, COLOURS, SYNONYMS, ARTICLES, FILLERS, COMPARED, FORMS, ORDERS)
-    return frozenset(word for group in groups for word in group) | _relation_words()

@@ -6,10 +6,20 @@ from enum import StrEnum
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
 from vla_deploy.planning.understanding.expressions import Expression
-from vla_deploy.planning.understanding.selection import facing, most, on_side
+from vla_deploy.planning.understanding.parting import Place
+from vla_deploy.planning.understanding.selection import (
+    by_distance,
+    facing,
+    in_a_row,
+    most,
+    nth,
+    on_side,
+    ranked,
+    together,
+)
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world import Query, Thing, find
-from vla_deploy.world.query import FROM_A_VIEW
+from vla_deploy.world import Query, Thing, Viewpoint, find
+from vla_deploy.world.query import FROM_A_VIEW, ORDERS
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
 
 
@@ -28,21 +38,107 @@ def fitting(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     Raises:
         DependsOnView: it says left, right, in front or behind, and nobody knows who looks at what.
     """
-    query, view = read.query, setting.view
+    found = told_apart(read, alike(read, use, setting), setting)
+    return [one for one in found if suits(one, use, _query(read, use, setting), setting)]
+
+
+def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
+    """Return what fits but for what compares things: a side, a place in a row, an extreme.
+
+    Raises:
+        DependsOnView: as `fitting`.
+    """
+    query, view = _query(read, use, setting), setting.view
     if query.relation in FROM_A_VIEW and (view is None or setting.request.scene is None):
         raise DependsOnView(read.said, OBJECT_CLASSES)
-    if not query.is_named and not query.thing_id:
-        query = replace(query, kind=_kind_spoken_of(query, setting))
-    found = [one for one in find(query, setting.scene, view) if suits(one, use, query, setting)]
+    found = find(replace(query, order=""), setting.scene, view)
+    if read.place is None:
+        found = [one for one in found if suits(one, use, query, setting)]
+    else:  # what cannot be taken is counted all the same
+        found = [one for one in found if not one.held_by]
     if read.support:
         found = [one for one in found if one.rests and one.rests.of in read.support]
     if read.is_other:
         before = setting.latest_id(read.query)
         found = [one for one in found if before is None or not one.is_called(before)]
+    for other in read.besides:
+        meant = told_apart(other, _described_by(other, found, setting), setting)
+        found = [one for one in found if one not in meant]
+    return _best_kinds(found, read)
+
+
+def told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[Thing]:
+    """Return of things that are alike the one at a side, a place in a row, or an extreme."""
+    view = setting.view
+    looks = facing(view) if read.by_speaker and view is not None else view
+    if read.among and len(found) not in (1, read.among):
+        return found
+    if read.near is not None:
+        return _by_nearness(read, read.near, found, setting)
+    if read.place is not None:
+        return _in_place(read, read.place, found, looks)
     if read.side:
-        looks = facing(view) if read.by_speaker and view is not None else view
         found = on_side(found, read.side, looks)
-    return most(found, read.extreme) if read.extreme else found
+    if read.extreme:
+        return most(found, read.extreme)
+    if read.query.order and view is not None:
+        found = by_distance(found, (view.x_m, view.y_m))
+        return found[:1] if ORDERS[read.query.order] > 0 else found[-1:]
+    return found
+
+
+def _query(read: Expression, use: Use, setting: Setting) -> Query:
+    query = read.query
+    if query.is_named or query.thing_id:
+        return query
+    return replace(query, kind=_kind_spoken_of(query, use, setting))
+
+
+def _described_by(read: Expression, things: list[Thing], setting: Setting) -> list[Thing]:
+    """Return those of some things that a part such as "the red one" describes."""
+    known = find(replace(read.query, order=""), setting.scene, setting.view)
+    found = [one for one in things if one in known]
+    if read.support:
+        found = [one for one in found if one.rests and one.rests.of in read.support]
+    return _best_kinds(found, read)
+
+
+def _best_kinds(found: list[Thing], read: Expression) -> list[Thing]:
+    """Return of what a word such as "round" fits those that it fits best."""
+    if not read.kinds:
+        return found
+    fitting_it = ([one for one in found if one.kind in kinds] for kinds in read.kinds)
+    return next((some for some in fitting_it if some), [])
+
+
+def _by_nearness(
+    read: Expression, near: Expression, found: list[Thing], setting: Setting
+) -> list[Thing]:
+    """Return the nearest to another thing, or the farthest; none where that is not known."""
+    others = told_apart(near, _described_by(near, list(setting.scene.things), setting), setting)
+    if len(others) != 1:
+        return found if others else []
+    row = by_distance([one for one in found if one not in others], others[0].xy_m)
+    return row[:1] if ORDERS[read.order] > 0 else row[-1:]
+
+
+def _in_place(
+    read: Expression, place: Place, found: list[Thing], view: Viewpoint | None
+) -> list[Thing]:
+    """Return the thing at a place in a row; none where the row is too short, all without a row."""
+    row: list[Thing] | None = None
+    if len(found) < place.number or not found:
+        return []
+    if read.extreme:
+        row = ranked(found, read.extreme)
+    elif read.query.order and view is not None:
+        row = by_distance(found, (view.x_m, view.y_m))[:: ORDERS[read.query.order]]
+    elif place.side:
+        row = in_a_row(together(found, place.number) or (), view)
+        row = row[::-1] if row and place.side == "right" else row
+    if row is None:
+        return found
+    return nth(row, place.number)
 
 
 def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
@@ -59,9 +155,11 @@ def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
             return True
 
 
-def _kind_spoken_of(query: Query, setting: Setting) -> str:
+def _kind_spoken_of(query: Query, use: Use, setting: Setting) -> str:
     """Return the kind that "the red one" means after "the cups": the last of which one is red."""
     for one in setting.spoken_of():
-        if one.kind and find(replace(query, kind=one.kind), setting.scene, setting.view):
+        if not one.kind or (use in (Use.TAKE, Use.PUT) and one.kind not in GRASPABLE_CLASSES):
+            continue
+        if find(replace(query, kind=one.kind), setting.scene, setting.view):
             return one.kind
     return ANY_CLASS

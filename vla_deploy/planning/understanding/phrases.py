@@ -35,15 +35,49 @@ EXTREMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "biggest": "big", "largest": "big", "bigger": "big", "larger": "big",
         "smallest": "small", "littlest": "small", "tiniest": "small", "smaller": "small",
-        "tallest": "tall", "taller": "tall", "highest": "tall",
+        "tallest": "tall", "taller": "tall",
         "shortest": "short", "shorter": "short",
         "longest": "long", "longer": "long",
+        "highest": "high", "higher": "high", "topmost": "high", "uppermost": "high",
+        "lowest": "low", "lower": "low", "bottommost": "low",
+        "widest": "wide", "wider": "wide", "broadest": "wide", "narrowest": "narrow",
+        "narrower": "narrow",
+        "thickest": "thick", "thicker": "thick", "fattest": "thick", "fatter": "thick",
+        "thinnest": "thin", "thinner": "thin", "slimmest": "thin", "slimmer": "thin",
+        "flattest": "thin", "flatter": "thin",
     }
 )  # fmt: skip
 ORDER_WORDS: Final[Mapping[str, str]] = MappingProxyType(
     {"nearer": "nearest", "closer": "nearest", "further": "farthest", "furthest": "farthest",
-     "farther": "farthest"}
+     "farther": "farthest", "tiny": "small", "mini": "small", "huge": "big", "giant": "big"}
 )  # fmt: skip
+# Places in a row or in a list; -1 is the end.
+ORDINALS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "first": 1, "1st": 1, "second": 2, "2nd": 2, "third": 3, "3rd": 3, "fourth": 4, "4th": 4,
+        "fifth": 5, "5th": 5, "sixth": 6, "6th": 6, "last": -1,
+    }
+)  # fmt: skip
+NUMBERS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6,
+        "1": 1, "2": 2, "3": 3, "4": 4, "5": 5, "6": 6,
+    }
+)  # fmt: skip
+# Words that fit some kinds, those that they fit best first: they mean the first that is there.
+FITTING_KINDS: Final[Mapping[str, tuple[frozenset[str], ...]]] = MappingProxyType(
+    {
+        "round": (frozenset({"ball"}), frozenset({"bowl", "cup", "can", "bottle"})),
+        "spherical": (frozenset({"ball"}),),
+        "cylindrical": (frozenset({"can", "bottle", "cup"}),),
+        "square": (frozenset({"box"}),),
+        "rectangular": (frozenset({"box", "book"}), frozenset({"phone", "remote"})),
+        "drink": (frozenset({"can", "bottle"}), frozenset({"cup"})),
+        "beverage": (frozenset({"can", "bottle"}), frozenset({"cup"})),
+    }
+)
+# Of these, those that name a thing by themselves.
+KIND_NOUNS: Final = frozenset({"drink", "beverage"})
 # What a kind of thing is called by in two words or more.
 COMPOUNDS: Final[Mapping[str, str]] = MappingProxyType(
     {

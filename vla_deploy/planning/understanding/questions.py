@@ -4,17 +4,20 @@ colour, kind, what it stands on or in, left or right, nearer or farther, size, t
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.understanding.conversation import Candidate
 from vla_deploy.planning.understanding.names import Match
-from vla_deploy.planning.understanding.selection import MEASURES, in_a_row, most
+from vla_deploy.planning.understanding.phrases import EXTREMES, FITTING_KINDS, ORDINALS
+from vla_deploy.planning.understanding.selection import MEASURES, by_distance, in_a_row, most
 from vla_deploy.world import Thing, Viewpoint
 
 # More than these are no short question.
 MOST_CHOICES: Final = 4
+# What is not that much nearer than another is not "the nearer one".
+LEAST_DISTANCE_M: Final = 0.05
 
 Contrast = Callable[[Sequence[Thing], Viewpoint | None], list[str] | None]
 
@@ -118,7 +121,7 @@ def _by_distance(things: Sequence[Thing], view: Viewpoint | None) -> list[str] |
         return None
     here = (view.x_m, view.y_m)
     near, far = (math.dist(one.xy_m, here) for one in things)
-    if abs(near - far) < 0.05:
+    if abs(near - far) < LEAST_DISTANCE_M:
         return None
     return ["the nearer one", "the farther one"][:: 1 if near < far else -1]
 
@@ -133,8 +136,13 @@ def _by_name(things: Sequence[Thing], _: Viewpoint | None) -> list[str]:
     return [one.thing_id for one in things]
 
 
+def _by_colour_there(things: Sequence[Thing], _: Viewpoint | None) -> list[str] | None:
+    words = [_support(one).replace("the one", f"the {one.colour} one", 1) for one in things]
+    return _distinct(words) if len({one.kind for one in things}) == 1 else None
+
+
 _CONTRASTS: Final[tuple[Contrast, ...]] = (
-    _by_colour, _by_kind, _by_support, _by_side, _by_distance, _by_size, _by_name,
+    _by_colour, _by_kind, _by_support, _by_side, _by_distance, _by_size, _by_colour_there, _by_name,
 )  # fmt: skip
 
 
@@ -148,7 +156,36 @@ def _features(
         if told is not None:
             words |= set(told[list(things).index(thing)].split())
     words |= {word for word in MEASURES if most(things, word) == [thing]}
-    words |= {"nearest", "closest", "closer"} if "nearer" in words else set()
-    words |= {"bigger", "biggest", "larger", "large", "largest"} if "big" in words else set()
-    words |= {"smaller", "smallest", "little"} if "small" in words else set()
+    words |= {word for word, measure in EXTREMES.items() if most(things, measure) == [thing]}
+    words |= {"large"} if "big" in words else set()
+    words |= {"little"} if "small" in words else set()
+    words |= {word for word, kinds in FITTING_KINDS.items() if any(thing.kind in k for k in kinds)}
+    words |= {*_by_nearness(thing, things, view), *_in_row(thing, things, view)}
     return frozenset(word for word in words if word)
+
+
+def _by_nearness(thing: Thing, things: Sequence[Thing], view: Viewpoint | None) -> Iterator[str]:
+    """Yield "nearest" and the like for what clearly is that."""
+    if view is None or len(things) < 2:
+        return
+    here = (view.x_m, view.y_m)
+    away_m = [math.dist(one.xy_m, here) for one in by_distance(things, here)]
+    own_m = math.dist(thing.xy_m, here)
+    if own_m == away_m[0] and away_m[1] - own_m >= LEAST_DISTANCE_M:
+        yield from ("nearest", "closest", "nearer", "closer")
+    if own_m == away_m[-1] and own_m - away_m[-2] >= LEAST_DISTANCE_M:
+        yield from ("farthest", "furthest", "farther", "further")
+
+
+def _in_row(thing: Thing, things: Sequence[Thing], view: Viewpoint | None) -> Iterator[str]:
+    """Yield "leftmost" for the end of a row, and "second_from_left" for every place in it."""
+    row = in_a_row(things, view) or []
+    for side, counted in (("left", row), ("right", row[::-1])):
+        place = counted.index(thing) + 1 if row else 0
+        yield from (side, f"{side}most") if place == 1 else ()
+        yield from (from_side(word, side) for word, at in ORDINALS.items() if at == place)
+
+
+def from_side(ordinal: str, side: str) -> str:
+    """Return the word by which candidates go by their place in a row."""
+    return f"{ordinal}_from_{side}"

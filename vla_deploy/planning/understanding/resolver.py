@@ -13,10 +13,11 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.understanding import phrases
+from vla_deploy.planning.understanding.absence import not_there
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.decisions import Decision
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
-from vla_deploy.planning.understanding.fitting import Use, fitting, suits
+from vla_deploy.planning.understanding.fitting import Use, alike, fitting, suits
 from vla_deploy.planning.understanding.questions import did_you_mean, which_thing
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, find
@@ -64,6 +65,7 @@ class Resolver:
 
         Raises:
             UnknownObject: it says nothing that the robot knows.
+            NotThere: things are known, but none that it can mean.
             Ambiguous: only the speaker can tell which one is meant.
         """
         read = read_expression(text, self.setting.furniture)
@@ -82,6 +84,7 @@ class Resolver:
 
         Raises:
             UnknownObject: it says nothing that the robot knows.
+            NotThere: things are known, but none that it can mean.
             Ambiguous: it means several, or only the speaker can tell.
         """
         found = self.things(text, use)
@@ -113,12 +116,16 @@ class Resolver:
         )
 
     def _choose(self, read: Expression, found: list[Thing], use: Use) -> tuple[Referent, ...]:
+        among = self._among(read, use) if read.is_relative else found
+        if not found and read.is_relative:
+            raise not_there(read, among)
         if not found:
             return (self._unseen(read, use),)
         if read.scope is Scope.ALL and read.count in (0, len(found)):
             return tuple(self._seen(read, one, use, "one of all of them", found) for one in found)
         if len(found) == 1:
-            return (self._seen(read, found[0], use, "the only one that fits", found),)
+            of = f" of {len(among)}" if len(among) > 1 else ""
+            return (self._seen(read, found[0], use, f"the only one{of} that fits", among),)
         if use is Use.SEE and not _needs_id(read):
             return (self._seen(read, found[0], use, "any of them will do", found),)
         chosen, why = self._preferred(read, found, use)
@@ -126,10 +133,16 @@ class Resolver:
             raise which_thing(found, self.setting.view, read.said)
         return (self._seen(read, chosen, use, why, found, by_id=True),)
 
+    def _among(self, read: Expression, use: Use) -> list[Thing]:
+        """Return what would fit if it were not compared, nor anything left out of it."""
+        return alike(replace(read, besides=(), kinds=()), use, self.setting)
+
     def _preferred(
         self, read: Expression, found: Sequence[Thing], use: Use
     ) -> tuple[Thing | None, str]:
         """Return which of several is meant, and why; None where only the speaker knows."""
+        if read.place is not None:
+            return None, ""
         if read.scope is Scope.ANY:
             return found[0], "any will do, this is the nearest"
         held = [one for one in found if one.held_by]
@@ -255,7 +268,9 @@ def _needs_id(read: Expression) -> bool:
     query = read.query
     pointed = read.side or read.extreme or read.is_other or read.support or query.order
     related = query.sizes or query.anchor is not None
-    return bool(pointed or related or not query.is_named or read.scope is Scope.ALL)
+    return bool(
+        pointed or related or read.is_relative or not query.is_named or read.scope is Scope.ALL
+    )
 
 
 def _can_move(one: Mention, use: Use) -> bool:

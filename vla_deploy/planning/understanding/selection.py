@@ -27,6 +27,12 @@ MEASURES: Final[Mapping[str, Measure]] = MappingProxyType(
         "tall": lambda thing: thing.size_m[2],
         "short": lambda thing: 1.0 / max(thing.size_m[2], 1e-3),
         "long": lambda thing: max(thing.size_m[:2]),
+        "high": lambda thing: thing.top_m,
+        "low": lambda thing: 1.0 / max(thing.top_m, 1e-3),
+        "wide": lambda thing: max(thing.size_m[:2]),
+        "narrow": lambda thing: 1.0 / max(*thing.size_m[:2], 1e-3),
+        "thick": lambda thing: min(thing.size_m),
+        "thin": lambda thing: 1.0 / max(min(thing.size_m), 1e-3),
     }
 )
 
@@ -64,6 +70,38 @@ def most(things: Sequence[Thing], word: str) -> list[Thing]:
         return []
     top = measure(ranked[0])
     return [one for one in ranked if measure(one) * DIFFERENCE_RATIO > top]
+
+
+def nth(things: Sequence[Thing], place: int) -> list[Thing]:
+    """Return the one thing at a place in a row, counted from 1; none where the row is shorter."""
+    return [things[place - 1 if place > 0 else place]] if place <= len(things) else []
+
+
+def together(things: Sequence[Thing], least: int) -> list[Thing] | None:
+    """Return what stands in one row: on one support, or on the only one that has enough of them.
+
+    None where that leaves several rows, or none that is long enough.
+    """
+    groups: dict[str, list[Thing]] = {}
+    for one in things:
+        groups.setdefault(one.rests.of if one.rests else "", []).append(one)
+    if len(groups) == 1:
+        return list(things)
+    large = [group for group in groups.values() if len(group) >= max(least, 2)]
+    return large[0] if len(large) == 1 else None
+
+
+def ranked(things: Sequence[Thing], word: str) -> list[Thing] | None:
+    """Return things from the biggest, tallest ... on; None where two of them do not differ."""
+    measure = MEASURES[word]
+    row = sorted(things, key=measure, reverse=True)
+    differ = all(measure(one) > DIFFERENCE_RATIO * measure(other) for one, other in pairwise(row))
+    return row if differ else None
+
+
+def by_distance(things: Sequence[Thing], here: tuple[float, float]) -> list[Thing]:
+    """Return things from the nearest to a point to the farthest."""
+    return sorted(things, key=lambda thing: math.dist(thing.xy_m, here))
 
 
 def facing(view: Viewpoint) -> Viewpoint:

@@ -61,6 +61,61 @@ def test_an_answer_to_yes_or_no(said: str, verdict: Verdict) -> None:
     assert reply(Conversation(question=SURE), said, now_ns=NS_PER_S).verdict is verdict
 
 
+LEFT = Candidate(
+    name="ball_1", words="the pink one",
+    features=frozenset({"pink", "ball", "left", "desk", "bigger", "first_from_left"}),
+)  # fmt: skip
+MIDDLE = Candidate(
+    name="ball_2", words="the grey one",
+    features=frozenset({"grey", "ball", "middle", "shelf", "second_from_left"}),
+)  # fmt: skip
+LAST = Candidate(
+    name="ball_3", words="the green one",
+    features=frozenset({"green", "ball", "right", "shelf", "third_from_left"}),
+)  # fmt: skip
+BALLS = Question(text="Which ball?", asked_ns=0, candidates=(LEFT, MIDDLE, LAST))
+
+
+@pytest.mark.parametrize(
+    ("said", "verdict", "chosen"),
+    [
+        ("the third ball", Verdict.CHOSEN, LAST),
+        ("the second one from the left, please", Verdict.CHOSEN, MIDDLE),
+        ("the one on the desk", Verdict.CHOSEN, LEFT),
+        ("the one on the shelf", Verdict.UNCLEAR, None),
+        ("the bigger one", Verdict.CHOSEN, LEFT),
+        ("the nearest", Verdict.UNCLEAR, None),
+        ("neither of them", Verdict.NO, None),
+        ("none of the three, thanks", Verdict.NO, None),
+        ("not the pink one", Verdict.UNCLEAR, None),
+        ("not the pink or the grey one", Verdict.CHOSEN, LAST),
+        ("not the pink one, the grey one", Verdict.CHOSEN, MIDDLE),
+        ("the one that isn't on the shelf", Verdict.CHOSEN, LEFT),
+        ("no, the grey one", Verdict.CHOSEN, MIDDLE),
+        ("any but the pink one", Verdict.CHOSEN, MIDDLE),
+        ("I don't want the pink one but the green one", Verdict.CHOSEN, LAST),
+        ("not the ball", Verdict.NO, None),
+        ("not the cup", Verdict.ANEW, None),
+        ("not that one", Verdict.UNCLEAR, None),
+        ("the other one", Verdict.UNCLEAR, None),
+        ("the fourth", Verdict.UNCLEAR, None),
+        ("not now, go to the kitchen", Verdict.ANEW, None),
+    ],
+)
+def test_an_answer_may_count_compare_and_leave_out(
+    said: str, verdict: Verdict, chosen: Candidate | None
+) -> None:
+    got = reply(Conversation(question=BALLS), said, now_ns=NS_PER_S)
+    assert (got.verdict, got.chosen) == (verdict, chosen)
+
+
+@pytest.mark.parametrize("said", ["the other one", "not the red one", "not the red one, the other"])
+def test_of_two_what_is_not_the_one_is_the_other(said: str) -> None:
+    got = reply(Conversation(question=WHICH), said, now_ns=NS_PER_S)
+    is_told = said.startswith("not")
+    assert got.chosen == (BLUE if is_told else None)
+
+
 @pytest.mark.parametrize("said", ["yes", "right", "Yes, please.", "the red one"])
 def test_a_yes_picks_the_only_candidate(said: str) -> None:
     question = replace(WHICH, candidates=(RED,))

@@ -1,0 +1,98 @@
+"""What a sentence says aside, put where it belongs, and what is left as it was said."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+
+from vla_deploy.planning.errors import NotThere, NotUnderstood, PlanningError
+from vla_deploy.planning.rules.asides import straightened
+
+if TYPE_CHECKING:
+    from conftest import Flat
+
+BOX = "place box in"
+TWO_OF_THEM = "pick_up red cup left; pick_up ball right"
+
+STRAIGHTENED = {
+    "the orange box, lay the book in it": "lay the book in the orange box",
+    "the green ball - fetch it": "fetch the green ball",
+    "the ball: please pick it up": "please pick the ball up",
+    "the ball and the book, stow them in the box": "stow the ball and the book in the box",
+    "as for the book, put that one in the box": "put the book in the box",
+    "the side table, put the book there": "put the book to the side table",
+    "the bedroom, drive there please": "drive to the bedroom please",
+    "the box, drop the ball in there": "drop the ball in the box",
+    "grab the second cup, counting from the right": "grab the second from the right cup",
+    "starting from the left, find the first book": "find the first from the left book",
+    "lift a cup, not the blue one": "lift a cup but not the blue one",
+    "lift the cup, not the blue one, the other one": "lift the cup but not the blue one",
+    "lift the cup, not the blue one, the red one": "lift the cup, i mean the red one",
+    "fetch the thing on the table, the book": "fetch the book on the table",
+    "grab the round object, the ball, and go home": "grab the round ball, and go home",
+    "hold the cup, the red one": "hold the red cup",
+}
+AS_SAID = (
+    "take the red cup, the ball",
+    "take the red cup, the blue cup and the book",
+    "take the red cup, the blue one",
+    "take the cup, the blue one, the ball",
+    "the orange box, take the ball and put it in there",
+    "put the cup in the box, not the red one",
+    "the elephant, pick it up",
+    "if you see the ball, pick it up",
+    "pick up the ball, and put it in the box",
+    "the ball, the book",
+    "say the words, it is late",
+    "go to the kitchen, then put that book away",
+)
+
+
+@pytest.mark.parametrize(("said", "straight"), list(STRAIGHTENED.items()))
+def test_an_aside_is_put_where_it_belongs(flat: "Flat", said: str, straight: str) -> None:
+    assert straightened(said, flat.request(said)) == straight
+
+
+@pytest.mark.parametrize("said", AS_SAID)
+def test_what_is_no_aside_stays_as_it_was_said(flat: "Flat", said: str) -> None:
+    assert straightened(said, flat.request(said)) == said
+
+
+@pytest.mark.parametrize(
+    ("said", "done"),
+    [
+        ("the orange box, lay the purple book in it", "place orange box in"),
+        ("the green ball - pick it up, please", "pick_up green ball"),
+        ("the red cup and the ball, take them", TWO_OF_THEM),
+        ("the first cup from the right, lift it please", "pick_up cup_1"),
+        ("could you lift the first cup, counted from the left?", "pick_up cup_2"),
+        ("take a cup, but not the red one", "pick_up cup_2"),
+        ("put the coffee table's green ball in the box", BOX),
+        ("throw the cup that isn't blue into the orange box", "place orange box in"),
+        ("put all cups but the blue one on the side table", "place side_table on"),
+        ("lay the ball over on the side table", "place side_table on"),
+        ("find the thing with the purple cover, the book", "find_object purple book"),
+        ("go near the cup farthest from the ball", "navigate_to cup_2"),
+    ],
+)
+def test_a_described_thing_is_acted_on(does: Callable[..., str], said: str, done: str) -> None:
+    assert does(said) == done
+
+
+@pytest.mark.parametrize(
+    ("said", "error"),
+    [
+        ("the third cup from the left, lift it", NotThere),
+        ("take the ball that isn't green", NotThere),
+        ("the red cup, don't touch it", NotUnderstood),
+        ("the ball and the elephant, lift them", NotUnderstood),
+        ("lift the ball, not the elephant", NotUnderstood),
+        ("not the red cup, the blue one", NotUnderstood),
+        ("the red cup, never lift it", NotUnderstood),
+    ],
+)
+def test_what_is_not_there_or_not_wanted_is_not_done(
+    does: Callable[..., str], said: str, error: type[PlanningError]
+) -> None:
+    with pytest.raises(error):
+        does(said)

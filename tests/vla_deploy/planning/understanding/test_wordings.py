@@ -1,0 +1,42 @@
+import pytest
+
+from vla_deploy.planning.understanding.wordings import reworded
+
+FURNITURE = {"desk": "desk", "side table": "side_table", "book shelf": "shelf"}
+
+
+@pytest.mark.parametrize(
+    ("said", "plain"),
+    [
+        ("the side table's green can", "green can on the side table"),
+        ("the shelf's second bowl", "second bowl on the shelf"),
+        ("my desk\u2019s lamp", "lamp on the desk"),
+        ("the bottle that isn't empty", "the bottle that is not empty"),
+        ("the one that's green", "the one that is green"),
+        ("a non-white can", "a can that is not white"),
+        ("the grey-coloured phone", "the grey phone"),
+        ("the notebook with the pink cover", "pink the notebook"),
+        ("the ball of yellow colour", "the ball yellow"),
+        ("the can furthest away from you", "the can farthest to you"),
+        ("the most distant bowl", "the farthest bowl"),
+        ("the phone up on the shelf", "the phone on the shelf"),
+        ("that remote on the desk there", "that remote on the desk"),
+        ("this bowl over here", "this bowl"),
+        ("the keys back out of the box", "the keys out of the box"),
+    ],
+)
+def test_roundabout_words_become_plain(said: str, plain: str) -> None:
+    assert reworded(said, FURNITURE) == plain
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "the bottle with the red lid",  # a lid tells nothing of the bottle
+        "anna's cup",  # nor does a person of where it is
+        "the ball there",  # where, only a finger tells
+        "the cup back there by the wall",
+    ],
+)
+def test_what_may_mean_something_else_stays(said: str) -> None:
+    assert reworded(said, FURNITURE) == said

@@ -1,0 +1,192 @@
+"""Put what a sentence says aside where it belongs, before it is taken apart at its commas.
+
+the blue box, put the phone in it             -> put the phone in the blue box
+pick up the first book, counting from the right -> pick up the first from the right book
+take a cup, not the red one                   -> take a cup but not the red one
+find the thing with a brown cover, the book   -> find the book with a brown cover
+take the cup, the blue one                    -> take the blue cup
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.rules.clauses import polite_off
+from vla_deploy.planning.understanding.expressions import Expression, read_expression
+from vla_deploy.planning.understanding.phrases import ORDINALS
+from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.world.vocabulary import ANY_CLASS, ARTICLES, OBJECT_CLASSES, SYNONYMS
+
+_COMMA: Final = re.compile(r"\s*(?:[,;:]|\s[-\u2013\u2014]+\s|[.!?](?=\s))\s*")
+_ABOUT: Final = re.compile(r"^(?:as for|concerning|regarding) (?=\w)")
+_NTH: Final = re.compile(rf"\b(?:{'|'.join(ORDINALS)})\b(?! (?:one )?(?:from|on|to) )")
+_COUNTING: Final = re.compile(
+    r"(?:(?:if you |when )?(?:counting|counted|count|starting|seen|looking|going)(?: it)? )?"
+    r"from (?:the|your|my) (?P<side>left|right)(?: hand)?(?: side| end)?"
+)
+_NOT: Final = re.compile(r"(?:but |just |only )?not (?P<not>(?:the|that|those|these) .+)")
+_OTHER: Final = re.compile(r"(?:but )?(?:rather )?(?:the|that) other(?: one)?")
+# "It", where it is no word before another thing: "that one", but not "that cup".
+_PRONOUN: Final = re.compile(
+    r"\b(?:it|them both|both of them|them|both|that one|this one|those|these|that|this)\b"
+    r"(?=$|[.!?]| (?:up|down|in|into|inside|on|onto|to|over|away|here|back|for|with|from|out|off|"
+    r"please|now|there)\b)"
+)
+_IN_THERE: Final = re.compile(r"\b(?P<how>in|into|inside|on|onto) there\b")
+_THERE: Final = re.compile(r"\b(?:over )?there\b(?=$|[.!?]| please\b)")
+_NEXT: Final = re.compile(r"\b(?:and|then)\b")
+_GENERIC: Final = re.compile(r"\b(?:thing|object|item|(?<=\bthe )one)\b")
+_KIND: Final = re.compile(
+    rf"\b(?:{'|'.join(sorted({*OBJECT_CLASSES, *SYNONYMS}, key=len, reverse=True))})e?s?\b"
+    r"(?! (?:you|i|we)\b)"
+)
+_PLAIN: Final = re.compile(rf"\bthe (?P<kind>{_KIND.pattern})")
+
+Pieces = Sequence[str]
+Change = Callable[[Pieces, Request], Pieces]
+
+
+def straightened(text: str, request: Request) -> str:
+    """Return a sentence with each aside where it belongs; one without any stays as it is."""
+    before = _COMMA.split(text)
+    pieces: Pieces = before
+    for change in _CHANGES if len(before) > 1 else ():
+        pieces = change(pieces, request)
+    return text if pieces == before else ", ".join(pieces)
+
+
+def _counted(pieces: Pieces, _: Request) -> Pieces:
+    """Put "counting from the right" behind the "first" that it is about."""
+    for at, piece in enumerate(pieces):
+        found = _COUNTING.fullmatch(polite_off(piece))
+        for near in (at - 1, at + 1) if found else ():
+            nth = _NTH.search(pieces[near]) if 0 <= near < len(pieces) else None
+            if found and nth:
+                told = _behind(pieces[near], nth.end(), f"from the {found['side']}")
+                return _without(at, _with(near, told, pieces))
+    return pieces
+
+
+def _left_out(pieces: Pieces, request: Request) -> Pieces:
+    """Put "not the red one" behind the thing that it is taken from.
+
+    What is meant may be said as well ("not the red one, the blue one"): then it stands for itself.
+    """
+    for at in range(1, len(pieces)):
+        found = _NOT.fullmatch(polite_off(pieces[at]))
+        read = _read(found["not"], request) if found else None
+        end = _end_of_noun(read, pieces[at - 1]) if read else None
+        if found is None or end is None:
+            continue
+        following = polite_off(pieces[at + 1]) if at + 1 < len(pieces) else ""
+        if _OTHER.fullmatch(following):
+            pieces = _without(at + 1, pieces)
+        elif _is_thing(following, request):
+            return _without(at, _with(at + 1, f"i mean {following}", pieces))
+        told = _behind(pieces[at - 1], end, f"but not {found['not']}")
+        return _without(at, _with(at - 1, told, pieces))
+    return pieces
+
+
+def _named_twice(pieces: Pieces, request: Request) -> Pieces:
+    """Let "the thing ..., the book" be the book, and "the cup, the blue one" the blue cup."""
+    for at in range(1, len(pieces)):
+        second = polite_off(pieces[at])
+        read = _read(second, request) if second.split()[:1] == ["the"] else None
+        goes_on = at + 1 < len(pieces) and pieces[at + 1].startswith(("the ", "and the "))
+        if read is None or read.pronoun or goes_on:
+            continue
+        told = _told_once(pieces[at - 1], second.split()[1:], read)
+        if told:
+            return _without(at, _with(at - 1, told, pieces))
+    return pieces
+
+
+def _told_once(first: str, second: Sequence[str], read: Expression) -> str:
+    """Return the first words with what the second add; "" where these are another thing."""
+    generic = _GENERIC.search(first)
+    if generic and len(second) == 1 and read.query.kind != ANY_CLASS:
+        return f"{first[: generic.start()]}{second[0]}{first[generic.end() :]}"
+    plain = list(_PLAIN.finditer(first))
+    if len(plain) == 1 and len(_KIND.findall(first)) == 1 and second[-1] == "one" != second[0]:
+        words = " ".join([*second[:-1], plain[0]["kind"]])
+        return f"{first[: plain[0].start()]}the {words}{first[plain[0].end() :]}"
+    return ""
+
+
+def _topic(pieces: Pieces, request: Request) -> Pieces:
+    """Put what the sentence begins with in the place of the pronoun that takes it up."""
+    about = [_ABOUT.sub("", polite_off(piece)) for piece in pieces]
+    count = next((at for at, one in enumerate(about) if not _is_thing(one, request)), 0)
+    if not count:
+        return pieces
+    topic, rest = " and ".join(about[:count]), pieces[count]
+    for pattern, instead in (
+        (_IN_THERE, rf"\g<how> {topic}"),
+        (_PRONOUN, topic),
+        (_THERE, f"to {topic}"),
+    ):
+        found = pattern.search(rest)
+        # "Take the ball and put it away": "it" is the ball.
+        if found and not _names_another(rest[: found.start()]):
+            told = f"{rest[: found.start()]}{found.expand(instead)}{rest[found.end() :]}"
+            return [told, *pieces[count + 1 :]]
+    return pieces
+
+
+def _names_another(before: str) -> bool:
+    thing = _KIND.search(before)
+    return thing is not None and _NEXT.search(before, thing.end()) is not None
+
+
+def _is_thing(text: str, request: Request) -> bool:
+    """Tell whether words are nothing but the names of things or of a place."""
+    parts = re.split(r" and ", text)
+    return bool(text) and all(_is_one_thing(part, request) for part in parts)
+
+
+def _is_one_thing(text: str, request: Request) -> bool:
+    if match_place(text, request.world.places):
+        return True
+    read = _read(text, request)
+    is_named = read is not None and (read.query.is_named or text.split()[0] in ARTICLES)
+    return is_named and read is not None and not read.pronoun
+
+
+def _read(text: str, request: Request) -> Expression | None:
+    try:
+        return read_expression(text, Setting(request).furniture)
+    except UnknownObject:
+        return None
+
+
+def _end_of_noun(read: Expression, clause: str) -> int | None:
+    """Return where the thing ends from which others are left out; None where that is not clear."""
+    nouns = [(_kind_of(found[0]), found.end()) for found in _KIND.finditer(clause)]
+    if read.query.is_named and read.query.kind != ANY_CLASS:
+        nouns = [noun for noun in nouns if noun[0] == read.query.kind]
+    return nouns[-1][1] if len({kind for kind, _ in nouns}) == 1 else None
+
+
+def _kind_of(word: str) -> str:
+    forms = (word, word.removesuffix("s"), word.removesuffix("es"))
+    single = next((one for one in forms if one in OBJECT_CLASSES or one in SYNONYMS), word)
+    return SYNONYMS.get(single, single)
+
+
+def _behind(text: str, at: int, more: str) -> str:
+    return f"{text[:at]} {more}{text[at:]}"
+
+
+def _with(at: int, said: str, pieces: Pieces) -> Pieces:
+    return [*pieces[:at], said, *pieces[at + 1 :]]
+
+
+def _without(at: int, pieces: Pieces) -> Pieces:
+    return [*pieces[:at], *pieces[at + 1 :]]
+
+
+_CHANGES: Final[tuple[Change, ...]] = (_counted, _left_out, _named_twice, _topic)

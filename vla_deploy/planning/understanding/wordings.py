@@ -1,0 +1,59 @@
+"""Bring roundabout ways of describing a thing into the plain ones that the reader knows.
+
+"the coffee table's cup" is "the cup on the coffee table", "a cup that isn't red" is "a cup that is
+not red", "the book with the brown cover" is "the brown book": one table, row after row.
+"""
+
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Final
+
+from vla_deploy.world.vocabulary import COLOURS
+
+_COLOUR: Final = rf"(?P<colour>{'|'.join((*COLOURS, 'gray', 'violet'))})"
+# Parts that give a thing its colour; a lid or a handle may have another one.
+_HULL: Final = r"(?:cover|jacket|binding|shell|casing|skin|surface|outside)"
+_HERE: Final = r"(?:from|than|to) (?:here|where (?:you|we) (?:are|stand))"
+_ROWS: Final[tuple[tuple[str, str], ...]] = (
+    (r",? ?\bplease\b", ""),
+    (r"\b(is|are)n'?t\b", r"\1 not"),
+    (r"\b(that|which|who|one)'s\b", r"\1 is"),
+    (rf"\bnon[- ]?{_COLOUR} (.+)", r"\2 that is not \g<colour>"),
+    (rf"\b{_COLOUR}(?:[- ]colou?red| in colou?r)\b", r"\g<colour>"),
+    (rf"\bof (?:a )?{_COLOUR} colou?r\b", r"\g<colour>"),
+    (rf"(.+?) (?:with|in) (?:a|an|the|its) {_COLOUR} {_HULL}\b", r"\g<colour> \1"),
+    # --- how far
+    (r"\bmost distant\b", "farthest"),
+    (r"\bfa(?:rthest|rther)\b|\bfurthe(?:st|r)\b", "farthest"),
+    (r"\bfarthest (?:away|off)\b", "farthest"),
+    (rf"\b(nearest|closest|nearer|closer|farthest) {_HERE}\b", r"\1"),
+    (r"\bfarthest from (you|yourself|me|us|the robot)\b", r"farthest to \1"),
+    # --- what points, and says nothing more
+    (r"\b(?:over|right) there (?=(?:on|in|inside|under|next to|beside)\b)", ""),
+    (r"^(.+) (?:over|right) there$", r"\1"),
+    (r"\bback (?=(?:out of|from|off)\b)", ""),
+    (r"(?<=\w) (?:over|up|down) (?=(?:on|in|inside|under|next to|beside|there)\b)", " "),
+    (r"^((?:that|this|those|these) .+?) (?:over |right )?(?:there|here)$", r"\1"),
+    (r"^(.+ (?:on|in|inside|under|next to|beside) .+?) (?:over |right )?(?:there|here)$", r"\1"),
+)  # fmt: skip
+_TABLE: Final = tuple((re.compile(pattern), instead) for pattern, instead in _ROWS)
+
+
+def reworded(text: str, furniture: Mapping[str, str]) -> str:
+    """Return a description in plain words; `furniture` are the spoken names of what has a top."""
+    text = text.lower().replace("\u2019", "'")
+    owned = _owner(tuple(furniture)).fullmatch(text.strip()) if "'" in text and furniture else None
+    if owned:
+        text = f"{owned['own']} on the {owned['owner']}"
+    for pattern, instead in _TABLE:
+        text = pattern.sub(instead, text)
+    return " ".join(text.split())
+
+
+@lru_cache(maxsize=8)
+def _owner(names: tuple[str, ...]) -> re.Pattern[str]:
+    """Return what finds "the side table's cup"; any table goes by the last word of its name."""
+    spoken = {*names, *(name.split()[-1] for name in names)}
+    owners = "|".join(re.escape(name) for name in sorted(spoken, key=len, reverse=True))
+    return re.compile(rf"(?:(?:the|my|your|that|this) )?(?P<owner>{owners})'s? (?P<own>.+)")
