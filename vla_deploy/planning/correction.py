@@ -10,8 +10,8 @@ from vla_deploy.world import Query, UnknownWord, parse_query
 
 CORRECTED: Final = "correction"
 _CORRECTION: Final = re.compile(
-    r"(?:no|nope|wrong|not that(?: one)?|not it)\b[,. ]*"
-    r"(?:(?:i (?:meant|mean|wanted|want)|rather|take|use|make it)\b)?[, ]*(?P<rest>.+)",
+    r"(?:no,? (?:wait|sorry)|wait,? no|no|nope|wrong|sorry|not that(?: one)?|not it)\b[,. ]*"
+    r"(?:(?:i (?:meant|mean|said|wanted|want)|rather|take|use|make it)\b)?[, ]*(?P<rest>.+)",
     re.IGNORECASE,
 )
 _ONE: Final = re.compile(r"\bones?\b", re.IGNORECASE)

@@ -25,6 +25,7 @@ from vla_deploy.planning.phrasing import Says, spoken_refusal
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.recovery import numbered, recover
+from vla_deploy.planning.rules_rung import RulesRung
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
@@ -86,6 +87,9 @@ class Desk:
         for command in dropped:
             if command is not None:
                 self._refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
+        # Who says "again" after a stop cannot mean what was done before it.
+        stop = Turn(said="stop", command_id=command_id, outcome=Outcome.CANCELLED)
+        self.dialogue.remember(stop)
 
     def has_ended(self, command_id: str, success: bool, error: str) -> None:
         """Note how the executor ended a command; a plan that failed is not given again."""
@@ -94,6 +98,12 @@ class Desk:
         self._telling.ended(command_id, success, error)
         if turn is not None and not success:
             self.planner.cache.forget(turn.said)
+
+    def turned_away(self, command_id: str, error: str) -> None:
+        """Note that the executor does not carry out a plan that it was given."""
+        if self._under_way.carried(command_id) is not None:
+            self._under_way.ended(command_id)
+            self.dialogue.ended(command_id, False, error)
 
     def set_back(self, command_id: str, told: Mapping[str, Any]) -> None:
         """Plan a command anew whose plan has failed, before any other, or say that it ends."""
@@ -216,6 +226,7 @@ class Desk:
                 mentioned=mentions_of(plan, request.scene),
                 plan=plan,
                 here=request.here,
+                in_full=_in_full(plan, answer),
             )
         )
 
@@ -325,3 +336,9 @@ class Desk:
         waiting = self.dialogue.settle()
         if waiting is not None:
             self._refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
+
+
+def _in_full(plan: Plan, answer: Answer) -> str:
+    """Return the words that rules have put in the place of a command; others sum it up freely."""
+    proposal = answer.proposal
+    return plan.goal if proposal is not None and proposal.rung == RulesRung.name else ""

@@ -8,7 +8,8 @@ PlanningError
 │   └── DependsOnView say what it stands on, in or next to
 ├── CannotBeDone      ask for something else: a planner has seen that this cannot be done
 │   └── NotAble       nor can any other planner: the robot lacks what it takes
-│       └── NotThere  say it of what is there: "there are only two books"
+│       ├── NotThere  say it of what is there: "there are only two books"
+│       └── NothingBefore  say the whole command: nothing before it can be repeated
 ├── Declined          ask the next rung of the ladder: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
 ├── NotReady          reset and arm the robot first
@@ -77,6 +78,10 @@ class NotAble(CannotBeDone):
 
 class NotThere(NotAble):
     """Say that of the things in sight none is the one described, and what there is."""
+
+
+class NothingBefore(NotAble):
+    """Say why a command that leans on the one before it, as "again" does, has nothing there."""
 
 
 class Declined(PlanningError):

@@ -157,6 +157,8 @@ class PlannerNode:
         told = event.payload
         if told.get("event") == "setback":
             self._desk.set_back(command_id_of(event), told)
+        if told.get("event") == "rejected":
+            self._desk.turned_away(command_id_of(event), str(told.get("reason") or ""))
         if told.get("event") == "finished":
             self._desk.has_ended(
                 command_id_of(event), bool(told.get("success")), str(told.get("error") or "")

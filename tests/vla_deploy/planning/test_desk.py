@@ -313,3 +313,49 @@ class TestSpokenCommands:
         desk.executor_tells(command_id="c1", event="finished", success=False, error="cancelled")
         desk.answers()
         assert desk.said_aloud() == []
+
+
+class TestRepeating:
+    @pytest.fixture
+    def desk(self, open_desk):
+        desk = open_desk()
+        desk.give(text="turn left")
+        desk.answers()
+        desk.plans()
+        return desk
+
+    def test_again_does_what_was_done(self, desk):
+        desk.executor_tells(command_id="c1", event="finished", success=True)
+        desk.give(command_id="c2", text="again")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+        assert desk.plans()[-1]["plan"]["goal"] == "turn left"
+
+    def test_after_a_stop_nothing_is_done_again(self, desk):
+        desk.executor_tells(command_id="c1", event="finished", success=True)
+        desk.give(command_id="c2", text="stop")
+        desk.answers()
+        desk.plans()
+        for number, text in enumerate(("again", "a bit more", "back again")):
+            desk.give(command_id=f"d{number}", text=text)
+        told = desk.answers()
+        assert events(told) == [("d0", "rejected"), ("d1", "rejected"), ("d2", "rejected")]
+        assert told[0]["reason"] == (
+            '"stop" was not done (cancelled), so I do not repeat it; say the whole command'
+        )
+        assert desk.plans() == []
+
+    @pytest.mark.parametrize(
+        "ended",
+        [
+            {"event": "finished", "success": False, "error": "the bumper was pressed"},
+            {"event": "rejected", "reason": "not armed"},
+        ],
+    )
+    def test_what_the_executor_could_not_or_would_not_do_is_not_done_again(self, desk, ended):
+        desk.executor_tells(command_id="c1", **ended)
+        desk.answers()
+        desk.give(command_id="c2", text="again")
+        told = desk.answers()
+        assert told[-1]["event"] == "rejected"
+        assert '"turn left" was not done (failed)' in told[-1]["reason"]
+        assert desk.plans() == []

@@ -3,7 +3,6 @@
 Grounding resolves the words and puts in the way there, so a step says only what is wanted.
 """
 
-import math
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -23,11 +22,7 @@ Groups = Mapping[str, str]
 Step = tuple[str, dict[str, Any]]
 Builder = Callable[[Groups, Request], list[Step]]
 
-DRIVE_M: Final = 0.5
-TURN_RAD: Final = math.pi / 2
 SLOW_RATIO: Final = 0.4
-LITTLE_M: Final = 0.2
-LITTLE_RAD: Final = math.radians(20.0)
 # "Go back" alone is about the command before; in a longer one it is about where that began.
 MOST_WORDS_ALONE: Final = 4
 # What "put it away" means where nothing else is said.
@@ -51,7 +46,7 @@ def parts_of(text: str) -> list[str]:
 def go(groups: Groups, request: Request) -> list[Step]:
     """Drive to each place or thing in turn; "near the box" is where the box can be reached."""
     named = (_NEAR.sub("", part) for part in parts_of(groups["place"]))
-    speed = _speed(groups, request)
+    speed = speed_in(groups, request)
     return [("navigate_to", {"place": part, **speed}) for part in named]
 
 
@@ -111,14 +106,17 @@ def split_put(text: str, request: Request) -> tuple[str, str, str]:
         for way in ways
         if all(is_one(part, request) for part in parts_of(way[0])) and is_one(way[2], request)
     ]
-    seen = [way for way in known if all(_is_seen(part, request) for part in parts_of(way[0]))]
+    seen = [way for way in known if all(is_seen(part, request) for part in parts_of(way[0]))]
     return (seen or known or ways[:1] or [(text, "on", "")])[-1]
 
 
-def _is_seen(text: str, request: Request) -> bool:
+def is_seen(text: str, request: Request) -> bool:
     """Tell whether something in the scene fits what shall be put."""
     setting = Setting(request)
-    read = read_expression(text, setting.furniture)
+    try:
+        read = read_expression(text, setting.furniture)
+    except UnknownObject:  # a place
+        return False
     return bool(read.pronoun or fitting(read, Use.PUT, setting))
 
 
@@ -133,12 +131,42 @@ def is_one(text: str, request: Request) -> bool:
     return True
 
 
+def leave_here(groups: Groups, request: Request) -> list[Step]:
+    """Put down here what of things is held; what is not held stays where it is by itself."""
+    said = groups["object"]
+    setting = Setting(request)
+    read = read_expression(said, setting.furniture)
+    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
+    if not held and not read.pronoun:
+        return [("speak", {"text": "I leave it where it is."})]
+    return [("place", {"object": said, "destination": "here", **_arm(groups)})]
+
+
+def pick_from(groups: Groups, request: Request) -> list[Step]:
+    """Take each thing out of what it is in."""
+    return [
+        step
+        for part in parts_of(groups["object"])
+        for step in pick({**groups, "object": _out_of(part, groups["source"])}, request)
+    ]
+
+
+def _out_of(text: str, source: str) -> str:
+    return text if text in PRONOUNS else f"{text} out of {source}"
+
+
 def put_down(groups: Groups, request: Request) -> list[Step]:
     """Put down what is held; with one thing in hand, or none, "it" tells nothing more."""
     said = groups.get("object", "it")
     held = [kind for kind in request.world.holding.values() if kind]
     named = {"object": said} if len(held) > 1 or PRONOUNS.get(said) != IT else {}
     return [("place", {**named, **_arm(groups)})]
+
+
+def empty_hand(groups: Groups, _: Request) -> list[Step]:
+    """Put down what a hand holds."""
+    arm = _arm(groups)
+    return [("place", {"object": f"what is in your {arm.get('arm', '')} hand", **arm})]
 
 
 def put_away(groups: Groups, _: Request) -> list[Step]:
@@ -161,40 +189,26 @@ def find(groups: Groups, _: Request) -> list[Step]:
     return there + [("find_object", {"object": part}) for part in parts_of(groups["object"])]
 
 
-def look(groups: Groups, _: Request) -> list[Step]:
-    """Turn the head to a direction or a thing."""
+def look(groups: Groups, request: Request) -> list[Step]:
+    """Turn the head to a direction or a thing; "down at the table" is down."""
     direction = _DIRECTIONS.get(re.sub(r"^(?:over )?(?:to )?(?:the |your )?", "", groups["what"]))
+    if direction is None and "side" in groups and match_place(groups["what"], _furniture(request)):
+        direction = _DIRECTIONS[groups["side"]]
     if direction is not None:
         return [("look_at", {"direction": direction})]
     return [("look_at", {"object": groups["what"]})]
+
+
+def _furniture(request: Request) -> Mapping[str, str]:
+    """Return what furniture may be called, by its whole name or what kind of furniture it is."""
+    named = Setting(request).furniture
+    return {name.split()[-1]: place for name, place in named.items()} | named
 
 
 def look_around(groups: Groups, _: Request) -> list[Step]:
     """Look to all sides, at a place if one is said."""
     there: list[Step] = [("navigate_to", {"place": groups["place"]})] if "place" in groups else []
     return there + [("look_at", {"direction": side}) for side in ("left", "ahead", "right", "down")]
-
-
-def drive(groups: Groups, request: Request) -> list[Step]:
-    """Drive straight."""
-    sign = -1.0 if groups["way"].startswith(("back", "reverse")) else 1.0
-    default = LITTLE_M if "little" in groups else DRIVE_M
-    distance_m = sign * _quantity(groups, "m", default)
-    return [("move", {"distance_m": distance_m, **_speed(groups, request)})]
-
-
-def turn(groups: Groups, _: Request) -> list[Step]:
-    """Turn on the spot."""
-    way = groups.get("way", "around")
-    default = math.pi if way == "around" else TURN_RAD
-    default = LITTLE_RAD if "little" in groups else 2 * math.pi if "whole" in groups else default
-    sign = -1.0 if way in ("right", "clockwise") else 1.0
-    return [("turn", {"angle_rad": sign * _quantity(groups, "rad", default)})]
-
-
-def turn_whole(groups: Groups, request: Request) -> list[Step]:
-    """Turn all the way round."""
-    return turn({**groups, "whole": "yes"}, request)
 
 
 def gripper(groups: Groups, _: Request) -> list[Step]:
@@ -233,7 +247,7 @@ def speak(groups: Groups, _: Request) -> list[Step]:
 
 def wait(groups: Groups, _: Request) -> list[Step]:
     """Do nothing for a while."""
-    return [("wait", {"duration_s": _quantity(groups, "s", 2.0)})]
+    return [("wait", {"duration_s": quantity_in(groups, "s", 2.0)})]
 
 
 def stop(_: Groups, __: Request) -> list[Step]:
@@ -241,7 +255,12 @@ def stop(_: Groups, __: Request) -> list[Step]:
     return [("stop", {})]
 
 
-def _quantity(groups: Groups, dimension: str, default: float) -> float:
+def quantity_in(groups: Groups, dimension: str, default: float) -> float:
+    """Return how much was said, in SI units of a dimension.
+
+    Raises:
+        NotUnderstood: that is no quantity.
+    """
     if "quantity" not in groups:
         return default
     value = quantity_of(groups["quantity"], dimension)
@@ -250,7 +269,7 @@ def _quantity(groups: Groups, dimension: str, default: float) -> float:
     return value
 
 
-def _speed(groups: Groups, request: Request) -> dict[str, Any]:
+def speed_in(groups: Groups, request: Request) -> dict[str, Any]:
     """Return how fast to drive, where it is said: "slowly", "at 0.2 m/s"."""
     most_m_s = request.world.max_speed_m_s
     if "speed" in groups:

@@ -4,6 +4,7 @@ import re
 from typing import Final
 
 from vla_deploy.planning.references import words_of
+from vla_deploy.planning.rules.figures import in_figures
 
 MOST_LETTERS: Final = 400
 # More clauses than that are no command that rules should answer.
@@ -18,28 +19,46 @@ STOP_WORDS: Final = frozenset(
         "stop immediately", "halt now", "freeze now", "enough",
     }
 )  # fmt: skip
-_POLITE: Final = re.compile(
+_POLITE_BEFORE: Final = re.compile(
     r"^(?:please|could you|can you|would you|will you|robot|butler|hey butler|hey robot|"
     r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
     r"i would like you to|i'd like you to|i need you to|you should|you need to|you have to|you can|"
-    r"let's|lets|let us|go ahead and|first|would you mind|do me a favour and|do me a favor and|"
+    r"let's|lets|let us|go ahead and|first(?: of all)?|would you mind|do me a favou?r and|"
     r"be so kind (?:and|as to)|be a dear and|how about you|how about|what about|"
     r"i was wondering if you (?:could|would)|i wonder if you (?:could|would)|"
     r"i'd (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
     r"i would (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
     r"what i (?:want|need) is for you to|possibly|so|well|quickly|maybe|perhaps|"
     r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait)\b)|"
-    r"see if you can|go (?:and )?(?=(?:stand|park)\b)|try to|try and|start to|next|finally)\b[, ]*"
-    r"|[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
-    r"would you|could you|butler|robot|quickly|immediately|at once|again|too|also|as well|instead|"
-    r"somewhere|anywhere|once more|for us)$|[.!?, ]+$"
+    r"see if you can|go (?:and )?(?=(?:stand|park)\b)|try to|try and|start to|next|finally|also|"
+    r"plus)\b[, ]*"
 )
+_POLITE_AFTER: Final = re.compile(
+    r"[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
+    r"would you|could you|butler|robot|quickly|immediately|at once|instead|somewhere|anywhere|"
+    r"for us)$|[.!?, ]+$"
+)
+# What likens a clause to another one, and says nothing where it can stand alone.
+_ECHO: Final = re.compile(r"[, ]*\b(?:again|too|also|as well|likewise|once more|(?<!the )first)$")
 _SPLIT: Final = re.compile(
     r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|and)\b|[,;]|[.!?]\s)"
     r"\s*"
 )
 # What people say while they think, and words said twice.
-_FILLER: Final = re.compile(r",?\s*\b(?:um+|uh+|er+m?|hmm+|you know|like,)(?=[\s,.!?]|$),?\s*")
+_FILLER: Final = re.compile(
+    r",?\s*\b(?:um+|uh+|er+m?|hmm+|you know|like,|let me (?:think|see)|"
+    r"(?:what's|what is|what was|what are) (?:it|that|they|its name)(?: called)?(?: again)?(?=,)|"
+    r"how do you (?:say|call it)|what do you call it|whatsit|whatchamacallit)"
+    r"(?=[\s,.!?]|$),?\s*"
+)
+# How people run words together.
+_FORMS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
+    (re.compile(rf"\b{pattern}\b"), full)
+    for pattern, full in (
+        ("gimme", "give me"), ("lemme have", "give me"), ("wanna", "want to"),
+        ("gotta", "have to"), ("gonna", "going to"), ("outta", "out of"), ("'em", "them"),
+    )
+)  # fmt: skip
 _TWICE: Final = re.compile(r"\b(\w+)(?: \1\b)+")
 # Whole parts of a sentence that ask for nothing.
 _COURTESY: Final = re.compile(
@@ -50,8 +69,8 @@ _COURTESY: Final = re.compile(
 )
 # Before these the speaker has changed his mind about what he has just said.
 _REPAIR: Final = re.compile(
-    r"(?:no,? wait|wait,? no|oh no|no|sorry|i mean|or rather|rather|actually(?:,? no)?|correction|"
-    r"make that|that is)\b"
+    r"(?:no,? wait|wait,? no|oh no|no|sorry|i (?:mean|meant|said)|or rather|rather|"
+    r"actually(?:,? no)?|correction|make (?:that|it)|that is)\b"
 )
 
 
@@ -66,12 +85,31 @@ _STOPS: Final = frozenset(" ".join(words_of(spoken)) for spoken in STOP_WORDS) |
 
 
 def polite_off(text: str) -> str:
-    """Return a command in lower case without what only asks nicely."""
+    """Return a command in lower case without what only asks nicely, or likens it to another."""
+    return _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER, _ECHO))
+
+
+def courtesy_off(text: str) -> str:
+    """Return a command in lower case without what only asks nicely; "again" and "too" stay."""
+    return _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER))
+
+
+def plain(text: str) -> str:
+    """Return a text in lower case without hesitation, with words in full that were run together."""
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
-    text = _TWICE.sub(r"\1", text)
-    while (shorter := _POLITE.sub("", text).strip()) != text and shorter:
-        text = shorter
-    return text
+    for pattern, full in _FORMS:
+        text = pattern.sub(full, text)
+    return in_figures(_TWICE.sub(r"\1", text))
+
+
+def _without(text: str, patterns: tuple[re.Pattern[str], ...]) -> str:
+    """Return a text without what any pattern finds in it, as long as words are left."""
+    while True:
+        before = text
+        for pattern in patterns:
+            text = pattern.sub("", text).strip() or text
+        if text == before:
+            return text
 
 
 def segments(text: str) -> list[str]:

@@ -10,7 +10,7 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
 from vla_deploy.planning.references import match_place, words_of
-from vla_deploy.planning.rules.building import STORE, Groups, Step, look_around
+from vla_deploy.planning.rules.building import STORE, Groups, Step, look_around, parts_of
 from vla_deploy.world import Thing
 
 MOST_THINGS: Final = 6
@@ -84,6 +84,21 @@ def patrol(groups: Groups, request: Request) -> list[Step]:
     if not points:
         raise NotAble(f"the map shows no free floor around the {name}")
     return [("navigate_to", {"x_m": x_m, "y_m": y_m}) for x_m, y_m in points[:MOST_POINTS]]
+
+
+def visit(groups: Groups, request: Request) -> list[Step]:
+    """Drive to each of the places that are listed.
+
+    Raises:
+        UnknownPlace: one of them is none that the robot knows.
+    """
+    steps: list[Step] = []
+    for part in parts_of(groups["place"]):
+        name = match_place(part, request.world.places)
+        if name is None:
+            raise UnknownPlace(part, set(request.world.places.values()))
+        steps.append(("navigate_to", {"place": name}))
+    return steps
 
 
 def rows(request: Request, x_m: float, y_m: float) -> Iterator[tuple[float, float]]:

@@ -1,104 +1,124 @@
 """Draft a plan from the table of rules: clause by clause, in the speaker's own words."""
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from vla_deploy.action_words import action_words
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.errors import NotUnderstood
+from vla_deploy.planning.errors import NothingBefore, NotUnderstood, PlanningError
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.rules.asides import straightened
-from vla_deploy.planning.rules.building import Groups, Step, is_one, parts_of, split_put
+from vla_deploy.planning.rules.building import Step, is_one
 from vla_deploy.planning.rules.clauses import (
     MOST_CLAUSES,
     MOST_LETTERS,
+    courtesy_off,
+    plain,
     polite_off,
     repaired,
     segments,
 )
+from vla_deploy.planning.rules.exchanging import continued, corrected
+from vla_deploy.planning.rules.fits import Fit, fit_of, is_whole, known_fit
 from vla_deploy.planning.rules.intents import PRIORITIES, Intent
+from vla_deploy.planning.rules.ordering import in_order
+from vla_deploy.planning.rules.recalling import is_again, last_words, leans, recalled, same_with
 from vla_deploy.planning.rules.refusals import refuse_unable
-from vla_deploy.planning.rules.table import RULES, Rule
+from vla_deploy.planning.rules.statements import statements_off
+from vla_deploy.planning.understanding.conversation import Conversation
 
-# Which hand to take: said at the end of a clause, whatever it is about.
-_WITH_HAND: Final = re.compile(
-    r"(?P<own>.+?),? (?:with|using|in) (?:the|your) (?P<arm>left|right) (?:hand|arm|gripper)"
-)
-_PACE: Final = re.compile(r",?\b(?:very |really |nice and )?(?:slowly|slow|carefully|gently)\b")
-_MANNERS: Final = (
-    _WITH_HAND,
-    re.compile(r"(?P<own>.+?),? (?:at|with) (?P<speed>[\d.]+ ?(?:m/s|cm/s|km/h|mps|mph))"),
-)
-# What of a clause can be corrected by a part alone.
-_CORRECTED: Final = frozenset({"object", "place", "destination", "quantity", "way", "what"})
-# What a rule finds in a clause: all of what is put somewhere, or some of what can be known.
-_PUT: Final = ("object", "relation", "destination")
-_NAMED: Final = ("object", "place", "destination")
 _HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
 
 
 @dataclass(slots=True)
 class _Draft:
-    """Hold the steps so far, what they are for, and the last clause, which the next may shorten."""
+    """Hold the steps so far, what they are for, and the last clause, which the next may shorten.
+
+    `said` are all clauses, in full. One that `leans` may be short for the command before it.
+    """
 
     request: Request
+    leans: bool = False
+    is_short: bool = False
     steps: list[tuple[Step, Intent]] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
     clause: str = ""
     thing: str = ""
     began: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    """Hold the rule that a clause fits."""
-
-    rule: Rule
-    groups: Groups
-
-
 def draft_plan(request: Request) -> Plan:
     """Return the plan of a command as it was said; `ground_plan` makes it one that can run.
 
+    Its goal has in full words what the command left to the one before it.
+
     Raises:
         NotUnderstood: no rule covers a clause.
-        NotAble: the robot cannot do such a thing.
+        NotAble: the robot cannot do such a thing, or there is nothing to repeat.
         UnknownObject: a clause names an object the robot cannot recognise.
     """
-    text = request.text
-    if len(text) > MOST_LETTERS:
-        raise NotUnderstood(f"{text[:60]}...")
-    said = straightened(polite_off(text), request)
+    if len(request.text) > MOST_LETTERS:
+        raise NotUnderstood(f"{request.text[:60]}...")
+    full = recalled(courtesy_off(request.text), request)
+    draft = _drafted(request if full is None else replace(request, text=full))
+    goal = ", then ".join(draft.said) if draft.is_short else draft.request.text.strip()
+    return Plan(goal=goal, summary=_summary(draft.steps), actions=_chain(draft.steps))
+
+
+def _drafted(request: Request) -> _Draft:
+    said = straightened(courtesy_off(request.text), request)
     helped = _HELP.fullmatch(said)
-    parts = segments(said if helped is None else helped["own"])
+    said = in_order(
+        said if helped is None else helped["own"],
+        lambda clause: known_fit(polite_off(clause), request) is not None,
+    )
+    parts = statements_off(segments(said), request)
     if not parts or len(parts) > MOST_CLAUSES:
-        raise NotUnderstood(text)
-    draft = _Draft(request)
+        raise NotUnderstood(request.text)
+    draft = _Draft(request, leans=leans(plain(request.text).strip(" .!?")))
     while parts:
         parts = parts[_take_clause(parts, draft) :]
-    return Plan(goal=text.strip(), summary=_summary(draft.steps), actions=_chain(draft.steps))
+    return draft
 
 
 def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     """Build the longest clause that the parts begin with; return how many parts it took."""
     for count in range(len(parts), 1, -1):
         clause = " and ".join(parts[:count])
-        fit = _fit(clause, draft.request)
-        if fit is not None and _is_whole(fit, draft.request):
+        fit = fit_of(clause, draft.request)
+        if fit is not None and is_whole(fit, draft.request):
             _build(clause, fit, draft)
             return count
     clause = parts[0]
     if repaired(clause) is not None:
         return _take_back(parts, draft)
     refuse_unable(clause)
-    fit = _fit(clause, draft.request)
-    if fit is None and draft.thing:
-        clause, fit = _with_verb(clause, draft)
+    clause, fit = _in_full(clause, draft)
     if fit is None:
         raise NotUnderstood(parts[0])
     _build(clause, fit, draft)
     return 1
+
+
+def _in_full(clause: str, draft: _Draft) -> tuple[str, Fit | None]:
+    """Return a clause with what it leaves to the one before it, and the rule that it fits."""
+    same = same_with(clause)
+    fit = fit_of(clause, draft.request) if same is None else None
+    if fit is not None:
+        return clause, fit
+    is_short = same is not None or (draft.leans and is_one(clause, draft.request))
+    if is_short and not draft.clause:
+        _go_on_from_last(draft)
+    if is_again(clause) and draft.clause:
+        return draft.clause, fit_of(draft.clause, draft.request)
+    own = clause if same is None else same
+    found = continued(own, draft.clause, draft.thing, draft.request)
+    if found is not None or same is None:
+        return found or (clause, None)
+    whole = corrected(own, draft.clause, draft.request)
+    return whole, known_fit(whole, draft.request)
 
 
 def _take_back(parts: Sequence[str], draft: _Draft) -> int:
@@ -113,109 +133,52 @@ def _take_back(parts: Sequence[str], draft: _Draft) -> int:
         said = part if instead is None else instead
         if said:
             break
-    if not draft.clause or not said:
+    if not said:
         raise NotUnderstood(parts[0])
-    del draft.steps[draft.began :]
-    whole = _in_place(said, draft)
-    fit = _fit(whole, draft.request)
+    if not draft.clause:
+        _correct_last(parts[0], draft)
+    del draft.steps[draft.began :], draft.said[-1:]
+    whole = corrected(said, draft.clause, draft.request)
+    fit = fit_of(whole, draft.request)
     if fit is None:
         raise NotUnderstood(said)
     _build(whole, fit, draft)
     return taken
 
 
-def _in_place(said: str, draft: _Draft) -> str:
-    """Return the last clause with what was said in the place of what it corrects.
+def _correct_last(part: str, draft: _Draft) -> None:
+    """Let the last clause of the command before this one be what is corrected.
 
-    That is the last part of it of the same kind; a clause of its own stands for itself.
+    Raises:
+        NotUnderstood: there is none that can be.
     """
-    request = draft.request
-    own = _fit(said, request)
-    if own is not None and _is_known(own, request):
-        return said
-    before = _fit(draft.clause, request)
-    groups = {} if before is None else before.groups
-    named = [value for name, value in groups.items() if name in _CORRECTED and value]
-    if "relation" in groups:
-        named.append(f"{groups['relation']} {groups['destination']}")
-    for value in sorted(named, key=draft.clause.rfind, reverse=True):
-        at = draft.clause.rfind(value)
-        whole = draft.clause[:at] + said + draft.clause[at + len(value) :]
-        fit = _fit(whole, request)
-        if fit is not None and _is_known(fit, request):
-            return whole
-    return said
+    try:
+        _go_on_from_last(draft)
+    except NothingBefore as error:
+        raise NotUnderstood(part) from error
 
 
-def _with_verb(clause: str, draft: _Draft) -> tuple[str, _Fit | None]:
-    """Let the clause before say what to do: "pick up the cup, then the ball"."""
-    verb = draft.clause[: draft.clause.index(draft.thing)] if draft.thing in draft.clause else ""
-    for whole in (f"{verb}{clause}", draft.clause.replace(draft.thing, clause, 1)):
-        fit = _fit(whole, draft.request) if verb and clause.split()[:1] != ["to"] else None
-        if fit is not None and _is_known(fit, draft.request):
-            return whole, fit
-    return clause, None
+def _go_on_from_last(draft: _Draft) -> None:
+    """Let the last clause of the command before this one be the last clause.
 
-
-def _is_known(fit: _Fit, request: Request) -> bool:
-    """Tell whether what a clause names is known, so that it is no accident that it fits."""
-    put = [fit.groups[name] for name in _PUT if name in fit.groups]
-    if len(put) == len(_PUT):
-        moved, _, destination = split_put(" ".join(put), request)
-        return all(is_one(one, request) for one in (*parts_of(moved), destination))
-    named = (fit.groups[name] for name in _NAMED if name in fit.groups)
-    return all(is_one(part, request) for text in named for part in parts_of(text))
-
-
-def _fit(clause: str, request: Request) -> _Fit | None:
-    """Return the first rule that fits and names only what is known, else the first that fits.
-
-    What is "for me" may as well not be said.
+    Raises:
+        NothingBefore: there is no command before, or none that may be done again.
+        NotUnderstood: that one was understood by somebody else.
     """
-    fits = [*_fits(clause), *_fits(clause.removesuffix(" for me"))]
-    return next((fit for fit in fits if _is_known(fit, request)), fits[0] if fits else None)
+    words = last_words(draft.request)
+    alone = replace(draft.request, text=words, conversation=Conversation())
+    try:
+        last = _drafted(alone)
+    except PlanningError as error:
+        raise NotUnderstood(draft.request.text) from error
+    draft.clause, draft.thing, draft.is_short = last.clause, last.thing, True
 
 
-def _fits(clause: str) -> Iterator[_Fit]:
-    own, manner = _manner_off(clause)
-    for rule in RULES:
-        found = rule.pattern.fullmatch(own)
-        # How fast to drive is nothing that the other skills could heed.
-        if found is None or ("speed" in manner and rule.intent is not Intent.NAVIGATION):
-            continue
-        groups = {
-            name.removesuffix("2"): value
-            for name, value in found.groupdict().items()
-            if value is not None
-        }
-        yield _Fit(rule, {**groups, **manner})
-
-
-def _manner_off(clause: str) -> tuple[str, Groups]:
-    """Return a clause without how it shall be done, and how: which hand, how fast."""
-    manner: dict[str, str] = {"pace": "slow"} if _PACE.search(clause) else {}
-    clause = " ".join(_PACE.sub(" ", clause).split())
-    for pattern in _MANNERS:
-        found = pattern.fullmatch(clause)
-        if found is not None:
-            clause = found["own"]
-            manner |= {name: value for name, value in found.groupdict().items() if name != "own"}
-    return clause, manner
-
-
-def _is_whole(fit: _Fit, request: Request) -> bool:
-    """Tell whether each of several things or places that a clause lists is one."""
-    listed = [name for name in ("object", "place") if " and " in fit.groups.get(name, "")]
-    others = [name for name in fit.groups if name not in listed and " and " in fit.groups[name]]
-    return bool(listed) and not others and all(
-        is_one(part, request) for name in listed for part in parts_of(fit.groups[name])
-    )  # fmt: skip
-
-
-def _build(clause: str, fit: _Fit, draft: _Draft) -> None:
+def _build(clause: str, fit: Fit, draft: _Draft) -> None:
     steps = fit.rule.build(fit.groups, draft.request)
     draft.began = len(draft.steps)
     draft.steps += [(step, fit.rule.intent) for step in steps]
+    draft.said.append(clause)
     draft.clause = clause
     draft.thing = fit.groups.get("object", fit.groups.get("place", ""))
 

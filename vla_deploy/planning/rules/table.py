@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.planning.rules import building, cleaning, telling
+from vla_deploy.planning.rules import building, cleaning, moving, returning, telling
 from vla_deploy.planning.rules.building import Builder
 from vla_deploy.planning.rules.intents import Intent
 from vla_deploy.planning.understanding.quantities import NUMBER
@@ -31,7 +31,10 @@ _SECONDS: Final = (
 )
 _WAY: Final = r"(?P<way>forwards?|ahead|straight(?: ahead| on)?|backwards?|back(?: up)?|in reverse)"
 _LITTLE: Final = r"(?:a (?:little|bit|tad)|slightly)"
-_SIDE: Final = r"(?P<way>left|right|around|clockwise|counter-?clockwise|anti-?clockwise)"
+_SIDE: Final = r"(?P<way>left|right|a?round|clockwise|counter-?clockwise|anti-?clockwise)"
+_SHARE: Final = (
+    r"(?:an? |one )?(?P<share>half|(?:three[ -])?quarters?|full|whole|complete)(?: an?| of an?)?"
+)
 _HAND: Final = r"(?:the |your |a )?(?:(?P<arm>left|right) )?(?:grippers?|hands?|fingers|claws?)"
 _INTO: Final = (
     r"(?P<relation>(?:back )?(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon))"
@@ -45,6 +48,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"what objects (?:do you see|are there)", telling.tell_sight),
     (Intent.QUESTION, rf"what(?:'s| is| do you see| can you see)(?: there)? (?:on|at) {_PLACE}",
      telling.tell_sight),
+    (Intent.QUESTION, rf"(?:which|what) {_OBJECT} (?:is|are|stands?|lies?)(?: there)? "
+     rf"(?P<where>(?:on|in|at) .+)", telling.tell_which),
     (Intent.QUESTION, r"what (?:are you holding|do you (?:hold|have)|have you got)"
      r"(?: in your hands?)?|what(?:'s| is) in your hands?|are you holding (?:anything|something)|"
      r"do you (?:hold|have) (?:anything|something)(?: in your hands?)?", telling.tell_hands),
@@ -83,10 +88,17 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay)(?: here| there)?(?: (?:for )?{_SECONDS})?",
      building.wait),
     # --- put
+    (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry) {_OBJECT} "
+     r"(?:back )?(?:to )?where (?:it|they|that|you) (?:(?:was|were|came from|belongs?|had been)"
+     r"(?: before)?|(?:found|got|took|had) (?:it|them)(?: from)?)", returning.put_back),
+    (Intent.MANIPULATION, rf"(?:put|set|place|lay) {_OBJECT} back(?: again)?|"
+     r"(?:put|set|place|lay) back (?P<object2>.+)", returning.put_back),
     (Intent.MANIPULATION, rf"(?:put|set|lay) {_OBJECT} down|(?:put|set|lay) down (?P<object2>.+?)",
      building.put_down),
     (Intent.MANIPULATION, r"(?:let go(?: of)?|drop|release|let loose)(?: of)?(?: (?P<object>it|"
      r"that|this|them))?", building.put_down),
+    (Intent.MANIPULATION, rf"(?:let go of|release|let loose of) {_OBJECT}", building.put_down),
+    (Intent.MANIPULATION, rf"(?:free|empty) {_HAND}", building.empty_hand),
     (Intent.MANIPULATION, rf"(?:tidy|clear|pack) {_OBJECT} (?:away|up) {_INTO} (?P<destination>.+)",
      building.put),
     (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
@@ -94,24 +106,36 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|take|stow|store|"
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
      rf"(?:down |away )?{_INTO} (?P<destination>.+)", building.put),
+    (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling) "
+     rf"{_OBJECT} (?:down |away |back )?(?P<relation>into|inside|in|onto|on top of|on) "
+     r"(?P<destination>.+)", building.put),
     (Intent.MANIPULATION, rf"(?:put|place|take|bring|carry|move) {_OBJECT} "
      r"(?P<destination>(?:over |back )?there)", building.put_there),
+    (Intent.MANIPULATION, rf"(?:leave|keep|put|set|drop) {_OBJECT} (?:right |over )?here",
+     building.leave_here),
     # --- straight and turning
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come) (?P<little>{_LITTLE} )?{_WAY}"
-     rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", building.drive),
-    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step)(?: by)? {_METRES} {_WAY}", building.drive),
+     rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", moving.drive),
+    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step)(?: by)? {_METRES} {_WAY}", moving.drive),
     (Intent.NAVIGATION, rf"(?P<way>back up|reverse)(?: (?:by )?{_METRES})?"
-     rf"(?P<little> {_LITTLE})?", building.drive),
-    (Intent.NAVIGATION, r"(?:turn|spin|rotate) (?:around once|all the way (?:a)?round|"
-     r"(?:a |in a )?full (?:circle|turn))|do a full turn", building.turn_whole),
+     rf"(?P<little> {_LITTLE})?", moving.drive),
+    (Intent.NAVIGATION, r"(?:turn|spin|rotate) (?:a?round once|once a?round|"
+     r"(?:all the way|right|completely) a?round(?: once)?|(?:in )?(?:a|one) circle)",
+     moving.turn_whole),
+    (Intent.NAVIGATION, rf"(?:(?:turn|spin|rotate|make|do|take)(?: by)? )?{_SHARE} "
+     rf"(?:turn|circle|rotation|spin)(?: (?:to )?(?:the |your )?{_SIDE})?", moving.turn_share),
+    (Intent.NAVIGATION, rf"(?:turn|spin|rotate)(?: by)? {_SHARE} (?:to )?(?:the |your )?{_SIDE}",
+     moving.turn_share),
+    (Intent.NAVIGATION, rf"(?:turn|spin|rotate) (?:to )?(?:the |your )?{_SIDE}(?: by)? {_SHARE}"
+     r"(?: turn| circle)?", moving.turn_share),
     (Intent.NAVIGATION, rf"(?:turn|rotate|spin|face|swivel)(?P<little> {_LITTLE})?"
      rf"(?: to)?(?: the| your)? ?{_SIDE}(?: (?:by )?{_ANGLE})?(?P<little2> {_LITTLE})?",
-     building.turn),
+     moving.turn),
     (Intent.SEARCH, r"turn your head (?P<what>.+)", building.look),
     (Intent.NAVIGATION, rf"(?:turn|rotate|spin|swivel)(?: by)? {_ANGLE}"
-     rf"(?: (?:to )?(?:the )?{_SIDE})?", building.turn),
+     rf"(?: (?:to )?(?:the )?{_SIDE})?", moving.turn),
     (Intent.NAVIGATION, r"(?:make|take|do) an? (?P<way>left|right)(?: turn)?|do a u-?turn",
-     building.turn),
+     moving.turn),
     # --- arms
     (Intent.MANIPULATION, rf"(?P<verb>open|close|shut) {_HAND}", building.gripper),
     (Intent.MANIPULATION, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?"
@@ -135,19 +159,26 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      building.look_around),
     (Intent.SEARCH, rf"(?:look around|scan|check(?: on)?) (?:in |at |on )?{_PLACE}",
      building.look_around),
+    (Intent.SEARCH, r"(?:look|glance) (?P<side>up|down|left|right) (?:at|to|towards?|on) "
+     r"(?P<what>.+)", building.look),
     (Intent.SEARCH, r"(?:look|have a look|take a look|gaze|glance)(?: at| to| towards?)? "
      r"(?P<what>.+)", building.look),
     # --- clean
     (Intent.CLEANING, r"(?:clean|tidy|clear)(?: things)?(?: up)?|clear (?:things )?away",
      cleaning.tidy),
     (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", cleaning.tidy),
+    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|do a (?:round|tour) of)(?: through)? [^:]+: ?"
+     r"(?P<place>.+)", cleaning.visit),
     (Intent.CLEANING, r"(?:patrol|inspect|sweep(?: through)?|cover(?: the floor (?:of|in))?|"
      r"drive (?:all )?over(?: the floor (?:of|in))?) (?P<place>.+?)(?: floor)?", cleaning.patrol),
     # --- pick
+    (Intent.MANIPULATION, rf"(?:get|take|fish|dig|pull|pick|lift|fetch|bring|remove|retrieve|grab|"
+     rf"scoop|collect) {_OBJECT} (?:back )?(?:up )?(?:out(?: of| from)|from inside) (?P<source>.+)",
+     building.pick_from),
+    (Intent.MANIPULATION, rf"bring {_OBJECT}(?: over)?", building.bring),
     (Intent.MANIPULATION, rf"(?:pick|lift)(?: up)? {_OBJECT}(?: up)?", building.pick),
     (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove)"
      rf"(?: hold of)? {_OBJECT}", building.pick),
-    (Intent.MANIPULATION, rf"bring {_OBJECT}", building.bring),
     # --- the rest
     (Intent.ASSIST, r"(?:(?:say|announce|repeat after me)[:,]?|tell [a-z]+(?= that))(?: that)? "
      r"(?P<text>.+)", building.speak),

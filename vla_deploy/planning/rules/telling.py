@@ -82,6 +82,12 @@ def tell_whether(groups: Groups, request: Request) -> list[Step]:
     return _say(f"Yes, I see {listed(found)}.")
 
 
+def tell_which(groups: Groups, request: Request) -> list[Step]:
+    """Say which of such things stand on, in or at something."""
+    found = _known(f"{groups['object']} {groups['where']}", request)
+    return _say(f"It is {listed(found)}." if found else "I see none there.")
+
+
 def tell_number(groups: Groups, request: Request) -> list[Step]:
     """Say how many such things are known."""
     count = len(_known(groups["object"], request))

@@ -79,6 +79,9 @@ _SILENT: Final = frozenset(
 _FILL: Final = frozenset({"the", "one", "on", "in", "a", "an"})
 Candidates = tuple[Candidate, ...]
 _WORD: Final = re.compile(r"[a-z0-9_']+")
+_TO: Final = re.compile(
+    r"^(?:(?:go |back |over )*(?:to|into|in|at|on|onto|by) )?(?:(?:the|my|your) )?"
+)
 _PIECE: Final = re.compile(r"\s*(?:[,;.!?]|\s-+\s)\s*")
 _NOT: Final = re.compile(
     r"(?:no )?(?P<any>(?:any|either|anything|whichever)(?: one| of them)? )?(?:the one )?"
@@ -163,7 +166,8 @@ def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | Non
 
 
 def _picked(candidates: Candidates, said: str) -> tuple[Verdict, Candidate | None]:
-    by_name = [one for one in candidates if said == one.name]
+    called = (said, _TO.sub("", said))
+    by_name = [one for one in candidates if one.name in called or _spoken(one) in called]
     if len(by_name) == 1:
         return Verdict.CHOSEN, by_name[0]
     words = _telling(candidates, said)
@@ -178,6 +182,10 @@ def _picked(candidates: Candidates, said: str) -> tuple[Verdict, Candidate | Non
         return Verdict.ANEW, None
     fitting = [one for one in candidates if one.features.issuperset(words)]
     return (Verdict.CHOSEN, fitting[0]) if len(fitting) == 1 else (Verdict.UNCLEAR, None)
+
+
+def _spoken(candidate: Candidate) -> str:
+    return candidate.name.replace("_", " ")
 
 
 def _known(candidates: Candidates) -> frozenset[str]:

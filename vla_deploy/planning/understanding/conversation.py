@@ -43,7 +43,8 @@ class Mention:
     """Hold one thing or place that a turn was about.
 
     `said` is how it was called, `means` the words or the place that plans use for it, and
-    `thing_id` the thing of the scene that was meant, "" where the scene does not tell.
+    `thing_id` the thing of the scene that was meant, "" where the scene does not tell. `rested` is
+    what it was on or in at that time: a place, or the id of a thing.
     """
 
     said: str
@@ -52,14 +53,15 @@ class Mention:
     thing_id: str = ""
     kind: str = ""
     colour: str = ""
+    rested: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Turn:
     """Hold one command, what the robot answered to it, and the plan that came of it or None.
 
-    `understood` is the command as the plan sums it up; `here` is where the robot stood (x, y, yaw
-    in the map) when it was told.
+    `understood` is the command as the plan sums it up, `in_full` its words with what they left to
+    the command before; `here` is where the robot stood (x, y, yaw in the map) when it was told.
     """
 
     said: str
@@ -71,6 +73,12 @@ class Turn:
     outcome: Outcome = Outcome.UNDER_WAY
     answer: str = ""
     here: Pose | None = None
+    in_full: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return the command so that it can be understood alone, as far as that is known."""
+        return self.in_full or self.said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,9 +19,22 @@ def mentions_of(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
     """Return what a grounded plan names, in its order, each once."""
     found: dict[tuple[str, str], Mention] = {}
     for action in plan.actions:
-        for mention in _mentions(action, plan, scene):
+        for mention in (*_put_from_hand(action, plan, scene), *_mentions(action, plan, scene)):
             found.setdefault((mention.means, mention.thing_id), mention)
-    return tuple(found.values()) or tuple(_spoken(plan.goal, scene))
+    return tuple(found.values()) or _told(plan, scene)
+
+
+def _told(plan: Plan, scene: Snapshot | None) -> tuple[Mention, ...]:
+    """Return what a plan that only answers is about: the one thing that it tells of, if it does."""
+    asked = tuple(_spoken(plan.goal, scene))
+    told = {
+        one.thing_id: one
+        for action in plan.actions
+        if isinstance(action.parameters.get("text"), str)
+        for one in _spoken(str(action.parameters["text"]), scene)
+        if one.thing_id
+    }
+    return tuple(told.values()) if len(told) == 1 else asked
 
 
 def _spoken(goal: str, scene: Snapshot | None) -> Iterator[Mention]:
@@ -49,6 +62,17 @@ def _mentions(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Me
         yield _mention(value, subject, role)
 
 
+def _put_from_hand(action: Action, plan: Plan, scene: Snapshot | None) -> Iterator[Mention]:
+    """Yield what a plan puts down that the hand had before; its actions do not name it."""
+    if action.skill != "place" or scene is None:
+        return
+    arm = action.parameters.get("arm")
+    taken = any(one.skill == "pick_up" for one in plan.actions[: plan.actions.index(action)])
+    held = [one for one in scene.things if one.held_by and arm in (None, one.held_by)]
+    if len(held) == 1 and not taken:
+        yield _mention(held[0].thing_id, subject_of(held[0].thing_id, scene), Role.OBJECT)
+
+
 def _mention(said: str, subject: Subject, role: Role) -> Mention:
     thing = subject.thing
     return Mention(
@@ -58,6 +82,7 @@ def _mention(said: str, subject: Subject, role: Role) -> Mention:
         thing_id="" if thing is None else thing.thing_id,
         kind=subject.kind,
         colour="" if thing is None else thing.colour,
+        rested="" if thing is None or thing.rests is None else thing.rests.of,
     )
 
 

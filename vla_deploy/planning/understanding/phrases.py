@@ -13,7 +13,7 @@ PRONOUNS: Final[Mapping[str, str]] = MappingProxyType(
         "the same": "it", "same one": "it", "the same one": "it", "that thing": "it",
         "this thing": "it", "the thing": "it", "the one": "it", "itself": "it",
         "them": "them", "those": "them", "these": "them", "all of them": "them", "them all": "them",
-        "both": "them", "both of them": "them",
+        "both": "them", "both of them": "them", "them both": "them", "the both of them": "them",
         "there": "there", "over there": "there", "that place": "there", "back there": "there",
         "here": "here", "over here": "here", "back here": "here", "this place": "here",
     }

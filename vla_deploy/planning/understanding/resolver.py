@@ -186,6 +186,9 @@ class Resolver:
 
     def _pronoun(self, read: Expression, use: Use) -> tuple[Referent, ...]:
         if read.pronoun == phrases.THEM:
+            in_hands = [one for _, one in self.setting.holding()]
+            if use is Use.PUT and "both" in read.said and len(in_hands) > 1:
+                return tuple(self._again(read, one, use, "it is in my hand") for one in in_hands)
             several = [one for one in self.setting.latest_group() if _can_move(one, use)]
             if several:
                 return tuple(self._again(read, one, use, "you spoke of them") for one in several)

@@ -10,7 +10,9 @@ from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import checked
 from vla_deploy.planning.rules import draft_plan
+from vla_deploy.planning.understanding import Conversation, Outcome, Turn
 from vla_deploy.planning.understanding.grounding import PUT_IN
+from vla_deploy.planning.understanding.mentioned import mentions_of
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.thing import Rest
@@ -71,17 +73,53 @@ class Flat:
 
     def does(self, text: str, **changes: Any) -> str:
         """Return the steps of a command in short, without what grounding puts in."""
-        return "; ".join(
-            " ".join([one.skill, *(str(value) for value in one.parameters.values())])
-            for one in self.plan(text, **changes).actions
-            if one.description != PUT_IN
-        )
+        return _in_short(self.plan(text, **changes), frozenset({PUT_IN}))
+
+    def after(self, *texts: str, outcome: Outcome = Outcome.SUCCEEDED) -> Conversation:
+        """Return the conversation after commands that were planned and ended so."""
+        talk = Conversation()
+        for number, text in enumerate(texts):
+            plan = self.plan(text, conversation=talk)
+            turn = Turn(
+                said=text,
+                command_id=f"c{number}",
+                mentioned=mentions_of(plan, self.request(text).scene),
+                plan=plan,
+                outcome=outcome,
+                here=HERE,
+                in_full=plan.goal,
+            )
+            talk = talk.after(turn)
+        return talk
+
+    def goes_on(self, talk: str) -> str:
+        """Return what the last of several commands does, with what is taken for it.
+
+        They are parted by ">>".
+        """
+        *before, text = [one.strip() for one in talk.split(">>")]
+        plan = self.plan(text, conversation=self.after(*before))
+        return _in_short(plan, frozenset({PUT_IN}), frozenset({"pick_up"}))
+
+
+def _in_short(plan: Plan, without: frozenset[str], but: frozenset[str] = frozenset()) -> str:
+    return "; ".join(
+        " ".join([one.skill, *(str(value) for value in one.parameters.values())])
+        for one in plan.actions
+        if one.description not in without or one.skill in but
+    )
 
 
 @pytest.fixture(scope="session")
 def flat() -> Flat:
     """Return the flat."""
     return Flat()
+
+
+@pytest.fixture(scope="session")
+def goes_on(flat: Flat) -> Callable[[str], str]:
+    """Return what the last of several commands does."""
+    return flat.goes_on
 
 
 @pytest.fixture(scope="session")

@@ -57,6 +57,14 @@ COMMANDS = {
         "turn a little to the left": "turn 0.3490658503988659",
         "rotate 45 degrees clockwise": "turn -0.7853981633974483",
         "spin around once": "turn 6.283185307179586",
+        "rotate right around": "turn 6.283185307179586",
+        "turn a quarter to the right": "turn -1.5707963267948966",
+        "half a turn please": "turn 3.141592653589793",
+        "do a quarter turn left": "turn 1.5707963267948966",
+        "turn left three quarters of a circle": "turn 4.71238898038469",
+        "back up a metre and a half": "move -1.5",
+        "look up at the blue cup": "look_at blue cup",
+        "glance down at the side table": "look_at down",
         "turn your head to the right": "look_at right",
         "look straight ahead": "look_at ahead",
     },
@@ -69,12 +77,19 @@ COMMANDS = {
         "pick up the red cup with your left hand": "pick_up red cup left",
         "pick up the red cup and the ball": "pick_up red cup left; pick_up ball right",
         "pick up the red cup, then the ball": "pick_up red cup left; pick_up ball right",
+        "pick up the book with your right hand and the ball with the left":
+            "pick_up book right; pick_up ball left",
+        "grab the red cup and the blue one": "pick_up red cup left; pick_up cup_2 right",
+        "dig the ball out of the box": "pick_up ball in box",
+        "get the book back out of the box": "pick_up book in box",
     },
     "bringing": {
         "get me the ball": f"pick_up ball; {BACK}; speak Here is the ball.",
         "can you fetch the book for me": f"pick_up book; {BACK}; speak Here is the book.",
         "I need the ball": f"pick_up ball; {BACK}; speak Here is the ball.",
         "bring me the red one": f"pick_up cup_1; {BACK}; speak Here is the red one.",
+        "gimme the book, will you": f"pick_up book; {BACK}; speak Here is the book.",
+        "could you bring the ball over": f"pick_up ball; {BACK}; speak Here is the ball.",
     },
     "putting": {
         "put the green ball inside the box": BOX,
@@ -93,6 +108,10 @@ COMMANDS = {
             "pick_up red cup left; pick_up ball right; place side_table on left; "
             "place side_table on",
         "stack the book on the box": "place box on",
+        "plonk the ball on the side table": "place side_table on",
+        "chuck the book into the box": BOX,
+        "leave the book here and take the ball to the side table":
+            "speak I leave it where it is.; place side_table on",
         "pick up the red cup, go to the kitchen, and put it on the table":
             "pick_up red cup; navigate_to kitchen; place kitchen_table on",
     },
@@ -114,10 +133,14 @@ COMMANDS = {
         "is the ball on the table?": "speak Yes, I see a green ball.",
         "is there a bottle?": "speak No, I do not see that.",
         "how many cups are there?": "speak I see 2.",
+        "which ball is on the coffee table?": "speak It is a green ball.",
+        "which cups are on the side table": "speak I see none there.",
         "what are you holding?": "speak My hands are empty.",
         "where are you": "speak I am near the coffee table.",
     },
     "cleaning": {
+        "patrol these rooms: hallway, bedroom and kitchen":
+            "navigate_to entrance; navigate_to bedroom; navigate_to kitchen",
         "tidy up": f"{BOX}; {BOX}; {BOX}; {BOX}; speak That is put away.",
         "tidy up the living room please": f"{BOX}; {BOX}; {BOX}; {BOX}; speak That is put away.",
         "clear the bedside table": "speak I know of nothing there to put away. I look around.; "
@@ -127,7 +150,7 @@ COMMANDS = {
         "um, could you, uh, get the, er, the ball please": "pick_up ball",
         "Hello! Excuse me, go to the kitchen, thank you": "navigate_to kitchen",
         "I was wondering if you could possibly find my keys": "find_object keys",
-        "pick up the red cup, no wait, the blue one": "pick_up cup_2",
+        "pick up the red cup, no wait, the blue one": "pick_up blue cup",
         "go to the kitchen, sorry, I mean the bedroom": "navigate_to bedroom",
         "turn left, no, turn right": "turn -1.5707963267948966",
         "move forward one metre, I mean half a metre": "move 0.5",
@@ -171,6 +194,10 @@ def test_a_command_does_what_it_says(does: Does, text: str, expected: str) -> No
         ("open the fridge", NotAble),
         ("place the book next to the box", NotAble),
         ("throw the ball at the dog", NotAble),
+        ("chuck the book at the cat", NotAble),
+        ("bung the ball out of the window", NotAble),
+        ("put the book back where it was", NotAble),
+        ("visit these rooms: kitchen, narnia", NotUnderstood),
         ("put the ball in the red cup", PlanInvalid),
         ("put it down", PlanInvalid),
         ("drive to the kitchen at 0.9 m/s", PlanInvalid),
@@ -193,6 +220,9 @@ def test_what_is_held_is_put_down_and_never_dropped(does: Does) -> None:
     holding = {"left": "cup"}
     assert does("put it down", holding=holding) == "place coffee_table on"
     assert does("let go of it", holding=holding) == "place coffee_table on"
+    assert does("let go of what you are holding", holding=holding) == "place coffee_table on"
+    assert does("free your left hand", holding=holding) == "place left coffee_table on"
+    assert does("leave what you are holding here", holding=holding) == "place coffee_table on"
     assert does("put what you are holding into the box", holding=holding) == BOX
     assert does("put everything down", holding=holding) == "place coffee_table on"
     with pytest.raises(PlanInvalid, match="no hand holds the green ball"):

@@ -81,3 +81,18 @@ def test_the_map_is_asked_before_a_straight_way(talk) -> None:
 def test_a_misheard_name_is_asked(talk) -> None:
     assert talk("pick up the red cap") == "asked: Did you mean the cup?"
     assert talk("yes") == "pick_up red cup"
+
+
+def test_the_answer_to_a_question_says_what_it_is(talk) -> None:
+    assert talk("which ball is on the coffee table?") == "speak It is a green ball."
+    assert talk("okay, pick it up") == "pick_up ball_1"
+
+
+def test_of_several_things_that_are_told_none_is_it(talk) -> None:
+    assert talk("which cups are on the coffee table?") == "speak It is a red cup and a blue cup."
+    assert talk("pick it up").startswith("asked: Which one")
+
+
+def test_a_place_may_be_answered_with_the_way_there(talk) -> None:
+    assert talk("go there") == "asked: Where do you mean?"
+    assert talk("over in the kitchen") == "navigate_to kitchen"

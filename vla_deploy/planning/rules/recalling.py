@@ -1,0 +1,185 @@
+"""Put into full words what a command leaves to the one before it: "again", "a bit more", "back".
+
+Nothing is repeated that failed, was refused or called off: a person has to say that anew.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import NothingBefore
+from vla_deploy.planning.understanding.conversation import Outcome, Turn
+
+_AGAIN: Final = re.compile(
+    r"(?:and )?(?:(?:do|try|say|make|repeat) (?:it|that|this|so|the same(?: thing)?) )?"
+    r"(?:(?:once )?again|once more|one more time|(?:yet )?another time|one more|another one)|"
+    r"(?:please )?repeat(?: (?:it|that|this))?|(?:do )?(?:just )?the same(?: thing)?(?: again)?|"
+    r"(?:the )?same again|(?:do|try) (?:it|that) again"
+)
+# How much "a bit more" is of the distance, angle or time that was last given outright.
+RATIOS: Final[Mapping[str, float]] = {
+    r"(?:just )?a (?:tiny |little |wee )?(?:bit|touch|tad|fraction)": 0.25,
+    r"(?:just )?a little|slightly": 0.25,
+    r"(?:some|quite a bit)": 0.5,
+    r"": 0.5,
+    r"(?:much|a lot|lots)": 1.0,
+}
+_FURTHER: Final = r"(?:more|further|farther|longer)(?: (?:on|ahead|round))?"
+_SHARES: Final[Mapping[str, float]] = {
+    r"half (?:that|as (?:much|far|long)|the (?:way|distance))(?: again)?": 0.5,
+    r"(?:as much|the same amount|that much)(?: again)?": 1.0,
+    r"twice (?:that|as (?:much|far|long))|double(?: (?:that|it))?": 2.0,
+}
+_GO: Final = r"(?:and |now |then )*(?:(?:go|move|drive|turn|rotate|spin|roll|come|wait) )?"
+_MORE: Final[tuple[tuple[re.Pattern[str], float], ...]] = tuple(
+    (re.compile(rf"{_GO}(?:{words})"), ratio)
+    for words, ratio in (
+        *((rf"(?:{bit}) {_FURTHER}" if bit else _FURTHER, ratio) for bit, ratio in RATIOS.items()),
+        *_SHARES.items(),
+    )
+)
+_BACK: Final = re.compile(
+    r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?|the other way(?: (?:round|around))?|"
+    r"(?:turn|move|drive|go|come|step|roll) back again)"
+)
+# What a command begins or ends with that leans on the one before it.
+_LEANING: Final = re.compile(
+    r"(?:(?:ok|okay|great|good|thanks|thank you|please|butler|robot|so|right)[, ]+)*"
+    r"(?:and|also|plus|then|now|next|(?:do |try )?(?:exactly |just )?(?:the )?same)\b.*|"
+    r".*\b(?:too|as well|also|likewise)"
+)
+_ASKING: Final = re.compile(r"\b(?:where|what|which|who|whose|how|why|is|are|was|do|does|did)\b")
+_SAME: Final = re.compile(
+    r"(?:do |try |make )?(?:exactly |just )?(?:the )?same(?: thing)?(?: again)? "
+    r"(?:with|for|to|(?=(?:in|at|on)\b))\s*(?P<said>.+)"
+)
+
+Amounts = tuple[str, Callable[[float], str]]
+
+
+def _straight(distance_m: float) -> str:
+    return f"move {'backward' if distance_m < 0 else 'forward'} {_figure(distance_m)} m"
+
+
+def _turning(angle_rad: float) -> str:
+    return f"turn {'right' if angle_rad < 0 else 'left'} {_figure(angle_rad)} rad"
+
+
+def _waiting(duration_s: float) -> str:
+    return f"wait {_figure(duration_s)} s"
+
+
+def _figure(value: float) -> str:
+    return f"{abs(value):.4f}".rstrip("0").rstrip(".")
+
+
+# What of a step can be more or less, and the words for it.
+_AMOUNTS: Final[Mapping[str, Amounts]] = {
+    "move": ("distance_m", _straight),
+    "turn": ("angle_rad", _turning),
+    "wait": ("duration_s", _waiting),
+}
+
+
+def recalled(text: str, request: Request) -> str | None:
+    """Return the full words of a command that only points at the one before it, else None.
+
+    Raises:
+        NothingBefore: there is none, it did not end well, or it has no amount.
+    """
+    if is_again(text):
+        return last_words(request)
+    ratio = _ratio(text)
+    if ratio is not None:
+        return _more(ratio, request)
+    return _back(request) if _BACK.fullmatch(text) else None
+
+
+def is_again(text: str) -> bool:
+    """Tell whether words want what was done last to be done again, and nothing else."""
+    return _AGAIN.fullmatch(text) is not None
+
+
+def leans(text: str) -> bool:
+    """Tell whether a command may be short for one with the verb of the one before it."""
+    return _LEANING.fullmatch(text) is not None and _ASKING.search(text) is None
+
+
+def same_with(clause: str) -> str | None:
+    """Return the other part in "do the same with the ball", None where it is no such clause."""
+    found = _SAME.fullmatch(clause)
+    return None if found is None else found["said"]
+
+
+def last_words(request: Request) -> str:
+    """Return the command before this one, in full.
+
+    Raises:
+        NothingBefore: there is none, or it did not end well.
+    """
+    return _last(request).words
+
+
+def _last(request: Request) -> Turn:
+    """Return the turn before this one, where that may be done again.
+
+    Raises:
+        NothingBefore: it may not.
+    """
+    turns = request.conversation.turns
+    if not turns:
+        raise NothingBefore("there is no command yet that I could repeat; say the whole command")
+    last = turns[-1]
+    if last.outcome not in (Outcome.UNDER_WAY, Outcome.SUCCEEDED) or last.plan is None:
+        raise NothingBefore(
+            f'"{last.said[:60]}" was not done ({last.outcome.value}), so I do not repeat it; '
+            "say the whole command"
+        )
+    return last
+
+
+def _ratio(text: str) -> float | None:
+    return next((ratio for pattern, ratio in _MORE if pattern.fullmatch(text)), None)
+
+
+def _more(ratio: float, request: Request) -> str:
+    """Return more of the last way, turn or wait, by what was given before any "more"."""
+    last = _last(request)
+    amount = _amount(last)
+    if amount is None:
+        raise NothingBefore(
+            f'"{last.said[:60]}" has no distance, angle or time of which I could do more; '
+            "say how much"
+        )
+    skill, value = amount
+    for turn in reversed(request.conversation.turns):
+        outright = _amount(turn)
+        if outright is None or outright[0] != skill:
+            break
+        value = outright[1]
+        if _ratio(turn.said.lower().strip(" .!?")) is None:
+            break
+    return _AMOUNTS[skill][1](ratio * value)
+
+
+def _amount(turn: Turn) -> tuple[str, float] | None:
+    """Return the last step of a turn that can be more or less, with its amount in SI units."""
+    actions = () if turn.plan is None else turn.plan.actions
+    for action in reversed(actions):
+        if action.skill in _AMOUNTS:
+            return action.skill, _number(action.parameters.get(_AMOUNTS[action.skill][0]))
+    return None
+
+
+def _back(request: Request) -> str:
+    """Return the way back of the last straight way or turn; else to where the command began."""
+    amount = _amount(_last(request))
+    if amount is None or amount[0] == "wait":
+        return "go back"
+    skill, value = amount
+    return _AMOUNTS[skill][1](-value)
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0

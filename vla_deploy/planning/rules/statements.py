@@ -1,0 +1,90 @@
+"""Take out of a command what only states something, and give the rest what it lends to it.
+
+"I left my keys in the kitchen, can you bring them?" tells what "them" is, and where to go first.
+"Not on the table, put it in the box" tells only where not.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.references import words_of
+from vla_deploy.planning.rules.building import Groups, is_one, parts_of
+from vla_deploy.planning.rules.fits import known_fit
+from vla_deploy.planning.understanding.expressions import Scope, read_expression
+from vla_deploy.planning.understanding.phrases import THEM
+from vla_deploy.planning.understanding.setting import Setting
+
+_THING: Final = r"(?P<thing>(?:my|the|our) .+?)"
+_SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"i (?:just |still |simply )?(?:can't|cannot|can not|couldn't|could not) "
+        rf"(?:find|see|spot|remember where i (?:put|left)) {_THING}(?: anywhere)?",
+        rf"i(?:'ve| have| seem to have| must have| think i(?:'ve)?)? (?:lost|mislaid|misplaced) "
+        rf"{_THING}",
+        rf"i(?:'ve| have| must have| think i(?:'ve)?)? (?:left|forgot|forgotten|put) {_THING} "
+        r"(?:in|on|at|by) (?P<place>.+)",
+        rf"{_THING} (?:is|are|must be|should be) (?:still )?(?:in|on|at) (?P<place>.+)",
+    )
+)
+_POINTS: Final = re.compile(r"\b(?:it|them|they|those)\b")
+_NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P<place>.+)")
+_NOT_THAT: Final = re.compile(r"(?:no )?not (?P<thing>(?:the|that|this|my) .+|that|this|it)")
+
+
+def statements_off(parts: Sequence[str], request: Request) -> list[str]:
+    """Return the parts of a command that ask for something, with what the others lend them."""
+    return _told_off(_not_that_off(_not_there_off(list(parts), request), request), request)
+
+
+def _told_off(parts: list[str], request: Request) -> list[str]:
+    """Let what a statement is about take the place of the pronoun behind it."""
+    if len(parts) < 2:
+        return parts
+    found = next((one for pattern in _SAID if (one := pattern.fullmatch(parts[0]))), None)
+    if found is None or not _POINTS.search(parts[1]) or not is_one(found["thing"], request):
+        return parts
+    place = found.groupdict().get("place")
+    if place is not None and not is_one(place, request):
+        return parts
+    asked = _POINTS.sub(found["thing"], parts[1], count=1)
+    return [*([f"go to {place}"] if place else []), asked, *parts[2:]]
+
+
+def _not_there_off(parts: list[str], request: Request) -> list[str]:
+    """Leave out where not, beside a part that says where."""
+    for at, part in enumerate(parts):
+        found = _NOT_THERE.fullmatch(part)
+        if found is None or len(parts) < 2 or not is_one(found["place"], request):
+            continue
+        fit = known_fit(parts[at - 1 if at else 1], request)
+        groups: Groups = {} if fit is None else fit.groups
+        said = groups.get("destination", groups.get("place", ""))
+        if said and words_of(said) != words_of(found["place"]) and _is_of_one(groups, request):
+            return parts[:at] + parts[at + 1 :]
+    return parts
+
+
+def _not_that_off(parts: list[str], request: Request) -> list[str]:
+    """Let "not the red one, the blue one" be a correction; never where that may mean both."""
+    found = _NOT_THAT.fullmatch(parts[0]) if len(parts) > 1 else None
+    if found is None:
+        return parts
+    fit = known_fit(parts[1], request)
+    groups: Groups = {"object": parts[1]} if fit is None else fit.groups
+    if not _is_of_one(groups, request):
+        return parts
+    return [f"no {parts[1]}" if fit is None else parts[1], *parts[2:]]
+
+
+def _is_of_one(groups: Groups, request: Request) -> bool:
+    """Tell whether a clause is about things that are named one by one."""
+    text = groups.get("object", "")
+    try:
+        read = [read_expression(one, Setting(request).furniture) for one in parts_of(text)]
+    except UnknownObject:
+        return is_one(text, request)
+    return all(one.scope is Scope.ONE and one.pronoun != THEM for one in read)
