@@ -16,13 +16,13 @@ from vla_deploy.planning.command_parser.spans import find_span
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.rules import building, cleaning, telling
+from vla_deploy.planning.rules import building, cleaning, moving, telling
 from vla_deploy.planning.understanding.insertions import is_surface
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
 Skill = building.Step
-DEFAULT_MOVE_M: Final = building.DRIVE_M
-DEFAULT_TURN_RAD: Final = building.TURN_RAD
+DEFAULT_MOVE_M: Final = moving.DRIVE_M
+DEFAULT_TURN_RAD: Final = moving.TURN_RAD
 DEFAULT_WAIT_S: Final = 5.0
 _SPEAKERS: Final = frozenset({"me", "us", "here", "over here"})
 # What poses are called besides their names in robot files.
