@@ -21,22 +21,27 @@ from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world.vocabulary import ANY_CLASS, ARTICLES, OBJECT_CLASSES, SYNONYMS
 
 _COMMA: Final = re.compile(r"\s*(?:[,;:]|\s[-\u2013\u2014]+\s|[.!?](?=\s))\s*")
-_ABOUT: Final = re.compile(r"^(?:as for|concerning|regarding) (?=\w)")
+_ABOUT: Final = re.compile(r"^(?:as for|concerning|regarding|you see) (?=\w)")
 _NTH: Final = re.compile(rf"\b(?:{'|'.join(ORDINALS)})\b(?! (?:one )?(?:from|on|to) )")
 _COUNTING: Final = re.compile(
     r"(?:(?:if you |when )?(?:counting|counted|count|starting|seen|looking|going)(?: it)? )?"
     r"from (?:the|your|my) (?P<side>left|right)(?: hand)?(?: side| end)?"
 )
-_NOT: Final = re.compile(r"(?:but |just |only )?not (?P<not>(?:the|that|those|these) .+)")
+_NOT: Final = re.compile(
+    r"(?:(?:but |just |only )?not|(?:any(?:thing)? )?(?:but|except|other than)) "
+    r"(?P<not>(?:the|that|those|these) .+)"
+)
 _OTHER: Final = re.compile(r"(?:but )?(?:rather )?(?:the|that) other(?: one)?")
 # "It", where it is no word before another thing: "that one", but not "that cup".
 _PRONOUN: Final = re.compile(
-    r"\b(?:it|them both|both of them|them|both|that one|this one|those|these|that|this)\b"
+    r"\b(?:it|them both|them all|both of them|them|both|that one|this one|those|these|that|this)\b"
     r"(?=$|[.!?]| (?:up|down|in|into|inside|on|onto|to|over|away|here|back|for|with|from|out|off|"
     r"please|now|there)\b)"
 )
-_IN_THERE: Final = re.compile(r"\b(?P<how>in|into|inside|on|onto) there\b")
+_IN_THERE: Final = re.compile(r"\b(?:in|into|inside) there\b")
 _THERE: Final = re.compile(r"\b(?:over )?there\b(?=$|[.!?]| please\b)")
+_RESTING: Final = re.compile(r"(?<! is)(?<! are)(?<! not) (?:on|in|inside) (?!the (?:left|right))")
+_POINTED: Final = re.compile(r" (?:over |right )?(?:there|here)$")
 _NEXT: Final = re.compile(r"\b(?:and|then)\b")
 _GENERIC: Final = re.compile(r"\b(?:thing|object|item|(?<=\bthe )one)\b")
 _KIND: Final = re.compile(
@@ -123,18 +128,38 @@ def _topic(pieces: Pieces, request: Request) -> Pieces:
     count = next((at for at, one in enumerate(about) if not _is_thing(one, request)), 0)
     if not count:
         return pieces
-    topic, rest = " and ".join(about[:count]), pieces[count]
-    for pattern, instead in (
-        (_IN_THERE, rf"\g<how> {topic}"),
-        (_PRONOUN, topic),
-        (_THERE, f"to {topic}"),
-    ):
+    topic, rest = " and ".join(map(_told_from_place, about[:count])), pieces[count]
+    for pattern, before in ((_IN_THERE, "in "), (_PRONOUN, ""), (_THERE, "to ")):
         found = pattern.search(rest)
         # "Take the ball and put it away": "it" is the ball.
         if found and not _names_another(rest[: found.start()]):
-            told = f"{rest[: found.start()]}{found.expand(instead)}{rest[found.end() :]}"
+            told = f"{rest[: found.start()]}{before}{topic}{rest[found.end() :]}"
             return [told, *pieces[count + 1 :]]
     return pieces
+
+
+def _named_after(pieces: Pieces, request: Request) -> Pieces:
+    """Put what a sentence ends with in the place of the "it" that went before."""
+    second = polite_off(pieces[-1])
+    found = re.search(r"\bit\b", pieces[0])
+    is_place = match_place(second, request.world.places) is not None
+    is_named = second.startswith("the ") and not is_place and _is_one_thing(second, request)
+    if (
+        len(pieces) != 2
+        or found is None
+        or not is_named
+        or _KIND.search(pieces[0][: found.start()])
+    ):
+        return pieces
+    told = _told_from_place(second)
+    return [f"{pieces[0][: found.start()]}{told}{pieces[0][found.end() :]}"]
+
+
+def _told_from_place(thing: str) -> str:
+    """Return "the cup that is on the table": no verb can take that for where to put it."""
+    if not _RESTING.search(thing):
+        return thing
+    return _RESTING.sub(r" that is\g<0>", _POINTED.sub("", thing), count=1)
 
 
 def _names_another(before: str) -> bool:
@@ -189,4 +214,4 @@ def _without(at: int, pieces: Pieces) -> Pieces:
     return [*pieces[:at], *pieces[at + 1 :]]
 
 
-_CHANGES: Final[tuple[Change, ...]] = (_counted, _left_out, _named_twice, _topic)
+_CHANGES: Final[tuple[Change, ...]] = (_counted, _left_out, _named_twice, _topic, _named_after)

@@ -17,6 +17,7 @@ from vla_deploy.planning.understanding.places import is_like_place
 from vla_deploy.planning.understanding.quantities import quantity_of
 from vla_deploy.planning.understanding.referring import pose_parameters
 from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 Groups = Mapping[str, str]
 Step = tuple[str, dict[str, Any]]
@@ -34,6 +35,12 @@ _PUT_RELATION: Final = re.compile(
     r"(?:^| )(?:(?:back|over|up|down) )?"
     r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
 )
+_NO_THING: Final = re.compile(
+    r"^(?:the |my |your )?(?:far |very )?(?:left|right|middle)$|\b(?:is|are|that|which|farthest|"
+    r"furthest|not)$"
+)
+# What is said of a thing to tell it from others is no name for it.
+_SAYS_MORE: Final = re.compile(r"'|\b(?:not|but|except|other than|that is|which)\b")
 _WAY: Final = re.compile(r"^(?:back|over|up|down) ")
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 
@@ -72,10 +79,16 @@ def pick(groups: Groups, _: Request) -> list[Step]:
 
 
 def put(groups: Groups, request: Request) -> list[Step]:
-    """Put each thing somewhere, fetching it first."""
+    """Put each thing somewhere, fetching it first.
+
+    Raises:
+        UnknownObject: where to is no more than a side.
+    """
     moved, said, destination = split_put(
         f"{groups['object']} {groups['relation']} {groups['destination']}", request
     )
+    if _NO_THING.search(destination):
+        raise UnknownObject(destination, OBJECT_CLASSES)
     bare = match_place(destination, request.world.places)
     if said in _TOWARDS and bare is not None and bare not in request.world.furniture:
         return [*pick({**groups, "object": moved}, request), ("navigate_to", {"place": bare})]
@@ -121,7 +134,12 @@ def is_seen(text: str, request: Request) -> bool:
 
 
 def is_one(text: str, request: Request) -> bool:
-    """Tell whether a text is the name of a place or refers to things that the robot can know."""
+    """Tell whether a text is the name of a place or refers to things that the robot can know.
+
+    A side alone is neither, nor is what breaks off: "the cup that is".
+    """
+    if _NO_THING.search(text):
+        return False
     if is_like_place(_NEAR.sub("", text), request.world.places):
         return True
     try:
@@ -179,7 +197,8 @@ def bring(groups: Groups, request: Request) -> list[Step]:
     """Fetch a thing and return to where the command was given."""
     back: list[Step] = [("navigate_to", {"place": "here"})] if request.here is not None else []
     words = " ".join(words_of(groups["object"]))
-    said = "Here you are." if words in PRONOUNS else f"Here is the {words}."
+    is_name = words not in PRONOUNS and not _SAYS_MORE.search(groups["object"])
+    said = f"Here is the {words}." if is_name else "Here you are."
     return [*pick(groups, request), *back, ("speak", {"text": said})]
 
 

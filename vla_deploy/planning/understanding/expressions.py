@@ -77,6 +77,13 @@ class Expression:
         """Tell whether only the things around tell which one it is: a row, or what it is not."""
         return bool(self.place or self.besides or self.near or self.kinds)
 
+    @property
+    def is_bare(self) -> bool:
+        """Tell whether it is only a place in a list: "the second one"."""
+        is_counted = self.place is not None and not self.place.side
+        tells = self.extreme or self.kinds or self.besides or self.near or self.support
+        return is_counted and self.query == Query() and not (tells or self.query.is_named)
+
 
 MOST_LETTERS: Final = 200
 _ID: Final = re.compile(r"[a-z]+_\d+")

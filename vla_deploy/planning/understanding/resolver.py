@@ -18,6 +18,7 @@ from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.decisions import Decision
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
 from vla_deploy.planning.understanding.fitting import Use, alike, fitting, suits
+from vla_deploy.planning.understanding.parting import Place
 from vla_deploy.planning.understanding.questions import did_you_mean, which_thing
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, find
@@ -77,6 +78,8 @@ class Resolver:
             raise did_you_mean(read.doubts[0], read.said)
         if read.pronoun:
             return self._pronoun(read, use)
+        if read.place is not None and read.is_bare:
+            return (self._in_list(read, read.place, use),)
         return self._choose(read, fitting(read, use, self.setting), use)
 
     def thing(self, text: str, use: Use) -> Referent:
@@ -203,6 +206,14 @@ class Resolver:
         if held is not None and use is not Use.ONTO:
             return (self._again(read, held, use, "it is in my hand"),)
         return (self._only_thing(read, use),)
+
+    def _in_list(self, read: Expression, place: Place, use: Use) -> Referent:
+        """Return "the second one" of those that were spoken of last."""
+        spoken = [one for one in self.setting.latest_group() if _can_move(one, use)]
+        if len(spoken) < max(place.number, 2):
+            raise UnknownObject(read.said, OBJECT_CLASSES)
+        chosen = spoken[place.number - 1 if place.number > 0 else place.number]
+        return self._again(read, chosen, use, f"of the {len(spoken)} that you spoke of")
 
     def _in_hand(self, read: Expression, use: Use) -> tuple[Referent, ...]:
         """Return what the hands hold, or the hand that is named."""

@@ -54,8 +54,11 @@ def in_a_row(things: Sequence[Thing], view: Viewpoint | None) -> list[Thing] | N
 
 
 def on_side(things: Sequence[Thing], side: str, view: Viewpoint | None) -> list[Thing]:
-    """Return the leftmost, rightmost or middle thing; all of them where that tells none apart."""
-    row = in_a_row(things, view)
+    """Return the leftmost, rightmost or middle thing; all of them where that tells none apart.
+
+    Where several stand on one piece of furniture and the others apart, those are the row.
+    """
+    row = in_a_row(together(things, 2) or things, view)
     if row is None or (side == "middle" and len(row) % 2 == 0):
         return list(things)
     place = {"left": 0, "right": -1, "middle": len(row) // 2}[side]

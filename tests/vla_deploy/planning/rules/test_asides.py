@@ -4,9 +4,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from vla_deploy.planning.errors import NotThere, NotUnderstood, PlanningError
+from vla_deploy.planning.errors import NotThere, NotUnderstood, PlanningError, UnknownObject
 from vla_deploy.planning.rules.asides import straightened
+from vla_deploy.planning.validator import plan_faults
 
 if TYPE_CHECKING:
     from conftest import Flat
@@ -31,6 +34,11 @@ STRAIGHTENED = {
     "fetch the thing on the table, the book": "fetch the book on the table",
     "grab the round object, the ball, and go home": "grab the round ball, and go home",
     "hold the cup, the red one": "hold the red cup",
+    "fetch a cup, any but the blue one": "fetch a cup but not the blue one",
+    "that ball on the coffee table there, get it": "get that ball that is on the coffee table",
+    "you see the ball? bring it to me": "bring the ball to me",
+    "the cups, lay them all in the box": "lay the cups in the box",
+    "lift it up, the red cup": "lift the red cup up",
 }
 AS_SAID = (
     "take the red cup, the ball",
@@ -43,6 +51,9 @@ AS_SAID = (
     "if you see the ball, pick it up",
     "pick up the ball, and put it in the box",
     "the ball, the book",
+    "lift it, the ball, the book",
+    "find the cup and put it in the box, the book",
+    "lay it on the table, the kitchen",
     "say the words, it is late",
     "go to the kitchen, then put that book away",
 )
@@ -72,11 +83,22 @@ def test_what_is_no_aside_stays_as_it_was_said(flat: "Flat", said: str) -> None:
         ("put all cups but the blue one on the side table", "place side_table on"),
         ("lay the ball over on the side table", "place side_table on"),
         ("find the thing with the purple cover, the book", "find_object purple book"),
+        ("take the red cup that is on the coffee table", "pick_up cup_1"),
+        ("take the cup furthest to the left", "pick_up cup_2"),
+        ("take the cup on the far right", "pick_up cup_1"),
+        ("lay the ball on the left in the box", BOX),
         ("go near the cup farthest from the ball", "navigate_to cup_2"),
     ],
 )
 def test_a_described_thing_is_acted_on(does: Callable[..., str], said: str, done: str) -> None:
     assert does(said) == done
+
+
+def test_what_is_brought_goes_by_its_name_only(does: Callable[..., str]) -> None:
+    assert does("bring me the cup that isn't red").endswith("speak Here you are.")
+    assert does("bring me the second cup from the left").endswith(
+        "speak Here is the second cup from left."
+    )
 
 
 @pytest.mark.parametrize(
@@ -88,6 +110,8 @@ def test_a_described_thing_is_acted_on(does: Callable[..., str], said: str, done
         ("the ball and the elephant, lift them", NotUnderstood),
         ("lift the ball, not the elephant", NotUnderstood),
         ("not the red cup, the blue one", NotUnderstood),
+        ("lay the red cup on the left", UnknownObject),
+        ("lift the second one", UnknownObject),
         ("the red cup, never lift it", NotUnderstood),
     ],
 )
@@ -96,3 +120,23 @@ def test_what_is_not_there_or_not_wanted_is_not_done(
 ) -> None:
     with pytest.raises(error):
         does(said)
+
+
+VOCABULARY = (
+    "the the the a red blue cup cups ball box one ones thing it them there second first last from "
+    "left right of two not but isn't that other than nearest to farthest any all except counting "
+    "take put in on table table's bring find bigger round drink , , , - . : please \\1 \\cup"
+)
+SENTENCES = st.lists(st.sampled_from(VOCABULARY.split()), max_size=16).map(" ".join)
+
+
+@settings(max_examples=200, deadline=None)
+@given(SENTENCES)
+def test_any_description_is_refused_by_name_or_makes_a_valid_plan(flat: "Flat", text: str) -> None:
+    request = flat.request(text)
+    try:
+        plan = flat.plan(text)
+    except PlanningError as error:
+        assert str(error)
+        return
+    assert plan_faults(plan, request.world, request.scene, request.here) == []

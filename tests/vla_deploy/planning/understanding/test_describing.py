@@ -71,7 +71,10 @@ def names(request: Request, text: str, use: Use = Use.TAKE) -> list[str]:
         ("the bottle furthest from the pink can", "bottle_4"),
         # --- what it is not
         ("the can that isn't green", "can_1"),
-        ("the bottle that is neither green nor pink", None),
+        ("the bottle that is neither green nor pink", "bottle_2"),
+        ("anything but the pink ones or the green ones", "bottle_2"),
+        ("the bottle on the far left", "bottle_3"),
+        ("the bottle furthest to the right", "bottle_1"),
         ("a bottle that's not green or pink", "bottle_2"),
         ("any bottle but the green ones", "bottle_2"),
         ("any bottle but the nearest", "bottle_3"),
@@ -169,6 +172,31 @@ def test_what_may_not_be_taken_is_counted_and_then_not_taken(home: "Home") -> No
 def test_a_thing_in_the_hand_stands_in_no_row(home: "Home") -> None:
     held = replace(BOTTLES[2], held_by="left")
     assert names(home.ask(*BOTTLES[:2], held), "the first bottle from the left") == ["bottle_2"]
+
+
+def test_the_second_one_alone_is_of_those_spoken_of(home: "Home") -> None:
+    talk = home.spoke_of("cup_4", "cup_2", "ball_1")
+    scene = home.ask("cup_1", "cup_2", "cup_4", "ball_1", conversation=talk)
+    assert names(scene, "the second one") == ["cup_2"]
+    assert names(scene, "the last one") == ["ball_1"]
+    for text in ("the fourth one", "the fifth"):
+        with pytest.raises(UnknownObject):
+            names(scene, text)
+
+
+@pytest.mark.parametrize("text", ["the second one", "the last", "number two"])
+def test_a_place_in_no_list_is_refused(home: "Home", text: str) -> None:
+    with pytest.raises(UnknownObject):
+        names(home.ask("cup_1", "cup_2", conversation=home.spoke_of("cup_1")), text)
+
+
+@pytest.mark.parametrize("text", ["the big one", "the bigger one", "the larger one please"])
+def test_the_big_one_after_a_mention_is_of_that_kind(home: "Home", text: str) -> None:
+    large = replace(BALL, thing_id="ball_2", colour="red", size_m=(0.09, 0.09, 0.09))
+    scene = home.ask(
+        large, "ball_1", "cup_1", *BOTTLES, "box_1", conversation=home.spoke_of("ball_1")
+    )
+    assert names(scene, text) == ["ball_2"]
 
 
 def test_the_big_one_is_of_the_kind_spoken_of_that_can_be_taken(home: "Home") -> None:
