@@ -46,7 +46,7 @@ _SPLIT: Final = re.compile(
 )
 # What people say while they think, and words said twice.
 _FILLER: Final = re.compile(
-    r",?\s*\b(?:um+|uh+|er+m?|hmm+|you know|like,|let me (?:think|see)|"
+    r",?\s*\b(?:um+|uh+|er+m?|hmm+|you know|like,|let me (?:think|see)(?=,)|"
     r"(?:what's|what is|what was|what are) (?:it|that|they|its name)(?: called)?(?: again)?(?=,)|"
     r"how do you (?:say|call it)|what do you call it|whatsit|whatchamacallit)"
     r"(?=[\s,.!?]|$),?\s*"
@@ -78,9 +78,14 @@ def is_stop(text: str) -> bool:
     """Tell whether a command means: stop what you are doing."""
     if len(text) > MOST_LETTERS:
         return False
-    return " ".join(words_of(polite_off(text).replace("'", ""))) in _STOPS
+    said = " ".join(words_of(polite_off(text).replace("'", "")))
+    urged = _URGED.sub("", said)
+    return said in _STOPS or (urged in _STOPS and urged.startswith(_HALTS))
 
 
+# What people say before it who want it now; "no, never mind" may still answer a question.
+_URGED: Final = re.compile(r"^(?:(?:and|then|but|no|wait|oh|hey|i (?:said|say)|just|now) )+")
+_HALTS: Final = ("stop", "halt", "freeze", "dont move", "do not move", "hold still", "stand still")
 _STOPS: Final = frozenset(" ".join(words_of(spoken)) for spoken in STOP_WORDS) | {"stop that"}
 
 

@@ -28,7 +28,10 @@ from vla_deploy.planning.rules.recalling import is_again, last_words, leans, rec
 from vla_deploy.planning.rules.refusals import refuse_unable
 from vla_deploy.planning.rules.statements import statements_off
 from vla_deploy.planning.understanding.conversation import Conversation
+from vla_deploy.planning.understanding.phrases import PRONOUNS
 
+# What of a clause the next one may exchange.
+_THINGS: Final = ("object", "place", "what")
 _HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
 
 
@@ -108,7 +111,8 @@ def _in_full(clause: str, draft: _Draft) -> tuple[str, Fit | None]:
     fit = fit_of(clause, draft.request) if same is None else None
     if fit is not None:
         return clause, fit
-    is_short = same is not None or (draft.leans and is_one(clause, draft.request))
+    names_another = clause not in PRONOUNS and is_one(clause, draft.request)
+    is_short = same is not None or (draft.leans and names_another)
     if is_short and not draft.clause:
         _go_on_from_last(draft)
     if is_again(clause) and draft.clause:
@@ -180,7 +184,7 @@ def _build(clause: str, fit: Fit, draft: _Draft) -> None:
     draft.steps += [(step, fit.rule.intent) for step in steps]
     draft.said.append(clause)
     draft.clause = clause
-    draft.thing = fit.groups.get("object", fit.groups.get("place", ""))
+    draft.thing = next((fit.groups[name] for name in _THINGS if name in fit.groups), "")
 
 
 def _chain(steps: Sequence[tuple[Step, Intent]]) -> tuple[Action, ...]:

@@ -20,7 +20,7 @@ _FORMS: Final[Mapping[str, str]] = {
         "come": "come coming came", "move": "move moving moved", "return": "return returning "
         "returned", "turn": "turn turning turned", "put": "put putting", "place": "place placing "
         "placed", "set": "set setting", "drop": "drop dropping dropped", "leave": "leave leaving "
-        "left", "pick": "pick picking picked", "take": "take taking taken took have having",
+        "left", "pick": "pick picking picked", "take": "take taking taken took",
         "grab": "grab grabbing grabbed", "get": "get getting got gotten", "fetch": "fetch "
         "fetching fetched", "bring": "bring bringing brought", "give": "give giving given gave",
         "carry": "carry carrying carried", "find": "find finding found", "look": "look looking "

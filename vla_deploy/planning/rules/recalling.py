@@ -40,16 +40,20 @@ _MORE: Final[tuple[tuple[re.Pattern[str], float], ...]] = tuple(
     )
 )
 _BACK: Final = re.compile(
-    r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?|the other way(?: (?:round|around))?|"
+    r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?|"
     r"(?:turn|move|drive|go|come|step|roll) back again)"
 )
+_REVERSE: Final = re.compile(r"(?:and )?(?:now )?the other way(?: (?:round|around))?")
 # What a command begins or ends with that leans on the one before it.
 _LEANING: Final = re.compile(
     r"(?:(?:ok|okay|great|good|thanks|thank you|please|butler|robot|so|right)[, ]+)*"
     r"(?:and|also|plus|then|now|next|(?:do |try )?(?:exactly |just )?(?:the )?same)\b.*|"
     r".*\b(?:too|as well|also|likewise)"
 )
-_ASKING: Final = re.compile(r"\b(?:where|what|which|who|whose|how|why|is|are|was|do|does|did)\b")
+# These ask or close: "and where is the book", "and that's it".
+_ASKING: Final = re.compile(
+    r"\b(?:where|what|which|who|whose|how|why|is|are|was|will|do|does|did|that'?s|it'?s)\b"
+)
 _SAME: Final = re.compile(
     r"(?:do |try |make )?(?:exactly |just )?(?:the )?same(?: thing)?(?: again)? "
     r"(?:with|for|to|(?=(?:in|at|on)\b))\s*(?P<said>.+)"
@@ -93,7 +97,9 @@ def recalled(text: str, request: Request) -> str | None:
     ratio = _ratio(text)
     if ratio is not None:
         return _more(ratio, request)
-    return _back(request) if _BACK.fullmatch(text) else None
+    if _REVERSE.fullmatch(text):
+        return _reverse(request)
+    return (_reverse(request) or "go back") if _BACK.fullmatch(text) else None
 
 
 def is_again(text: str) -> bool:
@@ -172,11 +178,11 @@ def _amount(turn: Turn) -> tuple[str, float] | None:
     return None
 
 
-def _back(request: Request) -> str:
-    """Return the way back of the last straight way or turn; else to where the command began."""
+def _reverse(request: Request) -> str | None:
+    """Return the last straight way or turn in the other direction, None where it was neither."""
     amount = _amount(_last(request))
     if amount is None or amount[0] == "wait":
-        return "go back"
+        return None
     skill, value = amount
     return _AMOUNTS[skill][1](-value)
 

@@ -91,6 +91,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry) {_OBJECT} "
      r"(?:back )?(?:to )?where (?:it|they|that|you) (?:(?:was|were|came from|belongs?|had been)"
      r"(?: before)?|(?:found|got|took|had) (?:it|them)(?: from)?)", returning.put_back),
+    (Intent.MANIPULATION, rf"(?:put|set|place|lay) back {_OBJECT} {_INTO} (?P<destination>.+)",
+     building.put),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay) {_OBJECT} back(?: again)?|"
      r"(?:put|set|place|lay) back (?P<object2>.+)", returning.put_back),
     (Intent.MANIPULATION, rf"(?:put|set|lay) {_OBJECT} down|(?:put|set|lay) down (?P<object2>.+?)",

@@ -108,6 +108,10 @@ COMMANDS = {
             "pick_up red cup left; pick_up ball right; place side_table on left; "
             "place side_table on",
         "stack the book on the box": "place box on",
+        "put back the ball on the side table": "place side_table on",
+        "when you have a moment, put the ball in the box": BOX,
+        "put the red cup and the ball in the box, no wait, on the side table":
+            "place side_table on; place side_table on",
         "plonk the ball on the side table": "place side_table on",
         "chuck the book into the box": BOX,
         "leave the book here and take the ball to the side table":
@@ -257,10 +261,29 @@ def test_what_is_urgent_ranks_before_what_is_not(flat: "Flat") -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["stop moving", "please don't move", "Stop that right now!", "hold it", "cancel that"]
+    "text",
+    [
+        "stop moving",
+        "please don't move",
+        "Stop that right now!",
+        "hold it",
+        "cancel that",
+        "and now stop",
+        "no, no, stop!",
+        "I said stop",
+        "wait, don't move",
+        "then halt",
+    ],
 )
 def test_ways_to_say_stop(text: str) -> None:
     assert is_stop(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["no, never mind", "stop before the table", "but first the box", "again", "and now"]
+)
+def test_what_is_no_stop(text: str) -> None:
+    assert not is_stop(text)
 
 
 VOCABULARY = (
