@@ -43,6 +43,8 @@ _THERE: Final = re.compile(r"\b(?:over )?there\b(?=$|[.!?]| please\b)")
 _RESTING: Final = re.compile(r"(?<! is)(?<! are)(?<! not) (?:on|in|inside) (?!the (?:left|right))")
 _POINTED: Final = re.compile(r" (?:over |right )?(?:there|here)$")
 _NEXT: Final = re.compile(r"\b(?:and|then)\b")
+# What is wanted too is another thing.
+_TOO: Final = re.compile(r"\b(?:too|also|as well)\b")
 _GENERIC: Final = re.compile(r"\b(?:thing|object|item|(?<=\bthe )one)\b")
 _KIND: Final = re.compile(
     rf"\b(?:{'|'.join(sorted({*OBJECT_CLASSES, *SYNONYMS}, key=len, reverse=True))})e?s?\b"
@@ -98,6 +100,8 @@ def _left_out(pieces: Pieces, request: Request) -> Pieces:
 
 def _named_twice(pieces: Pieces, request: Request) -> Pieces:
     """Let "the thing ..., the book" be the book, and "the cup, the blue one" the blue cup."""
+    if _TOO.search(request.text.lower()):
+        return pieces
     for at in range(1, len(pieces)):
         second = polite_off(pieces[at])
         read = _read(second, request) if second.split()[:1] == ["the"] else None

@@ -55,6 +55,8 @@ AS_SAID = (
     "find the cup and put it in the box, the book",
     "lay it on the table, the kitchen",
     "say the words, it is late",
+    "lift the cup, the red one too",
+    "lift the thing on the table, also the ball",
     "go to the kitchen, then put that book away",
 )
 

@@ -52,6 +52,23 @@ def test_a_question_is_answered_and_the_command_goes_on(talk) -> None:
     assert talk("the blue one") == "pick_up cup_2"
 
 
+@pytest.mark.parametrize(
+    "answer", ["not the red one", "the second one", "the left one", "the one that isn't red"]
+)
+def test_an_answer_may_count_or_leave_out(talk, answer: str) -> None:
+    talk("pick up the cup")
+    assert talk(answer) == "pick_up cup_2"
+
+
+def test_neither_drops_the_command_that_waits(talk) -> None:
+    talk("pick up the cup")
+    assert talk("neither of them").startswith("rejected: ")
+
+
+def test_what_is_not_there_is_said_to_be_not(talk) -> None:
+    assert talk("pick up the third cup from the left").endswith("there are only two cups")
+
+
 def test_never_mind_drops_the_command_that_waits(talk) -> None:
     talk("pick up the cup")
     assert talk("never mind").startswith("rejected: ")
