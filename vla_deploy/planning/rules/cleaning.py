@@ -69,11 +69,14 @@ def _surfaces(place: str, request: Request) -> frozenset[str]:
 
 
 def patrol(groups: Groups, request: Request) -> list[Step]:
-    """Drive over the free floor around a place in rows.
+    """Drive over the free floor around a place in rows, or to each of several places.
 
     Raises:
         NotAble: no map is at hand, or no floor is free there.
+        UnknownPlace: one of several is none that the robot knows.
     """
+    if len(parts_of(groups["place"])) > 1:
+        return visit(groups, request)
     name = match_place(groups["place"], request.world.places)
     site = request.world.sites.get(name or "")
     if site is None:

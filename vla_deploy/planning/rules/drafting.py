@@ -26,7 +26,7 @@ from vla_deploy.planning.rules.intents import PRIORITIES, Intent
 from vla_deploy.planning.rules.ordering import in_order
 from vla_deploy.planning.rules.recalling import is_again, last_words, leans, recalled, same_with
 from vla_deploy.planning.rules.refusals import refuse_unable
-from vla_deploy.planning.rules.statements import statements_off
+from vla_deploy.planning.rules.statements import begins_with_statement, statements_off
 from vla_deploy.planning.understanding.conversation import Conversation
 from vla_deploy.planning.understanding.phrases import PRONOUNS
 
@@ -71,7 +71,8 @@ def draft_plan(request: Request) -> Plan:
 
 
 def _drafted(request: Request) -> _Draft:
-    said = straightened(courtesy_off(request.text), request)
+    said = courtesy_off(request.text)
+    said = said if begins_with_statement(said) else straightened(said, request)
     helped = _HELP.fullmatch(said)
     said = in_order(
         said if helped is None else helped["own"],

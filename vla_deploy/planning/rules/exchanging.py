@@ -18,6 +18,7 @@ from vla_deploy.planning.understanding.setting import Setting
 
 # What of a clause can be exchanged by a part alone.
 _EXCHANGED: Final = frozenset({"object", "place", "destination", "quantity", "way", "what"})
+_MANNERS: Final = frozenset({"arm", "pace", "speed"})
 _ONE: Final = re.compile(r"(?<=\w )one(s?)\b")
 _PREPOSITION: Final = re.compile(r"^(?:in|into|on|onto|at|to|from|with|for) ")
 _BEHIND: Final = re.compile(r" (?:in|into|on|onto|at|to|from|with|for) $")
@@ -33,11 +34,13 @@ def continued(said: str, clause: str, thing: str, request: Request) -> tuple[str
     verb, own = clause[: clause.index(thing)], of_kind(said, thing, request)
     if _PREPOSITION.match(said) and _BEHIND.search(verb):
         return None
-    for whole in (f"{verb}{own}", clause.replace(thing, own, 1)):
-        fit = known_fit(whole, request) if verb else None
-        if fit is not None:
-            return whole, fit
-    return None
+    wholes = (f"{verb}{own}", clause.replace(thing, own, 1)) if verb else ()
+    found = [(whole, fit) for whole in wholes if (fit := known_fit(whole, request)) is not None]
+    before = fit_of(clause, request)
+    said_before = set() if before is None else before.groups.keys() - _MANNERS
+    # "Take the cup to the table, and the ball" takes the ball to the table, too.
+    full = [one for one in found if one[1].groups.keys() >= said_before]
+    return next(iter(full or found), None)
 
 
 def corrected(said: str, clause: str, request: Request) -> str:

@@ -53,6 +53,7 @@ _PATTERNS: Final[tuple[re.Pattern[str], ...]] = tuple(
         r"before (?P<under_later>[^,]+?),(?: then)? (?P<first>.+)",
         rf"{_AFTER} (?P<under_first>[^,]+?),(?: then)? (?P<later>.+)",
         r"(?P<later>.+?)[,.]? but (?:first(?: of all)?|before(?:hand| that)),? (?P<first>.+)",
+        r"(?P<later>.+?)[,.]? but (?P<first>.+) (?:first|before(?:hand| that))",
         r"(?P<first>.+?),? before (?P<under_later>.+)",
         rf"(?P<later>.+?),? {_AFTER} (?P<under_first>.+)",
     )

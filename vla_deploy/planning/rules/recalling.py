@@ -48,15 +48,15 @@ _REVERSE: Final = re.compile(r"(?:and )?(?:now )?the other way(?: (?:round|aroun
 _LEANING: Final = re.compile(
     r"(?:(?:ok|okay|great|good|thanks|thank you|please|butler|robot|so|right)[, ]+)*"
     r"(?:and|also|plus|then|now|next|(?:do |try )?(?:exactly |just )?(?:the )?same)\b.*|"
-    r".*\b(?:too|as well|also|likewise)"
+    r".*\b(?:too|as well|also|likewise)(?:,? (?:please|thanks|thank you|then))?"
 )
 # These ask or close: "and where is the book", "and that's it".
 _ASKING: Final = re.compile(
     r"\b(?:where|what|which|who|whose|how|why|is|are|was|will|do|does|did|that'?s|it'?s)\b"
 )
 _SAME: Final = re.compile(
-    r"(?:do |try |make )?(?:exactly |just )?(?:the )?same(?: thing)?(?: again)? "
-    r"(?:with|for|to|(?=(?:in|at|on)\b))\s*(?P<said>.+)"
+    r"(?:(?:do |try |make )?(?:exactly |just )?(?:the )?same(?: thing)?(?: again)? "
+    r"(?:with|for|to|(?=(?:in|at|on)\b))|do (?:that|this|it|so) (?:with|for))\s*(?P<said>.+)"
 )
 
 Amounts = tuple[str, Callable[[float], str]]

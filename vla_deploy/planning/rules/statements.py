@@ -35,6 +35,12 @@ _NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P
 _NOT_THAT: Final = re.compile(r"(?:no )?not (?P<thing>(?:the|that|this|my) .+|that|this|it)")
 
 
+def begins_with_statement(text: str) -> bool:
+    """Tell whether a command begins with what only states something."""
+    first = re.split(r"[,;.!?]", text, maxsplit=1)[0]
+    return any(pattern.fullmatch(first) for pattern in _SAID)
+
+
 def statements_off(parts: Sequence[str], request: Request) -> list[str]:
     """Return the parts of a command that ask for something, with what the others lend them."""
     return _told_off(_not_that_off(_not_there_off(list(parts), request), request), request)

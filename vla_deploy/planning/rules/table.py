@@ -124,6 +124,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.NAVIGATION, r"(?:turn|spin|rotate) (?:a?round once|once a?round|"
      r"(?:all the way|right|completely) a?round(?: once)?|(?:in )?(?:a|one) circle)",
      moving.turn_whole),
+    (Intent.NAVIGATION, r"(?:turn|spin|rotate) half(?: ?way)? (?P<way>a?round)", moving.turn),
     (Intent.NAVIGATION, rf"(?:(?:turn|spin|rotate|make|do|take)(?: by)? )?{_SHARE} "
      rf"(?:turn|circle|rotation|spin)(?: (?:to )?(?:the |your )?{_SIDE})?", moving.turn_share),
     (Intent.NAVIGATION, rf"(?:turn|spin|rotate)(?: by)? {_SHARE} (?:to )?(?:the |your )?{_SIDE}",
@@ -169,7 +170,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.CLEANING, r"(?:clean|tidy|clear)(?: things)?(?: up)?|clear (?:things )?away",
      cleaning.tidy),
     (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", cleaning.tidy),
-    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|do a (?:round|tour) of)(?: through)? [^:]+: ?"
+    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|do a (?:round|tour))\b[^:]*: ?"
      r"(?P<place>.+)", cleaning.visit),
     (Intent.CLEANING, r"(?:patrol|inspect|sweep(?: through)?|cover(?: the floor (?:of|in))?|"
      r"drive (?:all )?over(?: the floor (?:of|in))?) (?P<place>.+?)(?: floor)?", cleaning.patrol),

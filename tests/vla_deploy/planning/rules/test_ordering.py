@@ -23,6 +23,7 @@ BOOK_THEN_KITCHEN = "place box in; navigate_to kitchen"
         "go to the kitchen, but first put the book in the box",
         "go to the kitchen, but before that put the book in the box",
         "first put the book in the box, then go to the kitchen",
+        "go to the kitchen but put the book in the box first",
         "put the book in the box first, then go to the kitchen",
         "put the book in the box. When you're done, go to the kitchen",
         "put the book in the box and once that's done go to the kitchen",

@@ -47,6 +47,9 @@ TALKS = {
             "navigate_to kitchen; look_at left; look_at ahead; look_at right; look_at down",
         "go to the bedroom >> then the kitchen": "navigate_to kitchen",
         "look at the red cup >> now the ball": "look_at ball",
+        "carry the book to the side table >> and the ball": "pick_up ball; place side_table on",
+        "put the book in the box >> the ball too please": "pick_up ball; place box in",
+        "put the book in the box >> do that with the ball": "pick_up ball; place box in",
         "bring me the ball >> and the book, please":
             "pick_up book; navigate_to 2.15 2.05 -1.571; speak Here is the book.",
     },

@@ -17,8 +17,8 @@ BACK = "navigate_to 2.15 2.05 -1.571"
         ("I've lost my keys. Please find them", "find_object keys"),
         ("I think I left my ball in the bedroom, could you fetch it?",
          f"navigate_to bedroom; pick_up ball; {BACK}; speak Here is the ball."),
-        ("my book is on the coffee table, put it in the box",
-         "place box in"),
+        ("my keys are in the bedroom, bring them",
+         f"navigate_to bedroom; pick_up keys; {BACK}; speak Here is the keys."),
     ],
 )  # fmt: skip
 def test_a_statement_says_what_it_is(does: Does, text: str, expected: str) -> None:

@@ -59,6 +59,7 @@ COMMANDS = {
         "spin around once": "turn 6.283185307179586",
         "rotate right around": "turn 6.283185307179586",
         "turn a quarter to the right": "turn -1.5707963267948966",
+        "turn halfway round": "turn 3.141592653589793",
         "half a turn please": "turn 3.141592653589793",
         "do a quarter turn left": "turn 1.5707963267948966",
         "turn left three quarters of a circle": "turn 4.71238898038469",
@@ -143,6 +144,8 @@ COMMANDS = {
         "where are you": "speak I am near the coffee table.",
     },
     "cleaning": {
+        "patrol the kitchen, the bedroom and the hallway":
+            "navigate_to kitchen; navigate_to bedroom; navigate_to entrance",
         "patrol these rooms: hallway, bedroom and kitchen":
             "navigate_to entrance; navigate_to bedroom; navigate_to kitchen",
         "tidy up": f"{BOX}; {BOX}; {BOX}; {BOX}; speak That is put away.",
