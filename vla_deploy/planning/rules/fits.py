@@ -38,8 +38,13 @@ def fit_of(clause: str, request: Request) -> Fit | None:
 
     What is "for me" may as well not be said.
     """
-    fits = [*_fits(clause), *_fits(clause.removesuffix(" for me"))]
-    return next((fit for fit in fits if is_known(fit, request)), fits[0] if fits else None)
+    first: Fit | None = None
+    for said in dict.fromkeys((clause, clause.removesuffix(" for me"))):
+        for fit in _fits(said):
+            if is_known(fit, request):
+                return fit
+            first = first or fit
+    return first
 
 
 def known_fit(clause: str, request: Request) -> Fit | None:
