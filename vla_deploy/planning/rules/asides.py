@@ -1,10 +1,10 @@
 """Put what a sentence says aside where it belongs, before it is taken apart at its commas.
 
-the blue box, put the phone in it             -> put the phone in the blue box
-pick up the first book, counting from the right -> pick up the first from the right book
-take a cup, not the red one                   -> take a cup but not the red one
-find the thing with a brown cover, the book   -> find the book with a brown cover
-take the cup, the blue one                    -> take the blue cup
+the tall bowl, drop the ball in it           -> drop the ball in the tall bowl
+take the second cup, counting from the left  -> take the second from the left cup
+take a cup, not the red one                  -> take a cup but not the red one
+fetch the thing with a green shell, the ball -> fetch the ball with a green shell
+take the cup, the blue one                   -> take the blue cup
 """
 
 import re

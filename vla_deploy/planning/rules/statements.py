@@ -1,6 +1,6 @@
 """Take out of a command what only states something, and give the rest what it lends to it.
 
-"I left my keys in the kitchen, can you bring them?" tells what "them" is, and where to go first.
+"I left my phone in the bedroom, could you fetch it?" tells what "it" is, and where to go first.
 "Not on the table, put it in the box" tells only where not.
 """
 
