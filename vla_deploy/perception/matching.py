@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from vla_deploy.perception.assignment import assign
 from vla_deploy.perception.classes import OTHER
-from vla_deploy.perception.detection import Detection
 from vla_deploy.perception.filtering import distances2, grown
 from vla_deploy.perception.track import Sighting, Track
 
@@ -51,7 +50,7 @@ def _still_costs(
                 continue
             if track.cause and not _is_found(track, sighting):
                 costs[row, column] = GATE
-            else:
+            elif not sighting.is_doubtful:
                 costs[row, column] += _unlikeness(track, sighting)
     return costs
 
@@ -67,14 +66,8 @@ def _is_found(track: Track, sighting: Sighting) -> bool:
 
 
 def _unlikeness(track: Track, sighting: Sighting) -> float:
-    """Return how little class and colour fit, as twice the negative logarithm of a likelihood.
-
-    A part of a thing may pass for another kind, but hardly in another colour, too: such a part is
-    one of what stands around it, as the wall of the box that it lies in.
-    """
+    """Return how little class and colour fit, as twice the negative logarithm of a likelihood."""
     seen = sighting.detection
-    if sighting.is_doubtful and seen.colour != track.colour and _is_other_kind(track, seen):
-        return GATE
     colour = COLOUR_FLOOR + (1.0 - COLOUR_FLOOR) * track.colours.share(seen.colour)
     cost = -2.0 * math.log(colour)
     if seen.class_name == track.class_name:
@@ -83,10 +76,6 @@ def _unlikeness(track: Track, sighting: Sighting) -> float:
         return cost + UNRECOGNISED_COST
     kind = CLASS_FLOOR + (1.0 - CLASS_FLOOR) * track.classes.share(seen.class_name)
     return cost - 2.0 * math.log(kind)
-
-
-def _is_other_kind(track: Track, seen: Detection) -> bool:
-    return seen.class_name != track.class_name and OTHER not in (seen.class_name, track.class_name)
 
 
 def _pushed_costs(tracks: list[Track], sightings: list[Sighting]) -> NDArray[np.float64]:
