@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from benchmarks.command import parser, show
 from benchmarks.fixed_gain_localiser import FixedGainLocaliser
-from benchmarks.kidnapping import kidnap
+from benchmarks.kidnapping import CLEARANCE_M, kidnap
 from benchmarks.map_truth import compare_maps
 from benchmarks.pushed_robot import PushedRobot, tour
 from drivers.lidar.base import Scan
@@ -42,7 +42,6 @@ from vla_deploy.robots import RobotDescription, load_robot
 
 SLIP_RATIO: Final = 0.02
 LIDAR_SIGMA_M: Final = 0.02
-CLEARANCE_M: Final = 0.27
 CHI2_95_OF_3: Final = 7.815
 
 

@@ -18,22 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.command import parser, show
-from benchmarks.kidnapping import somewhere
+from benchmarks.kidnapping import CLEARANCE_M, somewhere
 from benchmarks.pushed_robot import PushedRobot
-from vla_deploy.navigation.beams import MAX_BEAM_M, MIN_BEAM_M
+from vla_deploy.navigation.beams import placed_beams
+from vla_deploy.navigation.dead_reckoning import DeadReckoning
 from vla_deploy.navigation.distance_field import DistanceField
 from vla_deploy.navigation.grid_map import GridMap, load_map
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.navigation.pose import Pose2D
+from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.navigation.scan_match import INLIER_M, ScanPoints, fit
 from vla_deploy.robots import load_robot
 
 Points = NDArray[np.float64]
-Matcher = Callable[[Points, Pose2D], Pose2D]
+Matcher = Callable[[ScanPoints, Pose2D], Pose2D]
 
 OFF_M: Final = 0.15
 OFF_RAD: Final = math.radians(8.0)
-CLEARANCE_M: Final = 0.27
 LIDAR_SIGMA_M: Final = 0.02
 HEIGHTS_M: Final = (-0.05, 0.0, 0.05)
 FAILED_M: Final = 0.1
@@ -50,12 +50,12 @@ def measure(robot_name: str = "butler", places: int = 200, seed: int = 3) -> dic
     planner, random = PathPlanner(grid, CLEARANCE_M), np.random.default_rng(seed)
     for _ in range(places):
         moved.carry_to(somewhere(planner, random))
-        points, truth = _scanned(moved), moved.pose
+        scan, truth = _scanned(moved), moved.pose
         off = random.uniform(-1.0, 1.0, 3) * (OFF_M, OFF_M, OFF_RAD)
         guess = Pose2D(truth.x_m + off[0], truth.y_m + off[1], truth.yaw_rad + off[2])
         for name, matcher in matchers.items():
             began_s = time.thread_time()
-            found = matcher(points, guess)
+            found = matcher(scan, guess)
             spent_s = time.thread_time() - began_s
             errors[name].append((found.distance_m(truth), found.turn_rad(truth), spent_s))
     return {"places": places, **{name: _row(rows) for name, rows in errors.items()}}
@@ -72,27 +72,22 @@ def _row(rows: Sequence[tuple[float, float, float]]) -> dict[str, float]:
     }
 
 
-def _scanned(moved: PushedRobot) -> Points:
-    """Return what a whole turn of the lidar meets, in the robot's frame, (n, 2)."""
+def _scanned(moved: PushedRobot) -> ScanPoints:
+    """Return what a whole turn of the lidar meets, in the frame of the robot, which stands."""
     scans = 0
     while True:
         reading = moved.read()
         scans += reading.scan is not None
         if reading.scan is not None and scans == 2:  # the first began before the robot stood here
-            range_m = reading.scan.range_m.astype(np.float64)
-            beams = np.flatnonzero((range_m > MIN_BEAM_M) & (range_m < MAX_BEAM_M))
-            angles = np.radians(beams * (360.0 / len(range_m)))
-            ways = np.column_stack((np.cos(angles), np.sin(angles)))
-            met: Points = range_m[beams, None] * ways
-            return met
+            scan = reading.scan
+            return placed_beams(DeadReckoning(), ORIGIN, scan.range_m, scan.beam_stamp_ns)
 
 
 def _own(grid: GridMap) -> Matcher:
     field = DistanceField.of(grid)
 
-    def match(points: Points, guess: Pose2D) -> Pose2D:
-        seen = ScanPoints(np.zeros_like(points), points)
-        return fit(field, seen.placed(guess), guess).pose
+    def match(scan: ScanPoints, guess: Pose2D) -> Pose2D:
+        return fit(field, scan.placed(guess), guess).pose
 
     return match
 
@@ -109,9 +104,9 @@ def _peers(grid: GridMap) -> Mapping[str, Matcher]:
 def _peer(small_gicp: ModuleType, walls: Points, kind: str) -> Matcher:
     target, tree = small_gicp.preprocess_points(walls, downsampling_resolution=0.01, num_threads=1)
 
-    def match(points: Points, guess: Pose2D) -> Pose2D:
+    def match(scan: ScanPoints, guess: Pose2D) -> Pose2D:
         source, _ = small_gicp.preprocess_points(
-            _raised(points), downsampling_resolution=0.01, num_threads=1
+            _raised(scan.ends), downsampling_resolution=0.01, num_threads=1
         )
         result = small_gicp.align(
             target,
@@ -131,7 +126,7 @@ def _peer(small_gicp: ModuleType, walls: Points, kind: str) -> Matcher:
 
 def _surfaces(grid: GridMap) -> Points:
     """Return the middle of each face between a wall's cell and a free one, (n, 2)."""
-    walls = grid.blocked if grid.seen_by_lidar is None else grid.seen_by_lidar
+    walls = grid.walls
     rows, columns = np.nonzero(walls[:, 1:] != walls[:, :-1])
     upright = np.column_stack((columns + 1.0, rows + 0.5))
     rows, columns = np.nonzero(walls[1:] != walls[:-1])

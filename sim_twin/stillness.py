@@ -15,7 +15,7 @@ from typing import Final
 PRIORITY: Final = 90
 STEP_NS: Final = 4_000_000
 HELD_UP_S: Final = 0.02
-"""What a robot need not stand: servos that are silent for 0.05 s count as lost."""
+"""With no answer for so much longer, control may rightly take the bus for lost."""
 
 
 class StillnessWatch:

@@ -33,7 +33,6 @@ _REST_FOR_S: Final = 0.3
 _POLL_S: Final = 0.02
 _SETTLE_S: Final = 1.0
 _TRIES: Final = 3
-"""With no answer for so much longer, control may rightly take the bus for lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -60,8 +60,7 @@ class JointOutput:
         begin = state.position_rad
         if any_of(joints & state.torque_on):
             begin = np.where(state.torque_on, self._payload.pressed(begin), begin)
-        self.motions.place(begin, joints)
-        self._gate.place(begin, joints)
+        self._seat(begin, joints)
 
     def ease_off(self, external_torque_nm: Floats, period_s: float) -> None:
         """Take back, slowly, setpoints by which joints at rest press hard on what they have met.
@@ -74,9 +73,12 @@ class JointOutput:
         if any_of(presses):
             step = self._easing_rad_s * period_s
             eased = self.sent - np.minimum(np.maximum(error, -step), step)
-            self.motions.place(eased, presses)
-            self._gate.place(eased, presses)
+            self._seat(eased, presses)
 
     def place_all(self) -> None:
         """Let every setpoint begin where its joint is."""
         self.place(np.ones(len(self.sent), dtype=np.bool_))
+
+    def _seat(self, setpoint: Floats, joints: Flags) -> None:
+        self.motions.place(setpoint, joints)
+        self._gate.place(setpoint, joints)

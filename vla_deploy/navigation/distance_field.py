@@ -27,8 +27,7 @@ class DistanceField:
     @classmethod
     def of(cls, grid: GridMap) -> "DistanceField":
         """Return the field of what the lidar sees of a map."""
-        walls = grid.blocked if grid.seen_by_lidar is None else grid.seen_by_lidar
-        occupied = walls.astype(np.uint8)
+        occupied = grid.walls.astype(np.uint8)
         outside = cv2.distanceTransform(1 - occupied, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         inside = cv2.distanceTransform(occupied, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         # Distances run between cell centres; the surface lies half a cell before the next one.

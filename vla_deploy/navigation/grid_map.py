@@ -27,6 +27,11 @@ class GridMap:
     blocked: NDArray[np.bool_]
     seen_by_lidar: NDArray[np.bool_] | None = None
 
+    @property
+    def walls(self) -> NDArray[np.bool_]:
+        """Return the cells that the lidar sees."""
+        return self.blocked if self.seen_by_lidar is None else self.seen_by_lidar
+
     def world_to_cell(self, x_m: float, y_m: float) -> tuple[int, int]:
         """Return row and column of the cell that holds a point; it may lie off the map."""
         column = math.floor((x_m - self.origin_m[0]) / self.resolution_m)
