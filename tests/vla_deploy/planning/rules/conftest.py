@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import PlanningError
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import checked
@@ -13,6 +14,7 @@ from vla_deploy.planning.rules import draft_plan
 from vla_deploy.planning.understanding import Conversation, Outcome, Turn
 from vla_deploy.planning.understanding.grounding import PUT_IN
 from vla_deploy.planning.understanding.mentioned import mentions_of
+from vla_deploy.planning.validator import plan_faults
 from vla_deploy.robots import load_robot
 from vla_deploy.world import Snapshot, Thing, Viewpoint
 from vla_deploy.world.thing import Rest
@@ -70,6 +72,16 @@ class Flat:
     def plan(self, text: str, **changes: Any) -> Plan:
         request = self.request(text, **changes)
         return checked(draft_plan(request), request)
+
+    def refuses_or_plans(self, text: str) -> None:
+        """Expect a refusal in words, or a plan that is valid."""
+        request = self.request(text)
+        try:
+            plan = self.plan(text)
+        except PlanningError as error:
+            assert str(error)
+            return
+        assert plan_faults(plan, request.world, request.scene, request.here) == []
 
     def does(self, text: str, **changes: Any) -> str:
         """Return the steps of a command in short, without what grounding puts in."""
