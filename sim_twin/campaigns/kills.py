@@ -80,8 +80,8 @@ RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
     ("dashboard", signal.SIGTERM): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
     ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
     ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
-    # An orderly end takes the power: the arms sink until they lie on the base.
-    ("supervisor", signal.SIGTERM): Rule(rest_s=10.0, ready_s=30.0, states=("silent",), ends=True),
+    # An orderly end takes the power: the arms come down slowly, until they lie on something.
+    ("supervisor", signal.SIGTERM): Rule(rest_s=12.0, ready_s=30.0, states=("silent",), ends=True),
 }
 
 

@@ -39,6 +39,11 @@ class JointOutput:
         """Return the setpoints that were sent last, without what carries the weight."""
         return self._gate.sent
 
+    @property
+    def weight_offset(self) -> Floats:
+        """Return how far above its setpoint each goal is, so that the motor carries the weight."""
+        return self._gravity.at(self.sent)
+
     def move(self, period_s: float) -> list[MotionResult]:
         """Advance the setpoints, bound them, add what gravity asks for, and send them."""
         state = self._servos.state
@@ -60,7 +65,7 @@ class JointOutput:
         begin = state.position_rad
         if any_of(joints & state.torque_on):
             begin = np.where(state.torque_on, self._payload.pressed(begin), begin)
-        self._seat(begin, joints)
+        self.seat(begin, joints)
 
     def ease_off(self, external_torque_nm: Floats, period_s: float) -> None:
         """Take back, slowly, setpoints by which joints at rest press hard on what they have met.
@@ -73,12 +78,13 @@ class JointOutput:
         if any_of(presses):
             step = self._easing_rad_s * period_s
             eased = self.sent - np.minimum(np.maximum(error, -step), step)
-            self._seat(eased, presses)
+            self.seat(eased, presses)
 
     def place_all(self) -> None:
         """Let every setpoint begin where its joint is."""
         self.place(np.ones(len(self.sent), dtype=np.bool_))
 
-    def _seat(self, setpoint: Floats, joints: Flags) -> None:
+    def seat(self, setpoint: Floats, joints: Flags) -> None:
+        """Let the setpoints of these joints go on from here, without a motion."""
         self.motions.place(setpoint, joints)
         self._gate.place(setpoint, joints)

@@ -1,5 +1,6 @@
 """Run control: read, judge, plan, limit, write, tell - once per tick, in this order."""
 
+from collections.abc import Callable
 from contextlib import closing
 
 from drivers.clock import NS_PER_S
@@ -13,6 +14,7 @@ from vla_deploy.control.dispatch import Dispatcher, axis_limits
 from vla_deploy.control.estop_button import EstopButton
 from vla_deploy.control.joint_output import JointOutput
 from vla_deploy.control.judging import Judging
+from vla_deploy.control.lowering import LOWERING_S, Lowering
 from vla_deploy.control.modes import AT_REST_MODES, Modes
 from vla_deploy.control.motions import MotionSet
 from vla_deploy.control.operator_desk import Act, OperatorDesk
@@ -32,7 +34,7 @@ from vla_deploy.power_off import power_off_asked
 from vla_deploy.robots import RobotDescription
 from vla_deploy.safety import Cause
 
-_SHUTDOWN_NS = 3 * NS_PER_S
+_RAMP_DOWN_S = 3.0
 _STANDSTILL_MODES = (Mode.STOPPED, Mode.PAUSED)
 
 
@@ -120,14 +122,9 @@ class ControlNode:
         category 2 too to their Bus Watchdog and to the next control.
         """
         self._telemetry.tell_results(self._motions.stop("control is shut down"))
-        deadline_ns = self._clock.now_ns() + _SHUTDOWN_NS
-        while not self._at_rest() and self._clock.now_ns() < deadline_ns:
-            self._servos.read()
-            self._telemetry.tell_results(self._joints.move(self.period_s))
-            self._base.brake(self.period_s)
-            self._clock.sleep_until(self._clock.now_ns() + round(self.period_s * NS_PER_S))
+        self._move_until(self._at_rest, _RAMP_DOWN_S)
         if power_off_asked(self._run_dir):
-            self._stopping.switch_off()
+            self._switch_off()
         else:
             self._stopping.release()
         self._wheels.cycle(0.0, 0.0)
@@ -135,6 +132,22 @@ class ControlNode:
             device.close()
         for topic in (self._telemetry, self._judging, self._commands, self._payload):
             topic.close()
+
+    def _switch_off(self) -> None:
+        """Let the arms come down, but for those that hold something, and take their power."""
+        joints = self._stopping.switching_off()
+        lowering = Lowering(self._robot, self._joints, self._servos, joints)
+        self._move_until(lambda: lowering.step(self.period_s), LOWERING_S)
+        self._stopping.switch_off(joints)
+
+    def _move_until(self, done: Callable[[], bool], limit_s: float) -> None:
+        """Go on sending setpoints until this is done, or its time is over; nothing is judged."""
+        deadline_ns = self._clock.now_ns() + round(limit_s * NS_PER_S)
+        while not done() and self._clock.now_ns() < deadline_ns:
+            self._servos.read()
+            self._telemetry.tell_results(self._joints.move(self.period_s))
+            self._base.brake(self.period_s)
+            self._clock.sleep_until(self._clock.now_ns() + round(self.period_s * NS_PER_S))
 
     @property
     def period_s(self) -> float:

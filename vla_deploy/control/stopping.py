@@ -1,5 +1,6 @@
 """Stop the robot by its stop categories: say who loses power at once, at rest, and not at all."""
 
+from vla_deploy.control.axes import Axes
 from vla_deploy.control.base_output import BaseOutput
 from vla_deploy.control.joint_output import JointOutput
 from vla_deploy.control.motions import MotionResult
@@ -15,8 +16,8 @@ from vla_deploy.safety import Reaction, Verdict
 class Stopping:
     """Follow one stop from its beginning to standstill, and take power where it has to go.
 
-    Joint groups of category 2, and hands that hold something, keep theirs; `switch_off` leaves it
-    to those hands alone, and only `remove_power` takes it all.
+    Joint groups of category 2, and hands that hold something, keep theirs; `switching_off` leaves
+    it to those hands alone, and only `remove_power` takes it all.
     """
 
     def __init__(
@@ -77,9 +78,13 @@ class Stopping:
         if self._plan.base is not StopCategory.STOP_KEEP_POWER:
             self._wheels.disable()
 
-    def switch_off(self) -> None:
-        """Take all power, but from hands that hold something: it would drop."""
-        self._servos.remove_power(self._plan.switched_off(self._holding()))
+    def switching_off(self) -> Axes:
+        """Return the joints that lose their power at the end: all but those that hold something."""
+        return self._plan.switched_off(self._holding())
+
+    def switch_off(self, joints: Axes) -> None:
+        """Take the power from these joints and from the wheels."""
+        self._servos.remove_power(joints)
         self._wheels.disable()
 
     def remove_power(self) -> str:

@@ -105,7 +105,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         devices_command=_DEVICES,
         ready_topic="joint_state",
         ready_files=("ready/control",),
-        stop_timeout_s=5.0,
+        stop_timeout_s=12.0,  # it ramps down, and brings the arms down where power goes
         watched=(
             Watched(topic="control_status", silence_limit_s=5.0),
             Watched(topic="joint_state", profile_rate="control_rate_hz"),

@@ -1,5 +1,6 @@
 """Run control against the twin in lock-step: arming, motion, stops, losses and restarts."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 from typing import Any as Rig  # the class in conftest.py, which no test can import
@@ -387,6 +388,64 @@ def test_a_robot_that_is_switched_off_ramps_and_then_takes_all_power(armed: Rig)
     armed.lockstep.remove(armed.control)
     assert [r["status"] for r in armed.results()] == ["stopped"]
     assert set(torque_enabled(armed).values()) == {0}
+
+
+def sampled_while_switched_off(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, sample: Callable[[], float]
+) -> list[float]:
+    """Switch the robot off and take a sample in every tick that this lasts."""
+    samples: list[float] = []
+    clock = rig.lockstep.clock
+    sleep_until = clock.sleep_until
+
+    def sampled(until_ns: int) -> None:
+        sleep_until(until_ns)
+        samples.append(sample())
+
+    ask_power_off(rig.lockstep.context.run_dir)
+    with monkeypatch.context() as patch:
+        patch.setattr(clock, "sleep_until", sampled)
+        rig.lockstep.remove(rig.control)
+    return samples
+
+
+def lift_both_arms(rig: Rig, pitch_rad: float, elbow_rad: float) -> None:
+    for n, side in enumerate(("left", "right")):
+        rig.go(n, **{f"{side}_shoulder_pitch": pitch_rad, f"{side}_elbow": elbow_rad})
+    rig.run(3.0)
+    assert rig.joint("left_elbow") == pytest.approx(elbow_rad, abs=0.05)
+
+
+@pytest.mark.parametrize("pitch_rad, elbow_rad", [(0.0, 1.5), (0.8, 1.2), (1.2, 0.4)])
+def test_arms_come_down_slowly_before_their_power_goes(
+    armed: Rig, monkeypatch: pytest.MonkeyPatch, pitch_rad: float, elbow_rad: float
+) -> None:
+    lift_both_arms(armed, pitch_rad, elbow_rad)
+    speeds = sampled_while_switched_off(armed, monkeypatch, lambda: armed.true_speeds().max())
+    assert set(torque_enabled(armed).values()) == {0}
+    assert max(speeds) < 0.8  # let go at once they fall at 1.5 to 2 rad/s
+    assert true_elbow(armed) < 0.5 * elbow_rad
+    for _ in range(10):  # without power
+        armed.run(0.1)
+        assert armed.true_speeds().max() < 0.2
+
+
+def test_an_arm_that_comes_down_is_braked_and_never_pushed(
+    armed: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lift_both_arms(armed, 0.0, 1.5)
+    bank = armed.lockstep.twin.serial_devices["servos"]
+    elbow = next(s.id for s in armed.robot.servo_bus.servos if s.joint == "left_elbow")
+
+    def lift_pulses() -> float:
+        return float(
+            bank.register(elbow, "goal_position") - bank.register(elbow, "present_position")
+        )
+
+    upwards = 1.0 if lift_pulses() > 0 else -1.0
+    assert upwards * lift_pulses() > 20  # what carries the forearm
+    lifts = sampled_while_switched_off(armed, monkeypatch, lambda: upwards * lift_pulses())
+    assert min(lifts) >= -1  # the rounding of both
 
 
 def test_what_a_hand_holds_is_not_dropped_when_the_robot_is_switched_off(armed: Rig) -> None:
