@@ -26,6 +26,7 @@ from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered
 from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
+from vla_deploy.skills.neighbours import crowding_m
 from vla_deploy.skills.swing import heights_above
 
 PREGRASP_M = 0.12
@@ -116,7 +117,7 @@ def _free_hands(context: SkillContext, wanted: str | None) -> list[str]:
 
 
 def _choose(context: SkillContext, query: ObjectQuery, hands: list[str]) -> Choice:
-    """Return the reachable grasp that moves the arm least, of the hand on the object's side.
+    """Return the plainest of the reachable grasps, of the hand on the object's side.
 
     Raises:
         TryAgain: the object is out of sight.
@@ -144,12 +145,22 @@ def _choose(context: SkillContext, query: ObjectQuery, hands: list[str]) -> Choi
             choice for grasp in grasps if (choice := _solve(context, hand, grasp, seen, reasons))
         ]
         if choices:
-            now = context.link.setpoints
-            return min(choices, key=lambda one: float(np.abs(one.above - now).max()))
+            return _plainest(context, choices, seen)
     raise OutOfReach(
         f"neither grasp of the {seen['class']} at {centre[0]:.2f}, {centre[1]:.2f}, "
         f"{centre[2]:.2f} m is within reach: {reasons[0] if reasons else 'no grasp fits'}"
     )
+
+
+def _plainest(context: SkillContext, choices: list[Choice], seen: Mapping[str, Any]) -> Choice:
+    """Return the one that leaves most room to what stands around, then the one that moves least."""
+    now = context.link.setpoints
+
+    def cost(one: Choice) -> tuple[float, float]:
+        rounded_m = round(crowding_m(context, one.grasp, seen), 2)
+        return rounded_m, float(np.abs(one.above - now).max())
+
+    return min(choices, key=cost)
 
 
 def _solve(
