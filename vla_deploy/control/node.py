@@ -185,8 +185,11 @@ class ControlNode:
         self._act = None if self._resetting.under_way else self._desk.next_act()
         if self._act is Act.RESET:
             self._modes.notice = self._resetting.begin(
-                now_ns, stopping=self._modes.mode is Mode.STOPPING
+                now_ns,
+                stopping=self._modes.mode is Mode.STOPPING,
+                met=self._judging.verdict.cause is Cause.COLLISION,
             )
+        self._resetting.step()
         jumped = self._judging.judge(
             self._ticks.tick,
             now_ns,

@@ -2,6 +2,8 @@
 
 from typing import Final
 
+import numpy as np
+
 from drivers.clock import NS_PER_S
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.wheels import Wheels
@@ -11,20 +13,29 @@ RESET_NS: Final = 2 * NS_PER_S
 
 
 class Resetting:
-    """Hold the reset that is under way; it moves nothing and arms nothing."""
+    """Hold the reset that is under way; it moves nothing and arms nothing.
+
+    An arm that pressed on something when its Bus Watchdog stopped it goes on pressing, and takes no
+    goal. Where a contact is the cause it is taken over, joint by joint, and held where it is, by as
+    much as its weight needs.
+    """
 
     def __init__(self, servos: ServoLine, wheels: Wheels) -> None:
         self._servos = servos
         self._wheels = wheels
         self._until_ns: int | None = None
+        self._queue: list[int] = []
 
     @property
     def under_way(self) -> bool:
         """Tell whether the judge is to be asked."""
         return self._until_ns is not None
 
-    def begin(self, now_ns: int, *, stopping: bool) -> str:
-        """Give the devices time to say that their fault is gone; return why not, or nothing."""
+    def begin(self, now_ns: int, *, stopping: bool, met: bool) -> str:
+        """Give the devices time to say that their fault is gone; return why not, or nothing.
+
+        `met` says that the robot stands because it has met something.
+        """
         if stopping:
             return "reset refused: the stop has not ended yet"
         held_by = self._servos.faulted_but_holding
@@ -38,7 +49,19 @@ class Resetting:
         if self._servos.state.error.any():
             self._servos.reboot_faulted()
         self._wheels.reset_fault()
+        if met:
+            self._begin_taking_over()
         return ""
+
+    def step(self) -> None:
+        """Do one tick's share: a servo a tick, so that the bus cycle never waits for it."""
+        if self._queue and not self._servos.energise(self._queue.pop(0)):
+            self._queue = []
+
+    def _begin_taking_over(self) -> None:
+        holding = self._servos.watchdog_tripped & self._servos.state.torque_on
+        if holding.any() and self._servos.clear_watchdogs():
+            self._queue = np.flatnonzero(holding).tolist()
 
     def note(self, now_ns: int, outcome: ResetOutcome, *, estop_asked: bool) -> str:
         """Take in what the judge made of it; return why it is given up, or nothing."""

@@ -19,6 +19,7 @@ BLOCKING_NM = 50.0
 OVERSHOOT_M = 0.002
 # What half of the contact's torque stretches a servo by, and friction.
 SETTLES_RAD = 0.05
+PRESSES_RAD = 0.07
 
 
 def test_an_arm_that_swings_freely_feels_no_contact(armed: Any) -> None:
@@ -57,6 +58,31 @@ def test_an_arm_that_a_contact_stopped_presses_no_more_and_is_reset(armed: Any) 
     model.dof_frictionloss[blocked] = freely_nm
     armed.run(1.0)
     assert armed.joint("left_shoulder_pitch") == pytest.approx(freed_from, abs=SETTLES_RAD)
+
+
+def test_an_arm_that_pressed_when_control_died_is_taken_over_by_a_reset(armed: Any) -> None:
+    def lead() -> float:
+        pitch = armed.joint("left_shoulder_pitch")
+        return float(armed.joint("left_shoulder_pitch", "setpoint") - pitch)
+
+    armed.go(1, **SWING)
+    assert armed.lockstep.run_until(lambda: armed.joint("left_shoulder_pitch") > 0.7, 3.0)
+    model = armed.lockstep.twin.engine.model
+    model.jnt_range[model.joint("left_shoulder_pitch").id][1] = armed.joint("left_shoulder_pitch")
+    assert armed.lockstep.run_until(lambda: lead() > PRESSES_RAD, 0.5)
+    assert armed.state == "armed"  # the contact has not lasted long enough to count as one
+    armed.lockstep.kill(armed.control)
+    armed.run(0.5)
+    armed.control = armed.new_control()
+    armed.lockstep.add(armed.control)
+    armed.run(0.5)
+    assert (armed.state, armed.status["cause"]) == ("fault", "collision")
+    stands_at = armed.joint("left_shoulder_pitch")
+    armed.ask("reset", within_s=1.0)
+    armed.ask("arm")
+    assert armed.state == "armed", armed.status["detail"]
+    assert armed.joint("left_shoulder_pitch") == pytest.approx(stands_at, abs=SETTLES_RAD)
+    assert abs(lead()) < 0.01
 
 
 def test_a_stop_for_another_cause_moves_no_setpoint_back(armed: Any) -> None:
