@@ -33,11 +33,12 @@ from vla_deploy.skills.surfaces import free_spots
 from vla_deploy.skills.swing import heights_above
 
 ABOVE_M = 0.10
-# A thing put into a container is let go this far below the rim: less where others lie in it, which
-# it must not be pressed on, and where the container is low. One put on something: just above.
+# A thing put into a container is let go this far below the rim: less where the container is low,
+# or where others lie in it, which it must not be pressed on. One put on something: just above.
 BELOW_RIM_M = 0.03
 DEEP_BELOW_RIM_M = 0.075
 ABOVE_FLOOR_M = 0.04
+ABOVE_CONTENTS_M = 0.015
 ABOVE_SURFACE_M = 0.008
 YAWS_RAD = tuple(2 * math.pi * step / 16 for step in range(16))
 LOST_OPENING_M = 0.012
@@ -135,18 +136,32 @@ def _over_object(
     top_m = z_m + float(seen["size_m"][2]) / 2
     if relation == "in" and seen["class"] != "box":
         raise NotPossible(f"a {seen['class']} is no container; put things in a box")
-    lower_m = _below_rim_m(context, seen) if relation == "in" else -ABOVE_SURFACE_M
+    lower_m = below_rim_m(context, seen, held) if relation == "in" else -ABOVE_SURFACE_M
     point_m = (x_m, y_m, top_m - lower_m + held.below_grip_m)
     return _solve_above(context, hand, point_m, held)
 
 
-def _below_rim_m(context: SkillContext, container: Mapping[str, Any]) -> float:
+def below_rim_m(context: SkillContext, container: Mapping[str, Any], held: Held) -> float:
     """Return how deep a thing is lowered into a container: what falls far may topple or break."""
-    rests = (one.get("rests", {}) for one in context.link.objects)
-    if any(rest.get("of") == container["id"] for rest in rests):
-        return BELOW_RIM_M
-    spare_m = float(container["size_m"][2]) - ABOVE_FLOOR_M
+    spare_m = float(container["size_m"][2]) - max(
+        ABOVE_FLOOR_M, _filled_m(context, container, held)
+    )
     return min(max(spare_m, BELOW_RIM_M), DEEP_BELOW_RIM_M)
+
+
+def _filled_m(context: SkillContext, container: Mapping[str, Any], held: Held) -> float:
+    """Return how high above a container's floor its contents reach, with room to spare.
+
+    What a hand holds may still be remembered where it was taken from, or be seen above the box.
+    """
+    floor_m = float(container["position_m"][2]) - float(container["size_m"][2]) / 2
+    tops_m = [
+        float(one["position_m"][2]) + float(one["size_m"][2]) / 2
+        for one in context.link.objects
+        if (one.get("rests") or {}).get("of") == container["id"]
+        and (one["class"], one["colour"]) != (held.kind, held.colour)
+    ]
+    return max(tops_m) + ABOVE_CONTENTS_M - floor_m if tops_m else 0.0
 
 
 def _solve_above(
