@@ -10,17 +10,17 @@ from vla_deploy.control.joint_output import JointOutput
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.robots import RobotDescription
 
-LOWERING_S: Final = 6.0
+LOWERING_S: Final = 5.0
 """After this, power goes wherever the arms are."""
 
 # Of a joint's top speed: slow enough to step aside, and to knock nothing over.
-_RATE_RATIO: Final = 0.2
+_RATE_RATIO: Final = 0.3
 # A joint that needs the second share of full duty to be held comes down at that rate, one that
 # hangs lighter more slowly, and one below the first not at all: gears hold that much by themselves.
-_PULL_RATIOS: Final = (0.02, 0.12)
+_PULL_RATIOS: Final = (0.02, 0.06)
 # Of the weight: what a motor leaves to gravity at most. It never presses on what the arm meets.
 _GIVEN_RATIO: Final = 0.9
-_STANDS_RAD: Final = 0.02  # less than this, within that time, is no way down
+_STANDS_RAD: Final = 0.04  # less than this, within that time, is no way down
 _STANDS_FOR_S: Final = 0.3
 
 
