@@ -69,16 +69,21 @@ def test_what_a_process_started_itself_counts_as_its_own():
 
 
 def test_memory_is_proportional_and_rss_stands_in_where_that_is_forbidden(monkeypatch):
-    meter = UsageMeter(0)
-    allowed = meter.sample({"a": os.getpid()}, NS_PER_S)["a"]
-    assert allowed.memory_mb < allowed.rss_mb
-    assert meter.memory_kind == "pss"
-
     def forbidden(pid: int) -> None:
         raise PermissionError(pid)
 
-    monkeypatch.setattr(usage, "read_pss_bytes", forbidden)
-    denied = meter.sample({"a": os.getpid()}, NS_PER_S)["a"]
+    meter = UsageMeter(0)
+    waiting = "print(flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", waiting], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as child:
+        child.stdout.readline()
+        allowed = meter.sample({"a": child.pid}, NS_PER_S)["a"]
+        assert allowed.memory_mb < allowed.rss_mb
+        assert meter.memory_kind == "pss"
+        monkeypatch.setattr(usage, "read_pss_bytes", forbidden)
+        denied = meter.sample({"a": child.pid}, NS_PER_S)["a"]
+        child.communicate(b"\n", timeout=10)
     assert denied.memory_mb == denied.rss_mb
     assert meter.memory_kind == "rss"
 
