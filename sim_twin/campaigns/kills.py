@@ -81,7 +81,7 @@ RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
     ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
     ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
     # An orderly end takes the power: the arms come down slowly, until they lie on something.
-    ("supervisor", signal.SIGTERM): Rule(rest_s=12.0, ready_s=30.0, states=("silent",), ends=True),
+    ("supervisor", signal.SIGTERM): Rule(rest_s=15.0, ready_s=30.0, states=("silent",), ends=True),
 }
 
 
