@@ -1,8 +1,10 @@
 """Put what the planner has to say into words: brief, plain, and nothing promised.
 
-Every sentence that a person hears or reads from the planner stands in one table.
+Every sentence that a person hears or reads from the planner stands in one table. None holds a stop
+word: the robot would take a person's for its own.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, Final
@@ -12,6 +14,7 @@ from vla_deploy.planning.plan import Plan
 
 _MOST_STEPS: Final = 6
 _MOST_SPOKEN_CHARACTERS: Final = 160
+_STOP_WORD: Final = re.compile(r"(?<![a-z])(?:stop|halt|freeze)(?![a-z])", re.IGNORECASE)
 
 
 class Says(StrEnum):
@@ -53,7 +56,7 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "move_arm": lambda given: f"bring my arms to the pose {given['pose']}",
     "speak": lambda given: "say something",
     "wait": lambda given: f"wait {float(given['duration_s']):g} seconds",
-    "stop": lambda given: "stop",
+    "stop": lambda given: "stand still",
 }
 
 
@@ -68,8 +71,9 @@ def spoken_refusal(reason: PlanningError | str) -> str:
 
 
 def first_part(reason: str) -> str:
-    """Return of a reason what fits into a spoken sentence."""
-    return reason.split(";")[0].strip(" .")[:_MOST_SPOKEN_CHARACTERS]
+    """Return of a reason what fits into a spoken sentence, in words that stop nothing."""
+    said = _STOP_WORD.sub("standstill", reason.split(";")[0])
+    return said.strip(" .")[:_MOST_SPOKEN_CHARACTERS]
 
 
 def steps_in_words(plan: Plan) -> str:

@@ -22,7 +22,7 @@ _PATTERNS: Final[Mapping[str, tuple[str, ...]]] = {
     "pose": ("bring my arms to", "name"),
     "say": ("say", "text"),
     "wait": ("wait", "by"),
-    "stop": ("stop",),
+    "stop": ("stand still",),
     "ask": ("answer you",),
 }
 _FIELDS: Final = frozenset({"where", "what", "how", "way", "by", "arm", "name", "text"})

@@ -18,7 +18,7 @@ from vla_deploy.world.memory import place_of, seen_words
 MOST_TOLD = 6
 ABILITIES = (
     "I can go to places, look for things, pick them up, put them in the box or on a table, "
-    "bring them to you, tidy up, and tell you what I see. Say stop, and I stop."
+    "bring them to you, tidy up, tell you what I see, and stand still when you tell me to."
 )
 
 
