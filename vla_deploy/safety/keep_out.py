@@ -29,20 +29,23 @@ def judge_keep_out(
 ) -> KeepOut | None:
     """Return the area that the footprint is deepest in, now or where the base can stand still.
 
-    `areas` are polygons in the base frame. None while the footprint stays outside all of them.
+    `areas` are polygons in the base frame. What leads deeper into any of them is blocked. None
+    while the footprint stays outside all of them.
     """
     way_m = float(np.copysign(braking_m(motion, reaction_s), motion.v_m_s))
     depths = {
         name: max(_depth(area, footprint), _depth(moved(area, way_m, 0.0), footprint))
         for name, area in areas.items()
     }
-    deepest = max(depths, key=lambda name: depths[name], default=None)
-    if deepest is None or depths[deepest] <= 0.0:
+    entered = [name for name, depth_m in depths.items() if depth_m > 0.0]
+    if not entered:
         return None
+    deepest = max(entered, key=lambda name: depths[name])
+    into = {one for name in entered for one in _directions_into(areas[name], footprint)}
     return KeepOut(
         name=deepest,
         depth_m=depths[deepest],
-        blocked=_directions_into(areas[deepest], footprint),
+        blocked=tuple(direction for direction in PROBES if direction in into),
     )
 
 

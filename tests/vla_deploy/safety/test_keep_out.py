@@ -55,6 +55,21 @@ def test_the_deepest_area_is_told_and_backing_out_stays_open() -> None:
     assert found.depth_m == pytest.approx(0.15)
 
 
+def test_what_leads_deeper_into_any_area_is_blocked_whichever_is_deepest() -> None:
+    behind = -BOX + (0.85, 0.0)
+    found = judge_keep_out({"ahead": BOX - (0.9, 0.0), "behind": behind}, ROUND, STANDING, 0.1)
+    assert found is not None
+    assert (found.name, found.depth_m) == ("ahead", pytest.approx(0.15))
+    assert found.blocked == (Direction.FORWARD, Direction.BACKWARD)
+
+
+def test_an_area_that_is_only_near_blocks_nothing_beside_one_that_is_entered() -> None:
+    areas = {"touched": -BOX + (0.75, 0.0), "entered": BOX - (0.9, 0.0)}
+    found = judge_keep_out(areas, ROUND, STANDING, 0.1)
+    assert found is not None
+    assert (found.name, found.blocked) == ("entered", (Direction.FORWARD,))
+
+
 def test_a_long_base_must_not_turn_its_end_into_the_area() -> None:
     beside = np.array([[0.3, 0.14], [1.0, 0.14], [1.0, 1.0], [0.3, 1.0]]) - (0.0, 0.05)
     found = judge_keep_out({"beside": beside}, LONG, STANDING, 0.0)
