@@ -25,10 +25,10 @@ test: $(STAMP)
 
 campaign: $(STAMP)
 	scripts/system-packages
-	$(VENV)/bin/python -m pytest -m slow --timeout 3600
+	$(VENV)/bin/python -m pytest -m "slow and not nightly" --timeout 3600
 
 mutation: $(STAMP)
-	$(VENV)/bin/python scripts/mutation
+	$(VENV)/bin/python -m pytest -m nightly -s
 
 lock: $(STAMP)
 	scripts/lock

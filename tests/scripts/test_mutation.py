@@ -112,3 +112,11 @@ def test_every_mutant_of_safety_that_is_listed_as_equivalent_exists_and_has_a_re
     rows = tomllib.loads(EQUIVALENT.read_text())["equivalent"]
     assert all(len(row["reason"]) > 20 for row in rows)
     assert len({row["mutant"] for row in rows}) == len(rows)
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+@pytest.mark.timeout(4 * 3600)
+def test_no_small_change_of_the_safety_rules_passes_their_tests() -> None:
+    # What it tells goes to the terminal, a line per file and survivor.
+    assert subprocess.run([sys.executable, str(TOOL)], check=False).returncode == 0
