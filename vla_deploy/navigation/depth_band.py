@@ -5,7 +5,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.protocol import Intrinsics
 from vla_deploy.navigation.pose import Points
 
 STRIDE_PX: Final = 3
@@ -19,20 +18,20 @@ CELL_M: Final = 0.05
 
 def depth_band(
     depth_m: NDArray[np.float32],
-    camera: Intrinsics,
+    rays: NDArray[np.float32],
     base_from_camera: NDArray[np.float64],
     body: NDArray[np.bool_],
 ) -> tuple[Points, Points]:
     """Return points of things that stand and of bare floor, (n, 2) each in the base's frame.
 
-    `body` marks the robot itself. What fewer than three of the pixels looked at show is noise.
+    `rays` (h, w, 2) is each pixel's way right and down per metre of depth; `body` marks the robot
+    itself. What fewer than three of the pixels looked at show is noise.
     """
     some = (slice(None, None, STRIDE_PX), slice(None, None, STRIDE_PX))
     depth = np.nan_to_num(depth_m[some].astype(np.float64))
     rows, columns = np.nonzero((depth > NEAR_M) & (depth < FAR_M) & ~body[some])
     z = depth[rows, columns]
-    x = (STRIDE_PX * columns - camera.cx) / camera.fx * z
-    y = (STRIDE_PX * rows - camera.cy) / camera.fy * z
+    x, y = rays[some][rows, columns].T * z
     points = np.column_stack((x, y, z)) @ base_from_camera[:3, :3].T + base_from_camera[:3, 3]
     height_m = points[:, 2]
     standing = points[(height_m > LOWEST_M) & (height_m < HIGHEST_M), :2]

@@ -17,6 +17,9 @@ CARRY_SPEED_M_S = 2.5
 SLACK_M = 0.5
 # One miss may be the detector's; two in a row make a thing that is not where it was.
 MISSING_MISSES = 2
+# A thing that a hundred hands have moved is not known by a hundred ids: who still holds one of the
+# oldest asks again. The scene's room counts on it, too.
+ALIASES_KEPT = 3
 
 
 def may_be(elder: Track, newer: Track) -> bool:
@@ -44,6 +47,7 @@ def is_missing(track: Track) -> bool:
 def take_over(newer: Track, elder: Track) -> None:
     """Let a thing have the id, and the past, of the one that it has turned out to be."""
     names = (newer.object_id, *newer.aliases, *elder.aliases)
-    newer.aliases = tuple(dict.fromkeys(name for name in names if name and name != elder.object_id))
+    other = dict.fromkeys(name for name in names if name and name != elder.object_id)
+    newer.aliases = tuple(other)[:ALIASES_KEPT]
     newer.object_id = elder.object_id
     newer.first_seen_ns = min(newer.first_seen_ns, elder.first_seen_ns)

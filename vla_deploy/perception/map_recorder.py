@@ -13,6 +13,7 @@ from vla_deploy.navigation.mapping import Mapper
 from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.perception.body_state import BodyState
+from vla_deploy.perception.lens import ray_table
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel, full_positions
 
@@ -78,7 +79,7 @@ class MapRecorder:
         camera = self._intrinsics(frame.width, frame.height)
         standing, floor = depth_band(
             depths_m(frame),
-            camera,
+            ray_table(camera),
             self._body.camera_pose(positions),
             self._body.mask(positions, camera),
         )
@@ -95,11 +96,16 @@ class MapRecorder:
         return stamp_ns != before
 
     def _intrinsics(self, width: int, height: int) -> Intrinsics:
+        """Return the calibrated lens; of images of another size, a pinhole as wide as theirs."""
+        known = self._camera.intrinsics
+        if (width, height) == (known.width, known.height):
+            return known
+        focal_px = self._camera.focal_px * height / self._camera.height
         return Intrinsics(
             width=width,
             height=height,
-            fx=self._camera.focal_px,
-            fy=self._camera.focal_px,
+            fx=focal_px,
+            fy=focal_px,
             cx=(width - 1) / 2,
             cy=(height - 1) / 2,
         )

@@ -49,8 +49,8 @@ def _no_colour() -> Belief:
 class Track:
     """Hold one thing; `object_id` is empty until it is confirmed, `held_by` names a hand.
 
-    `aliases` are ids under which the same thing was known before it was found to be the same;
-    `cause` tells why it is no longer where it was.
+    `aliases` are the last ids under which the same thing was known before it was found to be the
+    same; `cause` tells why it is no longer where it was.
     """
 
     estimate: Estimate
@@ -121,7 +121,7 @@ class Track:
             "colours": _rounded(self.colours.shares(TOLD_NAMES)),
         }
         if self.aliases:
-            told["aliases"] = list(self.aliases[:TOLD_NAMES])
+            told["aliases"] = list(self.aliases)
         if self.held_by:
             told["held_by"] = self.held_by
         if self.rests is not None:

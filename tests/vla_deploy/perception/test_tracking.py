@@ -290,6 +290,23 @@ def test_a_thing_found_elsewhere_before_its_old_place_was_seen_empty_gets_its_ol
     assert [(o["id"], o["aliases"]) for o in objects] == [("cup_1", ["cup_2"])]
 
 
+def test_a_thing_that_is_carried_about_all_day_goes_by_its_own_and_its_last_ids_only() -> None:
+    watcher = Watcher()
+    places = ((1.0, 2.0, 0.5), (4.0, 0.5, 0.6))
+    watcher.image(seen())
+    watcher.image(seen())
+    for move in range(1, 9):
+        at = places[move % 2]
+        for _ in range(20):
+            watcher.image(view=HIDDEN)
+        for _ in range(2):
+            watcher.image(seen(at=at), view=HIDDEN)
+        for _ in range(5):
+            watcher.image(seen(at=at))
+    (cup,) = watcher.tracker.objects
+    assert (cup.object_id, cup.aliases) == ("cup_1", ("cup_9", "cup_8", "cup_7"))
+
+
 def test_one_that_stood_there_all_the_time_is_no_moved_one() -> None:
     watcher = Watcher()
     pair = (seen(), seen(at=(4.0, 0.5, 0.6)))
