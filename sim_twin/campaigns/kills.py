@@ -20,6 +20,7 @@ from sim_twin.campaigns.report import Case, Report, told
 from sim_twin.campaigns.robot_service import NotReady, RobotService
 from sim_twin.stillness import HELD_UP_S, StillnessWatch
 from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
+from vla_deploy.supervisor.table import RestartPolicy
 
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
 _COMMANDS: Final = (
@@ -127,6 +128,7 @@ class KillCampaign:
     def __init__(self, folder: Path, seed: int, robot: str = "butler") -> None:
         self._clock = MonotonicClock()
         self._mover = ""
+        self._hit_ns: dict[str, int] = {}
         self._machine = Machine(folder / "machine", self._clock, robot=robot, seed=seed)
         self._stillness = StillnessWatch()
         try:
@@ -139,6 +141,7 @@ class KillCampaign:
     def inject(self, injection: Injection) -> Case:
         """Do one and judge it."""
         self._stillness.worst_s()
+        self._let_run_stably(injection.process)
         self._robot.make_ready()
         job = self._robot.begin("say", injection.command)
         self._clock.sleep_until(self._clock.now_ns() + round(injection.after_s * NS_PER_S))
@@ -155,6 +158,7 @@ class KillCampaign:
             failures.append(f"control is {state} ({why}), expected {' or '.join(rule.states)}")
         failures += [f"orphan {orphan}" for orphan in self._robot.orphans()]
         self._robot.end(job)
+        self._hit_ns[injection.process] = self._clock.now_ns()
         return Case(
             name=injection.name,
             failures=tuple(failures),
@@ -173,6 +177,12 @@ class KillCampaign:
         finally:
             self._stillness.close()
             self._machine.close()
+
+    def _let_run_stably(self, process: str) -> None:
+        """Hit a process only after a stable run: six failures in a row are another matter."""
+        stable_ns = round(RestartPolicy().stable_s * NS_PER_S)
+        if process in self._hit_ns:
+            self._clock.sleep_until(self._hit_ns[process] + stable_ns)
 
     def _follow(self, began_ns: int, rule: Rule, process: str, pid: int) -> tuple[float, float]:
         """Return when everything began to rest for good, and when all was ready again."""

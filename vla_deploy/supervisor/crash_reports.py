@@ -60,10 +60,12 @@ class CrashReports:
     ) -> None:
         """Write a report for each process that has just failed.
 
-        `started` holds the pid of each process and when it was started.
+        `started` holds the pid of each process and when it was started; one that could not be
+        started has no last words.
         """
         for name, record in after.items():
-            if before[name].state in RUNNING and record.state in _ENDED:
+            failed = before[name].state in RUNNING and record.state in _ENDED
+            if failed and name in started:
                 pid, started_ns = started[name]
                 self._write(name, self._report(name, record, pid, started_ns))
 

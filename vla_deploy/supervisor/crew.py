@@ -36,7 +36,7 @@ class Crew:
         clock: Clock,
     ) -> None:
         self.started: dict[str, tuple[int, int]] = {}
-        """The pid of each child that was ever started, and when."""
+        """The pid of each child that was started last, and when; none where that was refused."""
         self.profile, self.in_force = options.profile, load_profile(options.profile)
         """The name of the profile that a child is started with, and the profile."""
         self.started_under: dict[str, str] = {}
@@ -50,6 +50,7 @@ class Crew:
         self._children: dict[str, ChildProcess] = {}
         self._ready: set[str] = set()
         self._unswept: set[str] = set()
+        self._refused: dict[str, str] = {}
         self._environment = {
             **os.environ,
             RUN_ID_VARIABLE: run_dir.name,
@@ -60,14 +61,15 @@ class Crew:
             self._environment.pop("JOURNAL_STREAM", None)
         self._do: Mapping[Act, Callable[[str], None]] = {
             Act.SPAWN: self._spawn,
-            Act.TERMINATE: lambda name: self._children[name].terminate(),
-            Act.ABORT: lambda name: self._children[name].abort(),
-            Act.KILL: lambda name: self._children[name].kill(),
+            Act.TERMINATE: lambda name: self._signal(name, ChildProcess.terminate),
+            Act.ABORT: lambda name: self._signal(name, ChildProcess.abort),
+            Act.KILL: lambda name: self._signal(name, ChildProcess.kill),
         }
 
     def observe(self) -> dict[str, Seen]:
-        """Report every child that was ever started."""
-        return {name: self._see(name, child) for name, child in self._children.items()}
+        """Report every child that was ever started, or could not be."""
+        seen = {name: self._see(name, child) for name, child in self._children.items()}
+        return seen | {name: Seen(refused=why) for name, why in self._refused.items()}
 
     def perform(self, actions: Sequence[Action]) -> None:
         """Do what was decided, in order."""
@@ -100,9 +102,7 @@ class Crew:
     def bound_output(self) -> None:
         """Empty what a child has written past its log when that has grown large."""
         for name in self._children:
-            path = self._output_path(name)
-            if path.stat().st_size > _MOST_OUTPUT_BYTES:
-                os.truncate(path, 0)
+            _bound(self._output_path(name))
 
     def kill_all(self) -> None:
         """End every child at once, and what any of them has left behind."""
@@ -129,13 +129,33 @@ class Crew:
             self._ready.discard(name)
             end_leftovers(self._run_dir.name, name)
 
+    def _signal(self, name: str, send: Callable[[ChildProcess], None]) -> None:
+        """Signal a child, unless the computer could not start it: then nobody is there."""
+        if name in self._children:
+            send(self._children[name])
+
     def _spawn(self, name: str) -> None:
+        """Start a child; where the computer has no room for it, remember why."""
+        self._refused.pop(name, None)
+        try:
+            child = self._new_child(name)
+        except OSError as error:
+            self._refused[name] = str(error)
+            self._children.pop(name, None)
+            self.started.pop(name, None)
+            return
+        self._children[name] = child
+        self._unswept.add(name)
+        self.started_under[name] = self.profile
+        self.started[name] = (child.pid, self._clock.now_ns())
+
+    def _new_child(self, name: str) -> ChildProcess:
         self._readiness[name].forget()
         spec = self._specs[name]
         command = spec.command + (spec.devices_command if self._options.takes_devices else ())
         command += spec.viewer_command if self._options.viewer else ()
         command += spec.paced_command if self._options.paced else ()
-        child = ChildProcess(
+        return ChildProcess(
             replace(self._options, profile=self.profile).fill(command, self._run_dir),
             {
                 **self._environment,
@@ -144,10 +164,14 @@ class Crew:
             },
             self._output_path(name),
         )
-        self._children[name] = child
-        self._unswept.add(name)
-        self.started_under[name] = self.profile
-        self.started[name] = (child.pid, self._clock.now_ns())
 
     def _output_path(self, name: str) -> Path:
         return self._run_dir / LOGS_DIR / f"{name}{OUTPUT_SUFFIX}"
+
+
+def _bound(path: Path) -> None:
+    try:
+        if path.stat().st_size > _MOST_OUTPUT_BYTES:
+            os.truncate(path, 0)
+    except FileNotFoundError:
+        return  # somebody has tidied up: what has no name any more, nobody can shorten

@@ -7,7 +7,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from vla_deploy.exit_codes import EXIT_CONFIGURATION
-from vla_deploy.supervisor.table import GivingUp, ProcessSpec
+from vla_deploy.supervisor.table import GivingUp, ProcessSpec, RestartPolicy
 
 ABORT_GRACE_NS = NS_PER_S
 """How long a process that hangs may take to write down where it hung, before it is killed."""
@@ -46,13 +46,16 @@ class Act(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """Remember one process; `until_ns` ends its back-off, its start, its abortion or its stop."""
+    """Remember one process; `until_ns` ends its back-off, its start, its abortion or its stop.
+
+    `failures` counts since it last ran stably.
+    """
 
     state: State = State.WAITING
     until_ns: int = 0
     ready_ns: int = 0
     was_ready: bool = False
-    failures_ns: tuple[int, ...] = ()
+    failures: int = 0
     restarts: int = 0
     exit_code: int | None = None
     reason: str = ""
@@ -62,12 +65,19 @@ class Record:
 class Seen:
     """Report what was observed of one process; `exit_code` is None while it runs.
 
-    `silence` tells which topic it has not written for longer than the table allows.
+    `silence` tells which topic it has not written for longer than the table allows, `refused` why
+    the computer could not start it.
     """
 
     exit_code: int | None = None
     ready: bool = False
     silence: str = ""
+    refused: str = ""
+
+    @property
+    def ended(self) -> bool:
+        """Tell whether nothing runs."""
+        return self.exit_code is not None or bool(self.refused)
 
 
 Step = tuple[Record, Act | None]
@@ -169,8 +179,8 @@ def _run_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, no
 
 
 def _watch(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
-    if seen.exit_code is not None:
-        return _failed(spec, record, seen.exit_code, now_ns), None
+    if seen.ended:
+        return _failed(spec, record, seen, now_ns), None
     if record.state is State.ABORTING:
         return record, Act.KILL if now_ns >= record.until_ns else None
     if record.state is State.READY:
@@ -186,8 +196,8 @@ def _watch(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
 def _watch_ready(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Step:
     if seen.silence:
         return abort(record, seen.silence, now_ns)
-    if record.failures_ns and now_ns - record.ready_ns >= spec.restart.stable_s * NS_PER_S:
-        return replace(record, failures_ns=()), None
+    if record.failures and now_ns - record.ready_ns >= spec.restart.stable_s * NS_PER_S:
+        return replace(record, failures=0), None
     return record, None
 
 
@@ -197,26 +207,43 @@ def abort(record: Record, reason: str, now_ns: int) -> Step:
     return replace(record, state=State.ABORTING, until_ns=until_ns, reason=reason), Act.ABORT
 
 
-def _failed(spec: ProcessSpec, record: Record, exit_code: int, now_ns: int) -> Record:
-    policy = spec.restart
-    window_ns = round(policy.window_s * NS_PER_S)
-    recent = (*(at for at in record.failures_ns if now_ns - at < window_ns), now_ns)
-    why = record.reason if record.state is State.ABORTING else describe_exit(exit_code)
-    failed = replace(record, failures_ns=recent, exit_code=exit_code, reason=why)
+def _failed(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Record:
+    policy, failures = spec.restart, record.failures + 1
+    why = record.reason if record.state is State.ABORTING else _end_in_words(seen)
+    failed = replace(record, failures=failures, exit_code=seen.exit_code, reason=why)
     # What the file or the wiring says will not change by trying again before it ever worked.
-    if exit_code == EXIT_CONFIGURATION and not record.was_ready:
+    if seen.exit_code == EXIT_CONFIGURATION and not record.was_ready:
         return replace(failed, state=State.GIVEN_UP)
-    if len(recent) > policy.max_restarts:
-        why = f"{why}; given up after {len(recent)} failures in {policy.window_s:g} s"
+    if failures > policy.max_restarts:
+        why = f"{why}; given up after {failures} failures, never {policy.stable_s:g} s in order"
         return replace(failed, state=State.GIVEN_UP, reason=why)
-    delay_s = min(policy.initial_s * policy.factor ** (len(recent) - 1), policy.cap_s)
-    return replace(failed, state=State.BACKOFF, until_ns=now_ns + round(delay_s * NS_PER_S))
+    until_ns = now_ns + round(delay_s(policy, failures) * NS_PER_S)
+    return replace(failed, state=State.BACKOFF, until_ns=until_ns)
+
+
+def delay_s(policy: RestartPolicy, failures: int) -> float:
+    """Return how long a process that has failed so often in a row waits for its next start."""
+    return min(policy.initial_s * policy.factor ** (failures - 1), policy.cap_s)
+
+
+def give_up_s(spec: ProcessSpec) -> float:
+    """Return how long a process that never gets ready is tried at most before it is given up."""
+    policy = spec.restart
+    once_s = spec.ready_timeout_s + ABORT_GRACE_NS / NS_PER_S
+    pauses_s = sum(delay_s(policy, failures) for failures in range(1, policy.max_restarts + 1))
+    return (policy.max_restarts + 1) * once_s + pauses_s
+
+
+def _end_in_words(seen: Seen) -> str:
+    if seen.exit_code is None:
+        return f"could not be started: {seen.refused}"
+    return describe_exit(seen.exit_code)
 
 
 def _stop_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, now_ns: int) -> Step:
     if record.state not in RUNNING:
         return record, None
-    if seen.exit_code is not None:
+    if seen.ended:
         ended = replace(record, state=State.WAITING, exit_code=seen.exit_code, until_ns=now_ns)
         return ended, None
     if record.state is State.STOPPING:

@@ -22,12 +22,12 @@ class RestartPolicy:
     """Declare when an ended process is started again, and when no more.
 
     One that has been ready for `stable_s` starts with a clean sheet: its failures are forgotten.
+    Failures are counted, not timed: one that hangs, or never gets ready, takes minutes to fail.
     """
 
     initial_s: float = 0.25
     factor: float = 2.0
     cap_s: float = 5.0
-    window_s: float = 60.0
     max_restarts: int = 5
     stable_s: float = 30.0
 

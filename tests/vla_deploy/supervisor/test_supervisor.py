@@ -113,6 +113,29 @@ def test_a_process_that_never_gets_ready_fails_the_start(stage):
         stage.supervisor(row).start()
 
 
+def test_a_process_that_the_computer_cannot_start_fails_alone_and_is_tried_again(
+    stage, eventually, caplog
+):
+    with stage.supervisor(stage.row("a"), stage.row("b")) as supervisor:
+        supervisor.start()
+        output = supervisor.run_dir / "logs" / "b.out"
+        output.unlink()
+        table = supervisor.space.cell_reader("process_table")
+        told = table.latest().sequence
+        assert step_until(supervisor, eventually, lambda: table.latest().sequence > told)
+        output.mkdir()  # nothing can be written there
+        os.kill(stage.pids("b")[0], signal.SIGKILL)
+        assert step_until(
+            supervisor,
+            eventually,
+            lambda: "could not be started" in rows(supervisor)["b"]["reason"],
+        )
+        output.rmdir()
+        assert step_until(supervisor, eventually, lambda: rows(supervisor)["b"]["state"] == "ready")
+        assert rows(supervisor)["a"]["restarts"] == 0
+    assert "b: back-off (could not be started: [Errno 21] Is a directory" in caplog.text
+
+
 def test_a_stubborn_process_is_killed_after_its_stop_timeout(stage):
     with stage.supervisor(stage.row("a", "stubborn", stop_timeout_s=0.2)) as supervisor:
         supervisor.start()
