@@ -11,9 +11,17 @@ UNKNOWN_FAULT: Final = 0xFFFF
 
 
 def drive_samples(
-    names: Sequence[str], state: DriveState, tracking: WheelTracking, *, dropped_out: bool
+    names: Sequence[str],
+    state: DriveState,
+    tracking: WheelTracking,
+    *,
+    age_limit_s: float,
+    dropped_out: bool,
 ) -> tuple[DriveSample, ...]:
-    """Return each drive's sample; one that ceased to follow by itself has an unknown fault."""
+    """Return each drive's sample; one that ceased to follow by itself has an unknown fault.
+
+    `age_limit_s` is that of their driver.
+    """
     age_s = state.age_s.tolist()
     commanded_rad_s = tracking.commanded_rad_s.tolist()
     measured_rad_s = tracking.measured_rad_s.tolist()
@@ -22,6 +30,7 @@ def drive_samples(
             name=name,
             lost=state.lost[row],
             age_s=age_s[row],
+            age_limit_s=age_limit_s,
             fault_code=_fault_code(state, row, dropped_out=dropped_out),
             commanded_rad_s=commanded_rad_s[row],
             measured_rad_s=measured_rad_s[row],

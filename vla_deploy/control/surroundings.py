@@ -27,8 +27,8 @@ from vla_deploy.safety.zones import Footprint, Motion, braking_m
 BASE_REACTION_S = 0.1
 # Of each new sample, 10 times a second: a low-pass of 0.1 s.
 _IMU_SHARE = 0.5
-_MAX_POSE_AGE_NS = round(BY_NAME["pose"].deadline_s * NS_PER_S)
-_MAX_IMU_AGE_NS = round(BY_NAME["imu"].deadline_s * NS_PER_S)
+_MAX_POSE_AGE_S = BY_NAME["pose"].deadline_s
+_MAX_IMU_AGE_S = BY_NAME["imu"].deadline_s
 
 
 @dataclass(slots=True)
@@ -145,13 +145,15 @@ class SurroundingsWatch:
 
     def _look_at_keep_out(self, body: _Body) -> None:
         sample = self._pose.latest()
-        keep_out = None
-        if sample is not None and body.now_ns - sample.stamp_ns <= _MAX_POSE_AGE_NS:
+        if sample is None:
+            return
+        keep_out, age_s = None, sample.age_s(body.now_ns)
+        if age_s <= _MAX_POSE_AGE_S:
             x_m, y_m, yaw_rad = (float(sample.data[n]) for n in ("x_m", "y_m", "yaw_rad"))
             near = self._areas_near(x_m, y_m, body.motion)
             areas = {name: seen_from(area, x_m, y_m, yaw_rad) for name, area in near}
             keep_out = judge_keep_out(areas, self._footprint, body.motion, BASE_REACTION_S)
-        self._known = replace(self._known, keep_out=keep_out)
+        self._known = replace(self._known, keep_out=keep_out, pose_age_s=age_s)
 
     def _areas_near(self, x_m: float, y_m: float, motion: Motion) -> list[tuple[str, Floats]]:
         """Leave out the areas that the footprint cannot be in before it stands."""
@@ -167,9 +169,10 @@ class SurroundingsWatch:
         tip_over, sample = self._robot.protection.tip_over, self._imu.latest()
         if tip_over is None or sample is None:
             return
-        if body.now_ns - sample.stamp_ns > _MAX_IMU_AGE_NS:
+        age_s = sample.age_s(body.now_ns)
+        if age_s > _MAX_IMU_AGE_S:
             self._acceleration = None
-            self._known = replace(self._known, tip_margin_ratio=None)
+            self._known = replace(self._known, tip_margin_ratio=None, imu_age_s=age_s)
             return
         measured = np.array(sample.data["acceleration_m_s2"], dtype=np.float64)
         last = measured if self._acceleration is None else self._acceleration
@@ -180,7 +183,7 @@ class SurroundingsWatch:
             np.array(tip_over.support_m),
             tip_over.max_lean_rad,
         )
-        self._known = replace(self._known, tip_margin_ratio=ratio)
+        self._known = replace(self._known, tip_margin_ratio=ratio, imu_age_s=age_s)
 
 
 def _around(area: Floats) -> tuple[float, float, float]:

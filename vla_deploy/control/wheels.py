@@ -133,7 +133,11 @@ class Wheels:
         if self.state is None:
             return ()
         return drive_samples(
-            self._joints, self.state, self._tracking, dropped_out=self._dropped_out
+            self._joints,
+            self.state,
+            self._tracking,
+            age_limit_s=self._profile.can_heartbeat_s,
+            dropped_out=self._dropped_out,
         )
 
     def cycle(self, v_m_s: float, w_rad_s: float) -> None:

@@ -15,12 +15,14 @@ Flags = NDArray[np.bool_]
 class DriveSample:
     """Describe one wheel drive; its driver judges whether it is `lost`, `fault_code` 0 is none.
 
-    Both speeds are means over the same short time; they are equal where the drive need not follow.
+    A silent one is lost beyond `age_limit_s`, one that has restarted at once. Both speeds are means
+    over the same short time; they are equal where the drive need not follow.
     """
 
     name: str
     lost: bool
     age_s: float
+    age_limit_s: float
     fault_code: int
     commanded_rad_s: float
     measured_rad_s: float

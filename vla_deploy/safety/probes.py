@@ -136,11 +136,16 @@ def servo_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None
 
 
 def servo_watchdog_tripped(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
-    """Find a servo whose Bus Watchdog has stopped it."""
+    """Find servos that their Bus Watchdog has stopped; the first is named, all are counted."""
     joint = first_in(inputs.watchdog_tripped)
     if joint is None:
         return None
-    return Finding(subject=limits.joint_names[joint], age_s=float(inputs.sample_age_s[joint]))
+    return Finding(
+        subject=limits.joint_names[joint],
+        measured=float(np.count_nonzero(inputs.watchdog_tripped)),
+        limit=0.0,
+        age_s=float(inputs.sample_age_s[joint]),
+    )
 
 
 def can_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
@@ -149,7 +154,12 @@ def can_bus_lost(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
         return Finding(subject=inputs.lost_can_buses[0])
     for drive in inputs.drives:
         if drive.lost:
-            return Finding(subject=drive.name, measured=drive.age_s, age_s=drive.age_s)
+            return Finding(
+                subject=drive.name,
+                measured=drive.age_s,
+                limit=drive.age_limit_s,
+                age_s=drive.age_s,
+            )
     return None
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.robots.protection import ZoneKind as ZoneKind
+from vla_deploy.robots.protection import ZoneSource as ZoneSource
 
 
 class Direction(StrEnum):
@@ -28,14 +29,19 @@ class Direction(StrEnum):
 class ZoneFinding:
     """Tell of one zone that something is in.
 
-    `speed_ratio` is of the base's top speeds, to which both speeds are then bounded together.
-    `blocked` are the motions that would bring the base nearer; the way out is not among them.
+    `measured` is the distance of the nearest point and `limit` how far the zone reaches, both in m
+    from the footprint; of an APPROACH zone the time until the base meets one, and the time that it
+    looks ahead, in s. While it waits for its release `measured` is infinite. `speed_ratio` is of
+    the base's top speeds, to which both speeds are then bounded together. `blocked` are the motions
+    that would bring the base nearer; the way out is not among them.
     """
 
     kind: ZoneKind
     name: str
+    sources: tuple[ZoneSource, ...]
     points: int
-    distance_m: float
+    measured: float
+    limit: float
     speed_ratio: float
     blocked: tuple[Direction, ...]
 
@@ -91,6 +97,8 @@ class Surroundings:
     external_torque_nm: NDArray[np.float64] | None = None
     scan_age_s: float | None = None
     depth_age_s: float | None = None
+    pose_age_s: float | None = None
+    imu_age_s: float | None = None
 
 
 NOTHING_KNOWN: Final = Surroundings()

@@ -1,14 +1,13 @@
 """Find each cause that lies around the robot or in its pose: one pure function per cause."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
-from vla_deploy.robots.protection import ZoneKind
+from vla_deploy.robots.protection import ZoneKind, ZoneSource
 from vla_deploy.safety.findings import Finding, Probe, first_joint
 from vla_deploy.safety.inputs import SafetyInputs, SafetyLimits
-from vla_deploy.safety.surroundings import Clearance, Surroundings
+from vla_deploy.safety.surroundings import Clearance, Surroundings, ZoneFinding
 
 NEVER_SEEN = math.inf
 
@@ -17,8 +16,7 @@ def stale_scan(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a base that moves while its lidar has told nothing for too long, or nothing ever."""
     if not (inputs.base_moving and limits.scan_required):
         return None
-    age_s = inputs.surroundings.scan_age_s
-    age_s = NEVER_SEEN if age_s is None else age_s
+    age_s = _told_age_s(inputs.surroundings.scan_age_s)
     if age_s <= limits.scan_age_s:
         return None
     return Finding(subject="scan", measured=age_s, limit=limits.scan_age_s, age_s=age_s)
@@ -33,11 +31,12 @@ def in_zone(kind: ZoneKind) -> Probe:
         zones = [zone for zone in around.zones if zone.kind is kind]
         if not zones:
             return None
-        nearest = min(zones, key=lambda zone: zone.distance_m)
+        nearest = min(zones, key=lambda zone: zone.measured)
         return Finding(
             subject=nearest.name,
-            measured=nearest.distance_m,
-            age_s=_seen_age_s(around),
+            measured=nearest.measured,
+            limit=nearest.limit,
+            age_s=_seen_age_s(nearest, around),
             speed_ratio=min(zone.speed_ratio for zone in zones),
             blocked=frozenset().union(*(zone.blocked for zone in zones)),
         )
@@ -47,13 +46,15 @@ def in_zone(kind: ZoneKind) -> Probe:
 
 def keep_out(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a base that stands deeper in a keep-out area than allowed."""
-    area = inputs.surroundings.keep_out
+    around = inputs.surroundings
+    area = around.keep_out
     if area is None or area.depth_m <= limits.keep_out_depth_m:
         return None
     return Finding(
         subject=area.name,
         measured=area.depth_m,
         limit=limits.keep_out_depth_m,
+        age_s=_told_age_s(around.pose_age_s),
         blocked=frozenset(area.blocked),
     )
 
@@ -66,29 +67,37 @@ def workspace(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     if excess.excess_m <= limits.workspace_excess_m or excess.rate_m_s <= limits.approach_m_s:
         return None
     return Finding(
-        subject=excess.subject, measured=excess.excess_m, limit=limits.workspace_excess_m
+        subject=excess.subject,
+        measured=excess.excess_m,
+        limit=limits.workspace_excess_m,
+        age_s=_joints_age_s(inputs),
     )
 
 
 def self_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find two parts of the robot that are too close and come closer."""
     pair = inputs.surroundings.self_clearance if _moves_by_itself(inputs) else None
-    return _too_close(pair, limits.self_clearance_m, 0.0, limits)
+    return _too_close(pair, limits.self_clearance_m, inputs, limits)
 
 
 def environment_collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a part of the robot that is too close to something around it and comes closer."""
-    around = inputs.surroundings
-    pair = around.environment_clearance if _moves_by_itself(inputs) else None
-    return _too_close(pair, limits.environment_clearance_m, around.depth_age_s or 0.0, limits)
+    pair = inputs.surroundings.environment_clearance if _moves_by_itself(inputs) else None
+    return _too_close(pair, limits.environment_clearance_m, inputs, limits)
 
 
 def tip_over(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a robot whose margin against tipping over is used up but for the rest it must keep."""
-    margin = inputs.surroundings.tip_margin_ratio
+    around = inputs.surroundings
+    margin = around.tip_margin_ratio
     if margin is None or margin >= limits.tip_margin_ratio:
         return None
-    return Finding(subject="balance", measured=margin, limit=limits.tip_margin_ratio)
+    return Finding(
+        subject="balance",
+        measured=margin,
+        limit=limits.tip_margin_ratio,
+        age_s=_told_age_s(around.imu_age_s),
+    )
 
 
 def collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
@@ -107,7 +116,7 @@ def _moves_by_itself(inputs: SafetyInputs) -> bool:
 
 
 def _too_close(
-    pair: Clearance | None, allowed_m: float, age_s: float, limits: SafetyLimits
+    pair: Clearance | None, allowed_m: float, inputs: SafetyInputs, limits: SafetyLimits
 ) -> Finding | None:
     if pair is None or pair.closing_m_s <= limits.approach_m_s:
         return None
@@ -118,14 +127,20 @@ def _too_close(
         subject=f"{pair.first} and {pair.second}",
         measured=pair.distance_m,
         limit=least_m,
-        age_s=age_s,
+        age_s=_joints_age_s(inputs),
     )
 
 
-def _seen_age_s(around: Surroundings) -> float:
-    """Return the age of the newest of what the zones were judged by."""
-    return min(_known(around.scan_age_s, around.depth_age_s), default=0.0)
+def _joints_age_s(inputs: SafetyInputs) -> float:
+    """Return the age of what is known by the pose of all joints."""
+    return float(inputs.sample_age_s.max())
 
 
-def _known(*ages_s: float | None) -> Iterator[float]:
-    return (age_s for age_s in ages_s if age_s is not None)
+def _seen_age_s(zone: ZoneFinding, around: Surroundings) -> float:
+    """Return the age of the oldest of what a zone is judged by."""
+    ages_s = {ZoneSource.LIDAR: around.scan_age_s, ZoneSource.DEPTH: around.depth_age_s}
+    return max(_told_age_s(ages_s[source]) for source in zone.sources)
+
+
+def _told_age_s(age_s: float | None) -> float:
+    return NEVER_SEEN if age_s is None else age_s

@@ -190,7 +190,7 @@ def judge_zone(
         return trigger, None
     if zone.kind is ZoneKind.STOP and is_hit:
         trigger = _remember(trigger, directions_towards(found, footprint))
-    return trigger, _finding(zone, trigger, found, footprint, collision_s)
+    return trigger, _finding(zone, trigger, found, footprint, motion, collision_s)
 
 
 def _advance(zone: Zone, trigger: Trigger, is_hit: bool, fresh: bool) -> Trigger:
@@ -211,16 +211,26 @@ def _remember(trigger: Trigger, blocked: tuple[Direction, ...]) -> Trigger:
 
 
 def _finding(
-    zone: Zone, trigger: Trigger, found: Points, footprint: Footprint, collision_s: float
+    zone: Zone,
+    trigger: Trigger,
+    found: Points,
+    footprint: Footprint,
+    motion: Motion,
+    collision_s: float,
 ) -> ZoneFinding:
-    ratio = zone.speed_ratio
+    ratio, measured, limit = zone.speed_ratio, collision_s, zone.time_before_collision_s
     if zone.kind is ZoneKind.APPROACH:
         ratio = min(1.0, max(LEAST_RATIO, collision_s / zone.time_before_collision_s))
+    else:
+        measured = float(footprint.distance(found).min()) if len(found) else math.inf
+        limit = float(footprint.distance(stretched(zone, motion)).max())
     return ZoneFinding(
         kind=zone.kind,
         name=zone.name,
+        sources=zone.sources,
         points=len(found),
-        distance_m=float(footprint.distance(found).min()) if len(found) else math.inf,
+        measured=measured,
+        limit=limit,
         speed_ratio=ratio,
         blocked=trigger.blocked,
     )

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.robots.protection import ZoneKind
+from vla_deploy.robots.protection import ZoneKind, ZoneSource
 from vla_deploy.safety import (
     CLEAR,
     NOTHING_KNOWN,
@@ -67,11 +67,12 @@ LEFT = DriveSample(
     name="left_wheel",
     lost=False,
     age_s=0.0,
+    age_limit_s=0.1,
     fault_code=0,
     commanded_rad_s=0.0,
     measured_rad_s=0.0,
 )
-SEEN = Surroundings(scan_age_s=0.0, depth_age_s=0.0)
+SEEN = Surroundings(scan_age_s=0.0, depth_age_s=0.0, pose_age_s=0.0, imu_age_s=0.0)
 HEALTHY = SafetyInputs(
     energised=True,
     estop_source=None,
@@ -116,7 +117,8 @@ def around(**changes: Any) -> dict[str, Any]:
 
 
 def zone(kind: ZoneKind, name: str = "near", **changes: Any) -> ZoneFinding:
-    fields: dict[str, Any] = {"points": 3, "distance_m": 0.4, "speed_ratio": 0.5, "blocked": ()}
+    fields: dict[str, Any] = {"sources": (ZoneSource.LIDAR,), "points": 3, "measured": 0.4}
+    fields |= {"limit": 0.5, "speed_ratio": 0.5, "blocked": ()}
     return ZoneFinding(kind=kind, name=name, **fields | changes)
 
 
@@ -634,21 +636,32 @@ def test_what_brings_the_base_to_rest_leaves_it_no_speed(rule: Rule) -> None:
 
 
 def test_zones_of_one_kind_leave_the_least_speed_and_name_the_nearest() -> None:
-    far = zone(ZoneKind.SLOW, "far", distance_m=0.9, speed_ratio=0.2)
-    near = zone(ZoneKind.SLOW, "near", distance_m=0.3, speed_ratio=0.6)
+    far = zone(ZoneKind.SLOW, "far", measured=0.9, limit=1.2, speed_ratio=0.2)
+    near = zone(ZoneKind.SLOW, "near", measured=0.3, limit=0.6, speed_ratio=0.6)
     _, verdict = tick(SafetyState(), **around(zones=(far, near), scan_age_s=0.2))
-    assert (verdict.subject, verdict.measured, verdict.speed_ratio) == ("near", 0.3, 0.2)
+    assert (verdict.subject, verdict.measured, verdict.limit) == ("near", 0.3, 0.6)
+    assert verdict.speed_ratio == 0.2
 
 
 @pytest.mark.parametrize(
-    ("scan_age_s", "depth_age_s", "age_s"), [(0.2, 0.1, 0.1), (0.2, None, 0.2), (None, None, 0.0)]
+    ("sources", "scan_age_s", "depth_age_s", "age_s"),
+    [
+        ((ZoneSource.LIDAR,), 0.1, 0.2, 0.1),
+        ((ZoneSource.DEPTH,), 0.1, 0.2, 0.2),
+        ((ZoneSource.LIDAR, ZoneSource.DEPTH), 0.1, 0.2, 0.2),
+        ((ZoneSource.LIDAR, ZoneSource.DEPTH), 0.3, 0.2, 0.3),
+        ((ZoneSource.DEPTH,), 0.1, None, np.inf),
+    ],
 )
-def test_a_zone_tells_the_age_of_the_newest_points(
-    scan_age_s: float | None, depth_age_s: float | None, age_s: float
+def test_a_zone_tells_the_age_of_the_oldest_that_it_is_judged_by(
+    sources: tuple[ZoneSource, ...],
+    scan_age_s: float | None,
+    depth_age_s: float | None,
+    age_s: float,
 ) -> None:
     ages = {"scan_age_s": scan_age_s, "depth_age_s": depth_age_s}
-    changes = around(zones=(zone(ZoneKind.SLOW),), **ages) | {"base_moving": False}
-    assert tick(SafetyState(), **changes)[1].age_s == age_s
+    changes = around(zones=(zone(ZoneKind.SLOW, sources=sources),), **ages)
+    assert tick(SafetyState(), **changes | {"base_moving": False})[1].age_s == age_s
 
 
 def test_every_active_zone_bounds_the_base_whichever_is_named() -> None:
@@ -719,6 +732,14 @@ def test_the_numbers_of_a_finding_reach_its_text() -> None:
     assert (verdict.measured, verdict.limit) == (-1.5, -1.0)
 
 
+@pytest.mark.parametrize(("volts", "limit_v"), [(9.0, 9.5), (16.0, 15.5)])
+def test_a_voltage_is_measured_against_the_limit_that_it_is_beyond(
+    volts: float, limit_v: float
+) -> None:
+    _, verdict = ticks(SafetyState(), 25, voltage_v=np.array([volts, 12.0]))
+    assert (verdict.measured, verdict.limit) == (volts, limit_v)
+
+
 @pytest.mark.parametrize(
     ("changes", "age_s"),
     [
@@ -744,19 +765,24 @@ OLD = {"sample_age_s": np.array([0.0, 0.015]), "climate_age_s": np.array([0.0, 0
         ({"velocity": np.array([0.0, 4.0])}, 0.015),
         ({"hardware_error": np.array([0, 1], dtype=np.uint8)}, 0.015),
         ({"watchdog_tripped": np.array([False, True])}, 0.015),
+        (excess(0.1, 0.1), 0.015),
+        (within(0.1), 0.3),
+        (around(tip_margin_ratio=0.1), 0.07),
         ({"temperature_c": np.array([30.0, 90.0])}, 0.6),
         ({"voltage_v": np.array([12.0, 5.0])}, 0.6),
         (right(fault_code=3, age_s=0.05), 0.05),
         (right(measured_rad_s=5.0, age_s=0.05), 0.05),
         (standing(**right(measured_rad_s=0.2, age_s=0.05)), 0.05),
-        (close_by("environment_clearance", 0.0, 0.1), 0.0),
-        (close_by("self_clearance", 0.0, 0.1), 0.0),
+        (close_by("environment_clearance", 0.0, 0.1), 0.015),
+        (close_by("self_clearance", 0.0, 0.1), 0.015),
     ],
 )
 def test_a_measured_cause_tells_how_old_its_sample_is(
     changes: dict[str, Any], age_s: float
 ) -> None:
-    _, verdict = ticks(SafetyState(), 50, **OLD, **changes)
+    around_it = {"pose_age_s": 0.3, "imu_age_s": 0.07, "depth_age_s": 0.2}
+    changes = {**OLD, **changes, "around": around_it | changes.get("around", {})}
+    _, verdict = ticks(SafetyState(), 50, **changes)
     assert verdict.cause is not Cause.NONE
     assert verdict.age_s == age_s
 
@@ -774,9 +800,13 @@ def test_a_cause_without_numbers_tells_none_and_its_text_leaves_them_out() -> No
     [
         ({"hardware_error": np.array([0, 32], dtype=np.uint8)}, 32.0),
         (right(fault_code=3), 3.0),
+        ({"watchdog_tripped": np.array([False, True])}, 1.0),
+        ({"watchdog_tripped": np.array([True, True])}, 2.0),
     ],
 )
-def test_an_error_code_is_measured_against_none(changes: dict[str, Any], measured: float) -> None:
+def test_what_must_not_be_at_all_is_measured_against_none(
+    changes: dict[str, Any], measured: float
+) -> None:
     _, verdict = tick(SafetyState(), **changes)
     assert (verdict.measured, verdict.limit) == (measured, 0.0)
 
@@ -786,10 +816,17 @@ def test_of_several_joints_the_first_is_named() -> None:
     assert (verdict.subject, verdict.measured) == ("shoulder", 2.5)
 
 
-def test_what_the_camera_saw_tells_its_age() -> None:
+def test_a_lost_drive_tells_the_age_that_its_driver_allows() -> None:
+    _, verdict = tick(SafetyState(), **right(lost=True, age_s=0.25))
+    assert (verdict.measured, verdict.limit) == (0.25, 0.1)
+
+
+def test_how_near_a_part_comes_is_as_old_as_the_oldest_joint_and_not_as_the_image() -> None:
     pair = Clearance(first="hand", second="floor", distance_m=0.0, closing_m_s=0.1)
-    _, verdict = ticks(SafetyState(), 2, **around(environment_clearance=pair, depth_age_s=0.3))
-    assert (verdict.age_s, verdict.limit) == (0.3, 0.01)
+    seen = around(environment_clearance=pair, depth_age_s=0.3)
+    ages = {"sample_age_s": np.array([0.016, 0.004])}
+    _, verdict = ticks(SafetyState(), 2, **seen, **ages)
+    assert (verdict.age_s, verdict.limit) == (0.016, 0.01)
 
 
 def test_among_equal_reactions_the_first_latched_is_reported_as_the_root_cause() -> None:

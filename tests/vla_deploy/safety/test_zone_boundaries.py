@@ -163,7 +163,7 @@ def test_a_base_that_stands_collides_with_nothing(v_m_s: float, collision_s: flo
 
 def test_a_long_base_that_turns_on_the_spot_meets_what_its_corner_sweeps() -> None:
     corner_rad, reach_m = math.atan2(0.2, 0.4), math.hypot(0.4, 0.2)
-    ahead = reach_m * np.array([math.cos(corner_rad + 0.3), math.sin(corner_rad + 0.3)])
+    ahead = 0.999 * reach_m * np.array([math.cos(corner_rad + 0.3), math.sin(corner_rad + 0.3)])
     turning = replace(STANDING, w_rad_s=1.0)
     foreseen = time_to_collision(cloud((ahead[0], ahead[1])), LONG, turning, 1.0)
     assert foreseen == pytest.approx(0.3, abs=0.01)

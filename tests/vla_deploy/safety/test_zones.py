@@ -141,10 +141,10 @@ def test_a_stop_zone_needs_its_points_and_its_samples_and_is_released_by_its_cou
     trigger, found = judge_zone(zone, trigger, near, ROUND, STANDING, fresh=True)
     assert found is not None
     assert (found.points, found.blocked) == (2, (Direction.FORWARD,))
-    assert found.distance_m == pytest.approx(0.16)
+    assert found.measured == pytest.approx(0.16)
     trigger, found = judge_zone(zone, trigger, cloud(), ROUND, STANDING, fresh=True)
     assert found is not None
-    assert (found.blocked, found.distance_m) == ((Direction.FORWARD,), math.inf)
+    assert (found.blocked, found.measured) == ((Direction.FORWARD,), math.inf)
     trigger, found = judge_zone(zone, trigger, near, ROUND, STANDING, fresh=True)
     assert trigger.misses == 0
     for _ in range(2):
@@ -169,6 +169,32 @@ def test_an_approach_zone_slows_by_the_share_of_time_that_is_left() -> None:
     _, found = judge_zone(APPROACH, trigger, cloud((0.465, 0.0)), ROUND, STANDING, fresh=False)
     assert found is not None
     assert found.speed_ratio == 1.0
+
+
+def test_a_zone_tells_how_near_the_nearest_point_is_and_how_far_it_reaches_as_it_moves() -> None:
+    both = (ZoneSource.DEPTH, ZoneSource.LIDAR)
+    zone = replace(STOP, sources=both, min_points=1, reaction_s=0.2)
+    points = cloud((0.7, 0.0), (0.6, 0.0))
+    _, found = judge_zone(zone, IDLE, points, ROUND, CRUISING, fresh=True)
+    assert found is not None
+    assert (found.sources, found.measured) == (both, pytest.approx(0.36))
+    corner_m = math.hypot(0.5 + braking_m(CRUISING, 0.2), 0.5)
+    assert found.limit == pytest.approx(corner_m - ROUND.radius_m)
+
+
+def test_an_approach_zone_tells_the_time_to_the_collision_and_how_far_it_looks_ahead() -> None:
+    ahead = replace(APPROACH, time_before_collision_s=0.8)
+    _, found = judge_zone(ahead, IDLE, cloud((0.465, 0.0)), ROUND, CRUISING, fresh=True)
+    assert found is not None
+    assert (found.measured, found.limit) == (pytest.approx(0.5, abs=0.01), 0.8)
+
+
+@given(clouds, motions)
+def test_what_is_in_a_zone_is_never_further_than_it_reaches(points: Points, motion: Motion) -> None:
+    zone = replace(STOP, min_points=1, reaction_s=0.2)
+    for footprint in (ROUND, LONG):
+        _, found = judge_zone(zone, IDLE, points, footprint, motion, fresh=True)
+        assert found is None or found.measured <= found.limit + 1e-9
 
 
 @given(clouds)

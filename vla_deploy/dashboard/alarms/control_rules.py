@@ -24,6 +24,7 @@ UNITS: Final[Mapping[Cause, str]] = {
     Cause.CAN_BUS_LOST: "s",
     Cause.SERVO_HARDWARE_ERROR: "(error bits)",
     Cause.DRIVE_FAULT: "(fault code)",
+    Cause.SERVO_WATCHDOG_TRIPPED: "(servos)",
     Cause.ENCODER_JUMP: "rad",
     Cause.JOINT_POSITION_LIMIT: "rad",
     Cause.JOINT_VELOCITY_LIMIT: "rad/s",
@@ -44,7 +45,7 @@ UNITS: Final[Mapping[Cause, str]] = {
     Cause.OBSTACLE_STOP_ZONE: "m",
     Cause.OBSTACLE_SLOW_ZONE: "m",
     Cause.OBSTACLE_LIMIT_ZONE: "m",
-    Cause.OBSTACLE_APPROACH: "m",
+    Cause.OBSTACLE_APPROACH: "s",
 }
 """Units of what each cause measures; fingers, which slide, are in metres where joints turn."""
 LATE_RATIO: Final = 0.2

@@ -124,7 +124,7 @@ const UNITS = {
   obstacle_stop_zone: "m",
   obstacle_slow_zone: "m",
   obstacle_limit_zone: "m",
-  obstacle_approach: "m",
+  obstacle_approach: "s",
 };
 
 /** Return the unit of a cause's numbers, or "". */

@@ -193,7 +193,7 @@ def test_a_cause_carries_its_numbers_with_their_unit(words):
 
 
 def test_every_cause_with_numbers_has_a_unit_and_every_reaction_a_gravity():
-    without = {Cause.NONE, Cause.ESTOP, Cause.SERVO_WATCHDOG_TRIPPED, Cause.BUDGET_EXHAUSTED}
+    without = {Cause.NONE, Cause.ESTOP, Cause.BUDGET_EXHAUSTED}
     assert set(UNITS) == set(Cause) - without
     assert set(BY_REACTION) == set(Reaction)
     assert set(GIVEN_UP) == set(GivingUp)
