@@ -18,6 +18,7 @@ from vla_deploy.ipc import IpcError
 from vla_deploy.supervisor.lifecycle import is_settled
 from vla_deploy.supervisor.orphans import run_id_of
 from vla_deploy.supervisor.runtime import running
+from vla_deploy.supervisor.service_times import RESTART_S, watchdog_s
 
 _COMMAND: Final = (sys.executable, "-m", "vla_deploy.cli.main")
 _READY_S: Final = 120.0
@@ -26,8 +27,6 @@ _AGAIN_S: Final = 1.0
 _POLL_NS: Final = NS_PER_S // 20
 _FRESH_S: Final = 3.0
 _FRESH_STATUS_S: Final = 0.5
-WATCHDOG_S: Final = 10.0
-RESTART_S: Final = 1.0
 
 
 class NotReady(Exception):
@@ -134,7 +133,7 @@ class RobotService:
 
     def _started(self) -> ServiceRunner:
         runner = ServiceRunner(
-            self._command, dict(os.environ), watchdog_s=WATCHDOG_S, restart_s=RESTART_S
+            self._command, dict(os.environ), watchdog_s=watchdog_s(), restart_s=RESTART_S
         )
         runner.start()
         return runner

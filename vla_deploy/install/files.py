@@ -11,6 +11,12 @@ from platforms import Profile
 from vla_deploy.install.errors import ArgumentRefused, TemplateBroken
 from vla_deploy.install.layout import Layout
 from vla_deploy.robots import RobotDescription
+from vla_deploy.supervisor.service_times import (
+    RESTART_S,
+    START_BURST,
+    start_limit_s,
+    watchdog_s,
+)
 
 # In the source tree, or where a wheel puts it.
 _IN_SOURCE: Final = Path(__file__).parents[2] / "systemd"
@@ -43,7 +49,7 @@ class ServiceChoice:
     robot: str = "butler"
     profile: str = ""
     twin: bool = False
-    watchdog_s: int = 5
+    watchdog_s: int = watchdog_s()
     credentials: tuple[Credential, ...] = ()
 
 
@@ -110,6 +116,9 @@ def _values(
         "USER": _argument(layout.user),
         "IP": layout.ip,
         "WATCHDOG_S": str(choice.watchdog_s),
+        "RESTART_S": str(RESTART_S),
+        "START_BURST": str(START_BURST),
+        "START_LIMIT_S": str(start_limit_s()),
         "RT_PRIORITY": str(profile.realtime_priority + _CONTROL_HEADROOM),
         "MEMORY_HIGH_MB": f"{memory_mb:.0f}",
         "MEMORY_MAX_MB": f"{memory_mb * _MAX_OVER_HIGH:.0f}",

@@ -10,6 +10,7 @@ from vla_deploy.one_line import one_line
 
 NS_PER_US = 1000
 VARIABLES = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID")
+FEED_EVERY_NS = NS_PER_S
 _STATUS_NS = NS_PER_S
 _EXTEND_EVERY_NS = 5 * NS_PER_S
 _EXTEND_BY_S = 15
@@ -73,13 +74,14 @@ class NotifySocket:
 class Notifier:
     """Tell systemd that the run is ready, in what state it is, and that it is in time.
 
-    The watchdog is fed at half its interval, only while nothing is in trouble.
+    The watchdog is fed every second, at half its interval where that is shorter, and only while
+    nothing is in trouble: so nearly the whole interval is left to a trouble that mends itself.
     """
 
     def __init__(self, target: NotifyTarget, clock: Clock) -> None:
         self._socket = NotifySocket(target.address)
         self._clock = clock
-        self._feed_every_ns = target.watchdog_ns // 2
+        self._feed_every_ns = min(target.watchdog_ns // 2, FEED_EVERY_NS)
         self._fed_ns: int | None = None
         self._told = ""
         self._status_ns: int | None = None

@@ -41,7 +41,7 @@ def test_a_dry_run_shows_the_text_and_writes_nothing(
 ) -> None:
     assert main(["install", "--root", str(tmp_path), "--dry-run"]) == 0
     shown = capsys.readouterr().out
-    assert "+WatchdogSec=5\n" in shown
+    assert "+WatchdogSec=15\n" in shown
     assert f"+++ b/{SERVICE}" in shown
     assert list(tmp_path.iterdir()) == []
 
@@ -75,7 +75,7 @@ def test_an_edited_file_is_kept_with_the_new_version_beside_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run(capsys, "install", "--root", str(tmp_path))
-    mine = (tmp_path / SERVICE).read_text().replace("WatchdogSec=5", "WatchdogSec=9")
+    mine = (tmp_path / SERVICE).read_text().replace("WatchdogSec=15", "WatchdogSec=9")
     (tmp_path / SERVICE).write_text(mine)
     report = kinds(run(capsys, "install", "--root", str(tmp_path), "--twin"))
     assert report["vla-deploy.service"] == "keep, as it is edited"

@@ -14,6 +14,12 @@ from vla_deploy.install import Credential, InstallError, Layout, ServiceChoice, 
 from vla_deploy.install.errors import TemplateBroken
 from vla_deploy.install.files import filled
 from vla_deploy.robots import load_robot
+from vla_deploy.supervisor.service_times import (
+    RESTART_S,
+    START_BURST,
+    start_limit_s,
+    watchdog_s,
+)
 
 ROBOT = load_robot("butler")
 PROFILE = load_profile("desktop")
@@ -74,6 +80,17 @@ def test_the_unit_runs_what_was_chosen() -> None:
     assert "run --robot /etc/vla-deploy/robots/mine --profile jetson_orin_nx\n" in unit
     assert "WatchdogSec=7\n" in unit
     assert "LoadCredential=planner_key:/etc/vla-deploy/key\n" in unit
+
+
+def test_the_unit_is_as_patient_as_the_process_table_asks() -> None:
+    unit = texts()["vla-deploy.service"]
+    for line in (
+        f"WatchdogSec={watchdog_s()}",
+        f"RestartSec={RESTART_S}",
+        f"StartLimitBurst={START_BURST}",
+        f"StartLimitIntervalSec={start_limit_s()}",
+    ):
+        assert f"\n{line}\n" in unit
 
 
 def test_the_slice_follows_the_profiles_budget() -> None:
