@@ -9,11 +9,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from drivers.clock import Clock, MonotonicClock
-from drivers.errors import DriverError
+from drivers.errors import DeviceBusy, DeviceMissing, DriverError, LinkLost, NoReply
 from platforms import ProfileError, load_profile
 from vla_deploy.adapting import AdaptingNode
 from vla_deploy.aside import AtOnce, background
-from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_CRASHED, EXIT_OK
+from vla_deploy.exit_codes import (
+    EXIT_CONFIGURATION,
+    EXIT_CRASHED,
+    EXIT_DEVICE_ABSENT,
+    EXIT_OK,
+)
 from vla_deploy.host_settings import REALTIME_PROCESS, HostSettings
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.ipc import IpcError
@@ -23,7 +28,9 @@ from vla_deploy.node import Node, NodeContext, run_node
 from vla_deploy.robots import RobotFileError
 
 READY_DIR = "ready"
-# Starting again mends none of them: a person has to.
+# An adapter may be slow to appear at boot, a supply be switched on later, a dying holder let go.
+ABSENCES = (DeviceMissing, DeviceBusy, LinkLost, NoReply)
+# Starting again mends none of the others: a person has to.
 CONFIGURATION_ERRORS = (
     DriverError,
     RobotFileError,
@@ -62,6 +69,9 @@ def main(
             built = _adapting(name, build, context) if adapts else build(context)
             node = _Announced(built, context.run_dir / READY_DIR / name)
             run(node, context.clock, lambda: bool(stop_signals))
+        except ABSENCES as error:
+            _log.error("%s", error)
+            return EXIT_DEVICE_ABSENT
         except CONFIGURATION_ERRORS + mendable as error:
             _log.error("%s", error)
             return EXIT_CONFIGURATION

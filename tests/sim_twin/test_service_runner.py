@@ -16,7 +16,7 @@ from sim_twin.service_runner import ServiceRules, ServiceRunner, ServiceState
 SERVICE = """
 import os, signal, subprocess, sys, time
 mode = sys.argv[1]
-if mode in ("1", "2"):
+if mode.isdecimal():
     sys.exit(int(mode))
 if mode == "someone else":
     say = "import os, socket; to = os.environ['NOTIFY_SOCKET']; "
@@ -99,10 +99,11 @@ def test_a_service_in_trouble_does_not_feed_and_is_started_again(launch: Launch)
     assert runner.report.watchdog_kills == 1
 
 
-def test_a_service_that_crashes_at_once_is_given_up(launch: Launch) -> None:
-    runner = launch("1", ServiceRules(watchdog_s=1.0, restart_s=0.01, start_limit_burst=3))
+@pytest.mark.parametrize("code", [1, 4], ids=["crashed", "device absent"])
+def test_a_service_that_ends_at_once_is_tried_again_and_given_up(launch: Launch, code: int) -> None:
+    runner = launch(str(code), ServiceRules(watchdog_s=1.0, restart_s=0.01, start_limit_burst=3))
     assert runner.wait_for(ServiceState.FAILED, 20)
-    assert (runner.report.restarts, runner.report.exit_code) == (3, 1)
+    assert (runner.report.restarts, runner.report.exit_code) == (3, code)
 
 
 def test_a_wrong_configuration_is_not_tried_again(launch: Launch) -> None:

@@ -10,9 +10,11 @@ pytestmark = pytest.mark.stack
 NODE = """
 import sys
 from pathlib import Path
-from drivers.errors import DeviceMissing
+from drivers import errors
 from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.process_main import main
+
+TROUBLES = {kind.__name__: kind for kind in errors.DriverError.__subclasses__()}
 
 class Node:
     period_s = 0.01
@@ -21,8 +23,8 @@ class Node:
     def start(self):
         if self.context.robot == "blind":
             raise ModelFileSpoiled("detector.onnx: it was cut off; add it again")
-        if self.context.robot == "unwired":
-            raise DeviceMissing("servos: /dev/ttyUSB0 does not exist; plug it in")
+        if self.context.robot in TROUBLES:
+            raise TROUBLES[self.context.robot]("servos: /dev/ttyUSB0 does not exist; plug it in")
         print("start", self.context.devices_dir, Path("/proc/self/comm").read_text().strip())
     def step(self):
         self.steps += 1
@@ -61,11 +63,17 @@ def test_a_stop_signal_ends_the_node_in_order(tmp_path, number):
     assert not ready_file.exists()
 
 
-def test_a_missing_device_is_one_line_and_exit_code_2(tmp_path):
-    done = run(tmp_path, "unwired")
-    assert done.returncode == 2
+@pytest.mark.parametrize("trouble", ["DeviceMissing", "DeviceBusy", "LinkLost", "NoReply"])
+def test_an_absent_device_is_one_line_and_an_exit_code_of_its_own(tmp_path, trouble):
+    done = run(tmp_path, trouble)
+    assert done.returncode == 4
     assert done.stderr == ("planner: ERROR: servos: /dev/ttyUSB0 does not exist; plug it in\n")
     assert not (tmp_path / "ready" / "planner").exists()
+
+
+@pytest.mark.parametrize("trouble", ["WrongDevice", "DeviceFault", "UnknownModel"])
+def test_a_device_that_a_person_must_mend_is_exit_code_2(tmp_path, trouble):
+    assert run(tmp_path, trouble).returncode == 2
 
 
 def test_a_model_that_is_required_and_spoiled_is_one_line_and_exit_code_2(tmp_path):

@@ -10,8 +10,9 @@ from typing import Any
 
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_top_command
+from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
 from vla_deploy.logs import journal_stream
-from vla_deploy.supervisor.errors import ProcessGivenUp, StartCrashed
+from vla_deploy.supervisor.errors import DeviceAbsent, ProcessGivenUp, StartCrashed
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.profile_choice import start_profile
 from vla_deploy.supervisor.supervisor import Supervisor
@@ -74,7 +75,7 @@ def _seed(text: str) -> int:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Run until SIGINT or SIGTERM.
+    """Run until SIGINT or SIGTERM; an absent device has an exit code of its own, to try again.
 
     Raises:
         CommandFailed: the robot cannot go on without a process that was given up.
@@ -108,6 +109,9 @@ def main(arguments: argparse.Namespace) -> int:
     )
     try:
         _keep_running(options)
+    except DeviceAbsent as error:
+        sys.stderr.write(f"vla-deploy: {error}\n")
+        return EXIT_DEVICE_ABSENT
     except (ProcessGivenUp, StartCrashed) as error:
         raise CommandFailed(str(error)) from error
     print("stopped in order")

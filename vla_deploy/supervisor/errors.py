@@ -5,7 +5,8 @@ SupervisorError
 ├── RuntimeUnavailable  the runtime directory cannot be used: fix its path or permissions
 ├── ProcessGivenUp      the robot cannot go on without that process: the run ends
 └── StartFailed         a process did not become ready: its last words are in the message
-    └── StartCrashed    it crashed or hung on its way: another try may help
+    ├── StartCrashed    it crashed or hung on its way: another try may help
+    └── DeviceAbsent    a device it needs is not there, or silent: plug it in, switch it on
 """
 
 
@@ -27,6 +28,10 @@ class StartFailed(SupervisorError):
 
 class StartCrashed(StartFailed):
     """Say which process crashed or hung before it was ready: no fault of file or wiring."""
+
+
+class DeviceAbsent(StartFailed):
+    """Say which process did not find its device in several tries, and which device that is."""
 
 
 class ProcessGivenUp(SupervisorError):

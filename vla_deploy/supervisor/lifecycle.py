@@ -6,7 +6,7 @@ from enum import Enum
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from vla_deploy.exit_codes import EXIT_CONFIGURATION
+from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 from vla_deploy.supervisor.table import GivingUp, ProcessSpec, RestartPolicy
 
 ABORT_GRACE_NS = NS_PER_S
@@ -256,4 +256,6 @@ def _stop_step(spec: ProcessSpec, record: Record, seen: Seen, *, may_go: bool, n
 
 def describe_exit(exit_code: int) -> str:
     """Say in words how a process ended; a negative code is the signal that killed it."""
+    if exit_code == EXIT_DEVICE_ABSENT:
+        return f"a device is absent: exit code {exit_code}"
     return f"killed by signal {-exit_code}" if exit_code < 0 else f"exit code {exit_code}"

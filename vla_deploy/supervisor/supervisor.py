@@ -7,12 +7,18 @@ from pathlib import Path
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from platforms import load_profile
 from platforms.profile_schema import NODES
-from vla_deploy.exit_codes import EXIT_CONFIGURATION
+from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.power_off import ask_power_off
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.consequences import Consequences
-from vla_deploy.supervisor.errors import ProcessGivenUp, StartCrashed, StartFailed, SupervisorError
+from vla_deploy.supervisor.errors import (
+    DeviceAbsent,
+    ProcessGivenUp,
+    StartCrashed,
+    StartFailed,
+    SupervisorError,
+)
 from vla_deploy.supervisor.last_words import complaint, last_words
 from vla_deploy.supervisor.lifecycle import Action, Record, State, abort, reconcile, wind_down
 from vla_deploy.supervisor.liveness import Vital
@@ -29,6 +35,10 @@ _REPORT_NS = NS_PER_S // 2
 _HELD_UP_NS = 3 * NS_PER_S  # longer than any load explains, shorter than any silence allowed
 _TROUBLE = frozenset({State.BACKOFF, State.GIVEN_UP, State.ABORTING})
 _ON_THE_WAY = frozenset({State.WAITING, State.STARTING, State.BACKOFF, State.ABORTING})
+_MENDED_BY_A_PERSON: Mapping[int | None, type[StartFailed]] = {
+    EXIT_CONFIGURATION: StartFailed,
+    EXIT_DEVICE_ABSENT: DeviceAbsent,
+}
 _log = logging.getLogger(__name__)
 
 
@@ -94,6 +104,7 @@ class Supervisor:
             AlreadyRunning: another supervisor holds the runtime directory.
             RuntimeUnavailable: the runtime directory cannot be used.
             StartFailed: a process refused to start; everything is stopped again.
+            DeviceAbsent: a device did not appear in all tries; everything is stopped again.
             StartCrashed: a process was given up before it was ready; all is stopped again.
         """
         self._run = Run(
@@ -169,10 +180,11 @@ class Supervisor:
         )
 
     def _failure(self, name: str, record: Record) -> StartFailed:
-        words = last_words(self.run_dir, name)
-        if record.exit_code == EXIT_CONFIGURATION:
+        kind = _MENDED_BY_A_PERSON.get(record.exit_code)
+        if kind is not None:
             why = complaint(self.run_dir, name) or record.reason
-            return StartFailed(f"{name} did not start: {why}")
+            return kind(f"{name} did not start: {why}")
+        words = last_words(self.run_dir, name)
         return StartCrashed("\n".join([f"{name} did not start: {record.reason}", *words]))
 
     def _step(self, *, stopping: bool) -> None:

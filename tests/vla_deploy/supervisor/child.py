@@ -24,6 +24,10 @@ tell("started")
 if behaviour == "refuse":
     print("robot.toml: servo 3: no such joint", file=sys.stderr)
     sys.exit(2)
+if behaviour == "unwired" or (behaviour == "wired-later" and not (run_dir / "wired").exists()):
+    (run_dir / "wired").touch()
+    print("servos: /dev/ttyUSB0 does not exist; plug it in", file=sys.stderr)
+    sys.exit(4)
 if behaviour == "crash":
     sys.exit(3)
 if behaviour == "family":

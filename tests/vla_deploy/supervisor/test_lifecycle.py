@@ -3,6 +3,7 @@ from typing import Any
 
 import pytest
 
+from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
 from vla_deploy.supervisor.lifecycle import (
     ABORT_GRACE_NS,
     Act,
@@ -206,6 +207,14 @@ def test_a_configuration_fault_before_it_ever_worked_gives_up_at_once():
     play.step()
     play.step(a=Seen(exit_code=2))
     assert play.state("a") is State.GIVEN_UP
+
+
+def test_an_absent_device_is_looked_for_again_also_before_it_ever_worked():
+    play = Play(ROWS[:1])
+    play.step()
+    play.step(a=Seen(exit_code=EXIT_DEVICE_ABSENT))
+    assert play.state("a") is State.BACKOFF
+    assert play.records["a"].reason == "a device is absent: exit code 4"
 
 
 def test_the_same_exit_code_after_it_worked_is_restarted():

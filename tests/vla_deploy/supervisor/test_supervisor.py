@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 from platforms import ProfileError
-from vla_deploy.supervisor.errors import AlreadyRunning, StartCrashed, StartFailed
+from vla_deploy.supervisor.errors import AlreadyRunning, DeviceAbsent, StartCrashed, StartFailed
 from vla_deploy.supervisor.runtime import running
 from vla_deploy.supervisor.supervisor import Supervisor
 
@@ -105,6 +105,19 @@ def test_a_refusal_fails_the_start_at_once_with_the_process_own_words(stage):
         stage.supervisor(stage.row("a"), stage.row("b", "refuse")).start()
     assert refusal.type is StartFailed
     assert stage.events().count("b started") == 1
+
+
+def test_an_absent_device_fails_the_start_after_several_tries_with_the_process_own_words(stage):
+    with pytest.raises(DeviceAbsent, match=r"^b did not start: servos: /dev/ttyUSB0 does not"):
+        stage.supervisor(stage.row("a"), stage.row("b", "unwired")).start()
+    assert stage.events().count("b started") == 4
+
+
+def test_a_device_that_appears_late_only_delays_the_start(stage):
+    with stage.supervisor(stage.row("a", "wired-later")) as supervisor:
+        supervisor.start()
+        row = rows(supervisor)["a"]
+    assert (row["state"], row["restarts"], row["exit_code"]) == ("ready", 1, 4)
 
 
 def test_a_process_that_never_gets_ready_fails_the_start(stage):
