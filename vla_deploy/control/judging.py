@@ -63,6 +63,7 @@ class Judging:
         self.external_torque_nm = around.external_torque_nm
         inputs = self.watch.inputs(
             energised=energised,
+            stop_latched=bool(self.state.latched),
             estop_source=estop_source,
             reset_requested=reset_requested,
             setpoint=setpoint,

@@ -28,6 +28,7 @@ class Watch:
         self._base_sequence = 0
         self._base_age_s: float | None = None
         self._quiet = np.zeros(len(servos.state.torque_on), dtype=np.bool_)
+        self._powered = self._quiet.copy()
         self._steps = JointSteps(len(self._quiet))
 
     def refresh(self) -> None:
@@ -47,6 +48,7 @@ class Watch:
         self,
         *,
         energised: bool,
+        stop_latched: bool,
         estop_source: str | None,
         reset_requested: bool,
         setpoint: Floats,
@@ -58,8 +60,11 @@ class Watch:
 
         Tripped watchdogs do not hold up a reset: the servos go on holding until arming clears
         them. What arming clears by itself, and a stale command, is judged only while energised.
+        What loses its power while a stop is latched has not let go: the stop may take it.
         """
         state = self._servos.state
+        powers = energised and not stop_latched
+        self._powered = self._powered | state.torque_on if powers else self._quiet
         guarded = energised and not reset_requested
         commanded = not base_at_rest or self.v_m_s != 0.0 or self.w_rad_s != 0.0
         return SafetyInputs(
@@ -71,6 +76,7 @@ class Watch:
             position_step=self._steps.step,
             step_time_s=self._steps.time_s,
             setpoint=setpoint,
+            powered=self._powered,
             torque_enabled=state.torque_on,
             sample_age_s=state.age_s,
             effort_ratio=state.effort_ratio,

@@ -45,6 +45,7 @@ class Cause(Enum):
     SERVO_HARDWARE_ERROR = "servo_hardware_error"
     DRIVE_FAULT = "drive_fault"
     SERVO_WATCHDOG_TRIPPED = "servo_watchdog_tripped"
+    JOINT_UNPOWERED = "joint_unpowered"
     ENCODER_JUMP = "encoder_jump"
     JOINT_POSITION_LIMIT = "joint_position_limit"
     JOINT_VELOCITY_LIMIT = "joint_velocity_limit"
@@ -112,6 +113,8 @@ RULES: tuple[Rule, ...] = (
          probes.drive_fault, "look the code up in the drive's manual"),
     Rule(Cause.SERVO_WATCHDOG_TRIPPED,  Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.servo_watchdog_tripped, "control was silent on the bus: look at late_ticks"),
+    Rule(Cause.JOINT_UNPOWERED,         Reaction.HOLD,            Latch.ENERGISED, 3,   0,
+         probes.joint_unpowered, "the servo let go: support the arm, then look at its supply"),
     Rule(Cause.ENCODER_JUMP,            Reaction.HOLD,            Latch.ENERGISED, 1,   0,
          probes.encoder_jump, "disarm, then compare the joint's angle with the arm itself"),
     Rule(Cause.JOINT_POSITION_LIMIT,    Reaction.HOLD,            Latch.ENERGISED, 2,   0,

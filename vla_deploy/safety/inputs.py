@@ -33,10 +33,12 @@ class SafetyInputs:
     """Carry one tick's measurements, joint arrays in the order of the robot file.
 
     `energised` is true from arming until the robot is disarmed again, `standstill` while it has to
-    stand under a stop. `position_step` is what a joint has gone since its sample before this one,
-    `step_time_s` the time between both; both are 0 where no new one came. `effort_ratio` is of the
-    stall current; voltage and temperature are NaN before the first reading, and are read less often
-    than the rest: `climate_age_s`.
+    stand under a stop. `powered` are the joints that have come under power since arming began, none
+    once a stop has latched, for that may take it; `torque_enabled` is what each servo says.
+    `position_step` is what a joint has gone since its sample before this one, `step_time_s` the
+    time between both; both are 0 where no new one came. `effort_ratio` is of the stall current;
+    voltage and temperature are NaN before the first reading, and are read less often than the rest:
+    `climate_age_s`.
     `budget_stop` says which budget demands a stop.
     An age of None means that nothing has ever arrived, so there is nothing to lose yet.
     """
@@ -49,6 +51,7 @@ class SafetyInputs:
     position_step: Floats
     step_time_s: Floats
     setpoint: Floats
+    powered: Flags
     torque_enabled: Flags
     sample_age_s: Floats
     effort_ratio: Floats

@@ -31,6 +31,20 @@ def joint_velocity_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding 
     return _powered_above(np.abs(inputs.velocity), limits.velocity, inputs, limits)
 
 
+def joint_unpowered(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find joints that let go though nobody has taken their power; the first is named."""
+    loose = inputs.powered & ~inputs.torque_enabled
+    joint = first_in(loose)
+    if joint is None:
+        return None
+    return Finding(
+        subject=limits.joint_names[joint],
+        measured=float(np.count_nonzero(loose)),
+        limit=0.0,
+        age_s=float(inputs.sample_age_s[joint]),
+    )
+
+
 def encoder_jump(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a powered joint that is said to have gone further than any joint can in that time."""
     joint = first_in(jumped_joints(inputs, limits))

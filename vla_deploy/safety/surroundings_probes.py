@@ -111,8 +111,11 @@ def collision(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 
 def _moves_by_itself(inputs: SafetyInputs) -> bool:
-    """Tell whether every joint is under power: a limp arm that sinks is not stopped by a ramp."""
-    return inputs.energised and 0 not in inputs.torque_enabled.tobytes()
+    """Tell whether every joint has come under power: before that, limp arms may lie anywhere.
+
+    One that lets go later does not hide what the others do.
+    """
+    return inputs.energised and 0 not in inputs.powered.tobytes()
 
 
 def _too_close(

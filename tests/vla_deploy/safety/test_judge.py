@@ -82,6 +82,7 @@ HEALTHY = SafetyInputs(
     position_step=np.zeros(2),
     step_time_s=np.full(2, 0.004),
     setpoint=np.array([0.0, 1.0]),
+    powered=np.array([True, True]),
     torque_enabled=np.array([True, True]),
     sample_age_s=np.zeros(2),
     effort_ratio=np.zeros(2),
@@ -102,6 +103,10 @@ HEALTHY = SafetyInputs(
     surroundings=SEEN,
 )
 ULP = 1e-12
+LOOSE = {
+    "torque_enabled": np.array([False, True]),
+    "powered": np.array([False, True]),
+}
 
 
 def right(**changes: Any) -> dict[str, Any]:
@@ -157,6 +162,10 @@ def standing(**changes: Any) -> dict[str, Any]:
     return {"standstill": True, **changes}
 
 
+def let_go(*joints: bool, powered: tuple[bool, bool]) -> dict[str, Any]:
+    return {"torque_enabled": ~np.array(joints), "powered": np.array(powered)}
+
+
 def at(position: float, velocity: float) -> dict[str, Any]:
     return {
         "position": np.array([position, 1.0]),
@@ -202,13 +211,25 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         {"watchdog_tripped": np.array([False, False])},
         "elbow",
     ),
+    (
+        Cause.JOINT_UNPOWERED,
+        let_go(False, True, powered=(True, True)),
+        let_go(False, True, powered=(True, False)),
+        "elbow",
+    ),
+    (
+        Cause.JOINT_UNPOWERED,
+        let_go(True, True, powered=(True, False)),
+        let_go(True, True, powered=(False, False)),
+        "shoulder",
+    ),
     (Cause.ENCODER_JUMP, stepped(0.625 + ULP), stepped(0.625), "shoulder"),
     (Cause.ENCODER_JUMP, stepped(-0.625 - ULP), stepped(-0.625), "shoulder"),
     (Cause.ENCODER_JUMP, stepped(0.125 + ULP, 0.0), stepped(0.125, 0.0), "shoulder"),
     (
         Cause.ENCODER_JUMP,
         stepped(3.0),
-        stepped(3.0, torque_enabled=np.array([False, True])),
+        stepped(3.0, **LOOSE),
         "shoulder",
     ),
     (Cause.JOINT_POSITION_LIMIT, at(1.0 + ULP, 0.06), at(1.0, 0.06), "shoulder"),
@@ -294,7 +315,7 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
     (
         Cause.JOINT_CURRENT_LIMIT,
         {"effort_ratio": np.array([0.5, 0.75 + ULP])},
-        {"effort_ratio": np.array([0.9, 0.75]), "torque_enabled": np.array([False, True])},
+        {"effort_ratio": np.array([0.9, 0.75]), **LOOSE},
         "elbow",
     ),
     (
@@ -332,7 +353,7 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
     (
         Cause.COLLISION,
         pushed(2.0 + ULP),
-        pushed(2.5, torque_enabled=np.array([False, True])),
+        pushed(2.5, **LOOSE),
         "shoulder",
     ),
     (
@@ -445,6 +466,7 @@ SAID = {
     Cause.SERVO_HARDWARE_ERROR,
     Cause.DRIVE_FAULT,
     Cause.SERVO_WATCHDOG_TRIPPED,
+    Cause.JOINT_UNPOWERED,
     Cause.BUDGET_EXHAUSTED,
     Cause.OBSTACLE_STOP_ZONE,
     Cause.OBSTACLE_SLOW_ZONE,
@@ -703,24 +725,34 @@ def test_nothing_known_of_the_surroundings_forbids_nothing_but_driving_blind() -
 )
 def test_a_disarmed_arm_may_be_moved_by_hand_wherever_it_goes(cause: Cause) -> None:
     assert ticks(SafetyState(), 5, **SPOILERS[cause], energised=False)[1] is CLEAR
-    limp = {"torque_enabled": np.array([True, False])}
+    limp = let_go(False, True, powered=(True, False))
     assert ticks(SafetyState(), 5, **SPOILERS[cause], **limp)[1] is CLEAR
 
 
+@pytest.mark.parametrize(
+    "cause", [Cause.SELF_COLLISION, Cause.ENVIRONMENT_COLLISION, Cause.WORKSPACE]
+)
+def test_a_joint_that_lets_go_hides_nothing_of_what_the_others_do(cause: Cause) -> None:
+    loose = let_go(False, True, powered=(True, True))
+    state, verdict = ticks(SafetyState(), 2, **SPOILERS[cause], **loose)
+    assert verdict.cause is cause
+    _, verdict = tick(state, **SPOILERS[cause], **loose)
+    assert verdict.cause is Cause.JOINT_UNPOWERED
+
+
 def test_a_loose_joint_may_move_during_standstill() -> None:
-    loose = {"torque_enabled": np.array([False, True]), "velocity": np.array([9.0, 0.0])}
+    loose = {**LOOSE, "velocity": np.array([9.0, 0.0])}
     assert ticks(SafetyState(), 100, **standing(**loose))[1] is CLEAR
 
 
 @pytest.mark.parametrize("cause", [Cause.JOINT_POSITION_LIMIT, Cause.JOINT_VELOCITY_LIMIT])
 def test_a_joint_without_torque_has_no_limits(cause: Cause) -> None:
-    off = {"torque_enabled": np.array([False, True])}
-    _, verdict = ticks(SafetyState(), 60, **SPOILERS[cause], **off)
+    _, verdict = ticks(SafetyState(), 60, **SPOILERS[cause], **LOOSE)
     assert verdict is CLEAR
 
 
 def test_a_joint_without_torque_has_no_following_error() -> None:
-    changes = SPOILERS[Cause.FOLLOWING_ERROR] | {"torque_enabled": np.array([False, True])}
+    changes = SPOILERS[Cause.FOLLOWING_ERROR] | LOOSE
     assert ticks(SafetyState(), 60, **changes)[1] is CLEAR
 
 
@@ -765,6 +797,7 @@ OLD = {"sample_age_s": np.array([0.0, 0.015]), "climate_age_s": np.array([0.0, 0
         ({"velocity": np.array([0.0, 4.0])}, 0.015),
         ({"hardware_error": np.array([0, 1], dtype=np.uint8)}, 0.015),
         ({"watchdog_tripped": np.array([False, True])}, 0.015),
+        (let_go(False, True, powered=(True, True)), 0.015),
         (excess(0.1, 0.1), 0.015),
         (within(0.1), 0.3),
         (around(tip_margin_ratio=0.1), 0.07),
@@ -802,12 +835,14 @@ def test_a_cause_without_numbers_tells_none_and_its_text_leaves_them_out() -> No
         (right(fault_code=3), 3.0),
         ({"watchdog_tripped": np.array([False, True])}, 1.0),
         ({"watchdog_tripped": np.array([True, True])}, 2.0),
+        (let_go(False, True, powered=(True, True)), 1.0),
+        (let_go(True, True, powered=(True, True)), 2.0),
     ],
 )
 def test_what_must_not_be_at_all_is_measured_against_none(
     changes: dict[str, Any], measured: float
 ) -> None:
-    _, verdict = tick(SafetyState(), **changes)
+    _, verdict = ticks(SafetyState(), 3, **changes)
     assert (verdict.measured, verdict.limit) == (measured, 0.0)
 
 

@@ -25,6 +25,7 @@ UNITS: Final[Mapping[Cause, str]] = {
     Cause.SERVO_HARDWARE_ERROR: "(error bits)",
     Cause.DRIVE_FAULT: "(fault code)",
     Cause.SERVO_WATCHDOG_TRIPPED: "(servos)",
+    Cause.JOINT_UNPOWERED: "(joints)",
     Cause.ENCODER_JUMP: "rad",
     Cause.JOINT_POSITION_LIMIT: "rad",
     Cause.JOINT_VELOCITY_LIMIT: "rad/s",

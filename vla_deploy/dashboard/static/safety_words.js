@@ -37,6 +37,7 @@ const CAUSES = {
   servo_hardware_error: "A servo reports a hardware error",
   drive_fault: "A wheel drive reports a fault",
   servo_watchdog_tripped: "A servo's watchdog has tripped: control was silent",
+  joint_unpowered: "A joint has let go by itself",
   encoder_jump: "A joint's encoder has jumped",
   joint_position_limit: "A joint is beyond its range",
   joint_velocity_limit: "A joint moves too fast",
