@@ -26,7 +26,11 @@ class ProcessStat:
 
 
 def read_stat(pid: int) -> ProcessStat | None:
-    """Return what a process is and takes, or None when there is none."""
+    """Return what a process is and takes, or None when there is none.
+
+    Raises:
+        PermissionError: it may not be known.
+    """
     try:
         text = (_PROC / str(pid) / "stat").read_text()
     except _GONE:
@@ -43,9 +47,17 @@ def read_stat(pid: int) -> ProcessStat | None:
 
 
 def read_all_stats() -> dict[int, ProcessStat]:
-    """Return every process of the computer by its pid."""
+    """Return every process of the computer that may be known, by its pid."""
     pids = (int(path.name) for path in _PROC.iterdir() if path.name.isdecimal())
-    return {pid: stat for pid in pids if (stat := read_stat(pid)) is not None}
+    return {pid: stat for pid in pids if (stat := _read_if_known(pid)) is not None}
+
+
+def _read_if_known(pid: int) -> ProcessStat | None:
+    # Mounted with hidepid=1, /proc lists other users' processes and opens none of their files.
+    try:
+        return read_stat(pid)
+    except PermissionError:
+        return None
 
 
 def read_pss_bytes(pid: int) -> int | None:

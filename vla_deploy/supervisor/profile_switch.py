@@ -41,8 +41,12 @@ class ProfileSwitch:
         power: PowerSwitch,
         aside: Executor,
         watch_s: float = profile_change.WATCH_S,
+        on_change: Callable[[Profile], None] | None = None,
     ) -> None:
-        """Listen from now on; after a commit everything is watched for `watch_s`."""
+        """Listen from now on; after a commit everything is watched for `watch_s`.
+
+        `on_change` hears which profile is in force before the processes do.
+        """
         self.profile = self._kept = name
         self.in_force = self._kept_profile = profile
         self._clock = clock
@@ -50,6 +54,7 @@ class ProfileSwitch:
         self._power = power
         self._aside = aside
         self._watch_ns = _ns(watch_s)
+        self._on_change = on_change
         self._power_set: Future[str] | None = None
         self._requests = space.ring_reader("profile_request", from_start=False)
         self._changes = space.ring_writer("profile_change")
@@ -183,7 +188,7 @@ class ProfileSwitch:
 
     def _commit(self, change: Change) -> None:
         change.committed = True
-        self.profile, self.in_force = change.request.profile, change.target
+        self._put_in_force(change.request.profile, change.target)
         limit_s = profile_change.RESTART_S if change.restarts else profile_change.COMMIT_S
         change.enter(Phase.COMMIT, self._clock.now_ns(), _ns(limit_s))
         self._publish(change, "commit")
@@ -249,7 +254,7 @@ class ProfileSwitch:
 
     def _go_back(self, change: Change, failure: str) -> None:
         change.failure = failure
-        self.profile, self.in_force = self._kept, self._kept_profile
+        self._put_in_force(self._kept, self._kept_profile)
         self._power_set = (
             self._aside.submit(self._power.set, change.power_before)
             if change.power_before
@@ -257,6 +262,11 @@ class ProfileSwitch:
         )
         change.enter(Phase.ROLLBACK, self._clock.now_ns(), _ns(profile_change.ROLLBACK_S))
         self._publish(change, "rollback")
+
+    def _put_in_force(self, name: str, profile: Profile) -> None:
+        self.profile, self.in_force = name, profile
+        if self._on_change is not None:
+            self._on_change(profile)
 
     def _is_waiting(self, change: Change, restarting: tuple[str, ...] = ()) -> bool:
         """Tell whether answers may still come; when it is too late for them, go back."""

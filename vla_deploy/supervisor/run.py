@@ -94,6 +94,7 @@ class Run:
             choice_of(options.runtime_base),
             PowerSwitch(),
             background(),
+            on_change=self.budgets.adopt,
         )
         self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
         self.serial_workers = SerialWorkers(clock)

@@ -51,7 +51,16 @@ class Enforcer:
         return {name: self._rules.get(name, IDLE) for name in self._budgets}
 
     def adopt(self, budgets: Mapping[str, ProcessBudget]) -> None:
-        """Enforce these budgets from now on."""
+        """Enforce these budgets from now on; who is held back by the ones before is released.
+
+        Before the processes hear of the profile: what they then set for themselves shall stay.
+        """
+        for (_, name), held in self._held.items():
+            try:
+                held.release()
+            except HoldRefused as error:
+                _log.warning("budgets: %s stays held back: %s", name, error)
+        self._held.clear()
         self._budgets = budgets
         self._pids.clear()
 
@@ -133,7 +142,10 @@ class Enforcer:
             _log.debug("budgets: %s: its number of tasks is not bounded: %s", name, refusal)
 
     def _settle(self, metric: str, name: str, excess: Finding | None) -> None:
-        """Hold a process back while it is over, where its group does not; release it after that."""
+        """Hold a process back while it is over, where its group does not; release it after that.
+
+        What is refused is tried again with the next measurement.
+        """
         key = metric, name
         held = self._held.get(key)
         if key not in self._refused or (excess is None) == (held is None):
@@ -142,12 +154,10 @@ class Enforcer:
             if excess is not None:
                 self._held[key] = self._hold(excess)
             elif held is not None:
-                del self._held[key]
                 held.release()
+                del self._held[key]
         except HoldRefused as error:
-            _log.warning("budgets: %s is not held back: %s", name, error)
-            self._refused.pop(key)
-            self._say(metric, name, f"none, because {error}")
+            self._warn(metric, name, f"{'none' if held is None else held}, because {error}")
             return
         self._say(metric, name, self._described(key))
 
@@ -167,6 +177,13 @@ class Enforcer:
         memory = text if metric == "memory_mb" else rule.memory
         cpu = text if metric == "cpu_ratio" else rule.cpu
         self._rules[name] = Enforced(memory=memory, cpu=cpu)
+
+    def _warn(self, metric: str, name: str, text: str) -> None:
+        """Say what was refused, and log it when it begins, not with each measurement."""
+        rule = self._rules[name]
+        self._say(metric, name, text)
+        if self._rules[name] != rule:
+            _log.warning("budgets: %s: %s is enforced by %s", name, metric, text)
 
 
 _WHEN_OVER: Final[Mapping[str, str]] = {

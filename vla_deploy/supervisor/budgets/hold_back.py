@@ -1,14 +1,15 @@
 """Hold a process back from outside, where no control group can: nice, affinity, RLIMIT_DATA.
 
-All of it is undone when the process keeps its budget again. Address space (RLIMIT_AS) is never
-limited: memory-mapped models and shared memory count there without being used.
+All of it is undone when the process keeps its budget again, except what somebody else has changed
+meanwhile: a process that follows another profile sets its own affinity. Address space (RLIMIT_AS)
+is never limited: memory-mapped models and shared memory count there without being used.
 """
 
 import os
 import resource
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
 from typing import Final
@@ -24,16 +25,38 @@ class HoldRefused(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Claim:
+    """Say what the kernel grants one thread: its nice, and the cores that it may run on."""
+
+    nice: int
+    cores: frozenset[int]
+
+    @classmethod
+    def of(cls, thread: int) -> "_Claim":
+        return cls(
+            nice=os.getpriority(os.PRIO_PROCESS, thread),
+            cores=frozenset(os.sched_getaffinity(thread)),
+        )
+
+    def set(self, thread: int) -> None:
+        os.setpriority(os.PRIO_PROCESS, thread, self.nice)
+        os.sched_setaffinity(thread, self.cores)
+
+    def held(self, cores: frozenset[int]) -> "_Claim":
+        """Return the low claim that this becomes; one that is lower already stays so."""
+        return _Claim(nice=max(HELD_NICE, self.nice), cores=cores)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CpuHold:
-    """Remember what a process had before it was held back."""
+    """Remember what each thread of a process had before it was held back."""
 
     pid: int
-    cores: int
-    nice: int
-    affinity: frozenset[int]
+    cores: frozenset[int]
+    before: dict[int, _Claim] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        return f"nice {max(HELD_NICE, self.nice)} and {self.cores} cores"
+        return f"nice {self.before[self.pid].held(self.cores).nice} and {len(self.cores)} cores"
 
     @classmethod
     def take(cls, pid: int, cores: float) -> "CpuHold":
@@ -43,23 +66,52 @@ class CpuHold:
             HoldRefused: it is gone or not ours, or what is taken could not be given back.
         """
         with _translated(pid):
-            nice = os.getpriority(os.PRIO_PROCESS, pid)
-            affinity = frozenset(os.sched_getaffinity(pid))
-            _require_undo(nice)
-            kept = frozenset(sorted(affinity)[-ceil(cores) :])
-            _set_cpu(pid, max(HELD_NICE, nice), kept)
-            if os.sched_getaffinity(pid) != kept:
-                raise HoldRefused(f"pid {pid} did not take the cores {sorted(kept)}")
-        return cls(pid=pid, cores=len(kept), nice=nice, affinity=affinity)
+            main = _Claim.of(pid)
+            _require_undo(main.nice)
+            hold = cls(pid=pid, cores=frozenset(sorted(main.cores)[-ceil(cores) :]))
+            try:
+                hold._take_every_thread()
+            except (OSError, HoldRefused):
+                hold.release()
+                raise
+        return hold
 
     def release(self) -> None:
-        """Give the process back what it had.
+        """Give each thread back what it had; of a process that is gone nothing is held.
 
         Raises:
-            HoldRefused: it is gone or not ours.
+            HoldRefused: it is not ours.
         """
         with _translated(self.pid):
-            _set_cpu(self.pid, self.nice, self.affinity)
+            for thread in _threads(self.pid):
+                with suppress(ProcessLookupError):  # it ended meanwhile
+                    self._release_thread(thread)
+
+    def _take_every_thread(self) -> None:
+        # Who is started meanwhile by a thread that is not held yet inherits the high claim.
+        seen: set[int] = set()
+        while new := _threads(self.pid) - seen:
+            seen |= new
+            for thread in new:
+                with suppress(ProcessLookupError):
+                    self._take_thread(thread)
+        if self.pid not in self.before or _Claim.of(self.pid).cores != self.cores:
+            raise HoldRefused(f"pid {self.pid} did not take the cores {sorted(self.cores)}")
+
+    def _take_thread(self, thread: int) -> None:
+        self.before[thread] = _Claim.of(thread)
+        self.before[thread].held(self.cores).set(thread)
+
+    def _release_thread(self, thread: int) -> None:
+        """Give back what is still as the hold left it; later threads inherited their claim."""
+        before = self.before.get(thread) or self.before.get(self.pid)
+        if before is None:
+            return
+        now, held = _Claim.of(thread), before.held(self.cores)
+        _Claim(
+            nice=before.nice if now.nice == held.nice else now.nice,
+            cores=before.cores if now.cores == held.cores else now.cores,
+        ).set(thread)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,13 +144,14 @@ class MemoryHold:
         return cls(pid=pid, limit_bytes=limit, soft=soft, hard=hard)
 
     def release(self) -> None:
-        """Let the process grow as before.
+        """Let the process grow as before; of one that is gone nothing is held.
 
         Raises:
-            HoldRefused: it is gone or not ours.
+            HoldRefused: it is not ours.
         """
-        with _translated(self.pid):
-            resource.prlimit(self.pid, resource.RLIMIT_DATA, (self.soft, self.hard))
+        with _translated(self.pid), suppress(ProcessLookupError):
+            if resource.prlimit(self.pid, resource.RLIMIT_DATA)[0] == self.limit_bytes:
+                resource.prlimit(self.pid, resource.RLIMIT_DATA, (self.soft, self.hard))
 
 
 @contextmanager
@@ -109,11 +162,12 @@ def _translated(pid: int) -> Iterator[None]:
         raise HoldRefused(f"pid {pid}: {error.strerror}") from error
 
 
-def _set_cpu(pid: int, nice: int, affinity: frozenset[int]) -> None:
-    # Both belong to a thread, not to a process.
-    for thread in (_PROC / str(pid) / "task").iterdir():
-        os.setpriority(os.PRIO_PROCESS, int(thread.name), nice)
-        os.sched_setaffinity(int(thread.name), affinity)
+def _threads(pid: int) -> set[int]:
+    """Return the threads of a process, none of one that is gone: nice and cores belong to each."""
+    try:
+        return {int(path.name) for path in (_PROC / str(pid) / "task").iterdir()}
+    except (FileNotFoundError, ProcessLookupError):
+        return set()
 
 
 def _require_undo(nice: int) -> None:

@@ -3,7 +3,7 @@
 import logging
 import os
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -80,10 +80,21 @@ class BudgetKeeper:
         self._seen_ns = clock.now_ns()
         self._stale = False
         self._told_ns = 0
-        self._adopt(profile())
+        self._profile = profile()
+        self._take_over(self._profile)
 
-    def _adopt(self, profile: Profile) -> None:
+    def adopt(self, profile: Profile) -> None:
         """Go on with the budgets of another profile; steps that it does not declare are undone."""
+        if profile is self._profile:
+            return
+        known, now_ns = (*profile.ladder, EMERGENCY), self._clock.now_ns()
+        for one in reversed(self._ladder.taken):
+            if one.step not in known:
+                why = f"profile {profile.name} does not declare it"
+                self._record(Change(step=one.step, taken=False, why=why, at_ns=now_ns))
+        self._take_over(profile)
+
+    def _take_over(self, profile: Profile) -> None:
         self._profile = profile
         self._lines: tuple[Line, ...] = lines_of(profile.budgets, profile.total)
         known = (*profile.ladder, EMERGENCY)
@@ -100,15 +111,15 @@ class BudgetKeeper:
     def step(self, pids: Mapping[str, int]) -> Orders:
         """Judge the newest measurement, if there is a new one, and return what is to be done."""
         now_ns = self._clock.now_ns()
-        if self._profile_now() is not self._profile:
-            self._adopt(self._profile_now())
+        self.adopt(self._profile_now())
         everyone = {_SUPERVISOR: os.getpid(), **pids}
         self._feed.watch(everyone)
         restart: dict[str, str] = {}
-        snapshot = self._feed.latest()
-        if snapshot is not None and snapshot.stamp_ns > self._seen_ns:
-            self._seen_ns, self._stale = snapshot.stamp_ns, False
-            restart = self._judge(self._measure(snapshot), now_ns)
+        self._note_failures()
+        fresh = self._feed.since(self._seen_ns)
+        if fresh:
+            self._seen_ns, self._stale = fresh[-1].stamp_ns, False
+            restart = self._judge(self._measure(fresh), now_ns)
             self._enforcer.enforce(everyone, self._findings.values())
         elif now_ns - self._seen_ns > STALE_AFTER_NS and not self._stale:
             self._stale = True
@@ -127,9 +138,17 @@ class BudgetKeeper:
         self._feed.close()
         self._enforcer.close()
 
-    def _measure(self, snapshot: Snapshot) -> Measurements:
-        self._emergency = self._emergencies.judge(snapshot.readings)
-        return self._measurer.measure(snapshot, frozenset(self._profile.budgets))
+    def _measure(self, fresh: Sequence[Snapshot]) -> Measurements:
+        """Return the newest numbers; an emergency counts also when this comes late to see it."""
+        reasons = [self._emergencies.judge(one.readings) for one in fresh]
+        self._emergency = next(filter(None, reversed(reasons)), "")
+        for snapshot in fresh:
+            measured = self._measurer.measure(snapshot, frozenset(self._profile.budgets))
+        return measured
+
+    def _note_failures(self) -> None:
+        if self._feed.failures:
+            self.counts["measuring_failed"] = self._feed.failures
 
     def _unknown(self) -> Measurements:
         reason = (

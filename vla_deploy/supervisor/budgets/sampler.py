@@ -1,6 +1,8 @@
 """Measure the board and the processes beside the supervisor's loop, never in it."""
 
+import logging
 import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -10,6 +12,8 @@ from platforms.probes import Reading
 from vla_deploy.supervisor.usage import Usage, UsageMeter
 
 SAMPLE_PERIOD_S: Final = 0.5
+KEPT_SNAPSHOTS: Final = 64
+_log = logging.getLogger(__name__)
 
 
 class Probes(Protocol):
@@ -50,6 +54,15 @@ class Feed(Protocol):
         """Return the newest snapshot, or None before the first."""
         ...
 
+    def since(self, stamp_ns: int) -> tuple[Snapshot, ...]:
+        """Return what was measured after a moment, oldest first."""
+        ...
+
+    @property
+    def failures(self) -> int:
+        """Return how many rounds have failed."""
+        ...
+
     def close(self) -> None:
         """Measure no more."""
         ...
@@ -58,7 +71,9 @@ class Feed(Protocol):
 class BackgroundSampler:
     """Measure twice a second in a thread of its own.
 
-    Some sensors take milliseconds to answer, and one that hangs must not hold the supervisor up.
+    Some sensors take milliseconds to answer, and one that hangs must not hold the supervisor up. A
+    round that fails is logged and counted, and the next one is tried. Rounds are kept for a reader
+    that is late: each holds the events since the one before it.
     """
 
     def __init__(
@@ -69,7 +84,9 @@ class BackgroundSampler:
         self._period_s = period_s
         self._meter = UsageMeter(clock.now_ns())
         self._pids: Mapping[str, int] = {}
-        self._latest: Snapshot | None = None
+        self._kept: deque[Snapshot] = deque(maxlen=KEPT_SNAPSHOTS)
+        self._failures = 0
+        self._failure = ""
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="budget-sampler", daemon=True)
         self._thread.start()
@@ -80,7 +97,16 @@ class BackgroundSampler:
 
     def latest(self) -> Snapshot | None:
         """Return the newest snapshot, or None before the first."""
-        return self._latest
+        return self._kept[-1] if self._kept else None
+
+    def since(self, stamp_ns: int) -> tuple[Snapshot, ...]:
+        """Return what was measured after a moment, oldest first, as far as it is kept."""
+        return tuple(one for one in self._kept.copy() if one.stamp_ns > stamp_ns)
+
+    @property
+    def failures(self) -> int:
+        """Return how many rounds have failed."""
+        return self._failures
 
     def close(self) -> None:
         """End the thread; one that hangs in a sensor ends with the process."""
@@ -88,12 +114,26 @@ class BackgroundSampler:
         self._thread.join(timeout=2 * self._period_s)
 
     def _run(self) -> None:
-        probes = self._open_probes()
-        try:
-            while not self._closing.wait(self._period_s):
-                self._latest = self._sample(probes)
-        finally:
+        probes: Probes | None = None
+        while not self._closing.wait(self._period_s):
+            # This is the thread's main loop: whatever a system file or a sensor does, the next
+            # round may succeed, and without one the ladder would stand still for the whole run.
+            try:
+                probes = probes or self._open_probes()
+                self._kept.append(self._sample(probes))
+                self._failure = ""
+            except Exception as error:
+                self._note_failure(error)
+        if probes is not None:
             probes.close()
+
+    def _note_failure(self, error: Exception) -> None:
+        """Count a round that failed; the same failure is logged when it begins, not each time."""
+        self._failures += 1
+        failure = f"{type(error).__name__}: {error}"
+        if failure != self._failure:
+            self._failure = failure
+            _log.warning("budgets: nothing was measured this time: %s", failure, exc_info=error)
 
     def _sample(self, probes: Probes) -> Snapshot:
         pids, stamp_ns = self._pids, self._clock.now_ns()

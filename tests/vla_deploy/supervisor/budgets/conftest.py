@@ -31,14 +31,18 @@ class ScriptedFeed:
 
     def __init__(self) -> None:
         self.closed = False
-        self.snapshot: Snapshot | None = None
+        self.failures = 0
+        self.snapshots: list[Snapshot] = []
         self.watched: Mapping[str, int] = {}
 
     def watch(self, pids: Mapping[str, int]) -> None:
         self.watched = pids
 
     def latest(self) -> Snapshot | None:
-        return self.snapshot
+        return self.snapshots[-1] if self.snapshots else None
+
+    def since(self, stamp_ns: int) -> tuple[Snapshot, ...]:
+        return tuple(one for one in self.snapshots if one.stamp_ns > stamp_ns)
 
     def close(self) -> None:
         self.closed = True
@@ -75,11 +79,14 @@ class World:
         for _ in range(round(2 * seconds)):
             self.clock.ns += NS_PER_S // 2
             if measured:
-                self.feed.snapshot = self._snapshot()
+                self.measure()
             orders = self.keeper.step(self.running)
             self.running = {k: v for k, v in self.pids.items() if k not in orders.suspended}
             self.restarted += orders.restart
         return orders
+
+    def measure(self) -> None:
+        self.feed.snapshots.append(self._snapshot())
 
     def cell(self, name: str) -> dict:
         return self.space.cell_reader(name).latest().document()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from vla_deploy.supervisor.budgets import hold_back
 from vla_deploy.supervisor.budgets.hold_back import CpuHold, HoldRefused, MemoryHold
 
 THREADED = """
@@ -27,6 +28,8 @@ for line in sys.stdin:
         print("granted", flush=True)
 """
 MB = 1_000_000
+# What is nice already, such as the tests themselves, stays so.
+HELD_NICE = max(10, os.getpriority(os.PRIO_PROCESS, 0))
 
 
 @pytest.fixture
@@ -60,12 +63,46 @@ def test_every_thread_of_a_cpu_hog_is_held_back_and_gets_back_what_it_had(child)
     hold = CpuHold.take(child.pid, cores=0.6)
     tasks = threads(child.pid)
     assert len(tasks) >= 2
-    assert {os.getpriority(os.PRIO_PROCESS, task) for task in tasks} == {10}
+    assert {os.getpriority(os.PRIO_PROCESS, task) for task in tasks} == {HELD_NICE}
     assert {len(os.sched_getaffinity(task)) for task in tasks} == {1}
-    assert str(hold) == "nice 10 and 1 cores"
+    assert str(hold) == f"nice {HELD_NICE} and 1 cores"
     hold.release()
     assert {os.getpriority(os.PRIO_PROCESS, task) for task in tasks} == {nice}
     assert os.sched_getaffinity(child.pid) == before
+
+
+def claims(pid: int) -> dict[int, tuple[int, frozenset[int]]]:
+    return {
+        task: (os.getpriority(os.PRIO_PROCESS, task), frozenset(os.sched_getaffinity(task)))
+        for task in threads(pid)
+    }
+
+
+def test_a_thread_that_put_itself_aside_gets_its_own_claim_back(child):
+    aside = next(task for task in threads(child.pid) if task != child.pid)
+    os.setpriority(os.PRIO_PROCESS, aside, 17)
+    before = claims(child.pid)
+    hold = CpuHold.take(child.pid, cores=0.6)
+    assert claims(child.pid)[aside][0] == 17
+    hold.release()
+    assert claims(child.pid) == before
+
+
+def test_a_thread_that_ends_meanwhile_is_passed_over(child, monkeypatch):
+    before, listed = claims(child.pid), hold_back._threads
+    gone = 2**30  # no kernel gives out such an id
+    monkeypatch.setattr(hold_back, "_threads", lambda pid: {gone, *listed(pid)})
+    hold = CpuHold.take(child.pid, cores=0.6)
+    assert {nice for nice, _ in claims(child.pid).values()} == {HELD_NICE}
+    hold.release()
+    assert claims(child.pid) == before
+
+
+def test_what_a_process_set_for_itself_meanwhile_stays(child):
+    hold = CpuHold.take(child.pid, cores=0.6)
+    os.setpriority(os.PRIO_PROCESS, child.pid, 18)
+    hold.release()
+    assert claims(child.pid)[child.pid][0] == 18
 
 
 def ask(child: subprocess.Popen[str], size: int) -> str:

@@ -189,6 +189,32 @@ def test_another_profile_undoes_the_steps_that_it_does_not_declare(world, profil
     assert world.cell("resource_directives")["rate_ratio"] == {"perception": 0.25}
 
 
+def test_what_a_profile_change_undoes_is_logged_counted_and_shown(world, profile, caplog):
+    caplog.set_level(logging.INFO)
+    world.memory_mb["perception"] = 1000.0
+    world.go(3)
+    world.keeper.adopt(replace(profile, ladder=profile.ladder[1:]))
+    assert world.keeper.counts["undone"] == 1
+    told = caplog.records[-1].message
+    assert told == f"budgets: undid slow of perception: profile {profile.name} does not declare it"
+
+
+def test_a_brown_out_is_seen_by_a_loop_that_comes_late(world):
+    world.go(1)
+    for events in (2.0, 0.0, 0.0):
+        world.clock.ns += GB // 2
+        world.readings = {"throttle_events.oc1": events}
+        world.measure()
+    world.keeper.step(world.running)
+    assert "under-voltage" in world.cell("budget")["reason"]
+
+
+def test_rounds_that_could_not_be_measured_are_counted(world):
+    world.feed.failures = 3
+    world.go(1)
+    assert world.cell("budget")["ladder"]["counts"]["measuring_failed"] == 3
+
+
 def test_every_row_says_how_its_budget_is_enforced(world):
     world.go(1)
     enforced = {row["process"]: row for row in world.cell("budget")["enforced"]}

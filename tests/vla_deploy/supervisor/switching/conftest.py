@@ -171,6 +171,8 @@ class Bench:
         self.nodes: dict[str, AdaptingNode] = {}
         for name in self.workers:
             self.start(name, profile)
+        self.adopted: list[tuple[str, set[str]]] = []
+        """The profile that was told to be in force each time, and those that nodes then had."""
         self.supervision = self.supervise(profile)
         self._ticks = 0
 
@@ -196,6 +198,7 @@ class Bench:
             self.choice,
             PowerSwitch(self.root, (str(self.root / "nvpmodel"),)),
             AtOnce(),
+            on_change=lambda adopted: self.adopted.append((adopted.name, self.names())),
         )
         members = {name: Member(pid=1, started_under=profile) for name in self.nodes}
         return Supervision(switch, members)

@@ -68,6 +68,14 @@ def test_late_ticks_take_all_of_them_back(bench, profiles):
     keeps_swift(bench)
 
 
+def test_whoever_holds_processes_back_hears_of_a_profile_before_they_do(bench, profiles):
+    bench.desk.request(profiles["calm"])
+    bench.reach("watch")
+    bench.late_ticks = 60
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.adopted == [("calm", {"swift"}), ("swift", {"calm"})]
+
+
 def test_a_process_over_its_memory_takes_all_of_them_back(bench, profiles):
     bench.desk.request(profiles["calm"])
     bench.reach("watch")
