@@ -13,7 +13,7 @@ from typing import Any, Final
 from drivers.clock import MonotonicClock
 from platforms import ModelChoice, Profile, load_profile
 from platforms.profile import profile_names
-from vla_deploy.cli import models_language, models_whisper
+from vla_deploy.cli import models_detector, models_language, models_whisper
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.models_arguments import Run, register_acts
 from vla_deploy.inference.errors import AccuracyLost, InferenceError
@@ -26,7 +26,7 @@ from vla_deploy.perception.model_tools.adding import Request, add_model
 from vla_deploy.perception.model_tools.benching import Bench, bench
 from vla_deploy.perception.model_tools.images import read_image, spread_paths
 from vla_deploy.perception.model_tools.labelled import read_labelled
-from vla_deploy.perception.model_tools.quantising import Quantised, quantise
+from vla_deploy.perception.model_tools.quantising import quantise
 from vla_deploy.perception.model_tools.trial import empty_images
 from vla_deploy.perception.model_tools.verifying import Finding, verify
 from vla_deploy.supervisor.profile_choice import start_profile
@@ -94,7 +94,8 @@ def add(arguments: argparse.Namespace) -> int:
     text = (
         f"added {arguments.name} in {model.folder}: adapter {detection.adapter}, "
         f"{len(detection.classes)} classes; {trial}\n"
-        f"next: vla-deploy models quantise {arguments.name} ..., then name it in a profile: "
+        f"next: vla-deploy models quantise {arguments.name} ..., or calibrate: until it is "
+        "measured on labelled images, it names nothing by itself; then name it in a profile: "
         f'[models.detector] tiers = ["{arguments.name}"]'
     )
     return _tell(arguments, document, text)
@@ -157,12 +158,15 @@ def quantise_model(arguments: argparse.Namespace) -> int:
         )
     except AccuracyLost as error:
         raise CommandFailed(str(error)) from error
-    return _tell(arguments, done.document(), _quantised_text(done))
+    return _tell(arguments, done.document(), models_detector.quantised_text(done))
 
 
 def calibrate(arguments: argparse.Namespace) -> int:
-    """Learn how sure a recogniser's words are."""
-    shelf, profile = _shelf(arguments), _profile(arguments)
+    """Learn how sure a detector's or a recogniser's words are."""
+    shelf = _shelf(arguments)
+    if arguments.labelled is not None:
+        return _tell(arguments, *models_detector.calibrate_detector(arguments, shelf))
+    profile = _profile(arguments)
     return _tell(arguments, *models_whisper.calibrate_whisper(arguments, shelf, profile))
 
 
@@ -327,18 +331,6 @@ def _bench_text(figures: Bench) -> str:
 
 def _ms(value_s: float) -> str:
     return f"{1000 * value_s:>6.2f} ms"
-
-
-def _quantised_text(done: Quantised) -> str:
-    lines = [f"{variant:<10} mAP50 {one.map50:.4f}" for variant, one in done.accuracy.items()]
-    measured = next(iter(done.accuracy.values()))
-    return "\n".join(
-        [
-            *lines,
-            f"over {measured.images} images with {measured.things} things; drop "
-            f"{done.drop_points:.2f} points; installed as {done.model}",
-        ]
-    )
 
 
 def _tell(arguments: argparse.Namespace, document: object, text: str) -> int:

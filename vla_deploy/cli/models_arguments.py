@@ -15,6 +15,7 @@ from vla_deploy.speech.model_tools.fetching import PUBLISHED
 EXAMPLES: Final = """  vla-deploy models list
   vla-deploy models add mugs --onnx best.onnx --classes classes.txt
   vla-deploy models quantise mugs --images photos --labelled validation
+  vla-deploy models calibrate mugs --labelled validation
   vla-deploy models bench mugs
   vla-deploy models fetch whisper-small.en
   vla-deploy models verify
@@ -160,14 +161,21 @@ def _calibrate(acts: Any) -> None:
     calibrate = add_command(
         acts,
         "calibrate",
-        "learn from recordings how sure an added Whisper's words are",
+        "learn how sure the words of an added detector or Whisper are",
+        "  vla-deploy models calibrate mugs --labelled validation\n"
         "  vla-deploy models calibrate whisper-small.en --sounds recordings\n",
     )
     calibrate.add_argument("name", help="of the model")
-    calibrate.add_argument(
+    known = calibrate.add_mutually_exclusive_group(required=True)
+    known.add_argument(
+        "--labelled",
+        type=Path,
+        metavar="PATH",
+        help="for a detector: a folder with YOLO text files, or a COCO file, none of it trained on",
+    )
+    known.add_argument(
         "--sounds",
         type=Path,
-        required=True,
         metavar="DIR",
         help="WAV files, the words of each in a .txt beside it, empty for other sound",
     )

@@ -70,14 +70,30 @@ class ImageInput:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ClassMeasured:
+    """Declare how good a detector was at one class: of so many boxes, and of so many things."""
+
+    name: str
+    precision: float
+    recall: float
+    boxes: int
+    things: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
     """Declare how good a detector was on images that it had not seen, at its own threshold.
 
-    `precision` is the share of its boxes that were right, `recall` that of the things it found.
+    `precision` is the share of its `boxes` that were right, `recall` that of the `things` it found;
+    the counts are None where nobody wrote them down. Where `classes` are told, each class has its
+    own figures, and one that is missing was not measured.
     """
 
     precision: float
     recall: float
+    boxes: int | None = None
+    things: int | None = None
+    classes: tuple[ClassMeasured, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

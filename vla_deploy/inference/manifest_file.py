@@ -11,6 +11,7 @@ from vla_deploy.inference.errors import ManifestInvalid
 from vla_deploy.inference.manifest import (
     Calibration,
     Certainty,
+    ClassMeasured,
     Context,
     Detection,
     Fit,
@@ -95,7 +96,7 @@ def _detection(table: Document) -> Detection:
         **{
             **table,
             "classes": tuple(table["classes"]),
-            "measured": Measured(**table["measured"]) if "measured" in table else None,
+            "measured": _measured(table["measured"]) if "measured" in table else None,
             "image": ImageInput(
                 **{
                     **image,
@@ -107,6 +108,11 @@ def _detection(table: Document) -> Detection:
             ),
         }
     )
+
+
+def _measured(table: Document) -> Measured:
+    classes = tuple(ClassMeasured(**row) for row in table.get("classes", []))
+    return Measured(**{**table, "classes": classes})
 
 
 def _key_words(table: Document) -> KeyWords:

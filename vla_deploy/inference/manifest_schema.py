@@ -41,6 +41,10 @@ def _is_count(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and value > 0
 
 
+def _is_tally(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
 def _is_shape(value: object) -> bool:
     return isinstance(value, list) and all(
         _is_count(one) or (isinstance(one, str) and one != "") for one in value
@@ -74,6 +78,9 @@ RATIO: Final = Check(
     expected="a number from 0 to 1", holds=lambda value: is_number(value) and 0 <= value <= 1
 )
 COUNT: Final = Check(expected="an integer above 0", holds=_is_count)
+TALLY: Final = Check(expected="an integer from 0", holds=_is_tally)
+OPTIONAL_TALLY: Final = Check(expected=TALLY.expected, holds=TALLY.holds, is_optional=True)
+OPTIONAL_TABLES: Final = Check(expected=TABLES.expected, holds=TABLES.holds, is_optional=True)
 THREE: Final = Check(expected="three numbers", holds=_is_three)
 
 _HEAD: Shape = {
@@ -115,7 +122,20 @@ _DETECTION: Shape = {
     "image": TABLE,
     "measured": OPTIONAL_TABLE,
 }
-_MEASURED: Shape = {"precision": RATIO, "recall": RATIO}
+_MEASURED: Shape = {
+    "precision": RATIO,
+    "recall": RATIO,
+    "boxes": OPTIONAL_TALLY,
+    "things": OPTIONAL_TALLY,
+    "classes": OPTIONAL_TABLES,
+}
+_CLASS_MEASURED: Shape = {
+    "name": TEXT,
+    "precision": RATIO,
+    "recall": RATIO,
+    "boxes": TALLY,
+    "things": TALLY,
+}
 _IMAGE: Shape = {
     "width_px": COUNT,
     "height_px": COUNT,
@@ -176,9 +196,15 @@ def _graph_key_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
         detection = document["detection"]
         yield from check_record(detection, "detection", _DETECTION)
         if isinstance(detection.get("measured"), dict):
-            yield from check_record(detection["measured"], "detection.measured", _MEASURED)
+            yield from _measured_faults(detection["measured"])
         if isinstance(detection.get("image"), dict):
             yield from check_record(detection["image"], "detection.image", _IMAGE)
+
+
+def _measured_faults(measured: Mapping[str, Any]) -> Iterator[Fault]:
+    yield from check_record(measured, "detection.measured", _MEASURED)
+    for number, record in enumerate(_rows(measured.get("classes"))):
+        yield from check_record(record, f"detection.measured.classes[{number}]", _CLASS_MEASURED)
 
 
 def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fault]:
@@ -199,6 +225,15 @@ def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fau
         yield Fault(key="detection", got="nothing", expected="a table, as the role is detector")
     if "detection" in document and document["inputs"]:
         yield from _image_faults(document)
+        yield from _class_faults(document["detection"])
+
+
+def _class_faults(detection: Mapping[str, Any]) -> Iterator[Fault]:
+    """Compare the classes that were measured with those that there are."""
+    names = [row["name"] for row in detection.get("measured", {}).get("classes", [])]
+    if len(set(names)) != len(names) or not set(names) <= set(detection["classes"]):
+        expected = f"each once, of {detection['classes']}"
+        yield Fault(key="detection.measured.classes", got=repr(names), expected=expected)
 
 
 def _image_faults(document: Mapping[str, Any]) -> Iterator[Fault]:

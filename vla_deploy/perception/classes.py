@@ -172,6 +172,8 @@ POSSIBLE: dict[str, dict[str, Range]] = {
 }
 BYSTANDERS: frozenset[str] = frozenset({"person", "chair"})
 """What stands in the way and is never a thing to take: no thing's form is possible for them."""
+FURNITURE = "furniture"
+"""What tables, sofas and the like are called: a network's word for it names nothing to take."""
 
 
 def judge_form(shape: Shape, *, whole: bool = True) -> Form:
@@ -181,6 +183,7 @@ def judge_form(shape: Shape, *, whole: bool = True) -> Form:
         name=next((rule.name for rule in fits if rule.names), OTHER),
         fits=frozenset(rule.name for rule in fits),
         impossible=BYSTANDERS
+        | {FURNITURE}
         | {name for name, bounds in POSSIBLE.items() if not _can_be(bounds, shape, whole)},
     )
 

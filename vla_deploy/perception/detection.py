@@ -132,7 +132,9 @@ def _name(cluster: Cluster, shape: Shape, network: NetworkView | None) -> Name:
     if network is None:
         return by_form(form)
     word = network.word_for(cluster.box_px)
-    return by_form(form, network.silence(cluster.box_px)) if word is None else by_both(form, word)
+    if word is None:
+        return by_form(form, network.silence(cluster.box_px, form.name))
+    return by_both(form, word)
 
 
 def _detection(cluster: Cluster, look: _Look) -> Detection:

@@ -5,32 +5,29 @@ from typing import Final
 
 import numpy as np
 
-from vla_deploy.inference.manifest import Detection, Measured
+from vla_deploy.inference.manifest import Detection
 from vla_deploy.perception.detectors.boxes import Boxes, iou
 from vla_deploy.perception.naming import Word, chance_of
+from vla_deploy.perception.voices import Voice, voices_of
 
 SAME_IOU: Final = 0.5
 """Above one half, no box can be the same thing as two that do not overlap."""
 SEEN_PX: Final = 12
 """A network says nothing of smaller things; its silence there means nothing."""
-UNMEASURED: Final = Measured(precision=0.5, recall=0.0)
-"""What a model is taken for that nobody measured: it may support a name and overrule none."""
 Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkView:
-    """Hold a network's boxes in an image's pixels, its classes, and how good it is."""
+    """Hold a network's boxes in an image's pixels, and a voice for each of its classes."""
 
     boxes: Boxes
-    classes: tuple[str, ...]
-    measured: Measured
+    voices: tuple[Voice, ...]
 
     @classmethod
     def of(cls, boxes: Boxes, detection: Detection) -> "NetworkView":
         """Return the view of a model that declares how its outputs are read."""
-        measured = detection.measured or UNMEASURED
-        return cls(boxes=boxes, classes=detection.classes, measured=measured)
+        return cls(boxes=boxes, voices=voices_of(detection))
 
     def word_for(self, box_px: Box) -> Word | None:
         """Return the surest word for the thing that fills a box (left, top, right, bottom)."""
@@ -40,10 +37,14 @@ class NetworkView:
 
     def word(self, number: int) -> Word:
         """Return what one of the boxes says."""
-        chance = chance_of(float(self.boxes.scores[number]), self.measured.precision)
-        return Word(class_name=self.classes[self.boxes.classes[number]], chance=chance)
+        voice = self.voices[self.boxes.classes[number]]
+        chance = chance_of(float(self.boxes.scores[number]), voice.precision)
+        return Word(class_name=voice.class_name, chance=chance)
 
-    def silence(self, box_px: Box) -> float:
-        """Return how surely a thing of one of its classes would have been found in a box."""
+    def silence(self, box_px: Box, class_name: str) -> float:
+        """Return how surely a thing of a class would have been found in a box."""
         left, top, right, bottom = box_px
-        return self.measured.recall if max(right - left, bottom - top) >= SEEN_PX else 0.0
+        if max(right - left, bottom - top) < SEEN_PX:
+            return 0.0
+        recalls = [one.recall for one in self.voices if one.class_name == class_name]
+        return max(recalls, default=0.0)

@@ -112,6 +112,29 @@ def test_quantise_makes_the_files_that_bench_then_measures(vla, files, added):
     assert "times as fast as fp32" in out
 
 
+def test_calibrate_writes_down_what_a_detectors_words_are_worth(vla, files, added):
+    assert "it names nothing by itself" in vla("add", added, "--onnx", files["onnx"], "--classes",
+                                               files["classes"], "--replace")[1]  # fmt: skip
+    assert "measured" not in json.loads(vla("show", added, "--json")[1])["detection"]
+    code, out, _ = vla("calibrate", added, "--labelled", files["photos"])
+    assert code == 0
+    words = [line.split() for line in out.splitlines()]
+    assert ["fp32", "mAP50", "1.0000"] in words
+    assert ["red", "1.000", "4", "1.000", "4"] in words
+    measured = json.loads(vla("show", added, "--json")[1])["detection"]["measured"]
+    assert (measured["precision"], measured["things"]) == (1.0, 12)
+    assert {one["name"]: one["boxes"] for one in measured["classes"]} == dict.fromkeys(
+        ("red", "green", "blue"), 4
+    )
+
+
+def test_calibrate_takes_labelled_images_for_detectors_that_were_added_only(vla, files, added):
+    code, _, errors = vla("calibrate", "detector", "--labelled", files["photos"])
+    assert (code, "was not added as a detector" in errors) == (2, True)
+    code, _, errors = vla("calibrate", added, "--sounds", files["photos"])
+    assert (code, "was not added as a Whisper" in errors) == (2, True)
+
+
 def test_a_quantised_model_that_sees_worse_is_refused_with_code_1(vla, files, added, base, blobs):
     Path(files["onnx"]).write_bytes(blobs.raw(red_gain=3000.0).SerializeToString())
     vla("add", added, "--onnx", files["onnx"], "--classes", files["classes"], "--replace")
@@ -156,7 +179,7 @@ def test_a_bad_argument_is_one_line(vla, capsys, arguments):
 
 
 @pytest.mark.parametrize(
-    "act", ["list", "show", "add", "remove", "bench", "quantise", "verify", ""]
+    "act", ["list", "show", "add", "remove", "bench", "quantise", "calibrate", "verify", ""]
 )
 def test_every_act_has_help_with_an_example(vla, capsys, act):
     with pytest.raises(SystemExit) as caught:

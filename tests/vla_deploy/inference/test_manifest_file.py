@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from vla_deploy.inference.errors import ManifestInvalid
-from vla_deploy.inference.manifest import Measured, ModelFile, Tensor, Variant
+from vla_deploy.inference.manifest import ClassMeasured, Measured, ModelFile, Tensor, Variant
 from vla_deploy.inference.manifest_file import read_manifest, write_manifest
 
 WRITTEN = """
@@ -152,3 +152,39 @@ def test_a_measurement_that_no_detector_can_have_is_a_fault(faults_of):
     faults = faults_of(WRITTEN + "\n[detection.measured]\nprecision = 80\n")
     assert any("detection.measured.precision" in fault and "0 to 1" in fault for fault in faults)
     assert any("detection.measured.recall" in fault for fault in faults)
+
+
+def test_figures_by_class_are_written_and_read_again(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "model.toml").write_text(WRITTEN)
+    manifest = read_manifest(tmp_path / "mine")
+    cup = ClassMeasured(name="cup", precision=0.8, recall=0.7, boxes=40, things=45)
+    measured = Measured(precision=0.8, recall=0.7, boxes=40, things=45, classes=(cup,))
+    detection = dataclasses.replace(manifest.detection, measured=measured)
+    write_manifest(tmp_path / "mine", dataclasses.replace(manifest, detection=detection))
+    assert read_manifest(tmp_path / "mine").detection.measured == measured
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        (
+            'name = "bowl"\nboxes = 1',
+            "detection.measured.classes: got ['bowl'], expected each once",
+        ),
+        (
+            'name = "cup"\nboxes = -1',
+            "detection.measured.classes[0].boxes: got -1, expected an inte",
+        ),
+        (
+            'name = "cup"\nboxes = true',
+            "detection.measured.classes[0].boxes: got True, expected an",
+        ),
+    ],
+)
+def test_figures_of_classes_that_cannot_be_are_faults(faults_of, row, told):
+    (fault,) = faults_of(
+        f"{WRITTEN}\n[detection.measured]\nprecision = 0.8\nrecall = 0.7\n"
+        f"[[detection.measured.classes]]\nprecision = 0.8\nrecall = 0.7\nthings = 0\n{row}\n"
+    )
+    assert fault.startswith(told)

@@ -104,7 +104,7 @@ def test_an_answer_is_awaited_and_then_taken_once(eyes, executor, rgb):
     assert eyes.answer() is None
     executor.catch_up()
     answer = eyes.answer()
-    assert answer.view.classes == ("red", "green", "blue")
+    assert [one.class_name for one in answer.view.voices] == ["red", "green", "blue"]
     assert {int(one) for one in answer.view.boxes.classes} == {0}
     assert eyes.answer() == Answer(view=None)
     assert eyes.document()["model"]["runs"] == 1

@@ -7,10 +7,10 @@ import pytest
 
 from drivers.camera.base import RgbdFrame
 from drivers.camera.protocol import Intrinsics
-from vla_deploy.inference.manifest import Measured
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.pinhole_view import as_pinhole, in_image
+from vla_deploy.perception.voices import Voice
 
 CAMERA = Intrinsics(
     width=320, height=240, fx=216.5, fy=216.5, cx=159.5, cy=119.5, distortion=(-0.3, 0.1, 0, 0, 0)
@@ -33,8 +33,7 @@ def test_a_box_that_a_network_draws_lies_on_the_thing_in_the_cameras_image() -> 
     rows, columns = np.nonzero(shown[..., 0] > 127)
     box = np.array([[columns.min(), rows.min(), columns.max(), rows.max()]], np.float32)
     boxes = Boxes(corners_px=box, scores=np.array([0.9], np.float32), classes=np.array([0]))
-    measured = Measured(precision=0.9, recall=0.9)
-    view = in_image(NetworkView(boxes=boxes, classes=("cup",), measured=measured), CAMERA)
+    view = in_image(NetworkView(boxes=boxes, voices=(Voice(class_name="cup"),)), CAMERA)
     assert view is not None
     assert view.word_for(SQUARE) is not None
     assert view.boxes.corners_px[0] == pytest.approx(SQUARE, abs=6.0)

@@ -1,4 +1,4 @@
-"""Measure a detector on labelled images: average precision at an overlap of one half."""
+"""Measure a detector on labelled images: what its boxes are worth, at an overlap of one half."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.inference.errors import ImagesInvalid
+from vla_deploy.inference.manifest import ClassMeasured, Measured
 from vla_deploy.perception.detectors.boxes import Boxes, iou
 from vla_deploy.perception.model_tools.labelled import Labels
 
@@ -16,19 +17,27 @@ HIT_IOU: Final = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Accuracy:
-    """Hold average precision at IoU 0.5, 0..1: for each class that occurs, and their mean."""
+    """Hold average precision at IoU 0.5, 0..1: for each class that occurs, and their mean.
+
+    `measured` is what the boxes from the threshold on are worth.
+    """
 
     map50: float
     by_class: Mapping[str, float]
+    measured: Measured
     images: int
     things: int
 
 
 class AccuracyCount:
-    """Collect what was found and what was there, image by image."""
+    """Collect what was found and what was there, image by image.
 
-    def __init__(self, classes: tuple[str, ...]) -> None:
+    Average precision takes boxes of every score, `measured` only those from the threshold on.
+    """
+
+    def __init__(self, classes: tuple[str, ...], score_threshold: float = 0.0) -> None:
         self._classes = classes
+        self._threshold = score_threshold
         self._scores: list[list[float]] = [[] for _ in classes]
         self._hits: list[list[bool]] = [[] for _ in classes]
         self._present = [0] * len(classes)
@@ -60,9 +69,46 @@ class AccuracyCount:
         return Accuracy(
             map50=float(np.mean(list(by_class.values()))),
             by_class=by_class,
+            measured=self._measured(),
             images=self._images,
             things=sum(self._present),
         )
+
+    def _measured(self) -> Measured:
+        counts = [self._count(number) for number in range(len(self._classes))]
+        hits, boxes, things = (sum(column) for column in zip(*counts, strict=True))
+        return Measured(
+            precision=_share(hits, boxes),
+            recall=_share(hits, things),
+            boxes=boxes,
+            things=things,
+            classes=tuple(
+                _class_measured(name, *count)
+                for name, count in zip(self._classes, counts, strict=True)
+                if any(count)
+            ),
+        )
+
+    def _count(self, number: int) -> tuple[int, int, int]:
+        """Return how many boxes of a class are right, how many there are, and how many things."""
+        sure = np.array(self._scores[number]) >= self._threshold
+        hits = np.array(self._hits[number], dtype=bool) & sure
+        return int(hits.sum()), int(sure.sum()), self._present[number]
+
+
+def _class_measured(name: str, hits: int, boxes: int, things: int) -> ClassMeasured:
+    return ClassMeasured(
+        name=name,
+        precision=_share(hits, boxes),
+        recall=_share(hits, things),
+        boxes=boxes,
+        things=things,
+    )
+
+
+def _share(part: int, whole: int) -> float:
+    """Return a share as a manifest tells it; of nothing, none."""
+    return round(part / whole, 3) if whole else 0.0
 
 
 def average_precision(scores: Iterable[float], hits: Iterable[bool], present: int) -> float:

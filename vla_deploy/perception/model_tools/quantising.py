@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from drivers.clock import Clock
 from vla_deploy.inference.errors import (
@@ -16,19 +16,13 @@ from vla_deploy.inference.errors import (
 from vla_deploy.inference.file_check import checked_file, sha256_of
 from vla_deploy.inference.manifest import Detection, Manifest, ModelFile, Variant
 from vla_deploy.inference.manifest_file import write_manifest
-from vla_deploy.inference.opening import PLAIN_CHOICE
-from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import Model, ModelStore
-from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.perception.detectors.image_input import fit_image
-from vla_deploy.perception.model_tools.accuracy import Accuracy, AccuracyCount
+from vla_deploy.perception.model_tools.accuracy import Accuracy
 from vla_deploy.perception.model_tools.images import read_image
 from vla_deploy.perception.model_tools.int8_files import TYPES, Feed, write_int8
 from vla_deploy.perception.model_tools.labelled import LabelledImage
-from vla_deploy.perception.model_tools.verifying import only
-
-# Precision over recall needs the boxes that a robot would not act on, too.
-_MEASURING_SCORE: Final = 0.01
+from vla_deploy.perception.model_tools.measuring import measure, with_measured
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +51,8 @@ def quantise(
 ) -> Quantised:
     """Make both int8 files from the fp32 one and install them under a name with it.
 
+    The manifest tells what the boxes of the file that sees worst are worth.
+
     Raises:
         AccuracyLost: mAP50 drops by more than `max_drop_points` percent; nothing was installed.
         ToolMissing: the packages to quantise with are not installed.
@@ -82,40 +78,11 @@ def quantise(
             for variant in (Variant.FP32, *TYPES)
         }
         drop_points = _judge(accuracy, max_drop_points)
-        write_manifest(draft, made.manifest)
+        write_manifest(draft, with_measured(made.manifest, accuracy))
         store.install(draft)
     finally:
         store.abandon(draft)
     return Quantised(model=name, accuracy=accuracy, drop_points=drop_points)
-
-
-def measure(
-    model: Model,
-    variant: Variant,
-    labelled: Sequence[LabelledImage],
-    *,
-    engines: Path,
-    clock: Clock,
-) -> Accuracy:
-    """Return how well one file of a detector sees, run on the CPU.
-
-    Raises:
-        InferenceError: it cannot be run, or nothing is labelled.
-    """
-    detection = model.manifest.detection
-    assert detection is not None, "only detectors are measured"
-    keen = dataclasses.replace(detection, score_threshold=_MEASURING_SCORE)
-    manifest = dataclasses.replace(only(model, variant).manifest, detection=keen)
-    keen_model = dataclasses.replace(model, manifest=manifest)
-    detector = Detector(open_session(keen_model, PLAIN_CHOICE, engines=engines, clock=clock))
-    count = AccuracyCount(detection.classes)
-    try:
-        for image in labelled:
-            rgb, labels = image.read()
-            count.add(detector.detect(rgb), labels)
-    finally:
-        detector.close()
-    return count.result()
 
 
 def _copy_original(model: Model, source: Path, draft: Path, name: str) -> None:

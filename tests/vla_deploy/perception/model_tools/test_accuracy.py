@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -69,3 +71,19 @@ def test_images_in_which_nothing_is_labelled_tell_no_accuracy():
     count.add(found((HERE, 0.9, 0)), there())
     with pytest.raises(ImagesInvalid, match="nothing is labelled in 1 images"):
         count.result()
+
+
+def test_what_boxes_are_worth_counts_those_from_the_threshold_on_class_by_class():
+    count = AccuracyCount(("cup", "ball", "book", "key"), 0.5)
+    count.add(
+        found((HERE, 0.9, 0), (THERE, 0.6, 0), (NOWHERE, 0.3, 0), (HERE, 0.8, 1)),
+        there((HERE, 0), (NOWHERE, 0), (THERE, 2)),
+    )
+    measured = count.result().measured
+    assert (measured.precision, measured.recall) == (0.333, 0.333)
+    assert (measured.boxes, measured.things) == (3, 3)
+    assert [dataclasses.astuple(one) for one in measured.classes] == [
+        ("cup", 0.5, 0.5, 2, 2),
+        ("ball", 0.0, 0.0, 1, 0),
+        ("book", 0.0, 0.0, 0, 1),
+    ]

@@ -62,6 +62,8 @@ def test_both_int8_files_are_installed_and_see_as_well(shelf, installed, quantis
         Variant.INT8_S8S8: 1.0,
     }
     assert (done.accuracy[Variant.FP32].things, done.drop_points) == (18, 0.0)
+    measured = shelf.store.load("blobs").manifest.detection.measured
+    assert (measured.precision, measured.recall, measured.things) == (1.0, 1.0, 18)
     findings = list(verify(shelf, "blobs"))
     assert [one.check for one in findings if one.is_ok] == [
         "manifest",
