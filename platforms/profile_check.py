@@ -1,5 +1,6 @@
 """Check what the values of a profile promise together."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Final
 
@@ -11,6 +12,12 @@ MIN_WATCHDOG_PERIODS: Final = 3
 _STAND_IN: Final = "twin"  # it stands for the world, and is not on a real robot
 # Whoever keeps the robot safe is never slowed, suspended or restarted for want of resources.
 _SPARED: Final = ("supervisor", "control", _STAND_IN)
+# Whose models a process loads in tiers; the others have none to make smaller.
+_TIERED_ROLES: Final = {
+    "perception": "detector",
+    "speech": "speech_to_text",
+    "planner": "planner",
+}
 _RANKS: Final = {action: rank for rank, action in enumerate(LadderAction)}
 
 
@@ -116,6 +123,23 @@ def _step_faults(step: Table, processes: tuple[str, ...]) -> Iterator[tuple[str,
         yield "ratio", f"expected nothing, only slow has a ratio, got {step['ratio']!r}"
 
 
+def _smaller_models(values: Table) -> Iterator[Fault]:
+    """Find steps that would load the same model a second time, under want of memory."""
+    wanted: Counter[str] = Counter()
+    for number, step in enumerate(values["ladder"]):
+        process = step.get("process")
+        if step["action"] != LadderAction.SMALLER_MODEL or process in (None, *_SPARED):
+            continue
+        wanted[process] += 1
+        role = _TIERED_ROLES.get(process)
+        tiers = values["models"].get(role, {}).get("tiers", ())
+        if len(set(tiers)) > wanted[process]:
+            continue
+        models = f"models.{role}.tiers has {', '.join(tiers) or 'nothing'}" if role else "no models"
+        text = f"expected a smaller model of {process} to go to, got none: {models}"
+        yield Fault(key=f"ladder[{number}].action", text=text)
+
+
 _CHECKS: Final[tuple[Callable[[Table], Iterator[Fault]], ...]] = (
     _watchdogs,
     _perception,
@@ -125,4 +149,5 @@ _CHECKS: Final[tuple[Callable[[Table], Iterator[Fault]], ...]] = (
     _board_limits,
     _ladder_order,
     _ladder_steps,
+    _smaller_models,
 )

@@ -15,6 +15,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import Adaptable, NeedsRestart, Node, Slowable
 
 MIN_RATE_RATIO: Final = 0.8
+TIER_RETRY_NS: Final = 30 * NS_PER_S
 _PACE_WEIGHT: Final = 0.01
 _UNSLOWED: Final = "control"
 _log = logging.getLogger(__name__)
@@ -91,7 +92,9 @@ class AdaptingNode:
         self._aside = aside
         self._rate_ratio = 1.0
         self._pace = Pace()
-        self._tier = 0
+        self._tier = self._wanted_tier = 0
+        self._tier_loading = 0
+        self._tier_due_ns = 0
         self._tier_future: Future[tuple[Profile, Any]] | None = None
         self._directives_sequence = -1
         self._change: _Change | None = None
@@ -262,25 +265,35 @@ class AdaptingNode:
             self._rate_ratio = float(document.get("rate_ratio", {}).get(self._name, 1.0))
             if isinstance(self._node, Slowable):
                 self._node.slow(self._rate_ratio)
-            self._want_tier(int(document.get("model_tier", {}).get(self._name, 0)))
-        if self._tier_future is not None and self._tier_future.done() and self._change is None:
+            self._wanted_tier = int(document.get("model_tier", {}).get(self._name, 0))
+        if self._change is None:
+            self._follow_tier()
+
+    def _follow_tier(self) -> None:
+        """Take the models of the wanted tier; what failed is tried again after a while."""
+        is_due = self._clock.now_ns() >= self._tier_due_ns
+        if self._tier_future is None and self._tier != self._wanted_tier and is_due:
+            self._load_tier(self._wanted_tier)
+        if self._tier_future is not None and self._tier_future.done():
             self._take_tier(self._tier_future)
             self._tier_future = None
 
-    def _want_tier(self, tier: int) -> None:
-        """Prepare models of another tier, unless a change is under way: the cell comes again."""
-        if tier == self._tier or self._change is not None or self._tier_future is not None:
-            return
-        self._tier = tier
+    def _load_tier(self, tier: int) -> None:
         profile = self._profile
+        self._tier_loading = tier
         self._tier_future = self._aside.submit(lambda: (profile, self._prepared(profile, tier)))
 
     def _take_tier(self, future: "Future[tuple[Profile, Any]]") -> None:
-        error = future.exception()
+        error, tier = future.exception(), self._tier_loading
         if error is not None:
-            _log.warning("degraded: no models of tier %d: %s", self._tier, _one_line(error))
-        elif future.result()[0] is self._profile:
+            self._tier_due_ns = self._clock.now_ns() + TIER_RETRY_NS
+            retry = f"tried again after {TIER_RETRY_NS / NS_PER_S:g} s"
+            _log.warning("degraded: no models of tier %d: %s; %s", tier, _one_line(error), retry)
+        elif future.result()[0] is self._profile and tier == self._wanted_tier:
             self._discard(self._switch(future.result()))
+            self._tier = tier
+        else:
+            self._discard(future.result()[1])
 
 
 def _one_line(error: BaseException) -> str:

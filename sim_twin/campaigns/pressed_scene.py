@@ -37,7 +37,6 @@ control_rate_hz = 125
 executor_rate_hz = 25
 ladder = [
   { action = "slow", process = "perception", ratio = 0.5 },
-  { action = "smaller_model", process = "perception" },
   { action = "suspend", process = "planner" },
   { action = "restart", process = "perception" },
   { action = "protective_stop" },

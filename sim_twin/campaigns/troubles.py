@@ -54,7 +54,7 @@ def _jump(days: int) -> Callable[[Scene, float], None]:
     return press
 
 
-_OWN_STEPS: Final = ("slow perception", "smaller_model perception", "restart perception")
+_OWN_STEPS: Final = ("slow perception", "restart perception")
 TROUBLES: Final = (
     Trouble(
         name="memory_hog",
@@ -83,12 +83,7 @@ TROUBLES: Final = (
         name="thermal_ramp",
         press=_ramp,
         lift=lambda scene: scene.heat(COOL_C),
-        steps=(
-            "slow perception",
-            "smaller_model perception",
-            "suspend planner",
-            "protective_stop",
-        ),
+        steps=("slow perception", "suspend planner", "protective_stop"),
         metric="temperature_c",
         states=("armed", "protective_stop"),
         replaced=("planner",),

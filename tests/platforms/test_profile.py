@@ -167,6 +167,21 @@ def step(action: str, **values: object) -> str:
             step("suspend", process="planner", ratio=0.5),
             "ladder[0].ratio: expected nothing, only slow has a ratio, got 0.5",
         ),
+        (
+            step("smaller_model", process="perception"),
+            "ladder[0].action: expected a smaller model of perception to go to, got none: "
+            "models.detector.tiers has detector",
+        ),
+        (
+            2 * step("smaller_model", process="speech")
+            + '[models.speech_to_text]\ntiers = ["large", "small"]\n',
+            "ladder[1].action: expected a smaller model of speech to go to, got none: "
+            "models.speech_to_text.tiers has large, small",
+        ),
+        (
+            step("smaller_model", process="recorder"),
+            "ladder[0].action: expected a smaller model of recorder to go to, got none: no models",
+        ),
     ],
 )
 def test_a_bad_ladder_is_one_fault(faults_of, steps, fault):

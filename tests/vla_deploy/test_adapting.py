@@ -4,7 +4,8 @@ from typing import Any
 import pytest
 
 from platforms import Profile, load_profile
-from vla_deploy.adapting import AdaptingNode
+from platforms.profile_source import read_source
+from vla_deploy.adapting import TIER_RETRY_NS, AdaptingNode
 from vla_deploy.aside import AtOnce, background
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import run_node
@@ -42,13 +43,13 @@ class Plain:
 class WithModels(Plain):
     def __init__(self) -> None:
         self.model = "tier 0"
-        self.loaded = {"tier 0"}
+        self.loaded = ["tier 0"]
         self.is_broken = False
 
     def prepare(self, profile: Profile, model_tier: int) -> str:
         if self.is_broken:
             raise FileNotFoundError("small.onnx")
-        self.loaded.add(f"tier {model_tier}")
+        self.loaded.append(f"tier {model_tier}")
         return f"tier {model_tier}"
 
     def commit(self, prepared: str) -> str:
@@ -77,14 +78,19 @@ class Later(Executor):
 
 
 @pytest.fixture
-def adapted(tmp_path):
+def clock() -> StepClock:
+    return StepClock()
+
+
+@pytest.fixture
+def adapted(tmp_path, clock):
     def adapted(node: Plain, name: str = "planner", aside: Executor | None = None) -> AdaptingNode:
         wrapped = AdaptingNode(
             name,
             node,
             load_profile("desktop"),
             ipc=tmp_path,
-            clock=StepClock(),
+            clock=clock,
             host=Host(),
             aside=aside or AtOnce(),
         )
@@ -102,6 +108,18 @@ def direct(tmp_path):
         cell.put_document({"rate_ratio": rate_ratio, "model_tier": model_tier, "suspended": []})
 
     return direct
+
+
+@pytest.fixture
+def change(tmp_path):
+    """Return a way to tell a change to the same profile, read anew."""
+    ring = SharedSpace(tmp_path, StepClock()).ring_writer("profile_change")
+    values = read_source("desktop").values
+
+    def change(phase: str) -> None:
+        ring.publish({"change_id": 1, "phase": phase, "profile": "desktop", "values": values})
+
+    return change
 
 
 def test_a_slowed_process_steps_less_often_and_then_as_before(adapted, direct):
@@ -141,12 +159,12 @@ def test_a_smaller_model_is_prepared_aside_and_taken_between_two_steps(adapted, 
     aside.do()
     assert inner.model == "tier 0", "never in the middle of a step"
     node.step()
-    assert (inner.model, inner.loaded) == ("tier 1", {"tier 1"})
+    assert (inner.model, inner.loaded) == ("tier 1", ["tier 1"])
     direct({}, {})
     node.step()
     aside.do()
     node.step()
-    assert (inner.model, inner.loaded) == ("tier 0", {"tier 0"})
+    assert (inner.model, inner.loaded) == ("tier 0", ["tier 0"])
 
 
 def test_a_model_that_cannot_be_loaded_leaves_the_old_one_and_says_so(adapted, direct, caplog):
@@ -155,8 +173,52 @@ def test_a_model_that_cannot_be_loaded_leaves_the_old_one_and_says_so(adapted, d
     node = adapted(inner)
     direct({}, {"planner": 1})
     node.step()
-    assert (inner.model, inner.loaded) == ("tier 0", {"tier 0"})
+    assert (inner.model, inner.loaded) == ("tier 0", ["tier 0"])
     assert "degraded: no models of tier 1: small.onnx" in caplog.text
+
+
+def test_what_could_not_be_loaded_is_tried_again_after_a_while(adapted, direct, clock):
+    inner = WithModels()
+    node = adapted(inner)
+    direct({}, {"planner": 1})
+    node.step()
+    node.step()
+    inner.is_broken = True
+    direct({}, {})
+    node.step()
+    node.step()
+    assert inner.model == "tier 1"
+    inner.is_broken = False
+    node.step()
+    assert inner.model == "tier 1", "not with each step"
+    clock.ns += TIER_RETRY_NS
+    node.step()
+    node.step()
+    assert (inner.model, inner.loaded) == ("tier 0", ["tier 0"])
+
+
+def test_a_tier_that_was_loaded_for_another_profile_is_discarded_and_loaded_anew(
+    adapted, direct, change
+):
+    inner, aside = WithModels(), Later()
+    node = adapted(inner, aside=aside)
+    direct({}, {"planner": 1})
+    node.step()
+    change("prepare")
+    node.step()
+    aside.do()
+    node.step()
+    assert inner.model == "tier 0", "not in the middle of a change"
+    change("commit")
+    node.step()
+    change("keep")
+    node.step()
+    assert node.profile.name == "desktop"
+    assert (inner.model, inner.loaded) == ("tier 0", ["tier 0"])
+    node.step()
+    aside.do()
+    node.step()
+    assert (inner.model, inner.loaded) == ("tier 1", ["tier 1"])
 
 
 def test_a_node_without_models_follows_any_tier(adapted, direct):

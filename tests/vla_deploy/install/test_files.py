@@ -93,9 +93,10 @@ def test_the_unit_is_as_patient_as_the_process_table_asks() -> None:
         assert f"\n{line}\n" in unit
 
 
-def test_the_slice_follows_the_profiles_budget() -> None:
-    high = round(PROFILE.total.memory_mb)
-    assert f"MemoryHigh={high}M\nMemoryMax={round(high * 1.25)}M\n" in texts()["vla-deploy.slice"]
+def test_the_slice_leaves_room_for_page_cache_above_the_profiles_budget() -> None:
+    budget = round(PROFILE.total.memory_mb)
+    limits = f"MemoryHigh={round(budget * 1.5)}M\nMemoryMax={round(budget * 1.75)}M\n"
+    assert limits in texts()["vla-deploy.slice"]
 
 
 def test_the_can_link_has_the_robots_bitrate() -> None:

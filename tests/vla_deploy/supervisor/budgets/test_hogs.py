@@ -28,6 +28,8 @@ ladder = [
   { action = "protective_stop" },
 ]
 ladder_timing = { rise_s = 1.0, fall_s = 1.0, release_ratio = 0.85 }
+[models.detector]
+tiers = ["detector", "smaller"]
 [budgets]
 perception = { memory_mb = 100, cpu_ratio = 0.15 }
 planner = { memory_mb = 100, cpu_ratio = 0.15 }
