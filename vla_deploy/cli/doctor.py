@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
-from platforms import Profile, ProfileError, load_profile
+from platforms import load_profile
 from platforms.probes import ProbeSet, Reading, open_probes, read_power_modes
 from platforms.tree import Tree
 from vla_deploy import doctor
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.profile_choice import detect, start_profile
+from vla_deploy.supervisor.profile_choice import StartProfile, detect, start_profile
 
 LIVE_ROOT = Path("/")
 FIRST_LOOK_S = 0.5  # what is counted needs two looks
@@ -74,9 +74,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the findings; return 1 where one is a failure."""
     root = _root(arguments)
     robot = None if arguments.robot is None else load_robot(arguments.robot)
-    profile = _profile(arguments.profile, root, arguments.runtime_base)
+    start = _start_profile(arguments.profile, root, arguments.runtime_base)
+    profile = load_profile(start.name)
     if root == LIVE_ROOT:
-        context = doctor.live_context(profile, robot)
+        context = doctor.live_context(profile, robot, start.fault)
     else:
         context = doctor.recorded_context(root, profile, robot)
     sections = doctor.examine(context)
@@ -94,15 +95,14 @@ def _root(arguments: argparse.Namespace) -> Path:
     return root
 
 
-def _profile(name: str | None, root: Path, base: Path | None) -> Profile | None:
-    """Return the profile that is named, or that a run would take; None where that has faults."""
+def _start_profile(name: str | None, root: Path, base: Path | None) -> StartProfile:
+    """Return the profile that is named, or that a run would take."""
     if name is not None:
-        return load_profile(name)
-    name, _ = start_profile(base) if root == LIVE_ROOT else detect(root)
-    try:
-        return load_profile(name)
-    except ProfileError:
-        return None
+        return StartProfile(name=name, why="given")
+    if root == LIVE_ROOT:
+        return start_profile(base)
+    found, why = detect(root)
+    return StartProfile(name=found, why=why)
 
 
 def run_probes(arguments: argparse.Namespace) -> int:

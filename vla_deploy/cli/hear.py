@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _profile(arguments: argparse.Namespace) -> Profile:
-    profile = load_profile(arguments.profile or start_profile(arguments.runtime_base)[0])
+    profile = load_profile(arguments.profile or start_profile(arguments.runtime_base).name)
     if arguments.model is None:
         return profile
     choice = profile.models["speech_to_text"]

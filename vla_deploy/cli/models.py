@@ -217,7 +217,7 @@ def _findings(shelf: ModelShelf, name: str, profile: Profile | None) -> Iterator
 
 
 def _profile(arguments: argparse.Namespace) -> Profile:
-    return load_profile(arguments.profile or start_profile(arguments.runtime_base)[0])
+    return load_profile(arguments.profile or start_profile(arguments.runtime_base).name)
 
 
 def _choice(model: Model, profile: Profile) -> ModelChoice:

@@ -98,7 +98,7 @@ def _row(name: str, fits: str, chosen: str | None) -> dict[str, Any]:
 
 def show_profile(arguments: argparse.Namespace) -> int:
     """Print a profile's values, or what differs from another one."""
-    source = read_source(arguments.name or start_profile(arguments.runtime_base)[0])
+    source = read_source(arguments.name or start_profile(arguments.runtime_base).name)
     profile_from(source)
     values = dict(flat(source.values))
     if arguments.diff:
@@ -125,11 +125,18 @@ def show_profile(arguments: argparse.Namespace) -> int:
 def detect_profile(arguments: argparse.Namespace) -> int:
     """Print which profile fits this computer, and which one a start would take."""
     name, why = detect()
-    taken, reason = start_profile(arguments.runtime_base)
-    document = {"profile": name, "why": why, "next_start": taken, "next_start_why": reason}
+    start = start_profile(arguments.runtime_base)
+    document = {
+        "profile": name,
+        "why": why,
+        "next_start": start.name,
+        "next_start_why": start.why,
+        "fault": start.fault,
+    }
     text = f"{name} ({why})" + (
-        "" if taken == name else f"\nthe next start takes {taken} ({reason})"
+        "" if start.name == name else f"\nthe next start takes {start.name} ({start.why})"
     )
+    text += start.fault and f"\n{start.fault}"
     return _tell(arguments, document, text)
 
 

@@ -121,7 +121,7 @@ def _remove(arguments: argparse.Namespace, store: ReleaseStore) -> int:
 
 def _switch_to(release_id: str, arguments: argparse.Namespace, store: ReleaseStore) -> int:
     choice = installed_choice(Layout(root=arguments.root.absolute(), prefix=arguments.prefix))
-    profile = arguments.profile or choice.profile or start_profile(SERVICE_RUNTIME)[0]
+    profile = arguments.profile or choice.profile or start_profile(SERVICE_RUNTIME).name
     plan = SwitchPlan(
         to=release_id,
         robot=arguments.robot or choice.robot,

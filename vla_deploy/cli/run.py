@@ -91,13 +91,15 @@ def main(arguments: argparse.Namespace) -> int:
     if not journal_stream(os.environ, _STDERR):  # the supervisor logs there itself
         logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(message)s")
     arm = arguments.twin if arguments.arm is None else arguments.arm
-    profile = arguments.profile
+    profile, fault = arguments.profile, ""
     if profile is None:
-        profile, why = start_profile(arguments.runtime_base)
-        logging.info("profile %s: %s", profile, why)
+        start = start_profile(arguments.runtime_base)
+        profile, fault = start.name, start.fault
+        logging.info("profile %s: %s", profile, start.why)
     options = RunOptions(
         robot=arguments.robot,
         profile=profile,
+        profile_fault=fault,
         twin=arguments.twin,
         devices_dir=arguments.devices_dir,
         viewer=arguments.viewer,

@@ -83,7 +83,8 @@ def _profile(status: dict[str, Any]) -> str:
     last = profile["last"]
     failed = last.get("outcome") in (Outcome.REFUSED, Outcome.ROLLED_BACK)
     refused = f" ({last['profile']} {last['outcome']}: {last['reason']})" if failed else ""
-    return f"profile: {profile['profile']}{change}{refused}"
+    fault = profile.get("fault") and f"\n  alarm: {profile['fault']}"
+    return f"profile: {profile['profile']}{change}{refused}{fault or ''}"
 
 
 def _control(status: dict[str, Any]) -> str:

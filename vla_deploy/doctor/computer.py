@@ -30,8 +30,10 @@ def user(context: Context) -> Iterator[Finding]:
 def profile(context: Context) -> Iterator[Finding]:
     """Compare the profile in use with the one made for this board."""
     made, used = context.board.profile_name, context.profile
-    if used is None:
-        yield fail("profile", "the chosen one has faults", "vla-deploy profile show")
+    if context.profile_fault:
+        yield fail("profile", context.profile_fault, "vla-deploy profile use NAME")
+    elif used is None:
+        yield fail("profile", "none to look at", "vla-deploy profile use NAME")
     elif made is None or used.name == made:
         yield ok("profile", used.name)
     else:

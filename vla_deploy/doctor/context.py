@@ -38,7 +38,10 @@ class Rights:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Context:
-    """Hold everything that the checks look at; `is_live` is False for a recorded tree."""
+    """Hold everything that the checks look at; `is_live` is False for a recorded tree.
+
+    `profile_fault` tells why the profile is not the chosen one.
+    """
 
     tree: Tree
     is_live: bool
@@ -48,9 +51,12 @@ class Context:
     rights: Rights
     ask: Asker
     clock: Clock
+    profile_fault: str = ""
 
 
-def live_context(profile: Profile | None, robot: RobotDescription | None) -> Context:
+def live_context(
+    profile: Profile | None, robot: RobotDescription | None, profile_fault: str = ""
+) -> Context:
     """Return this very computer."""
     return Context(
         tree=Tree(),
@@ -61,6 +67,7 @@ def live_context(profile: Profile | None, robot: RobotDescription | None) -> Con
         rights=read_rights(),
         ask=ask_command,
         clock=MonotonicClock(),
+        profile_fault=profile_fault,
     )
 
 

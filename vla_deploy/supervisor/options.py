@@ -8,12 +8,15 @@ from pathlib import Path
 class RunOptions:
     """Choose robot, profile and world; `arm` arms the robot once everything is ready.
 
+    `profile_fault` tells why the profile is not the one that was chosen.
+
     `viewer` shows the twin in a window; `paced` gives what is on its buses the time it takes.
     `devices_dir` replaces the hardware by what is served there, as by a twin that runs by itself.
     """
 
     robot: str = "butler"
     profile: str = "desktop"
+    profile_fault: str = ""
     twin: bool = False
     viewer: bool = False
     paced: bool = False

@@ -2,15 +2,28 @@
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from platforms import ProfileError, load_profile
 from platforms.board import identify
+from vla_deploy.one_line import one_line
 from vla_deploy.state_dir import library_dir_of
 from vla_deploy.supervisor.runtime import default_base
 
 _NAME: Final = "profile.json"
 _FALLBACK: Final = "desktop"
+_MOST_CHARACTERS: Final = 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartProfile:
+    """Name the profile that a start takes, and why; `fault` tells why it is not the chosen one."""
+
+    name: str
+    why: str
+    fault: str = ""
 
 
 class ProfileChoice:
@@ -46,12 +59,22 @@ def choice_of(runtime_base: Path | None) -> ProfileChoice:
     return ProfileChoice(library_dir_of(runtime_base or default_base()) / _NAME)
 
 
-def start_profile(runtime_base: Path | None, root: Path = Path("/")) -> tuple[str, str]:
-    """Return the profile to start with when none is given, and why."""
+def start_profile(runtime_base: Path | None, root: Path = Path("/")) -> StartProfile:
+    """Return the profile to start with when none is given.
+
+    A chosen one that does not load any more, as after its file or its release has gone, keeps no
+    robot down: the detected one is taken, and the fault told. The choice stays as it is.
+    """
+    name, why = detect(root)
     chosen = choice_of(runtime_base).load()
-    if chosen is not None:
-        return chosen, "chosen by: vla-deploy profile use"
-    return detect(root)
+    if chosen is None:
+        return StartProfile(name=name, why=why)
+    try:
+        load_profile(chosen)
+    except ProfileError as error:
+        fault = f"the chosen profile {chosen} does not load: {'; '.join(error.faults)}"
+        return StartProfile(name=name, why=why, fault=one_line(fault)[:_MOST_CHARACTERS])
+    return StartProfile(name=chosen, why="chosen by: vla-deploy profile use")
 
 
 def detect(root: Path = Path("/")) -> tuple[str, str]:

@@ -34,8 +34,11 @@ class ProfileReport:
         }
         self._due_ns = 0
 
-    def tell(self, profile: str, change: Change | None) -> None:
-        """Publish at a steady pace, and at once after an end."""
+    def tell(self, profile: str, change: Change | None, fault: str) -> None:
+        """Publish at a steady pace, and at once after an end.
+
+        `fault` tells why the profile is not the chosen one; "" where it is.
+        """
         now_ns = self._clock.now_ns()
         if now_ns < self._due_ns:
             return
@@ -46,5 +49,6 @@ class ProfileReport:
                 "phase": change.phase.value if change else "",
                 "target": change.request.profile if change else "",
                 "last": self._last,
+                "fault": fault,
             }
         )

@@ -42,11 +42,14 @@ class ProfileSwitch:
         aside: Executor,
         watch_s: float = profile_change.WATCH_S,
         on_change: Callable[[Profile], None] | None = None,
+        fault: str = "",
     ) -> None:
         """Listen from now on; after a commit everything is watched for `watch_s`.
 
-        `on_change` hears which profile is in force before the processes do.
+        `on_change` hears which profile is in force before the processes do; `fault` tells why the
+        profile is not the chosen one, until another one is kept.
         """
+        self.fault = fault
         self.profile = self._kept = name
         self.in_force = self._kept_profile = profile
         self._clock = clock
@@ -83,7 +86,7 @@ class ProfileSwitch:
         answers = [event.payload for event in self._answers.drain()]
         change = self._change
         if change is None:
-            self._report.tell(self._kept, self._change)
+            self._report.tell(self._kept, self._change, self.fault)
             return self._allegiance.strangers(
                 members, self.profile, may_restart_control=self._trial.control_state == _DISARMED
             )
@@ -91,7 +94,7 @@ class ProfileSwitch:
             change.note(answer)
         self._look_for_dead(change, members)
         self._phases[change.phase](change, members)
-        self._report.tell(self._kept, self._change)
+        self._report.tell(self._kept, self._change, self.fault)
         return self._to_restart(change, members)
 
     def close(self) -> None:
@@ -231,6 +234,7 @@ class ProfileSwitch:
             return
         self._publish(change, "keep")
         self._kept, self._kept_profile = self.profile, self.in_force
+        self.fault = ""
         self._allegiance.adopt(members)
         self._end(change, Outcome.KEPT, "")
 

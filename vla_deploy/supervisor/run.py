@@ -95,6 +95,7 @@ class Run:
             PowerSwitch(),
             background(),
             on_change=self.budgets.adopt,
+            fault=options.profile_fault,
         )
         self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
         self.serial_workers = SerialWorkers(clock)
@@ -106,6 +107,8 @@ class Run:
         journal = JOURNAL_SOCKET if journal_stream(os.environ, _STDERR) else None
         self._log = RunLog(origin, run_dir / LOGS_DIR, journal, clock)
         self._log.__enter__()
+        if options.profile_fault:
+            _log.error("%s; the run takes %s", options.profile_fault, options.profile)
         if self.runtime.orphans:
             _log.warning("ended what a dead run had left: pids %s", self.runtime.orphans)
 

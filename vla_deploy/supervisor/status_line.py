@@ -8,8 +8,12 @@ _SETTLED = frozenset({State.READY, State.OFF})
 _TROUBLE = frozenset({State.ABORTING, State.BACKOFF, State.GIVEN_UP})
 
 
-def status_line(records: Mapping[str, Record], *, stopping: bool) -> str:
-    """Return who is not ready, and why, or that all are."""
+def status_line(records: Mapping[str, Record], *, stopping: bool, fault: str = "") -> str:
+    """Return who is not ready, and why, or that all are; then what else a person should mend."""
+    return _processes(records, stopping=stopping) + (fault and f"; {fault}")
+
+
+def _processes(records: Mapping[str, Record], *, stopping: bool) -> str:
     wanted = {name: record for name, record in records.items() if record.state is not State.OFF}
     if stopping:
         left = [name for name, record in wanted.items() if record.state is not State.STOPPED]

@@ -202,7 +202,7 @@ class Supervisor:
         run.notifier.step(
             ready=self._is_ready(),
             stopping=stopping,
-            status=status_line(self._records, stopping=stopping),
+            status=status_line(self._records, stopping=stopping, fault=run.switch.fault),
             troubles=run.health.troubles(),
         )
 

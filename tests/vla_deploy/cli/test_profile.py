@@ -9,7 +9,13 @@ from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.main import main
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.supervisor.profile_choice import ProfileChoice, choice_of, detect, start_profile
+from vla_deploy.supervisor.profile_choice import (
+    ProfileChoice,
+    StartProfile,
+    choice_of,
+    detect,
+    start_profile,
+)
 
 
 @pytest.fixture
@@ -74,11 +80,33 @@ def test_validate_tells_every_fault_and_fails(vla, tmp_path):
 
 
 def test_a_chosen_profile_is_the_next_starts(vla, base, mine):
-    assert start_profile(base)[0] == detect()[0]
+    assert start_profile(base).name == detect()[0]
     code, out, _ = vla("use", mine)
     assert (code, out) == (0, f"profile {mine}: kept for the next start; no robot runs\n")
-    assert start_profile(base) == (mine, "chosen by: vla-deploy profile use")
+    assert start_profile(base) == StartProfile(name=mine, why="chosen by: vla-deploy profile use")
     assert f"the next start takes {mine}" in vla("detect")[1]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "words"),
+    [
+        ("of_a_later_release", "no profile 'of_a_later_release'"),
+        ("/no/such/mine.toml", "No such file"),
+        ("broken.toml", "executor_rate_hz: expected a number from 5 to 200 Hz, got 0"),
+    ],
+)
+def test_a_chosen_profile_that_no_longer_loads_gives_way_to_the_detected_one(
+    vla, base, tmp_path, monkeypatch, chosen, words
+):
+    monkeypatch.chdir(tmp_path)
+    Path("broken.toml").write_text('inherits = "desktop"\nexecutor_rate_hz = 0\n')
+    choice_of(base).save(chosen)
+    start = start_profile(base)
+    assert start.name == detect()[0]
+    assert start.fault.startswith(f"the chosen profile {chosen} does not load: ")
+    assert words in start.fault
+    assert choice_of(base).load() == chosen  # it may come back
+    assert start.fault in vla("detect")[1]
 
 
 def test_root_chooses_for_the_service_whether_it_names_its_folder_or_not(monkeypatch):

@@ -41,6 +41,17 @@ def test_what_spoils_the_images_is_told() -> None:
     assert text.endswith("  image: dark: 1, limit 0.9 (...)")
 
 
+def test_that_the_chosen_profile_does_not_load_is_told() -> None:
+    profile = {
+        "profile": "desktop",
+        "phase": "",
+        "last": {},
+        "fault": "the chosen profile x is gone",
+    }
+    lines = as_text({**dict.fromkeys(SILENT), "scene": None, "profile": profile}).splitlines()
+    assert lines[lines.index("profile: desktop") + 1] == "  alarm: the chosen profile x is gone"
+
+
 def test_whether_spoken_words_are_understood_is_told_and_why_not() -> None:
     def ears(speech: dict[str, Any] | None) -> str:
         return as_text({**dict.fromkeys(SILENT), "scene": None, "speech": speech}).split("\n")[-2]

@@ -197,6 +197,14 @@ def test_a_broken_profile_starts_nothing(stage):
     assert not stage.base.exists()
 
 
+def test_a_run_under_another_than_the_chosen_profile_says_so_loudly(stage, caplog):
+    fault = "the chosen profile mine.toml does not load: it is gone"
+    with stage.supervisor(stage.row("a"), profile_fault=fault) as supervisor:
+        supervisor.start()
+    (told,) = (record for record in caplog.records if record.levelname == "ERROR")
+    assert told.getMessage() == f"{fault}; the run takes desktop"
+
+
 def test_sigterm_ends_the_run_in_order(stage, python):
     supervisor = start_supervisor(stage, python)
     supervisor.terminate()

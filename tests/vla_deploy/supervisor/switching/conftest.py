@@ -189,7 +189,7 @@ class Bench:
         )
         self.nodes[name].start()
 
-    def supervise(self, profile: str) -> Supervision:
+    def supervise(self, profile: str, fault: str = "") -> Supervision:
         switch = ProfileSwitch(
             profile,
             load_profile(profile),
@@ -199,6 +199,7 @@ class Bench:
             PowerSwitch(self.root, (str(self.root / "nvpmodel"),)),
             AtOnce(),
             on_change=lambda adopted: self.adopted.append((adopted.name, self.names())),
+            fault=fault,
         )
         members = {name: Member(pid=1, started_under=profile) for name in self.nodes}
         return Supervision(switch, members)

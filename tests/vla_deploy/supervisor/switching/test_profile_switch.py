@@ -39,6 +39,17 @@ def test_every_process_switches_and_the_choice_is_kept(bench, profiles):
         assert kernel.applied == ["calm"]
 
 
+def test_that_the_chosen_profile_does_not_load_is_told_until_another_is_kept(bench, profiles):
+    fault = "the chosen profile /home/me/mine.toml does not load: Permission denied"
+    bench.supervision = bench.supervise(profiles["swift"], fault)
+    bench.tick()
+    assert bench.desk.status["fault"] == fault
+    bench.desk.use(profiles["calm"], dry_run=True)
+    assert bench.desk.status["fault"] == fault
+    bench.desk.use(profiles["calm"])
+    assert bench.desk.status["fault"] == ""
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_profile_that_one_process_refuses_changes_nothing(bench, profiles, hinder, name):
     reason = hinder(bench, name)
