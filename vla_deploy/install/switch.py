@@ -10,7 +10,7 @@ from drivers.clock import Clock
 from vla_deploy.install.commands import run_command
 from vla_deploy.install.errors import CommandFailed, ReleaseRefused, SwitchFailed
 from vla_deploy.install.release_store import ReleaseStore
-from vla_deploy.install.service_control import ServiceControl, trouble_within
+from vla_deploy.install.service_control import ServiceControl, known_trouble, trouble_within
 
 _log = logging.getLogger(__name__)
 
@@ -89,9 +89,10 @@ class Switch:
         self._service = service
         self._clock = clock
         self._origin = store.current()
+        self._known_trouble = ""
         self.do: dict[Step, Callable[[], None]] = {
             Step.CHECK: self._check,
-            Step.MARK: lambda: store.begin_trial(plan.to),
+            Step.MARK: self._mark,
             Step.SWAP: lambda: store.use(plan.to),
             Step.RESTART: self._restart,
             Step.WATCH: self._watch,
@@ -132,6 +133,11 @@ class Switch:
         for arguments in self._plan.self_tests():
             run_command([program, *arguments])
 
+    def _mark(self) -> None:
+        if self._service is not None:
+            self._known_trouble = known_trouble(self._service)
+        self._store.begin_trial(self._plan.to)
+
     def _restart(self) -> None:
         if self._service is not None and self._store.current():
             self._service.restart()
@@ -139,7 +145,9 @@ class Switch:
     def _watch(self) -> None:
         if self._service is None or not self._store.current():
             return
-        trouble = trouble_within(self._service, self._clock, self._plan.healthy_s)
+        trouble = trouble_within(
+            self._service, self._clock, self._plan.healthy_s, self._known_trouble
+        )
         if trouble:
             raise SwitchFailed(trouble)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.one_line import one_line
+from vla_deploy.supervisor.status_line import with_late
 
 NS_PER_US = 1000
 VARIABLES = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID")
@@ -91,11 +92,14 @@ class Notifier:
     def step(self, *, ready: bool, stopping: bool, status: str, troubles: tuple[str, ...]) -> None:
         """Tell what has changed; call it at every step."""
         now_ns = self._clock.now_ns()
-        if ready and not stopping and not self._ready:
+        becomes_ready = ready and not stopping and not self._ready
+        if becomes_ready:
+            self._status_ns = None  # whoever waits for READY reads the status next
+        self._tell(with_late(status, troubles), now_ns)
+        if becomes_ready:
             self._ready = self._socket.send(READY="1")
         if stopping or not self._ready:
             self._extend(now_ns)
-        self._tell(status if not troubles else f"{status}; not in time: {troubles[0]}", now_ns)
         self._feed(troubles, now_ns, stopping=stopping)
 
     def stopping(self) -> None:

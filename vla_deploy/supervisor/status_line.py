@@ -1,9 +1,11 @@
 """Say in one line how the run is, for systemd and for people."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from vla_deploy.supervisor.lifecycle import Record, State
 
+DEGRADED = "degraded"
+LATE = "not in time"
 _SETTLED = frozenset({State.READY, State.OFF})
 _TROUBLE = frozenset({State.ABORTING, State.BACKOFF, State.GIVEN_UP})
 
@@ -24,8 +26,18 @@ def _processes(records: Mapping[str, Record], *, stopping: bool) -> str:
         if record.state in _TROUBLE
     ]
     if troubles:
-        return f"degraded: {'; '.join(troubles)}"
+        return f"{DEGRADED}: {'; '.join(troubles)}"
     pending = [name for name, record in wanted.items() if record.state not in _SETTLED]
     if pending:
         return f"starting {pending[0]}: {len(wanted) - len(pending)} of {len(wanted)} ready"
     return f"all {len(wanted)} processes ready"
+
+
+def with_late(status: str, troubles: Sequence[str]) -> str:
+    """Add the first of what is not in time."""
+    return f"{status}; {LATE}: {troubles[0]}" if troubles else status
+
+
+def trouble_in(status: str) -> str:
+    """Return a status that tells of a process that fails or is late; "" for one that does not."""
+    return status if status.startswith(DEGRADED) or f"; {LATE}: " in status else ""

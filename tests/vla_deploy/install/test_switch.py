@@ -13,6 +13,10 @@ from vla_deploy.install.service_control import ServiceState, trouble_within
 from vla_deploy.install.switch import NEXT, End, Step, Switch, SwitchPlan, recover
 
 GUARD = Path(__file__).parents[3] / "systemd" / "release-guard"
+TROUBLES = (
+    "degraded: planner back-off (exit code 1)",
+    "all 9 processes ready; not in time: control: tick rate 90 Hz, limit 125 Hz",
+)
 PROGRAM = '#!/bin/sh\ntest ! -e "$(dirname "$0")/broken"\n'
 
 
@@ -35,7 +39,7 @@ class RecordedService:
     def __init__(self, store: ReleaseStore, fails: dict[str, str] | None = None) -> None:
         self.started: list[str] = []
         self._store = store
-        self._fails = fails or {}  # release -> "start" or "later"
+        self._fails = fails or {}  # release -> "start", "later", or the status that it tells then
         self._asked = 0
 
     def restart(self) -> None:
@@ -46,8 +50,15 @@ class RecordedService:
 
     def state(self) -> ServiceState:
         self._asked += 1
-        died = self._fails.get(self.started[-1]) == "later" and self._asked > 5
-        return ServiceState(active="active", main_pid=2 if died else 1, restarts=int(died))
+        what = self._fails.get(self.started[-1] if self.started else self._store.current(), "")
+        died = what == "later" and self._asked > 5
+        told = ":" in what and (self._asked > 5 or not self.started)
+        return ServiceState(
+            active="active",
+            main_pid=2 if died else 1,
+            restarts=int(died),
+            status=what if told else "all 9 processes ready",
+        )
 
 
 @pytest.fixture
@@ -95,13 +106,28 @@ def test_a_release_that_does_not_run_changes_nothing(store: ReleaseStore) -> Non
     assert report.failures[0].startswith("check that the new release runs: ")
 
 
-@pytest.mark.parametrize("when", ["start", "later"])
+@pytest.mark.parametrize("when", ["start", "later", *TROUBLES])
 def test_a_release_that_does_not_stay_well_is_taken_back(store: ReleaseStore, when: str) -> None:
     service = RecordedService(store, {"new": when})
     report = switch_of(store, service).run()
     assert (report.end, report.current) == (End.ROLLED_BACK, "old")
     assert service.started == ["new", "old"]
     assert store.trial() is None
+
+
+@pytest.mark.parametrize("trouble", TROUBLES)
+def test_a_release_is_not_blamed_for_what_was_known_before(
+    store: ReleaseStore, trouble: str
+) -> None:
+    report = switch_of(store, RecordedService(store, {"old": trouble, "new": trouble})).run()
+    assert (report.end, report.current) == (End.SWITCHED, "new")
+
+
+def test_a_release_that_changes_the_trouble_is_blamed_for_it(store: ReleaseStore) -> None:
+    service = RecordedService(store, {"old": TROUBLES[0], "new": TROUBLES[1]})
+    report = switch_of(store, service).run()
+    assert (report.end, report.current) == (End.ROLLED_BACK, "old")
+    assert report.failures == (f"watch its health: it says: {TROUBLES[1]}",)
 
 
 def test_a_service_that_is_down_with_either_release_is_reported(store: ReleaseStore) -> None:

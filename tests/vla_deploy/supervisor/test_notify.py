@@ -160,6 +160,15 @@ def test_the_status_is_told_when_it_changes_and_at_most_once_a_second(systemd, n
     assert "STATUS=fine; not in time: bus lost" in systemd.heard()
 
 
+def test_whoever_waits_until_it_is_ready_reads_a_status_of_now(systemd, notifier, clock):
+    notifier.step(ready=False, stopping=False, status="degraded: a back-off", troubles=())
+    systemd.heard()
+    clock.pass_s(0.05)
+    step(notifier)
+    heard = systemd.heard()
+    assert heard.index("STATUS=fine") < heard.index("READY=1")
+
+
 def test_a_long_start_asks_for_time_every_five_seconds(systemd, notifier, clock):
     asked = 0
     for _ in range(40):  # 20 s
