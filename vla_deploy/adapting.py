@@ -13,32 +13,11 @@ from platforms.profile import profile_from
 from platforms.profile_source import Source
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.node import Adaptable, NeedsRestart, Node, Slowable
+from vla_deploy.pace import Pace, Watch
 
-MIN_RATE_RATIO: Final = 0.8
 TIER_RETRY_NS: Final = 30 * NS_PER_S
-_PACE_WEIGHT: Final = 0.01
 _UNSLOWED: Final = "control"
 _log = logging.getLogger(__name__)
-
-
-class Pace:
-    """Measure which share of its steps a node makes: one that was slow before may stay so."""
-
-    def __init__(self) -> None:
-        self._periods_by_step = 1.0
-        self._last_ns: int | None = None
-
-    @property
-    def ratio(self) -> float:
-        """Return the share of its steps that the node has made of late."""
-        return min(1.0, 1.0 / self._periods_by_step)
-
-    def note(self, now_ns: int, period_s: float) -> None:
-        """Count a step."""
-        if self._last_ns is not None:
-            periods = (now_ns - self._last_ns) / (period_s * NS_PER_S)
-            self._periods_by_step += _PACE_WEIGHT * (periods - self._periods_by_step)
-        self._last_ns = now_ns
 
 
 class Host(Protocol):
@@ -61,9 +40,6 @@ class _Change:
     future: "Future[tuple[Profile, Any]]"
     answered: bool = False
     way_back: "tuple[Profile, Any] | None" = None
-    steps: int = 0
-    committed_ns: int = 0
-    wanted_hz: float = 0.0
 
 
 class AdaptingNode:
@@ -98,9 +74,11 @@ class AdaptingNode:
         self._tier_future: Future[tuple[Profile, Any]] | None = None
         self._directives_sequence = -1
         self._change: _Change | None = None
+        self._watch: Watch | None = None
         self._handlers: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
             "prepare": self._on_prepare,
             "commit": self._on_commit,
+            "watch": self._on_watch,
             "validate": self._on_validate,
             "keep": self._on_keep,
             "rollback": self._on_rollback,
@@ -133,8 +111,8 @@ class AdaptingNode:
             self._heed_directives()
         self._pace.note(self._clock.now_ns(), self.period_s)
         self._node.step()
-        if self._change is not None:
-            self._change.steps += 1
+        if self._watch is not None:
+            self._watch.note()
 
     def stop(self) -> None:
         """Stop the node; what is being prepared is given up."""
@@ -190,26 +168,30 @@ class AdaptingNode:
             for text in self._host.apply(self._profile)
             if text not in self._host.obstacles(before)
         ]
-        change.steps, change.committed_ns = 0, self._clock.now_ns()
-        change.wanted_hz = MIN_RATE_RATIO * kept_ratio / self.period_s
+        self._begin_watch(change.change_id, kept_ratio)
         self._answer(change.change_id, "commit", "; ".join(refused))
 
+    def _on_watch(self, message: Mapping[str, Any]) -> None:
+        """Count from now on when this process has been started for the change."""
+        kept_ratio = message["restarted"].get(self._name)
+        if kept_ratio is not None:
+            self._begin_watch(message["change_id"], kept_ratio)
+
+    def _begin_watch(self, change_id: int, kept_ratio: float) -> None:
+        self._watch = Watch(change_id, self._clock.now_ns(), kept_ratio / self.period_s)
+
     def _on_validate(self, message: Mapping[str, Any]) -> None:
-        change = self._of(message)
-        if change is None:
-            self._answer(message["change_id"], "validate", "it has committed nothing")
+        watch, change_id = self._watch, message["change_id"]
+        if watch is None or watch.change_id != change_id:
+            self._answer(change_id, "validate", "it has committed nothing")
             return
-        elapsed_s = (self._clock.now_ns() - change.committed_ns) / NS_PER_S
-        rate_hz = change.steps / max(elapsed_s, self.period_s)
-        slow = rate_hz < change.wanted_hz
-        reason = f"steps at {rate_hz:.1f} Hz, expected {change.wanted_hz:.1f} Hz" if slow else ""
-        self._answer(change.change_id, "validate", reason)
+        self._answer(change_id, "validate", watch.fault(self._clock.now_ns(), self.period_s))
 
     def _on_keep(self, message: Mapping[str, Any]) -> None:
         change = self._of(message)
         if change is not None and change.way_back is not None:
             self._discard(change.way_back[1])
-        self._change = None
+        self._change = self._watch = None
 
     def _on_rollback(self, message: Mapping[str, Any]) -> None:
         change = self._of(message)
@@ -217,6 +199,7 @@ class AdaptingNode:
             self._discard(self._switch(change.way_back))
             self._host.apply(self._profile)
             self._change = None
+        self._watch = None
         self._abandon()
         self._answer(message["change_id"], "rollback", "")
 
@@ -252,6 +235,7 @@ class AdaptingNode:
                 "ok": not reason,
                 "reason": reason[:1000],
                 "restart": restart,
+                "pace_ratio": self._pace.ratio,
             }
         )
 

@@ -29,13 +29,19 @@ class HostSettings:
         self._process = process
         self._every_cpu = os.sched_getaffinity(0)
         self._locked = False
+        self._threads: int | None = None
 
     def obstacles(self, profile: Profile) -> tuple[str, ...]:
         """Return what the kernel would refuse of a profile; nothing is changed."""
         return tuple(text for check in _OBSTACLES for text in check(self, profile))
 
     def apply(self, profile: Profile) -> tuple[str, ...]:
-        """Apply as much of a profile as the kernel permits, and return what it refused."""
+        """Apply as much of a profile as the kernel permits, and return what it refused.
+
+        The first is the one that this process was started with.
+        """
+        if self._threads is None:
+            self._threads = profile.processes[self._process].threads
         refused = list(self.obstacles(profile))
         for act in (self._set_affinity, self._set_nice, self._set_priority, self._set_lock):
             try:
@@ -113,6 +119,14 @@ class HostSettings:
         if self._wants_lock(profile) and not _may_lock():
             yield "no memory lock (grant CAP_IPC_LOCK or LimitMEMLOCK=infinity); ticks may be late"
 
+    def _thread_obstacle(self, profile: Profile) -> Iterator[str]:
+        wanted = profile.processes[self._process].threads
+        if self._threads is not None and wanted != self._threads:
+            yield (
+                f"threads = {wanted}: numeric libraries read that once, at the start of the "
+                f"process; they have {self._threads}"
+            )
+
 
 def _threads() -> list[int]:
     return [int(path.name) for path in _THREADS.iterdir()]
@@ -137,4 +151,5 @@ _OBSTACLES: Final[tuple[Callable[[HostSettings, Profile], Iterator[str]], ...]] 
     HostSettings._nice_obstacle,
     HostSettings._priority_obstacle,
     HostSettings._lock_obstacle,
+    HostSettings._thread_obstacle,
 )

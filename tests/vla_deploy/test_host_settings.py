@@ -69,6 +69,15 @@ def test_what_the_kernel_refuses_is_told_with_its_remedy(powerless, profile_of, 
     assert host.apply(profile) == (obstacle,)
 
 
+def test_other_threads_of_numeric_libraries_take_another_process(profile_of):
+    host, two = HostSettings("control"), profile_of("processes.control.threads = 2")
+    assert host.apply(profile_of("")) == ()
+    (obstacle,) = host.obstacles(two)
+    assert obstacle.startswith("threads = 2: numeric libraries read that once")
+    assert obstacle.endswith("they have 1")
+    assert host.obstacles(profile_of("")) == HostSettings("control").obstacles(two) == ()
+
+
 def test_a_priority_that_is_not_required_is_quietly_done_without(powerless, profile_of):
     profile = replace(profile_of("realtime_priority = 40"), realtime_required=False)
     assert HostSettings("control").apply(profile) == ()

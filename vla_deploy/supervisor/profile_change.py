@@ -78,7 +78,8 @@ class Change:
     deadline_ns: int = 0
     committed: bool = False
     answers: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    restarts: set[str] = field(default_factory=set)
+    restarts: dict[str, float] = field(default_factory=dict)
+    """Who is to be started again, with the share of its steps that it made before."""
     power_before: str = ""
     failure: str = ""
 
@@ -100,8 +101,14 @@ class Change:
         self.deadline_ns = now_ns + limit_ns
         self.answers = {}
 
+    def settle(self, pids: Mapping[str, int]) -> dict[str, float]:
+        """Count the processes that were started again among all others; return `restarts`."""
+        restarted, self.restarts = self.restarts, {}
+        self.pids.update({name: pids[name] for name in restarted})
+        return restarted
+
     def note(self, answer: Mapping[str, Any]) -> None:
         """Take in an answer to the present phase."""
         fits = answer["change_id"] == self.change_id and answer["phase"] == self.phase
-        if fits and answer["process"] in self.pids.keys() - self.restarts:
+        if fits and answer["process"] in self.pids.keys() - self.restarts.keys():
             self.answers[answer["process"]] = answer

@@ -15,9 +15,9 @@ class Allegiance:
         self._adopted: dict[str, int] = {}
         self._doubtful: dict[str, int] = {}
 
-    def adopt(self, members: Mapping[str, Member]) -> None:
-        """Take note that all of them now run under the profile in force."""
-        self._adopted = {name: member.pid for name, member in members.items()}
+    def adopt(self, pids: Mapping[str, int]) -> None:
+        """Take note of who has taken over the profile in force; nobody else has."""
+        self._adopted = dict(pids)
         self._doubtful = {}
 
     def doubt(self, pids: Mapping[str, int]) -> None:

@@ -127,14 +127,7 @@ class ProfileSwitch:
             deadline_ns=now_ns + _ns(profile_change.PREPARE_S),
         )
         self._change = change
-        self._changes.publish(
-            {
-                "change_id": change.change_id,
-                "phase": "prepare",
-                "profile": request.profile,
-                "values": change.values,
-            }
-        )
+        self._publish(change, "prepare", values=change.values)
 
     def _refuse_if_busy(self, absent: Mapping[str, str]) -> None:
         if self._change is not None:
@@ -168,7 +161,7 @@ class ProfileSwitch:
             elif name == CONTROL and self._trial.control_state != _DISARMED:
                 refusals[name] = f"needs a restart: {reason}; disarm first"
             else:
-                change.restarts.add(name)
+                change.restarts[name] = change.answers[name]["pace_ratio"]
                 del refusals[name]
         return refusals
 
@@ -202,13 +195,15 @@ class ProfileSwitch:
             for name in change.restarts
             if name in members and members[name].pid != change.pids[name]
         }
-        if self._is_waiting(change, tuple(change.restarts - back)):
+        if self._is_waiting(change, tuple(change.restarts.keys() - back)):
             return
         if change.refusals:
             self._go_back(change, _listed(change.refusals))
             return
+        restarted = change.settle({name: member.pid for name, member in members.items()})
         self._trial.begin()
         change.enter(Phase.WATCH, self._clock.now_ns(), self._watch_ns)
+        self._publish(change, "watch", restarted=restarted)
 
     def _watching(self, change: Change, _: Mapping[str, Member]) -> None:
         if self._clock.now_ns() >= change.deadline_ns:
@@ -216,7 +211,7 @@ class ProfileSwitch:
             change.enter(Phase.VALIDATE, self._clock.now_ns(), limit_ns)
             self._publish(change, "validate")
 
-    def _validating(self, change: Change, members: Mapping[str, Member]) -> None:
+    def _validating(self, change: Change, _: Mapping[str, Member]) -> None:
         if self._is_waiting(change):
             return
         faults = [*self._trial.faults(change.target)]
@@ -224,9 +219,9 @@ class ProfileSwitch:
         if faults:
             self._go_back(change, "; ".join(faults))
             return
-        self._keep(change, members)
+        self._keep(change)
 
-    def _keep(self, change: Change, members: Mapping[str, Member]) -> None:
+    def _keep(self, change: Change) -> None:
         try:
             self._choice.save(change.request.profile)
         except OSError as error:
@@ -235,7 +230,7 @@ class ProfileSwitch:
         self._publish(change, "keep")
         self._kept, self._kept_profile = self.profile, self.in_force
         self.fault = ""
-        self._allegiance.adopt(members)
+        self._allegiance.adopt(change.pids)
         self._end(change, Outcome.KEPT, "")
 
     def _rolling_back(self, change: Change, _: Mapping[str, Member]) -> None:
@@ -284,10 +279,11 @@ class ProfileSwitch:
     # --- processes that come and go -----------------------------------------------------------
 
     def _look_for_dead(self, change: Change, members: Mapping[str, Member]) -> None:
+        ended_for_it = change.restarts.keys() if change.committed else frozenset()
         dead = [
             name
             for name, pid in change.pids.items()
-            if name not in change.restarts and (name not in members or members[name].pid != pid)
+            if name not in ended_for_it and (name not in members or members[name].pid != pid)
         ]
         if not dead:
             return
@@ -307,9 +303,10 @@ class ProfileSwitch:
 
     # --- tell ---------------------------------------------------------------------------------
 
-    def _publish(self, change: Change, phase: str) -> None:
+    def _publish(self, change: Change, phase: str, **more: object) -> None:
+        profile = change.request.profile
         self._changes.publish(
-            {"change_id": change.change_id, "phase": phase, "profile": change.request.profile}
+            {"change_id": change.change_id, "phase": phase, "profile": profile, **more}
         )
 
     def _end(self, change: Change, outcome: Outcome, reason: str) -> None:

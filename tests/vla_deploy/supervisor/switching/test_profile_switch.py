@@ -199,6 +199,72 @@ def test_a_process_that_needs_it_is_restarted_when_that_is_allowed(bench, profil
     assert (bench.desk.last["outcome"], bench.names()) == ("kept", {"calm"})
 
 
+def reach_with_restart(bench: Any, name: str, phase: str) -> None:
+    """Let `name` be restarted for a change to `calm`, and go on to a phase after that."""
+    bench.workers[name].refusal = NeedsRestart("other threads")
+
+    def reached() -> bool:
+        restart_on_request(bench, name)
+        return bench.desk.status.get("phase") == phase
+
+    assert bench.run_until(reached, 60.0)
+
+
+@pytest.mark.parametrize("phase", ["watch", "judging"])
+def test_a_restarted_process_that_dies_takes_all_of_them_back(bench, profiles, phase):
+    bench.desk.request(profiles["calm"], allow_restart=True)
+    reach_with_restart(bench, "planner", "watch")
+    if phase == "judging":
+        bench.dead.add("planner")
+        assert bench.run_until(lambda: bench.desk.status["phase"] == "validate", 20.0)
+    del bench.supervision.members["planner"]
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "rolled back"
+    assert bench.desk.last["reason"].startswith("planner ended meanwhile")
+    assert {bench.nodes[name].profile.name for name in NAMES if name != "planner"} == {"swift"}
+    assert bench.choice.load() is None
+
+
+def test_a_restarted_process_that_hangs_is_not_kept(bench, profiles):
+    bench.desk.request(profiles["calm"], allow_restart=True)
+    reach_with_restart(bench, "planner", "watch")
+    bench.dead.add("planner")
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "rolled back"
+    assert bench.desk.last["reason"].startswith("planner: no answer to validate in time")
+
+
+def test_a_restarted_process_that_is_too_slow_takes_all_of_them_back(bench, profiles):
+    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.workers["planner"].period_s = 0.001
+    reach_with_restart(bench, "planner", "watch")
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "rolled back"
+    assert bench.desk.last["reason"].startswith("planner: steps at 20.")
+    bench.tick()
+    assert bench.supervision.restarts == ["planner"], "it runs under the profile that was refused"
+
+
+def test_a_restarted_process_need_not_be_faster_than_it_was_before(bench, profiles):
+    bench.workers["planner"].period_s = 0.03
+    assert bench.run_until(lambda: bench.workers["planner"].steps > 1000, 60.0)
+    bench.desk.request(profiles["calm"], allow_restart=True)
+    reach_with_restart(bench, "planner", "watch")
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "kept", "20 Hz of 33 Hz, as before"
+
+
+def test_a_process_that_came_under_the_old_profile_meanwhile_is_started_again(bench, profiles):
+    late = bench.supervision.members.pop("planner")
+    bench.desk.request(profiles["calm"])
+    bench.reach("watch")
+    bench.supervision.members["planner"] = late
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "kept"
+    bench.tick()
+    assert set(bench.supervision.restarts) == {"planner"}
+
+
 def test_control_is_not_restarted_while_it_is_armed(bench, profiles):
     bench.workers["control"].refusal = NeedsRestart("bus_watchdog_s")
     last = bench.desk.use(profiles["calm"], allow_restart=True)
