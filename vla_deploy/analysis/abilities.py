@@ -63,13 +63,13 @@ class Abilities:
     poses: frozenset[str]
 
     @classmethod
-    def of(cls, robot: RobotDescription) -> "Abilities":
-        """Read what a robot file says of it.
+    def of(cls, robot: RobotDescription, planner: PathPlanner | None = None) -> "Abilities":
+        """Read what a robot file says of it; whoever has a planner for its base gives it.
 
         Raises:
             MapInvalid: its map cannot be used.
         """
-        planner = base_planner(robot)
+        planner = planner or base_planner(robot)
         return cls(
             body=Body.of(robot, planner.is_free),
             arms=Arms(robot),

@@ -1,4 +1,7 @@
-"""Judge whether a goal in words can be reached, by planning it with rules and going through it."""
+"""Judge whether a goal in words can be reached, by planning it with rules and going through it.
+
+One action of a plan is judged in the same way, without the planning.
+"""
 
 from typing import Final
 
@@ -9,7 +12,7 @@ from vla_deploy.analysis.question import Question
 from vla_deploy.analysis.steps import judge_step
 from vla_deploy.planning.errors import NotUnderstood, PlanningError
 from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.rules import plan_command
 
 _DIGITS: Final = 3
@@ -29,10 +32,20 @@ def judge_goal(question: Question, abilities: Abilities) -> Task:
             judge_step(action.skill, action.parameters, outlook)
     except CannotBe as found:
         return _task(question, outlook, Feasible.NO, found.belief, str(found))
-    return _summed_up(question, outlook, plan)
+    return _summed_up(question, outlook, len(plan.actions))
 
 
-def _summed_up(question: Question, outlook: Outlook, plan: Plan) -> Task:
+def judge_action(action: Action, question: Question, abilities: Abilities) -> Task:
+    """Return the verdict on one action of a plan, from how the world is now."""
+    outlook = _outlook(question, abilities)
+    try:
+        judge_step(action.skill, action.parameters, outlook)
+    except CannotBe as found:
+        return _task(question, outlook, Feasible.NO, found.belief, str(found))
+    return _summed_up(question, outlook, 1)
+
+
+def _summed_up(question: Question, outlook: Outlook, steps: int) -> Task:
     if outlook.unseen:
         unseen = " and ".join(f"the {one}" for one in outlook.unseen)
         reason = f"{unseen} must be found first; what comes after cannot be judged"
@@ -40,7 +53,7 @@ def _summed_up(question: Question, outlook: Outlook, plan: Plan) -> Task:
     if outlook.prerequisites:
         reason = "something must be done before"
         return _task(question, outlook, Feasible.AFTER_PREREQUISITES, outlook.belief, reason)
-    reason = f"{len(plan.actions)} steps, and nothing in their way"
+    reason = f"{steps} steps, and nothing in their way"
     return _task(question, outlook, Feasible.YES, outlook.belief, reason)
 
 

@@ -1,6 +1,6 @@
 """Run the executor: plans in, motions out, and a word about every action."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drivers.clock import NS_PER_S
@@ -20,6 +20,7 @@ from vla_deploy.node import NodeContext
 from vla_deploy.planning.plan import ActionStatus, Plan
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.robots import RobotDescription
+from vla_deploy.skills.advice import Adviser
 from vla_deploy.skills.arms import believe_fingers, recall_hands
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.executor import ActionRecord, PlanExecution
@@ -45,6 +46,7 @@ class ExecutorNode:
         self._robot = robot
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._skills: SkillContext
+        self._adviser: Adviser
         self._plans: RingReader
         self._events: RingWriter
         self._status: CellWriter
@@ -66,6 +68,7 @@ class ExecutorNode:
             voice=Announcer(self._space, "speak", self._clock),
             claims=ClaimBook(self._space, self._clock),
         )
+        self._adviser = Adviser(self._skills)
         self._skills.claims.declare(body_of(self._robot))
         self._plans = self._space.ring_reader("plan", from_start=False)
         self._events = self._space.ring_writer("task_event")
@@ -167,12 +170,17 @@ class ExecutorNode:
         )
 
     def _finish(self, why_no_other: str, success: bool = False) -> None:
-        """Tell how the command ended; of plans that failed, all that was done counts."""
+        """Tell how the command ended; of plans that failed, all that was done counts.
+
+        Where the world was against it, it is told what to do before, or instead.
+        """
         records, self._recovery = self._recovery.records, Recovery()
         self._execution = None
         errors = [one.error for one in reversed(records) if one.status is ActionStatus.ABORTED]
         errors += [one.error for one in records if one.error]
-        error = "; ".join(one for one in (*errors[:1], why_no_other) if one) or None
+        advice = "" if success else self._advice(records)
+        told = ". ".join(one.rstrip(".?") for one in (*errors[:1], advice) if one)
+        error = "; ".join(one for one in (told, why_no_other) if one) or None
         self._tell(
             self._command_id,
             "finished",
@@ -180,6 +188,13 @@ class ExecutorNode:
             error=None if success else error,
             actions=[record.document() for record in records],
         )
+
+    def _advice(self, records: Sequence[ActionRecord]) -> str:
+        """Return what to do about the action that the last plan failed by, "" where nothing."""
+        aborted = [one for one in records if one.status is ActionStatus.ABORTED]
+        if not aborted or aborted[-1].cause is None:
+            return ""
+        return self._adviser.advice_on(aborted[-1].action)
 
     def _planner_lives(self) -> bool:
         sample = self._planner.latest()
