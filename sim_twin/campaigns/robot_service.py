@@ -9,14 +9,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-import psutil
-
 from drivers.clock import NS_PER_S, Clock
+from sim_twin.campaigns.strays import MARK, strays
 from sim_twin.service_runner import ServiceRunner, ServiceState
 from vla_deploy.cli.session import Session
 from vla_deploy.ipc import IpcError
 from vla_deploy.supervisor.lifecycle import is_settled
-from vla_deploy.supervisor.orphans import run_id_of
 from vla_deploy.supervisor.runtime import running
 from vla_deploy.supervisor.service_times import RESTART_S, watchdog_s
 
@@ -27,6 +25,7 @@ _AGAIN_S: Final = 1.0
 _POLL_NS: Final = NS_PER_S // 20
 _FRESH_S: Final = 3.0
 _FRESH_STATUS_S: Final = 0.5
+_TABLE_NS: Final = NS_PER_S  # twice as long as the table grows old
 
 
 class NotReady(Exception):
@@ -117,23 +116,32 @@ class RobotService:
             job.wait()
 
     def orphans(self) -> list[str]:
-        """Return every process of a run that is no more."""
-        owner = running(self._base)
-        now = "" if owner is None else owner.run_id
-        return [
-            f"{process.pid} of run {run_id}"
-            for process in psutil.process_iter()
-            if (run_id := run_id_of(process)) and run_id != now and self._is_mine(process)
-        ]
+        """Return every process of a run that is no more, or of this one and of no row of it.
+
+        Who comes or goes while the table is being told is looked at twice.
+        """
+        suspects = self._strays()
+        if not suspects:
+            return []
+        self._clock.sleep_until(self._clock.now_ns() + _TABLE_NS)
+        again = self._strays()
+        return [suspect for suspect in suspects if suspect in again]
 
     def close(self) -> None:
         """End the service in order."""
         self._runner.stop()
         self._detach()
 
+    def _strays(self) -> list[str]:
+        owner = running(self._base)
+        table = self._document("process_table", _FRESH_S)
+        rows = None if table is None else {row["pid"] for row in table["processes"] if row["pid"]}
+        return strays(str(self._base), "" if owner is None else owner.run_id, rows)
+
     def _started(self) -> ServiceRunner:
+        environment = {**os.environ, MARK: str(self._base)}
         runner = ServiceRunner(
-            self._command, dict(os.environ), watchdog_s=watchdog_s(), restart_s=RESTART_S
+            self._command, environment, watchdog_s=watchdog_s(), restart_s=RESTART_S
         )
         runner.start()
         return runner
@@ -181,9 +189,3 @@ class RobotService:
         if self._session is not None:
             self._session.close()
         self._session = None
-
-    def _is_mine(self, process: psutil.Process) -> bool:
-        try:
-            return str(self._base) in " ".join(process.cmdline())
-        except (psutil.NoSuchProcess, psutil.AccessDenied):
-            return False
