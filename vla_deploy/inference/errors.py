@@ -6,6 +6,7 @@ InferenceError
 ├── ModelFileSpoiled     a file is missing, cut off or not what was checked in: add it again
 ├── ModelMismatch        the graph is not what the manifest says: mend the manifest, or export anew
 ├── ProviderUnavailable  nothing here runs it as the profile asks: mend profile or installation
+├── MemoryRefused        others hold the memory it needs: take a smaller one, or raise the budget
 ├── RunFailed            a run failed, or told what cannot be: a robot goes on without the answer
 ├── ImagesInvalid        images or labels to measure with cannot be used: mend the folder
 ├── FetchFailed          a published model did not come: mend the network, or add it by hand
@@ -47,6 +48,10 @@ class ModelMismatch(InferenceError):
 
 class ProviderUnavailable(InferenceError):
     """Say that no execution provider runs a model that the profile allows."""
+
+
+class MemoryRefused(InferenceError):
+    """Say who holds the memory that a model needs."""
 
 
 class RunFailed(InferenceError):

@@ -1,14 +1,16 @@
 """Find which model plays a role under a profile, and what it would run on."""
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivers.clock import Clock
 from platforms import ModelChoice, Profile
 from vla_deploy.inference.errors import ModelUnknown
+from vla_deploy.inference.memory_claims import LoadedT, RunMemory
 from vla_deploy.inference.session import ModelSession, open_session
-from vla_deploy.inference.store import ModelStore
+from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.state_dir import engines_dir_of, models_dir_of
 
 _log = logging.getLogger(__name__)
@@ -21,11 +23,26 @@ class ModelShelf:
     store: ModelStore
     engines: Path
     clock: Clock
+    memory: RunMemory | None = None
 
     @classmethod
     def of_base(cls, base: Path, clock: Clock) -> "ModelShelf":
         """Return the shelf for runs in a runtime directory; a run's own is one of its children."""
         return cls(store=ModelStore(models_dir_of(base)), engines=engines_dir_of(base), clock=clock)
+
+    @classmethod
+    def of_run(cls, run_dir: Path, clock: Clock) -> "ModelShelf":
+        """Return the shelf of one run: models that it loads claim their memory there."""
+        shelf = cls.of_base(run_dir.parent, clock)
+        return replace(shelf, memory=RunMemory(run_dir / "ipc", clock))
+
+    def load(self, model: Model, choice: ModelChoice, load: Callable[[], LoadedT]) -> LoadedT:
+        """Load a model, its memory claimed until it is closed; outside a run nothing is claimed.
+
+        Raises:
+            MemoryRefused: others hold what it needs.
+        """
+        return load() if self.memory is None else self.memory.load(model, choice, load)
 
     def open(self, role: str, profile: Profile, model_tier: int) -> ModelSession:
         """Open the model for a role, `model_tier` steps below the best; the last one at most.
@@ -39,6 +56,7 @@ class ModelShelf:
             ModelFileSpoiled: its file is not what was checked in, or no ONNX graph.
             ModelMismatch: the graph is not what the manifest says.
             ProviderUnavailable: no provider that the profile allows runs it.
+            MemoryRefused: others hold the memory that it needs.
             RunFailed: it cannot run.
         """
         choice = choice_for(role, profile)
@@ -49,7 +67,11 @@ class ModelShelf:
                 f"profile {profile.name}, models.{role}.tiers: {name} is a "
                 f"{model.manifest.role}; see: vla-deploy models list"
             )
-        session = open_session(model, choice, engines=self.engines, clock=self.clock)
+        session = self.load(
+            model,
+            choice,
+            lambda: open_session(model, choice, engines=self.engines, clock=self.clock),
+        )
         for notice in session.notices:
             _log.warning("degraded: %s", notice)
         return session

@@ -13,6 +13,7 @@ from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelMismatch, RunFailed
 from vla_deploy.inference.graph_check import output_faults
 from vla_deploy.inference.manifest import Layout, Manifest, Tensor
+from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.opening import Opened, open_with_choice
 from vla_deploy.inference.runtime import SESSION_ERRORS, available_providers
 from vla_deploy.inference.stats import SessionStats, resident_mb
@@ -38,6 +39,7 @@ class ModelSession:
         self._failures = 0
         self.load_s = 0.0
         self.memory_mb = 0.0
+        self.claim = MemoryClaim()
 
     def run(self, inputs: Arrays) -> dict[str, NDArray[Any]]:
         """Return the outputs by name.
@@ -94,6 +96,7 @@ class ModelSession:
     def close(self) -> None:
         """Release the memory; a run after that fails."""
         self._session = None
+        self.claim.release()
 
     def _run(self, inputs: Arrays) -> dict[str, NDArray[Any]]:
         name, session = self.model.manifest.name, self._session

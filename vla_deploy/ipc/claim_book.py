@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.ipc.claims import Book, Claim, ask, declare, obstacles, release, settle
+from vla_deploy.ipc.claims import Book, Claim, amend, ask, declare, obstacles, release, settle
 from vla_deploy.ipc.errors import BadPayload, ClaimRefused
 from vla_deploy.ipc.shared_document import Document
 from vla_deploy.ipc.space import SharedSpace
@@ -64,6 +64,14 @@ class ClaimBook:
     def release(self, *holders: str) -> None:
         """Give back what holders have or wait for; releasing nothing is allowed."""
         self._change(lambda book, now_ns: release(book, holders, now_ns))
+
+    def amend(self, holder: str, wants: Mapping[str, int]) -> None:
+        """Correct what a holder was granted by what it really takes; others wait where it is more.
+
+        Raises:
+            ClaimRefused: there are too many claims.
+        """
+        self._change(lambda book, now_ns: amend(book, holder, wants, now_ns))
 
     def obstacles(self, wants: Mapping[str, int]) -> str:
         """Say who holds what stands in the way."""

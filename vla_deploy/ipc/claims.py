@@ -75,6 +75,14 @@ def release(book: Book, holders: Iterable[str], now_ns: int) -> Book:
     )
 
 
+def amend(book: Book, holder: str, wants: Mapping[str, int], now_ns: int) -> Book:
+    """Correct what a holder was granted by what it turned out to take, be it more than there is."""
+    granted = tuple(
+        replace(one, wants=dict(wants)) if one.holder == holder else one for one in book.granted
+    )
+    return settle(replace(book, granted=granted), now_ns)
+
+
 def settle(book: Book, now_ns: int) -> Book:
     """Forget claims that have waited too long, and grant whatever can be granted."""
     granted = list(book.granted)

@@ -64,7 +64,7 @@ class PerceptionNode:
         self._clock = context.clock
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._profile = profile
-        self._shelf = ModelShelf.of_base(context.run_dir.parent, context.clock)
+        self._shelf = ModelShelf.of_run(context.run_dir, context.clock)
         model = RobotModel(robot)
         rate_hz = profile.camera_rate_hz
         self._sensors = Sensors(robot, model, devices, context.clock, rate_hz)

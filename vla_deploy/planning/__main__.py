@@ -15,7 +15,7 @@ def build(context: NodeContext) -> PlannerNode:
     """Build the node from what the process was started with."""
     robot = load_robot(context.robot)
     profile, base = load_profile(context.profile), context.run_dir.parent
-    planner = planner_for(robot, profile, context.clock, base)
+    planner = planner_for(robot, profile, context.clock, base, run_dir=context.run_dir)
     memory = open_memory(profile.planning, base)
     return PlannerNode(context, robot, planner, beside("plan"), memory)
 

@@ -22,16 +22,25 @@ _log = logging.getLogger(__name__)
 
 
 def planner_for(
-    robot: RobotDescription, profile: Profile, clock: Clock, base: Path, model_tier: int = 0
+    robot: RobotDescription,
+    profile: Profile,
+    clock: Clock,
+    base: Path,
+    model_tier: int = 0,
+    *,
+    run_dir: Path | None = None,
 ) -> Planner:
     """Return a planner for a robot, with the models on board that a profile names.
 
-    `model_tier` is how many steps below the best; `base` is the runtime directory.
+    `model_tier` is how many steps below the best; `base` is the runtime directory, and `run_dir`
+    that of the run in which the models claim their memory, None for none.
     """
     # Its libraries take a third of a second to load, which a planner of rules can do without.
     from vla_deploy.planning.on_board import open_on_board
 
-    shelf = ModelShelf.of_base(base, clock)
+    shelf = (
+        ModelShelf.of_base(base, clock) if run_dir is None else ModelShelf.of_run(run_dir, clock)
+    )
     on_board = open_on_board(robot, profile, shelf, checked, model_tier)
     return open_planner(robot, profile.planning, clock, base, on_board.rungs, on_board.away)
 

@@ -46,7 +46,7 @@ class PlannerNode:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
         self._robot = robot
-        self._base = context.run_dir.parent
+        self._base, self._run_dir = context.run_dir.parent, context.run_dir
         self._planner = planner or Planner(context.clock)
         self._aside = aside or AtOnce()
         self._memory = memory
@@ -99,7 +99,9 @@ class PlannerNode:
 
     def prepare(self, profile: Profile, model_tier: int) -> Planner:
         """Build the planner that a profile asks for."""
-        return planner_for(self._robot, profile, self._clock, self._base, model_tier)
+        return planner_for(
+            self._robot, profile, self._clock, self._base, model_tier, run_dir=self._run_dir
+        )
 
     def commit(self, prepared: Planner) -> Planner:
         """Plan by the new planner from the next command on."""

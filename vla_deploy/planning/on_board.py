@@ -2,7 +2,6 @@
 
 import dataclasses
 import logging
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -51,7 +50,7 @@ def open_on_board(
     away: dict[str, str] = {}
     for name in dict.fromkeys((NAME, tier_name(choice, model_tier))):
         try:
-            opened += _open(robot, shelf.store.load(name), choice, check)
+            opened.append(_open(robot, shelf, shelf.store.load(name), choice, check))
         except InferenceError as error:
             away[name] = one_line(error)
             _log.warning("degraded: planning does without %s: %s", name, away[name])
@@ -59,14 +58,13 @@ def open_on_board(
 
 
 def _open(
-    robot: RobotDescription, model: Model, choice: ModelChoice, check: Check
-) -> Iterator[CommandParser | ChatRung]:
+    robot: RobotDescription, shelf: ModelShelf, model: Model, choice: ModelChoice, check: Check
+) -> CommandParser | ChatRung:
     language = model.manifest.language
     if language is not None and language.use is Use.COMMAND_PARSER:
         # So small a model is done on the CPU before a GPU has begun.
         on_cpu = dataclasses.replace(
             PLAIN_CHOICE, providers=(CPU,), threads=1, memory_arena=choice.memory_arena
         )
-        yield open_command_parser(model, on_cpu)
-    else:
-        yield open_chat_rung(model, choice, robot, check)
+        return shelf.load(model, on_cpu, lambda: open_command_parser(model, on_cpu))
+    return shelf.load(model, choice, lambda: open_chat_rung(model, choice, robot, check))

@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import dataclass
+from functools import partial
 
 from platforms import Profile
 from vla_deploy.inference.errors import InferenceError, ModelUnknown
@@ -45,8 +46,10 @@ def open_best(shelf: ModelShelf, profile: Profile, model_tier: int) -> Recognise
             model = shelf.store.load(name)
             if model.manifest.whisper is None:
                 raise ModelUnknown(f"{name} is a {model.manifest.role}, no Whisper")
-            beam = profile.speech.beam
-            recogniser = open_recogniser(model, choice, beam=beam, clock=shelf.clock)
+            opening = partial(
+                open_recogniser, model, choice, beam=profile.speech.beam, clock=shelf.clock
+            )
+            recogniser = shelf.load(model, choice, opening)
         except (InferenceError, SpeechError) as error:
             reasons.append(f"{name}: {one_line(error)}")
             continue

@@ -66,7 +66,7 @@ class SpeechNode:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._robot = robot
         self._profile = profile
-        self._shelf = shelf or ModelShelf.of_base(context.run_dir.parent, context.clock)
+        self._shelf = shelf or ModelShelf.of_run(context.run_dir, context.clock)
         self._executor = AtOnce() if executor is None else executor
         self._voice = voice
         self._listeners = tuple(listeners)

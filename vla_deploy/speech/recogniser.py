@@ -13,6 +13,7 @@ from platforms import ModelChoice
 from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, RunFailed
 from vla_deploy.inference.file_check import check_parts
 from vla_deploy.inference.manifest import Context, Whisper
+from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.providers import CPU, CUDA
 from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import Model
@@ -68,6 +69,7 @@ class Recogniser:
         self.notices: tuple[str, ...] = ()
         self.load_s = 0.0
         self.memory_mb = 0.0
+        self.claim = MemoryClaim()
         self.latency = LatencyHistogram()
         self._whisper: Any = whisper
         self._clock = clock
@@ -118,6 +120,7 @@ class Recogniser:
         if self._whisper is not None:
             self._whisper.model.unload_model()
         self._whisper = None
+        self.claim.release()
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.ipc.claims import Book, Claim, ask, declare, obstacles, release, settle
+from vla_deploy.ipc.claims import Book, Claim, amend, ask, declare, obstacles, release, settle
 from vla_deploy.ipc.errors import ClaimRefused
 
 BODY = Book(capacities={"base": 1, "head": 1, "left_arm": 1, "right_arm": 1, "ram_mb": 1000})
@@ -51,6 +51,15 @@ def test_one_that_wants_something_else_does_not_wait():
 def test_a_counted_resource_is_shared_up_to_its_capacity():
     book = filled(claim("a", ram_mb=600), claim("b", ram_mb=400), claim("c", ram_mb=1))
     assert holders(book) == ["a", "b"]
+
+
+def test_what_took_more_than_was_asked_for_makes_the_next_one_wait():
+    book = amend(filled(claim("a", ram_mb=600)), "a", {"ram_mb": 1100}, 0)
+    assert book.used("ram_mb") == 1100
+    assert ask(book, claim("b", ram_mb=1), 0).waits("b")
+    less = amend(ask(book, claim("b", ram_mb=300), 0), "a", {"ram_mb": 700}, 0)
+    assert holders(less) == ["a", "b"]
+    assert amend(less, "nobody", {"ram_mb": 5}, 0) == less
 
 
 def test_a_higher_priority_goes_first_but_takes_nothing_away():

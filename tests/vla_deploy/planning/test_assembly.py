@@ -6,8 +6,9 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from platforms import load_profile
+from vla_deploy.ipc import ClaimBook, SharedSpace
 from vla_deploy.planning.aids import Aid
-from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.assembly import open_planner, planner_for
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.robots import load_robot
 
@@ -90,3 +91,19 @@ def test_the_world_of_the_robot_names_the_places_that_a_server_may_choose(open_w
     schema = json.dumps(loopback.heard[0].body["response_format"])
     for place in set(world_of(load_robot("butler"), {}).places.values()):
         assert f'"{place}"' in schema
+
+
+def test_models_on_board_are_done_without_where_others_hold_the_memory(tmp_path):
+    clock, run_dir = MonotonicClock(), tmp_path / "base" / "run"
+    book = ClaimBook(SharedSpace(run_dir / "ipc", clock), clock)
+    book.declare({"ram_mb": 500})
+    robot, profile = load_robot("butler"), load_profile("desktop")
+    planner = planner_for(robot, profile, clock, tmp_path / "base", run_dir=run_dir)
+    assert "command_parser" in planner.rungs
+    (claim,) = book.look().granted
+    assert claim.holder.startswith("planner command_parser ")
+    planner.close()
+    book.ask("perception", {"ram_mb": 500})
+    planner = planner_for(robot, profile, clock, tmp_path / "base", run_dir=run_dir)
+    assert "command_parser" not in planner.rungs
+    assert "ram_mb is held by perception (500)" in planner.away["command_parser"]

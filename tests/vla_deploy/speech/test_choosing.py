@@ -1,14 +1,17 @@
 """The best recogniser that is there is taken, and what was left out is told."""
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from drivers.clock import MonotonicClock
 from platforms import ModelChoice, Profile, load_profile
+from vla_deploy.inference.memory_claims import RunMemory
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
+from vla_deploy.ipc import ClaimBook, SharedSpace
 from vla_deploy.speech.choosing import ears_of, open_best
 from vla_deploy.speech.errors import NoRecogniser
 
@@ -44,6 +47,25 @@ def test_a_spoiled_model_gives_way_to_the_next(shelf: ModelShelf, scripted_whisp
     recogniser = open_best(shelf, profile_with("spoiled", "tiny"), 0)
     assert recogniser.model.manifest.name == "tiny"
     assert "expected SHA-256" in recogniser.notices[0]
+
+
+def test_a_model_too_large_for_the_memory_that_is_free_gives_way_to_a_smaller_one(
+    shelf: ModelShelf, scripted_whisper: Any, tmp_path: Path
+) -> None:
+    large = scripted_whisper.model("large", "turn left")
+    (large / "padding.bin").write_bytes(bytes(30_000_000))
+    scripted_whisper.model("tiny", "turn right")
+    clock, ipc = MonotonicClock(), tmp_path / "run" / "ipc"
+    book = ClaimBook(SharedSpace(ipc, clock), clock)
+    book.declare({"ram_mb": 40})
+    book.ask("planner", {"ram_mb": 20})
+    in_run = dataclasses.replace(shelf, memory=RunMemory(ipc, clock))
+    recogniser = open_best(in_run, profile_with("large", "tiny"), 0)
+    assert recogniser.model.manifest.name == "tiny"
+    assert "needs 30 of ram_mb, but ram_mb is held by planner (20)" in recogniser.notices[0]
+    assert len(book.look().granted) == 2
+    recogniser.close()
+    assert [one.holder for one in book.look().granted] == ["planner"]
 
 
 def test_with_none_the_robot_says_why_and_goes_on(shelf: ModelShelf, scripted_whisper: Any) -> None:

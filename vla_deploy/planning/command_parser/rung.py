@@ -12,6 +12,7 @@ from typing import Final
 from platforms import ModelChoice
 from vla_deploy.inference.errors import InferenceError, ModelMismatch
 from vla_deploy.inference.manifest import Certainty, Use
+from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
@@ -69,6 +70,7 @@ class CommandParser:
         if model.language.use is not Use.COMMAND_PARSER:
             raise ModelMismatch(NAME, (f"language.use: expected {Use.COMMAND_PARSER}",))
         self.model = model
+        self.claim = MemoryClaim()
         self._known = known_words
         self._weights = model.language.certainty or UNMEASURED
 
@@ -134,6 +136,7 @@ class CommandParser:
     def close(self) -> None:
         """Release the memory."""
         self.model.close()
+        self.claim.release()
 
 
 def open_command_parser(model: Model, choice: ModelChoice) -> CommandParser:

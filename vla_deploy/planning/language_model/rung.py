@@ -7,6 +7,7 @@ from pydantic import ValidationError
 
 from platforms import ModelChoice
 from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.chat import Chat
 from vla_deploy.model_servers.deadline import Deadline
@@ -37,6 +38,7 @@ class ChatRung:
     ) -> None:
         self.name = name
         self.model = model
+        self.claim = MemoryClaim()
         self._robot = robot.name
         self._check = check
         self._answer = answer_for(sorted(set(spoken_places(robot.places).values())))
@@ -69,6 +71,7 @@ class ChatRung:
     def close(self) -> None:
         """Release the memory."""
         self.model.close()
+        self.claim.release()
 
     def _proposal(self, request: Request, told: PlanAnswer, answer: Answer) -> Proposal:
         if told.question and not told.steps:

@@ -17,6 +17,7 @@ def build_stop_words(
     context: NodeContext, profile: Profile, voice: Voice | None = None
 ) -> StopWords:
     """Return the listener; it opens the profile's model when the node starts."""
+    # It claims no memory: what hears a spoken stop is never refused for want of it.
     shelf = ModelShelf.of_base(context.run_dir.parent, context.clock)
     return StopWords(
         lambda: open_spotter(shelf, profile),

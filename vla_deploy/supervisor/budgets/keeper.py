@@ -24,13 +24,14 @@ from vla_deploy.supervisor.budgets.enforcement import Enforcer
 from vla_deploy.supervisor.budgets.judge import Finding, Findings, Measurement, judge
 from vla_deploy.supervisor.budgets.ladder import EMERGENCY, Change, LadderState, Pressure, climb
 from vla_deploy.supervisor.budgets.lines import Line, lines_of
-from vla_deploy.supervisor.budgets.measure import Measurements, Measurer
+from vla_deploy.supervisor.budgets.measure import OUTSIDE_THE_TOTAL, Measurements, Measurer
 from vla_deploy.supervisor.budgets.sampler import Feed, Snapshot
 
 TELL_PERIOD_NS: Final = NS_PER_S // 2
 STALE_AFTER_NS: Final = 5 * NS_PER_S
 KEPT_CHANGES: Final = 20
 _REASON_CHARACTERS: Final = 500
+LOADING_MODELS: Final = ("perception", "speech", "planner")
 WARNED_ONLY: Final = frozenset({"disk_free_mb"})
 """What no step of the ladder relieves."""
 _SUPERVISOR: Final = "supervisor"
@@ -211,9 +212,14 @@ class BudgetKeeper:
 
 
 def _memory_of(profile: Profile) -> dict[str, int]:
-    """Return the memory that may be claimed, as resources."""
+    """Return the memory that models may claim: what the others' budgets leave of the total."""
+    others_mb = sum(
+        budget.memory_mb
+        for name, budget in profile.budgets.items()
+        if name not in (*LOADING_MODELS, *OUTSIDE_THE_TOTAL)
+    )
     gpu_mb = profile.total.gpu_memory_mb
-    memory = {"ram_mb": int(profile.total.memory_mb)}
+    memory = {"ram_mb": int(profile.total.memory_mb - others_mb)}
     return memory if gpu_mb is None else {**memory, "gpu_memory_mb": int(gpu_mb)}
 
 

@@ -238,9 +238,10 @@ def test_a_full_disk_is_warned_of_and_slows_nobody(world, caplog):
     ]
 
 
-def test_memory_may_be_claimed_up_to_the_profiles_total(world, profile, tmp_path):
+def test_models_may_claim_what_the_other_processes_leave_of_the_total(world, profile):
     book = ClaimBook(world.space, world.clock)
-    assert book.look().capacities == {"ram_mb": int(profile.total.memory_mb)}
+    others_mb = 80 + 250 + 60 + 250 + 250 + 150
+    assert book.look().capacities == {"ram_mb": int(profile.total.memory_mb) - others_mb}
     world.profile = replace(profile, total=replace(profile.total, gpu_memory_mb=800))
     world.go(0.5)
     assert book.look().capacities["gpu_memory_mb"] == 800
