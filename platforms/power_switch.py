@@ -1,4 +1,7 @@
-"""Set a Jetson's power mode by its name, through nvpmodel, and read it back."""
+"""Set a Jetson's power mode by its name, through nvpmodel, and read it back.
+
+Only root may: where the service for that is installed, it is asked to.
+"""
 
 import re
 import subprocess
@@ -7,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from platforms.errors import ProfileError
+from platforms.power_service import SOCKET, ask_for_mode
 from platforms.probes.power_mode import CONFIGURATION, PowerModes, read_power_modes
 from platforms.tree import Missing, Tree
 
@@ -19,11 +23,12 @@ _PREFIX: Final = "MODE_"
 
 
 class PowerSwitch:
-    """Know the modes of the board below `root`; `command` sets one."""
+    """Know the modes of the board below `root`; `command` sets one where no service does."""
 
     def __init__(self, root: Path = Path("/"), command: Sequence[str] = NVPMODEL) -> None:
         self._tree = Tree(root)
         self._command = tuple(command)
+        self._service = root / SOCKET
 
     def check(self, name: str) -> None:
         """Refuse a mode that the board does not have, or that it takes a reboot to enter.
@@ -59,23 +64,33 @@ class PowerSwitch:
         wanted = _find(modes, name)
         if not name or wanted == modes.current is not None:
             return ""
+        if wanted is None:
+            return f"power mode {name}: this board has none of that name"
+        set_mode = self._ask if self._service.exists() else self._run
         try:
-            done = subprocess.run(
-                [*self._command, "-m", str(wanted)],
-                stdin=subprocess.DEVNULL,  # it asks whether to reboot
-                capture_output=True,
-                text=True,
-                timeout=_TIMEOUT_S,
-                check=False,
-            )
+            said = set_mode(wanted)
         except (OSError, subprocess.TimeoutExpired) as error:
             return f"power mode {name}: {error}"
         now = read_power_modes(self._tree)
         if now.current == wanted:
             return ""
-        words = (done.stderr or done.stdout).strip().splitlines()
-        said = f"; nvpmodel said: {words[-1]}" if words else ""
         return f"power mode {name}: it is {now.current_name} after setting it{said}"
+
+    def _ask(self, wanted: int) -> str:
+        answer = ask_for_mode(self._service, wanted, _TIMEOUT_S)
+        return f"; vla-deploy-power.service said: {answer or 'nothing'}"
+
+    def _run(self, wanted: int) -> str:
+        done = subprocess.run(
+            [*self._command, "-m", str(wanted)],
+            stdin=subprocess.DEVNULL,  # it asks whether to reboot
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT_S,
+            check=False,
+        )
+        words = (done.stderr or done.stdout).strip().splitlines()
+        return f"; nvpmodel said: {words[-1]}" if words else ""
 
     def _masks(self) -> Mapping[int, tuple[tuple[str, ...], ...]]:
         """Return what each mode says about the units that get power."""

@@ -1,6 +1,12 @@
+import socket
+import subprocess
+import threading
+from pathlib import Path
+
 import pytest
 
 from platforms import ProfileError
+from platforms.power_service import SOCKET, ask_for_mode
 from platforms.power_switch import PowerSwitch
 
 CONFIGURATION = """
@@ -18,7 +24,11 @@ TPC_POWER_GATING TPC_PG_MASK 252
 
 < PM_CONFIG DEFAULT=0 >
 """
-SETS = '#!/bin/sh\n[ "$1" = -m ] && printf "pmode:%04d" "$2" > {status}\n'
+SETS = """#!/bin/sh
+[ "$1" = -m ] && printf "pmode:%04d" "$2" > {status} && exit
+printf 'NV Power Mode: some\\n%d\\n' "$(sed 's/pmode:0*//;s/^$/0/' {status})"
+"""
+BY_ROOT = Path(__file__).parents[2] / "systemd" / "set-power-mode"
 
 
 @pytest.fixture
@@ -90,3 +100,76 @@ def test_a_mode_that_cannot_be_read_back_is_not_set(board, tmp_path):
     (tmp_path / "var/lib/nvpmodel/status").unlink()
     with pytest.raises(ProfileError, match="cannot be read back"):
         switch.check("25W")
+
+
+@pytest.fixture
+def service(tmp_path):
+    """Start what installs as vla-deploy-power.socket: each connection is a run of its script."""
+    path = tmp_path / SOCKET
+    path.parent.mkdir()
+    command = ["sh", BY_ROOT, tmp_path / "nvpmodel", tmp_path / "etc/nvpmodel.conf"]
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        listener.listen()
+
+        def serve() -> None:
+            while True:
+                line, _ = listener.accept()
+                with line:
+                    if line.recv(1, socket.MSG_PEEK) == b"":
+                        return
+                    subprocess.run(command, stdin=line, stdout=line, check=True)
+
+        server = threading.Thread(target=serve)
+        server.start()
+        yield path
+        with socket.socket(socket.AF_UNIX) as last:
+            last.connect(str(path))
+        server.join()
+
+
+def no_command(root: Path) -> PowerSwitch:
+    """Return a switch that may not run nvpmodel itself."""
+    return PowerSwitch(root, ["/nowhere/nvpmodel"])
+
+
+def test_where_the_service_is_installed_root_sets_the_mode(board, service, tmp_path):
+    board()
+    switch = no_command(tmp_path)
+    assert switch.set("25W") == ""
+    assert switch.current() == "25W"
+    assert switch.set("15W") == ""
+    assert switch.current() == "MODE_15W"
+
+
+def test_the_service_says_what_nvpmodel_said(board, service, tmp_path):
+    board("#!/bin/sh\n[ $1 = -q ] && echo 0 && exit\necho NVPM ERROR: no such clock >&2\nexit 1\n")
+    assert no_command(tmp_path).set("25W") == (
+        "power mode 25W: it is MODE_15W after setting it; vla-deploy-power.service said: "
+        "mode 0 is set; nvpmodel said: NVPM ERROR: no such clock"
+    )
+
+
+def test_the_service_sets_no_mode_that_the_board_does_not_declare(board, service):
+    board()
+    assert ask_for_mode(service, 2, 5.0).endswith("nvpmodel.conf has no mode 2")
+
+
+@pytest.mark.parametrize("asked", ["", "1; reboot", "-m 1", "../1", "11111", "1\t2", "$(id)"])
+def test_the_service_takes_nothing_but_a_number(board, tmp_path, asked):
+    board("#!/bin/sh\nexit 9\n")
+    command = ["sh", BY_ROOT, tmp_path / "nvpmodel", tmp_path / "etc/nvpmodel.conf"]
+    done = subprocess.run(command, input=asked + "\n", capture_output=True, text=True, check=True)
+    assert done.stdout == "refused: expected the number of a mode\n"
+
+
+def test_a_service_that_is_gone_is_told(board, tmp_path):
+    board()
+    (tmp_path / SOCKET).parent.mkdir()
+    with socket.socket(socket.AF_UNIX) as nobody:
+        nobody.bind(str(tmp_path / SOCKET))
+    assert "refused" in no_command(tmp_path).set("25W")
+
+
+def test_a_mode_without_a_number_is_not_asked_for(board):
+    assert board().set("40W") == "power mode 40W: this board has none of that name"

@@ -31,7 +31,8 @@ def after_install(files: Iterable[SystemFile]) -> tuple[Command, ...]:
 
 def before_uninstall(paths: Iterable[Path]) -> tuple[Command, ...]:
     """Return what stops the robot in order and keeps it from starting again."""
-    units = [path.name for path in paths if path.suffix == ".service" and path.name != SERVICE]
+    names = [path.name for path in paths if path.suffix in (".service", ".socket")]
+    units = [name for name in names if name != SERVICE and "@" not in name]
     return (("systemctl", "disable", "--now", SERVICE, *units),)
 
 

@@ -31,7 +31,14 @@ _ARGUMENT: Final = re.compile(r"[A-Za-z0-9_./-]+")
 _HIGH_OVER_BUDGET: Final = 1.5
 _MAX_OVER_BUDGET: Final = 1.75
 _CONTROL_HEADROOM: Final = 10
-_LIBEXEC: Final = ("release-guard", "wait-for-children")
+_LIBEXEC: Final = ("release-guard", "set-power-mode", "wait-for-children")
+_UNITS: Final = (
+    "vla-deploy.service",
+    "vla-deploy.slice",
+    "vla-deploy-gave-up.service",
+    "vla-deploy-power.socket",
+    "vla-deploy-power@.service",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +83,7 @@ def system_files(
     """
     values = _values(robot, profile, choice, layout)
     units = Path("/etc/systemd/system")
-    names = ["vla-deploy.service", "vla-deploy.slice", "vla-deploy-gave-up.service"]
+    names = [*_UNITS]
     if values["CAN_INTERFACE"]:
         names.append("vla-deploy-can.service")
     return (
@@ -118,6 +125,7 @@ def _values(
         "PREFIX": _argument(str(layout.prefix)),
         "USER": _argument(layout.user),
         "IP": layout.ip,
+        "NVPMODEL": layout.nvpmodel,
         "WATCHDOG_S": str(choice.watchdog_s),
         "RESTART_S": str(RESTART_S),
         "START_BURST": str(START_BURST),

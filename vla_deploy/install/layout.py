@@ -16,13 +16,14 @@ STATE_FOLDERS = (
 class Layout:
     """Name the folders; `root` is put in front of each when it is written, never into a text.
 
-    `ip` is the program that sets network links up.
+    `ip` is the program that sets network links up, `nvpmodel` the one that sets power modes.
     """
 
     root: Path = Path("/")
     prefix: Path = Path("/opt/vla-deploy")
     user: str = "vla-deploy"
     ip: str = "/sbin/ip"
+    nvpmodel: str = "/usr/sbin/nvpmodel"
 
     def on_disk(self, path: Path) -> Path:
         """Return where a file of the robot lies as seen from here."""

@@ -21,6 +21,7 @@ from vla_deploy.supervisor.health import Health
 from vla_deploy.supervisor.liveness import liveness_of
 from vla_deploy.supervisor.notify import Notifier, NotifyTarget
 from vla_deploy.supervisor.options import RunOptions
+from vla_deploy.supervisor.power_at_start import set_at_start
 from vla_deploy.supervisor.profile_choice import choice_of
 from vla_deploy.supervisor.profile_switch import ProfileSwitch
 from vla_deploy.supervisor.readiness import readiness_of
@@ -86,14 +87,15 @@ class Run:
             probe_root=options.probe_root,
         )
         self.directives = Directives(self.space)
+        power, aside = PowerSwitch(), background()
         self.switch = ProfileSwitch(
             options.profile,
             profile(),
             self.space,
             clock,
             choice_of(options.runtime_base),
-            PowerSwitch(),
-            background(),
+            power,
+            aside,
             on_change=self.budgets.adopt,
             fault=options.profile_fault,
         )
@@ -107,6 +109,7 @@ class Run:
         journal = JOURNAL_SOCKET if journal_stream(os.environ, _STDERR) else None
         self._log = RunLog(origin, run_dir / LOGS_DIR, journal, clock)
         self._log.__enter__()
+        aside.submit(set_at_start, power, profile().power_mode)
         if options.profile_fault:
             _log.error("%s; the run takes %s", options.profile_fault, options.profile)
         if self.runtime.orphans:

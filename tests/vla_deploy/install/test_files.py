@@ -11,6 +11,7 @@ import pytest
 from platforms import load_profile
 from vla_deploy.cli.main import main
 from vla_deploy.install import Credential, InstallError, Layout, ServiceChoice, system_files
+from vla_deploy.install.commands import before_uninstall
 from vla_deploy.install.errors import TemplateBroken
 from vla_deploy.install.files import filled
 from vla_deploy.robots import load_robot
@@ -24,7 +25,12 @@ from vla_deploy.supervisor.service_times import (
 ROBOT = load_robot("butler")
 PROFILE = load_profile("desktop")
 MOST_EXPOSURE = 4.0
-SERVICES = ("vla-deploy.service", "vla-deploy-can.service", "vla-deploy-gave-up.service")
+SERVICES = (
+    "vla-deploy.service",
+    "vla-deploy-can.service",
+    "vla-deploy-gave-up.service",
+    "vla-deploy-power@.service",
+)
 
 
 def texts(choice: ServiceChoice | None = None, **robot: object) -> dict[str, str]:
@@ -97,6 +103,20 @@ def test_the_slice_leaves_room_for_page_cache_above_the_profiles_budget() -> Non
     budget = round(PROFILE.total.memory_mb)
     limits = f"MemoryHigh={round(budget * 1.5)}M\nMemoryMax={round(budget * 1.75)}M\n"
     assert limits in texts()["vla-deploy.slice"]
+
+
+def test_the_robot_may_ask_for_a_power_mode_where_the_board_has_modes() -> None:
+    files = texts()
+    assert "Wants=vla-deploy-power.socket\n" in files["vla-deploy.service"]
+    assert "ConditionFileIsExecutable=/usr/sbin/nvpmodel\n" in files["vla-deploy-power.socket"]
+    assert "SocketGroup=vla-deploy\nSocketMode=0660\n" in files["vla-deploy-power.socket"]
+
+
+def test_a_template_of_units_is_not_stopped_by_its_name() -> None:
+    files = system_files(ROBOT, PROFILE, ServiceChoice(), Layout())
+    (command,) = before_uninstall(file.path for file in files)
+    assert "vla-deploy-power.socket" in command
+    assert not [word for word in command if "@" in word]
 
 
 def test_the_can_link_has_the_robots_bitrate() -> None:
