@@ -9,16 +9,15 @@ from typing import Any, Final
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.document import AnalysedObject, SceneAnalysis, Task
 from vla_deploy.analysis.geometric import GeometricAnalyser
-from vla_deploy.analysis.question import Analyser, Question, question_of
+from vla_deploy.analysis.question import Analyser, Question
 from vla_deploy.analysis.served import WITHIN_S, ServedAnalyser
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.known_world import FRESH_S, running_robot, told_scene
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.dashboard.analysing import question_about
 from vla_deploy.ipc.rgbd_image import colours
 from vla_deploy.model_servers.shelf import ServerShelf
-from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.supervisor.runtime import default_base
-from vla_deploy.world import Viewpoint
 
 EXAMPLES: Final = """  vla-deploy analyse
   vla-deploy analyse --goal "pick up the red cup and put it in the box"
@@ -61,15 +60,8 @@ def ask(session: Session, goal: str) -> Question:
     """
     scene = told_scene(session)
     frame = session.frame("rgbd", age_limit_s=FRESH_S)
-    executor = session.document("executor_status", age_limit_s=FRESH_S) or {}
-    return question_of(
-        scene,
-        now_ns=session.clock.now_ns(),
-        robot=_pose(session),
-        holding=executor.get("holding", {}),
-        image=None if frame is None else colours(frame),
-        goal=goal,
-    )
+    image = None if frame is None else colours(frame)
+    return question_about(session, scene, goal, image)
 
 
 def analyser_for(session: Session, arguments: argparse.Namespace) -> Analyser:
@@ -85,15 +77,6 @@ def analyser_for(session: Session, arguments: argparse.Namespace) -> Analyser:
     base: Path = arguments.runtime_base or default_base()
     server = ServerShelf.of_base(base, session.clock).open(arguments.server)
     return ServedAnalyser(server, measuring, arguments.within)
-
-
-def _pose(session: Session) -> Viewpoint | None:
-    """Return where the robot is; one that is lost is nowhere."""
-    sample = session.fresh("pose", age_limit_s=1.0)
-    if sample is None or PlaceState(int(sample.data["state"])) is PlaceState.LOST:
-        return None
-    x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
-    return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
 
 
 def as_text(analysis: SceneAnalysis) -> str:

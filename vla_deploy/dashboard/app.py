@@ -3,6 +3,7 @@
 from fastapi import FastAPI
 
 from vla_deploy.dashboard.access import Access, guard
+from vla_deploy.dashboard.analysing import Analyst
 from vla_deploy.dashboard.answers import add_error_answers
 from vla_deploy.dashboard.headers import SafeHeaders
 from vla_deploy.dashboard.link import RobotLink
@@ -24,6 +25,7 @@ def create_app(link: RobotLink, settings: DashboardSettings, access: Access) -> 
         redoc_url=None,
     )
     app.state.link, app.state.settings = link, settings
+    app.state.analyst = Analyst(link)
     app.state.parts = [make(app) for make in PARTS]
     guard(app, access)
     add_error_answers(app)

@@ -8,6 +8,7 @@ from vla_deploy.dashboard import page
 from vla_deploy.dashboard.access import routes as access
 from vla_deploy.dashboard.alarms import routes as alarms
 from vla_deploy.dashboard.api import (
+    analysis,
     commands,
     files,
     logs,
@@ -26,6 +27,7 @@ API_PREFIX: Final = "/api/v1"
 API_ROUTERS: Final[tuple[APIRouter, ...]] = (
     access.router,
     state.router,
+    analysis.router,
     commands.router,
     operate.router,
     profile.router,

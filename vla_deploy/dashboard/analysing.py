@@ -1,0 +1,104 @@
+"""Analyse what the running robot tells of its surroundings, by measurement: no model is asked.
+
+What it takes to judge goals, the robot's kinematics above all, is read at the first question: it
+costs memory that a dashboard which nobody asks can do without.
+"""
+
+from http import HTTPStatus
+from threading import Lock
+from typing import Any, Final
+
+from vla_deploy.analysis.document import SceneAnalysis
+from vla_deploy.analysis.question import Analyser, Image, Question, question_of
+from vla_deploy.dashboard.access.rates import Buckets
+from vla_deploy.dashboard.errors import Refused
+from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.navigation.errors import MapInvalid
+from vla_deploy.navigation.place_judge import PlaceState
+from vla_deploy.robots import load_robot
+from vla_deploy.world import SceneUnreadable, Viewpoint
+
+FRESH_S: Final = 5.0
+_POSE_AGE_S: Final = 1.0
+# One question at a time: threads that wait for their turn are those that other answers need.
+_TURN_WITHIN_S: Final = 2.0
+# A room full of things takes half a second of a core, which the robot has better use for.
+_RATE_HZ: Final = 1.0
+_BURST: Final = 5
+
+
+class Analyst:
+    """Answer questions about the scene, one at a time; for routes that run in threads."""
+
+    def __init__(self, link: RobotLink) -> None:
+        self._link = link
+        self._turn = Lock()
+        self._asked = Buckets(_RATE_HZ, _BURST, link.clock)
+        self._analyser: Analyser | None = None
+
+    def analyse(self, goal: str) -> SceneAnalysis:
+        """Return what the geometric analyser makes of the scene, and of a goal in words.
+
+        Raises:
+            Refused: nothing is seen, the robot's map cannot be used, or too many ask.
+        """
+        scene = self._link.document("scene", age_limit_s=FRESH_S)
+        if scene is None:
+            raise _unavailable("no_scene", "perception tells no scene")
+        if self._asked.take("") > 0.0:
+            raise Refused(
+                HTTPStatus.TOO_MANY_REQUESTS,
+                "too_often",
+                f"more than {_RATE_HZ:g} analysis a second is asked for",
+                "ask again in a second",
+            )
+        if not self._turn.acquire(timeout=_TURN_WITHIN_S):
+            raise _unavailable("busy", "others are asking just now", "ask again in a moment")
+        try:
+            analyser = self._analyser = self._analyser or _measuring(self._link.robot)
+            return analyser.analyse(question_about(self._link, scene, goal))
+        except SceneUnreadable as error:
+            raise _unavailable("no_scene", str(error)) from error
+        except MapInvalid as error:
+            raise _unavailable("no_map", str(error), "vla-deploy map check") from error
+        finally:
+            self._turn.release()
+
+
+def question_about(
+    link: RobotLink, scene: dict[str, Any], goal: str, image: Image | None = None
+) -> Question:
+    """Return a question about a scene, with where the robot is and what it holds now.
+
+    Raises:
+        SceneUnreadable: the document is no scene.
+    """
+    executor = link.document("executor_status", age_limit_s=FRESH_S) or {}
+    return question_of(
+        scene,
+        now_ns=link.clock.now_ns(),
+        robot=_pose(link),
+        holding=executor.get("holding", {}),
+        image=image,
+        goal=goal,
+    )
+
+
+def _pose(link: RobotLink) -> Viewpoint | None:
+    """Return where the robot is; one that is lost is nowhere."""
+    sample = link.fresh("pose", age_limit_s=_POSE_AGE_S)
+    if sample is None or PlaceState(int(sample.data["state"])) is PlaceState.LOST:
+        return None
+    x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
+    return Viewpoint(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+
+
+def _measuring(robot: str) -> Analyser:
+    from vla_deploy.analysis.abilities import Abilities  # takes pinocchio with it
+    from vla_deploy.analysis.geometric import GeometricAnalyser
+
+    return GeometricAnalyser(Abilities.of(load_robot(robot)))
+
+
+def _unavailable(code: str, what: str, try_: str = "vla-deploy status") -> Refused:
+    return Refused(HTTPStatus.SERVICE_UNAVAILABLE, code, what, try_)
