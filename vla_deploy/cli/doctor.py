@@ -16,7 +16,9 @@ from vla_deploy import doctor
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.robots import load_robot
+from vla_deploy.state_dir import models_dir_of
 from vla_deploy.supervisor.profile_choice import StartProfile, detect, start_profile
+from vla_deploy.supervisor.runtime import default_base
 
 LIVE_ROOT = Path("/")
 FIRST_LOOK_S = 0.5  # what is counted needs two looks
@@ -77,7 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
     start = _start_profile(arguments.profile, root, arguments.runtime_base)
     profile = load_profile(start.name)
     if root == LIVE_ROOT:
-        context = doctor.live_context(profile, robot, start.fault)
+        models = models_dir_of(arguments.runtime_base or default_base())
+        context = doctor.live_context(profile, robot, models, start.fault)
     else:
         context = doctor.recorded_context(root, profile, robot)
     sections = doctor.examine(context)

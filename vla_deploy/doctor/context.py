@@ -12,6 +12,7 @@ from drivers.clock import Clock, MonotonicClock
 from platforms import Profile
 from platforms.board import Board, identify
 from platforms.tree import Missing, Tree
+from vla_deploy.inference.store import ModelStore
 from vla_deploy.robots import RobotDescription
 
 COMMAND_TIMEOUT_S: Final = 10.0
@@ -51,13 +52,17 @@ class Context:
     rights: Rights
     ask: Asker
     clock: Clock
+    models: ModelStore
     profile_fault: str = ""
 
 
 def live_context(
-    profile: Profile | None, robot: RobotDescription | None, profile_fault: str = ""
+    profile: Profile | None,
+    robot: RobotDescription | None,
+    models: Path,
+    profile_fault: str = "",
 ) -> Context:
-    """Return this very computer."""
+    """Return this very computer; `models` is where a person has added some."""
     return Context(
         tree=Tree(),
         is_live=True,
@@ -67,6 +72,7 @@ def live_context(
         rights=read_rights(),
         ask=ask_command,
         clock=MonotonicClock(),
+        models=ModelStore(models),
         profile_fault=profile_fault,
     )
 
@@ -84,6 +90,7 @@ def recorded_context(
         rights=read_rights(),
         ask=_ask_nobody,
         clock=MonotonicClock(),
+        models=ModelStore(root / "var/lib/vla-deploy/models"),
     )
 
 

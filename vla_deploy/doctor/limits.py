@@ -1,22 +1,35 @@
 """Check which limits of the kernel's control groups are real here."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Final
 
-from platforms.probes import read_cgroup
+from platforms.probes import Cgroup, read_cgroup
+from platforms.probes.cgroup import MOUNT, UNIFIED
 from vla_deploy.doctor.boot import boot_option
 from vla_deploy.doctor.context import Context
 from vla_deploy.doctor.finding import Finding, ok, warn
+from vla_deploy.doctor.realtime import has_group_scheduling, wanted_priority
 
-# Controller, what it limits, and what takes its place where it is missing.
-CONTROLLERS: Mapping[str, tuple[str, str]] = {
-    "cpu": ("processor time", "nice and affinity"),
-    "memory": ("memory", "rlimits and the ladder"),
-    "cpuset": ("which processors", "affinity"),
-    "io": ("disk traffic", "nothing"),
-    "pids": ("number of processes", "rlimits"),
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Name the file that sets a limit, what it limits, and what takes its place where it is not."""
+
+    file: str
+    what: str
+    instead: str
+
+
+CONTROLLERS: Mapping[str, Limit] = {
+    "cpu": Limit("cpu.max", "processor time", "nice and affinity"),
+    "memory": Limit("memory.max", "memory", "rlimits and the ladder"),
+    "cpuset": Limit("cpuset.cpus", "which processors", "affinity"),
+    "io": Limit("io.max", "disk traffic", "nothing"),
+    "pids": Limit("pids.max", "number of processes", "rlimits"),
 }
 _SWITCH: Final = "systemd.unified_cgroup_hierarchy=1"
+_OPTIONS: Final = "zgrep CGROUP /proc/config.gz   # what this kernel was built with"
 
 
 def control_groups(context: Context) -> Iterator[Finding]:
@@ -32,10 +45,25 @@ def control_groups(context: Context) -> Iterator[Finding]:
         )
         return
     yield ok("control groups", "version 2")
-    for name, (what, instead) in CONTROLLERS.items():
-        if name in cgroup.controllers:
-            note = ", but not of CUDA memory" if name == "memory" and context.board.l4t else ""
-            yield ok(f"limit of {name}", f"real: {what}{note}")
+    for name, limit in CONTROLLERS.items():
+        objection, remedy = _objection(context, cgroup, name, limit)
+        if objection:
+            measured = f"not real, {objection}: {limit.instead} instead"
+            yield warn(f"limit of {name}", measured, remedy)
         else:
-            remedy = f"echo +{name} | sudo tee /sys/fs/cgroup/cgroup.subtree_control"
-            yield warn(f"limit of {name}", f"not real: {instead} instead", remedy)
+            note = ", but not of CUDA memory" if name == "memory" and context.board.l4t else ""
+            yield ok(f"limit of {name}", f"real: {limit.what}{note}")
+
+
+def _objection(context: Context, cgroup: Cgroup, name: str, limit: Limit) -> tuple[str, str]:
+    """Return why a limit is not real and the remedy, or nothing twice."""
+    if name not in cgroup.controllers:
+        remedy = f"echo +{name} | sudo tee /sys/fs/cgroup/cgroup.subtree_control"
+        return "not enabled here", remedy
+    if cgroup.folder in (MOUNT, UNIFIED):
+        return "we are in the root group", "sudo vla-deploy install   # the service has its own"
+    if not context.tree.exists(f"{cgroup.folder}/{limit.file}"):
+        return f"the kernel has no {limit.file}", _OPTIONS
+    if name == "cpu" and wanted_priority(context) and has_group_scheduling(context):
+        return "RT_GROUP_SCHED would refuse SCHED_FIFO", _OPTIONS
+    return "", ""

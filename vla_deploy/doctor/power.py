@@ -1,6 +1,6 @@
 """Check heat, throttling, power mode and processor clocks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from platforms.probes import open_probes, read_power_modes
@@ -118,12 +118,31 @@ def governor(context: Context) -> Iterator[Finding]:
 
 
 def isolated_processors(context: Context) -> Iterator[Finding]:
-    """Tell which processors the kernel leaves to those who ask for them."""
+    """Check that the kernel keeps others off the processors that control has for itself."""
     isolated = context.tree.text("/sys/devices/system/cpu/isolated")
     wanted = context.profile.processes["control"].affinity if context.profile else ()
-    if isolated or not wanted or not (context.profile and context.profile.realtime_priority):
-        yield ok("isolated CPUs", isolated or "none, and the profile needs none")
-    else:
-        listed = ",".join(str(cpu) for cpu in wanted)
-        remedy = boot_option(context.tree, f"isolcpus={listed}")
-        yield warn("isolated CPUs", f"none; control runs on {listed} beside others", remedy)
+    if not wanted or not (context.profile and context.profile.realtime_priority):
+        yield ok("isolated CPUs", f"{isolated or 'none'}, and the profile needs none")
+        return
+    shared = sorted(set(wanted) - _processors(isolated))
+    if not shared:
+        yield ok("isolated CPUs", isolated)
+        return
+    remedy = boot_option(context.tree, f"isolcpus={_listed(wanted)}")
+    measured = f"{isolated or 'none'}; control runs on {_listed(shared)} beside others"
+    yield warn("isolated CPUs", measured, remedy)
+
+
+def _processors(listed: str) -> set[int]:
+    """Read a list of the kernel's, such as `2-3,5`."""
+    found: set[int] = set()
+    for part in filter(None, listed.split(",")):
+        first, _, last = part.partition("-")
+        if not first.isdecimal() or not (last or first).isdecimal():
+            raise Missing(f"/sys/devices/system/cpu/isolated says {listed[:40]!r}")
+        found.update(range(int(first), int(last or first) + 1))
+    return found
+
+
+def _listed(processors: Iterable[int]) -> str:
+    return ",".join(map(str, processors))

@@ -10,7 +10,7 @@ from typing import Final
 from drivers.clock import NS_PER_S
 from platforms.tree import Missing
 from vla_deploy.doctor.context import UNLIMITED, Context
-from vla_deploy.doctor.finding import Finding, fail, ok, trouble, warn
+from vla_deploy.doctor.finding import Finding, fail, missing, ok, trouble, warn
 
 LIMITS_FILE: Final = "/etc/security/limits.d/90-vla-deploy.conf"
 MEMORY_LOCK_BYTES: Final = 512 << 20
@@ -19,9 +19,11 @@ LATE_RATIO: Final = 0.2  # of the period: a tick this late counts as late
 FAIR_SERVER: Final = "/sys/kernel/debug/sched/fair_server"
 _QUANTILE: Final = 0.99
 _SWITCH: Final = "CONFIG_RT_GROUP_SCHED=y"
+_ANY_OPTION: Final = "CONFIG_"
 
 
-def _wanted(context: Context) -> int:
+def wanted_priority(context: Context) -> int:
+    """Return control's SCHED_FIFO priority in the profile, 0 for none."""
     return context.profile.realtime_priority if context.profile else 0
 
 
@@ -59,7 +61,7 @@ def fifo(context: Context) -> Iterator[Finding]:
 
 def serial_data(context: Context) -> Iterator[Finding]:
     """Check that the kernel's workers which carry serial data may go before ordinary processes."""
-    if not _wanted(context):
+    if not wanted_priority(context):
         yield ok("serial data", "as any ordinary process, as the profile has no real-time priority")
     elif context.rights.may_raise_others:
         yield ok("serial data", "its kernel workers may go before ordinary processes")
@@ -91,7 +93,7 @@ def fair_server(context: Context) -> Iterator[Finding]:
     cores = context.tree.names(FAIR_SERVER) or ("cpu0",)
     runtimes_ns = [context.tree.number(f"{FAIR_SERVER}/{core}/runtime") for core in cores]
     longest_ms = max(runtimes_ns) / 1e6
-    if longest_ms <= 0.0 or not _wanted(context):
+    if longest_ms <= 0.0 or not wanted_priority(context):
         yield ok("fair server", f"{longest_ms:.0f} ms")
         return
     measured = f"ordinary processes may take a core from control for {longest_ms:.0f} ms"
@@ -100,8 +102,12 @@ def fair_server(context: Context) -> Iterator[Finding]:
 
 def group_scheduling(context: Context) -> Iterator[Finding]:
     """Check for RT_GROUP_SCHED, under which SCHED_FIFO fails below the root control group."""
-    if not _has_group_scheduling(context):
-        yield ok("RT_GROUP_SCHED", "off, or unknown to this kernel")
+    is_on = has_group_scheduling(context)
+    if is_on is None:
+        why = "no /proc/config.gz or /boot/config-*: the kernel does not tell how it was built"
+        yield missing("RT_GROUP_SCHED", why)
+    elif not is_on:
+        yield ok("RT_GROUP_SCHED", "off")
     elif context.rights.fifo_refusal:
         yield warn(
             "RT_GROUP_SCHED",
@@ -112,9 +118,12 @@ def group_scheduling(context: Context) -> Iterator[Finding]:
         yield ok("RT_GROUP_SCHED", "on, but SCHED_FIFO is granted here")
 
 
-def _has_group_scheduling(context: Context) -> bool:
-    old_groups = context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us")
-    return old_groups or _SWITCH in _kernel_options(context)
+def has_group_scheduling(context: Context) -> bool | None:
+    """Tell whether the kernel has RT_GROUP_SCHED; None where it does not tell."""
+    if context.tree.exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us"):
+        return True
+    options = _kernel_options(context)
+    return _SWITCH in options if _ANY_OPTION in options else None
 
 
 def _kernel_options(context: Context) -> str:
@@ -152,7 +161,7 @@ def memory_lock(context: Context) -> Iterator[Finding]:
 def wake_up(context: Context) -> Iterator[Finding]:
     """Measure for a second how late this computer wakes a process at the control rate."""
     rate_hz = context.profile.control_rate_hz if context.profile else 250.0
-    priority = _wanted(context)
+    priority = wanted_priority(context)
     with _scheduled(priority) as how:
         late_ns = _lateness_ns(context, round(NS_PER_S / rate_hz))
     p99_ms = late_ns[int(_QUANTILE * len(late_ns))] / 1e6

@@ -11,10 +11,12 @@ from typing import Final
 from platforms.tree import Missing
 from vla_deploy.doctor.context import Context
 from vla_deploy.doctor.finding import Finding, fail, missing, ok, warn
+from vla_deploy.inference.errors import InferenceError, ModelUnknown
+from vla_deploy.inference.file_check import check_parts, checked_file
+from vla_deploy.inference.store import ModelStore
 
 PROJECT: Final = "vla-deploy"
 EGL_SCRIPT: Final = Path(__file__).with_name("egl.py")
-MODELS: Final = Path(__file__).parent.parent / "models"
 OLDEST_PYTHON: Final = (3, 11)
 NEWEST_PYTHON: Final = (3, 13)
 GL_PACKAGES: Final = "sudo apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
@@ -74,17 +76,30 @@ def _installed(name: str) -> bool:
 
 
 def models(context: Context) -> Iterator[Finding]:
-    """Check that the models which the profile names are there."""
+    """Check that the models which the profile names are there, and whole."""
     wanted = context.profile.models if context.profile else {}
     if not wanted:
         yield ok("models", "the profile names none")
     for role, choice in wanted.items():
-        absent = [tier for tier in choice.tiers if not (MODELS / tier).is_dir()]
-        if absent:
-            remedy = f"ls {MODELS}   # expected {', '.join(absent)}"
-            yield warn(role, f"without the models {', '.join(absent)}", remedy)
+        faults = [fault for tier in choice.tiers if (fault := _fault_of(context.models, tier))]
+        if faults:
+            yield warn(role, "; ".join(faults), "vla-deploy models list")
         else:
             yield ok(role, ", ".join(choice.tiers))
+
+
+def _fault_of(store: ModelStore, name: str) -> str:
+    """Read a model whole; return what keeps it from being used."""
+    try:
+        model = store.load(name)
+        for variant in model.manifest.files:
+            checked_file(model, variant)
+        check_parts(model)
+    except ModelUnknown:
+        return f"no model {name}"
+    except InferenceError as error:
+        return str(error)
+    return ""
 
 
 def open_gl(context: Context) -> Iterator[Finding]:

@@ -1,5 +1,6 @@
 """List every check of the doctor, and carry them out."""
 
+import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -18,8 +19,9 @@ from vla_deploy.doctor import (
     storage,
 )
 from vla_deploy.doctor.context import Context
-from vla_deploy.doctor.finding import Finding, missing
+from vla_deploy.doctor.finding import Finding, missing, warn
 
+_log = logging.getLogger(__name__)
 Examination = Callable[[Context], Iterator[Finding]]
 
 
@@ -98,4 +100,8 @@ def _findings(context: Context, check: Check) -> list[Finding]:
         findings.extend(check.run(context))
     except (Missing, OSError) as error:
         findings.append(missing(check.name, str(error)))
+    except Exception as error:  # a check that breaks must not take the others with it
+        _log.exception("the check %r broke", check.name)
+        measured = f"the check itself broke: {type(error).__name__}: {error}"
+        findings.append(warn(check.name, measured, "vla-deploy doctor --json   # and report it"))
     return findings

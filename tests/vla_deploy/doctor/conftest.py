@@ -10,6 +10,7 @@ from platforms.board import identify
 from platforms.tree import Missing, Tree
 from vla_deploy.doctor import Context, Finding
 from vla_deploy.doctor.context import UNLIMITED, Rights
+from vla_deploy.inference.store import ModelStore
 from vla_deploy.robots import load_robot
 
 ALL_RIGHTS = Rights(
@@ -97,6 +98,7 @@ class Computer:
             rights=ALL_RIGHTS,
             ask=self.ask,
             clock=LateClock(),
+            models=ModelStore(self.root / "added", self.root / "embedded"),
         )
 
 

@@ -105,6 +105,9 @@ def test_every_governor_counts(computer, found, level) -> None:
         ("\n", "desktop", Level.OK),
         ("\n", "robot", Level.WARN),
         ("5\n", "robot", Level.OK),
+        ("2-3,5-7\n", "robot", Level.OK),
+        ("2-4\n", "robot", Level.WARN),
+        ("3\n", "desktop", Level.OK),
     ],
 )
 def test_isolated_processors_matter_where_control_has_its_own(

@@ -2,7 +2,7 @@ import json
 import random
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -22,9 +22,11 @@ from vla_deploy.doctor import (
     examine,
     recorded_context,
     succeeded,
+    table,
 )
 from vla_deploy.doctor.context import ask_command
 from vla_deploy.doctor.software import EGL_SCRIPT
+from vla_deploy.doctor.table import Check
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.profile_choice import choice_of
 
@@ -88,6 +90,21 @@ def test_files_that_are_folders_or_gone_are_examined(board_tree: BoardTree, seed
         if trouble == 2:
             path.mkdir()
     assert all_findings(examined(root))
+
+
+def test_a_check_that_breaks_does_not_end_the_examination(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: object) -> Iterator[Finding]:
+        raise ZeroDivisionError("no such number")
+        yield
+
+    checks = (Check("Power", "fan", broken), *CHECKS)
+    monkeypatch.setattr(table, "CHECKS", checks)
+    first, *others = all_findings(examined(tmp_path))
+    assert (first.name, first.level) == ("fan", Level.WARN)
+    assert first.measured == "the check itself broke: ZeroDivisionError: no such number"
+    assert len(others) >= len(CHECKS) - 2
 
 
 def sections_of(*levels: Level) -> tuple[Section, ...]:

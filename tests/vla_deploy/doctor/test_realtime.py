@@ -117,7 +117,7 @@ def test_group_scheduling_is_found_wherever_the_kernel_tells_it(
 ) -> None:
     computer.write("/proc/sys/kernel/osrelease", "5.15.148-tegra\n")
     (before,) = checks.group_scheduling(stripped(computer.context()))
-    assert before.level is Level.OK
+    assert before.level is Level.MISSING
     computer.write(path).write_bytes(content)
     (finding,) = checks.group_scheduling(stripped(computer.context()))
     assert finding.level is Level.WARN
@@ -128,7 +128,14 @@ def test_group_scheduling_is_found_wherever_the_kernel_tells_it(
 def test_a_damaged_kernel_configuration_harms_nothing(computer) -> None:
     computer.write("/proc/config.gz").write_bytes(b"\x1f\x8b garbage")
     (finding,) = checks.group_scheduling(computer.context())
-    assert finding.level is Level.OK
+    assert finding.level is Level.MISSING
+
+
+def test_group_scheduling_is_off_only_where_the_kernel_says_so(computer) -> None:
+    options = gzip.compress(b"CONFIG_SMP=y\n# CONFIG_RT_GROUP_SCHED is not set\n", mtime=0)
+    computer.write("/proc/config.gz").write_bytes(options)
+    (finding,) = checks.group_scheduling(computer.context())
+    assert (finding.level, finding.measured) == (Level.OK, "off")
 
 
 @pytest.mark.parametrize(

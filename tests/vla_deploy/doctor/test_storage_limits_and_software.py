@@ -1,9 +1,12 @@
+import gzip
+import shutil
 import sys
 from collections import namedtuple
 
 import pytest
 
 from vla_deploy.doctor import Level, limits, software, storage
+from vla_deploy.inference.store import EMBEDDED
 
 Room = namedtuple("Room", "f_bavail f_frsize")
 CGROUP = "/sys/fs/cgroup/cgroup.controllers"
@@ -46,20 +49,59 @@ def test_swap_on_a_disk_that_is_used_is_told(computer, total, free, swaps, level
     assert words in finding.measured
 
 
-def test_each_controller_is_told_real_or_not(computer) -> None:
-    computer.write("/proc/self/cgroup", "0::/\n")
-    computer.write(CGROUP, "memory pids\n")
-    found = {one.name: one for one in limits.control_groups(computer.context())}
-    assert found["limit of memory"].level is Level.OK
-    assert found["limit of cpu"].level is Level.WARN
-    assert "nice and affinity instead" in found["limit of cpu"].measured
-    assert found["limit of cpu"].remedy.startswith("echo +cpu")
+@pytest.fixture
+def groups(computer):
+    """Put us into a group of our own that has two controllers."""
+    computer.write("/proc/self/cgroup", "0::/robot\n")
+    computer.write(CGROUP, "cpu memory pids\n")
+    folder = "/sys/fs/cgroup/robot"
+    computer.write(f"{folder}/cgroup.controllers", "cpu memory\n")
+    for name in ("cpu.max", "memory.max"):
+        computer.write(f"{folder}/{name}", "max\n")
+    return computer
+
+
+def limit_of(computer, name, profile="desktop"):
+    findings = limits.control_groups(computer.context(profile))
+    return next(one for one in findings if one.name == f"limit of {name}")
+
+
+def test_each_controller_is_told_real_or_not(groups) -> None:
+    assert limit_of(groups, "memory").level is Level.OK
+    assert limit_of(groups, "cpu").level is Level.OK
+    pids = limit_of(groups, "pids")
+    assert pids.level is Level.WARN
+    assert pids.measured == "not real, not enabled here: rlimits instead"
+    assert pids.remedy.startswith("echo +pids")
+
+
+def test_nothing_is_limited_in_the_root_group(groups) -> None:
+    groups.write("/proc/self/cgroup", "0::/\n")
+    memory = limit_of(groups, "memory")
+    assert memory.level is Level.WARN
+    assert "we are in the root group" in memory.measured
+    assert memory.remedy.startswith("sudo vla-deploy install")
+
+
+def test_a_controller_without_its_file_limits_nothing(groups) -> None:
+    (groups.root / "sys/fs/cgroup/robot/cpu.max").unlink()
+    cpu = limit_of(groups, "cpu")
+    assert (cpu.level, limit_of(groups, "memory").level) == (Level.WARN, Level.OK)
+    assert cpu.measured == "not real, the kernel has no cpu.max: nice and affinity instead"
+
+
+def test_processor_time_is_not_limited_where_that_would_cost_control_its_priority(groups) -> None:
+    options = gzip.compress(b"CONFIG_RT_GROUP_SCHED=y\n", mtime=0)
+    groups.write("/proc/config.gz").write_bytes(options)
+    cpu = limit_of(groups, "cpu", "robot")
+    assert cpu.level is Level.WARN
+    assert "RT_GROUP_SCHED would refuse SCHED_FIFO" in cpu.measured
+    assert limit_of(groups, "memory", "robot").level is Level.OK
 
 
 def test_a_jetson_is_told_that_cuda_memory_is_not_counted(board_tree, computer) -> None:
     computer.root = board_tree("orin_nano_8gb_super")
-    found = {one.name: one for one in limits.control_groups(computer.context())}
-    assert found["limit of memory"].measured == "real: memory, but not of CUDA memory"
+    assert limit_of(computer, "memory").measured == "real: memory, but not of CUDA memory"
 
 
 @pytest.mark.parametrize("boot", ["/boot/extlinux/extlinux.conf", "/etc/default/grub"])
@@ -103,14 +145,38 @@ def test_a_package_that_is_not_there_fails_with_the_line_that_installs_it(
     assert (finding.level, finding.remedy) == (Level.FAIL, "pip install no-such-package-of-ours")
 
 
-def test_models_that_are_not_there_are_named(computer, monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr(software, "MODELS", tmp_path)
-    for tier in ("medium", "small"):
-        (tmp_path / tier).mkdir()
+def put_model(folder, name, *, is_whole=True):
+    """Copy a model that comes with the software into a folder, under another name."""
+    shutil.copytree(EMBEDDED / "stop_words", folder / name)
+    manifest = folder / name / "model.toml"
+    manifest.write_text(manifest.read_text().replace("stop_words", name, 1))
+    if not is_whole:
+        (folder / name / "stop_words.onnx").write_bytes(b"half")
+
+
+def test_models_that_are_not_there_are_named(computer) -> None:
+    put_model(computer.root / "embedded", "medium")
+    put_model(computer.root / "added", "small")
     found = {one.name: one for one in software.models(computer.context("robot"))}
-    assert found["detector"].level is Level.OK
-    assert found["planner"].level is Level.WARN
-    assert "planner_1b" in found["planner"].measured
+    assert (found["detector"].level, found["detector"].measured) == (Level.OK, "medium, small")
+    assert (found["planner"].level, found["planner"].measured) == (
+        Level.WARN,
+        "no model planner_1b",
+    )
+
+
+def test_a_model_that_was_cut_off_is_told(computer) -> None:
+    put_model(computer.root / "embedded", "medium")
+    put_model(computer.root / "added", "small", is_whole=False)
+    found = {one.name: one for one in software.models(computer.context("robot"))}
+    assert found["detector"].level is Level.WARN
+    assert "expected SHA-256" in found["detector"].measured
+
+
+def test_a_folder_without_a_manifest_is_no_model(computer) -> None:
+    (computer.root / "embedded/medium").mkdir(parents=True)
+    found = {one.name: one for one in software.models(computer.context("robot"))}
+    assert found["detector"].measured == "no model medium; no model small"
 
 
 @pytest.mark.parametrize(
