@@ -30,7 +30,8 @@ from vla_deploy.install.commands import (
     before_uninstall,
     run_command,
 )
-from vla_deploy.install.disk import apply_changes, read_files
+from vla_deploy.install.disk import apply_changes, read_files, remove_if_empty
+from vla_deploy.install.layout import DEFAULT_PREFIX
 from vla_deploy.install.manifest import afterwards, during, read_manifest, write_manifest
 from vla_deploy.robots import load_robot
 from vla_deploy.supervisor.profile_choice import detect
@@ -76,7 +77,7 @@ def register(commands: Any) -> None:
 def add_layout_arguments(command: argparse.ArgumentParser) -> None:
     """Add what says where things lie and how to report."""
     command.add_argument("--root", type=Path, default=Path("/"), help="a folder to install into")
-    command.add_argument("--prefix", type=Path, default=Path("/opt/vla-deploy"), help="of releases")
+    command.add_argument("--prefix", type=Path, default=DEFAULT_PREFIX, help="of releases")
     command.add_argument(
         "--dry-run", action="store_true", help="say what would be done, do nothing"
     )
@@ -126,6 +127,8 @@ def run_install(arguments: argparse.Namespace) -> int:
 def run_uninstall(arguments: argparse.Namespace) -> int:
     """Remove what install wrote and nobody has edited since."""
     layout = layout_of(arguments)
+    if arguments.purge:
+        _refuse_strange_prefix(layout)
     known = read_manifest(layout)
     changes = uninstall_changes(known, read_files(layout, known))
     before = before_uninstall(known) if known and layout.is_this_computer else ()
@@ -137,7 +140,23 @@ def run_uninstall(arguments: argparse.Namespace) -> int:
         apply_changes(layout, changes)
         write_manifest(layout, {})
         _run(after)
+        remove_if_empty(layout.on_disk(layout.prefix))
     return 0
+
+
+def _refuse_strange_prefix(layout: Layout) -> None:
+    """Purge no folder that a mistyped prefix may name.
+
+    Raises:
+        UsageError: nothing of ours is there.
+    """
+    prefix = layout.on_disk(layout.prefix)
+    is_gone = layout.prefix == DEFAULT_PREFIX and not prefix.exists()
+    if not layout.is_installation and not is_gone:
+        raise UsageError(
+            f"--prefix {layout.prefix}: expected an installation, found neither "
+            f"{prefix / 'manifest.json'} nor a release; nothing was removed"
+        )
 
 
 def _credential(text: str) -> Credential:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from vla_deploy.install.errors import CommandFailed
 from vla_deploy.install.files import SystemFile
-from vla_deploy.install.layout import SERVICE, STATE_FOLDERS, Layout
+from vla_deploy.install.layout import RELEASE_FILES, SERVICE, STATE_FOLDERS, Layout
 
 Command = tuple[str, ...]
 _TIMEOUT_S = 120.0
@@ -37,11 +37,15 @@ def before_uninstall(paths: Iterable[Path]) -> tuple[Command, ...]:
 
 
 def after_uninstall(layout: Layout, *, purge: bool) -> tuple[Command, ...]:
-    """Return what makes the system forget; with `purge` also state, releases and user."""
+    """Return what makes the system forget; with `purge` also state, releases and user.
+
+    Of the prefix only what is known to be ours goes: others may keep files there.
+    """
     if not purge:
         return _RELOAD
-    folders = [str(layout.on_disk(folder)) for folder in (*STATE_FOLDERS, layout.prefix)]
-    remove: Command = ("rm", "-rf", "--one-file-system", "--", *folders)
+    ours = (*STATE_FOLDERS, *(layout.prefix / name for name in RELEASE_FILES))
+    paths = [str(layout.on_disk(path)) for path in ours]
+    remove: Command = ("rm", "-rf", "--one-file-system", "--", *paths)
     return (*_RELOAD, remove, ("userdel", layout.user)) if layout.is_this_computer else (remove,)
 
 

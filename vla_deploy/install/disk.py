@@ -61,6 +61,12 @@ def sync_folder(folder: Path) -> None:
         os.close(fd)
 
 
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder that nothing is left in."""
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
 def _remove_empty_parents(folder: Path, prefix: Path) -> None:
     """Remove folders of our own that nothing is left in; those of the system stay."""
     while folder.is_relative_to(prefix) and not any(folder.iterdir()):

@@ -10,6 +10,9 @@ STATE_FOLDERS = (
     Path("/var/log/vla-deploy"),
     Path("/etc/vla-deploy"),
 )
+# What the releases leave in the prefix, beside the files that the manifest lists.
+RELEASE_FILES = ("releases", "current", "previous", "trial", "trial-started", "last-rollback")
+DEFAULT_PREFIX = Path("/opt/vla-deploy")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +23,7 @@ class Layout:
     """
 
     root: Path = Path("/")
-    prefix: Path = Path("/opt/vla-deploy")
+    prefix: Path = DEFAULT_PREFIX
     user: str = "vla-deploy"
     ip: str = "/sbin/ip"
     nvpmodel: str = "/usr/sbin/nvpmodel"
@@ -38,3 +41,9 @@ class Layout:
     def manifest(self) -> Path:
         """Return the file that says what was installed."""
         return self.prefix / "manifest.json"
+
+    @property
+    def is_installation(self) -> bool:
+        """Tell whether the prefix holds what `install` or a release has put there."""
+        releases = self.on_disk(self.prefix / "releases")
+        return self.on_disk(self.manifest).is_file() or any(releases.glob("*/bin/vla-deploy"))

@@ -127,6 +127,49 @@ def test_purge_takes_state_and_releases_too(
     assert not (tmp_path / "opt/vla-deploy").exists()
 
 
+@pytest.mark.parametrize("prefix", ["/home/me", "/nowhere"])
+def test_purge_refuses_a_prefix_that_is_no_installation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], prefix: str
+) -> None:
+    run(capsys, "install", "--root", str(tmp_path))
+    mine = tmp_path / "home/me/releases/notes"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("keep me")
+    before = tree(tmp_path)
+    command = ["uninstall", "--purge", "--root", str(tmp_path), "--prefix", prefix]
+    assert main([*command, "--dry-run"]) == main(command) == 2
+    assert f"--prefix {prefix}: expected an installation" in capsys.readouterr().err
+    assert tree(tmp_path) == before
+
+
+def test_purge_takes_of_a_shared_prefix_only_what_is_ours(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    layout = ("--root", str(tmp_path), "--prefix", "/opt")
+    release, mine = tmp_path / "opt/releases/1/bin/vla-deploy", tmp_path / "opt/other/bin/tool"
+    for file in (release, mine):
+        file.parent.mkdir(parents=True)
+        file.write_text("x")
+    (tmp_path / "opt/current").symlink_to("releases/1")
+    run(capsys, "install", *layout)
+    run(capsys, "uninstall", *layout, "--purge")
+    assert list(tree(tmp_path)) == [str(mine)]
+    assert sorted(path.name for path in (tmp_path / "opt").iterdir()) == ["other"]
+
+
+def test_what_uninstall_left_may_be_purged_later(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    release = tmp_path / "opt/vla-deploy/releases/1/bin/vla-deploy"
+    release.parent.mkdir(parents=True)
+    release.write_text("x")
+    run(capsys, "install", "--root", str(tmp_path))
+    run(capsys, "uninstall", "--root", str(tmp_path))
+    run(capsys, "uninstall", "--root", str(tmp_path), "--purge")
+    assert tree(tmp_path) == {}
+    assert not (tmp_path / "opt/vla-deploy").exists()
+
+
 def test_an_edited_file_outlives_uninstall_and_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
