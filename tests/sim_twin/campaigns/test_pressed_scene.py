@@ -1,5 +1,6 @@
 """What the campaign lays out must be what the robot's own probes and profiles read."""
 
+from functools import partial
 from pathlib import Path
 
 from drivers.clock import MonotonicClock
@@ -34,7 +35,7 @@ def test_heat_and_brown_outs_reach_the_probes(tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
     scene.disk.mkdir()
     probes = open_probes(scene.board, disk_folders=[scene.disk])
-    emergencies = Emergencies(critical_trips_c(scene.board))
+    emergencies = Emergencies(partial(critical_trips_c, scene.board))
     try:
         readings = probes.read()
         assert readings["temperature_c"].value == 45.0

@@ -1,6 +1,7 @@
 """Put the keeper of one run together."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from drivers.clock import Clock
@@ -35,7 +36,7 @@ def open_keeper(
         space,
         clock,
         BackgroundSampler(probes, clock),
-        Emergencies(critical_trips_c(probe_root)),
+        Emergencies(partial(critical_trips_c, probe_root)),
         Enforcer(CgroupTree(realtime=profile().realtime_priority > 0)),
         ClaimBook(space, clock),
     )

@@ -69,7 +69,7 @@ class World:
             self.space,
             self.clock,
             self.feed,
-            Emergencies({"tj-thermal": 104.5}),
+            Emergencies(lambda: {"tj-thermal": 104.5}),
             Enforcer(CgroupTree(directory)),
             ClaimBook(self.space, self.clock),
         )
