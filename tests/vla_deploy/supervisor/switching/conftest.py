@@ -189,7 +189,9 @@ class Bench:
         )
         self.nodes[name].start()
 
-    def supervise(self, profile: str, fault: str = "") -> Supervision:
+    def supervise(
+        self, profile: str, fault: str = "", aside: Executor | None = None
+    ) -> Supervision:
         switch = ProfileSwitch(
             profile,
             load_profile(profile),
@@ -197,7 +199,7 @@ class Bench:
             self.clock,
             self.choice,
             PowerSwitch(self.root, (str(self.root / "nvpmodel"),)),
-            AtOnce(),
+            aside or AtOnce(),
             on_change=lambda adopted: self.adopted.append((adopted.name, self.names())),
             fault=fault,
         )

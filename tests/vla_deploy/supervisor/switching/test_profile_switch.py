@@ -225,6 +225,17 @@ def test_a_restarted_process_that_dies_takes_all_of_them_back(bench, profiles, p
     assert bench.choice.load() is None
 
 
+def test_a_process_that_dies_before_it_is_to_be_restarted_ends_the_change(bench, profiles):
+    bench.supervision = bench.supervise(profiles["swift"], aside=Never())
+    bench.workers["planner"].refusal = NeedsRestart("other threads")
+    bench.desk.request(profiles["calm"], allow_restart=True)
+    bench.reach("set power mode")
+    bench.supervision.members["planner"] = Member(pid=2, started_under=profiles["swift"])
+    assert bench.run_until(lambda: bench.desk.last, 5.0)
+    assert bench.desk.last["reason"].startswith("planner ended meanwhile")
+    keeps_swift(bench)
+
+
 def test_a_restarted_process_that_hangs_is_not_kept(bench, profiles):
     bench.desk.request(profiles["calm"], allow_restart=True)
     reach_with_restart(bench, "planner", "watch")
