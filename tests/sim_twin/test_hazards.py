@@ -3,8 +3,11 @@
 import math
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 
+from drivers.clock import NS_PER_S
 from sim_twin.hazards import MOST_TILT_RAD, HazardWatch
 from sim_twin.stack import LockstepControl
 from sim_twin.twin import Twin
@@ -56,11 +59,27 @@ def test_a_cup_that_is_let_go_a_centimetre_above_the_floor_is_none(twin: Twin) -
 
 def test_a_joint_too_fast_and_one_beyond_its_stop_are_seen(twin: Twin) -> None:
     watch, model, data = twin.hazards, twin.engine.model, twin.engine.data
-    fast = 2.0 * float(ROBOT.velocity_max[ROBOT.joint_names.index("left_elbow")])
+    fast = 1.15 * float(ROBOT.velocity_max[ROBOT.joint_names.index("left_elbow")])
     data.qvel[model.joint("left_elbow").dofadr[0]] = fast
-    data.qpos[model.joint("head_pan").qposadr[0]] = model.joint("head_pan").range[1] + 0.2
+    data.qpos[model.joint("head_pan").qposadr[0]] = model.joint("head_pan").range[1] + 0.05
     watch.step(twin.now_ns)
     assert {("joint speed", "left_elbow"), ("joint range", "head_pan")} <= kinds(watch)
+
+
+def test_a_hand_behind_its_workspace_is_seen(twin: Twin) -> None:
+    watch, model, data = twin.hazards, twin.engine.model, twin.engine.data
+    box = ROBOT.protection.workspaces["left"]
+    turn = model.joint("left_shoulder_yaw").qposadr[0]
+    data.qpos[model.joint("left_elbow").qposadr[0]] = 0.0
+    data.qpos[model.joint("left_shoulder_pitch").qposadr[0]] = -1.0
+    angles = np.linspace(*model.joint("left_shoulder_yaw").range, 60)
+    for look, angle in enumerate(angles, start=1):
+        data.qpos[turn] = angle
+        mujoco.mj_forward(model, data)
+        watch.step(look * NS_PER_S)
+    (hazard,) = (found for found in watch.found if found.kind == "workspace")
+    assert hazard.part == "left"
+    assert hazard.worst < float(np.subtract(box.max_m, box.min_m).max())
 
 
 @pytest.mark.parametrize(
