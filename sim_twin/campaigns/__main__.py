@@ -9,6 +9,7 @@ from typing import Final
 
 from sim_twin.campaigns import fault_matrix, kills, pressure, soak, switches
 from sim_twin.campaigns.report import Report
+from sim_twin.campaigns.selection import NothingChosen
 
 CAMPAIGNS: Final[Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], Report]]] = {
     "faults": fault_matrix.run,
@@ -24,10 +25,14 @@ _EXAMPLES: Final = """examples:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run it; exit code 0 only where no case failed."""
+    """Run it; exit code 0 only where no case failed, 2 where `--only` chooses none."""
     options = _parser().parse_args(argv)
     progress = _to_stderr if options.json else _to_stdout
-    report = CAMPAIGNS[options.campaign](options, progress)
+    try:
+        report = CAMPAIGNS[options.campaign](options, progress)
+    except NothingChosen as error:
+        _to_stderr(f"validate {options.campaign}: {error}")
+        return 2
     if options.junit is not None:
         report.write_junit(options.junit)
     _to_stdout(json.dumps(report.document(), indent=2) if options.json else report.text())

@@ -14,6 +14,7 @@ import numpy as np
 
 from sim_twin.campaigns.phases import PAYLOAD, NotSet, Phase, Stage
 from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.separation import Separation
 from sim_twin.errors import FaultRefused
 from sim_twin.faults import Component, Fault
@@ -211,10 +212,10 @@ def _known(value: float) -> float | None:
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Play every case whose name contains `options.only`, several at a time."""
     robot = load_robot("butler")
-    chosen = [cell for cell in cells(robot) if options.only in cell.name]
+    mine = chosen(cells(robot), options.only, lambda cell: cell.name)
     with multiprocessing.get_context("spawn").Pool(options.workers, maxtasksperchild=20) as pool:
         cases = []
-        for case in pool.imap(partial(play, seed=options.seed), chosen):
+        for case in pool.imap(partial(play, seed=options.seed), mine):
             tell(case.row)
             cases.append(case)
     return Report(campaign="faults", cases=tuple(cases), summary=_summary(cases))

@@ -10,15 +10,17 @@ import random
 import signal
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from sim_twin.campaigns.kill_failures import is_void, late, late_ready, wrong_state
 from sim_twin.campaigns.machine import Machine
 from sim_twin.campaigns.report import Case, Report, told
 from sim_twin.campaigns.robot_service import NotReady, RobotService
-from sim_twin.stillness import HELD_UP_S, StillnessWatch
+from sim_twin.campaigns.selection import chosen
+from sim_twin.stillness import StillnessWatch
 from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
 from vla_deploy.supervisor.table import RestartPolicy
 
@@ -152,10 +154,14 @@ class KillCampaign:
         rest_s, ready_s = self._follow(began_ns, rule, injection.process, pid)
         self._clock.sleep_until(self._clock.now_ns() + round(_SETTLE_S * NS_PER_S))
         state = self._robot.control_state()
-        failures = [*self._machine.hazards(), *_late(rule, rest_s, ready_s, self._mover)]
+        failures = [
+            *self._machine.hazards(),
+            *late(rule.rest_s, rest_s, self._mover),
+            *late_ready(rule.ready_s, ready_s),
+        ]
         if state not in rule.states:
             why = self._robot.why()
-            failures.append(f"control is {state} ({why}), expected {' or '.join(rule.states)}")
+            failures.append(wrong_state(state, why, rule.states))
         failures += [f"orphan {orphan}" for orphan in self._robot.orphans()]
         self._robot.end(job)
         self._hit_ns[injection.process] = self._clock.now_ns()
@@ -207,45 +213,37 @@ class KillCampaign:
         return self._robot.is_ready() and self._robot.pid_of(process) not in (0, pid)
 
 
-def _late(rule: Rule, rest_s: float, ready_s: float, mover: str) -> list[str]:
-    late = []
-    if rule.rest_s is not None and not rest_s <= rule.rest_s:
-        late.append(f"at rest after {rest_s:.2f} s, limit {rule.rest_s:g} s ({mover})")
-    if not ready_s <= rule.ready_s:
-        late.append(f"ready after {ready_s:.1f} s, limit {rule.ready_s:g} s")
-    return late
-
-
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Do `options.count` injections, 200 unless told otherwise."""
     drawn = injections(options.count or 200, options.seed)
-    chosen = [each for each in drawn if options.only in each.name]
-    return inject_all(chosen, options.seed, tell)
+    return inject_all(chosen(drawn, options.only, lambda each: each.name), options.seed, tell)
 
 
-def inject_all(chosen: Sequence[Injection], seed: int, tell: Callable[[str], None]) -> Report:
+def inject_all(drawn: Sequence[Injection], seed: int, tell: Callable[[str], None]) -> Report:
     """Do injections one after the other on one machine."""
     with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
         campaign = KillCampaign(Path(folder), seed)
         try:
-            cases = [told(_tried(campaign, injection, tell), tell) for injection in chosen]
+            cases = [told(_tried(campaign, injection, tell), tell) for injection in drawn]
         finally:
             campaign.close()
     return Report(campaign="kills", cases=tuple(cases), summary=_summary(cases))
 
 
 def _tried(campaign: KillCampaign, injection: Injection, tell: Callable[[str], None]) -> Case:
-    """Do an injection, again where the computer itself stood still: a robot's own never does."""
-    for left in reversed(range(_TRIES)):
+    """Do an injection, again where all that failed follows from a computer that stood still."""
+    voids: list[str] = []
+    while True:
         try:
             case = campaign.inject(injection)
         except NotReady as error:
             case = Case(name=injection.name, failures=(str(error),))
+        case = replace(case, voids=tuple(voids))
         held_up_s = campaign.held_up_s()
-        if not case.failures or held_up_s < HELD_UP_S or not left:
-            break
-        tell(f"{case.row}\n  void: this computer stood still for {held_up_s:.3f} s; again")
-    return case
+        if len(voids) + 1 == _TRIES or not is_void(case.failures, held_up_s):
+            return case
+        voids.append(f"stood still for {held_up_s:.3f} s: {'; '.join(case.failures)}")
+        tell(f"{case.row}\n  void: this computer {voids[-1]}; again")
 
 
 def _summary(cases: Sequence[Case]) -> dict[str, Any]:

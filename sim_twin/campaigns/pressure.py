@@ -14,6 +14,7 @@ from sim_twin.campaigns.pressed_scene import CannotPress, Scene
 from sim_twin.campaigns.pressure_judge import judge, listed
 from sim_twin.campaigns.pressure_trial import Trial
 from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.troubles import TROUBLES, Trouble
 from sim_twin.campaigns.working_robot import RobotFailed
 
@@ -26,7 +27,7 @@ def play(trouble: Trouble, seed: int, clock: Clock) -> Case:
         with Scene(clock, seed, **wants) as scene:
             seen = Trial(trouble, scene, clock).run()
     except CannotPress as error:
-        return Case(name=trouble.name, figures={"skipped": str(error)})
+        return Case(name=trouble.name, skipped=str(error))
     except RobotFailed as error:
         return Case(name=trouble.name, failures=(str(error),))
     figures = {
@@ -46,16 +47,12 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Play every trouble whose name contains `options.only`, one after the other."""
     clock = MonotonicClock()
     cases = []
-    for trouble in TROUBLES:
-        if options.only in trouble.name:
-            cases.append(play(trouble, options.seed, clock))
-            tell(cases[-1].row)
+    for trouble in chosen(TROUBLES, options.only, lambda trouble: trouble.name):
+        cases.append(play(trouble, options.seed, clock))
+        tell(cases[-1].row)
     return Report(campaign="pressure", cases=tuple(cases), summary=_summary(cases))
 
 
 def _summary(cases: Sequence[Case]) -> dict[str, Any]:
     times = [float(case.figures["service_s"]) for case in cases if "service_s" in case.figures]
-    return {
-        "longest_way_to_full_service_s": max(times, default=math.nan),
-        "skipped": sum("skipped" in case.figures for case in cases),
-    }
+    return {"longest_way_to_full_service_s": max(times, default=math.nan)}

@@ -10,10 +10,15 @@ from xml.etree import ElementTree
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Tell one case: no `failures` means that all was as it must be; `figures` are for tables."""
+    """Tell one case: no `failures` means that all was as it must be; `figures` are for tables.
+
+    `voids` tells of each try that says nothing why, and `skipped` why the case was not played.
+    """
 
     name: str
     failures: tuple[str, ...] = ()
+    voids: tuple[str, ...] = ()
+    skipped: str = ""
     figures: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -21,8 +26,11 @@ class Case:
     def row(self) -> str:
         """Return one line for a table."""
         figures = "  ".join(f"{name} {_short(value)}" for name, value in self.figures.items())
-        verdict = "ok" if not self.failures else "FAILED: " + "; ".join(self.failures)
-        return f"{self.name:44} {verdict:6} {figures}".rstrip()
+        verdict = "FAILED: " + "; ".join(self.failures) if self.failures else "ok"
+        if self.skipped:
+            verdict = f"skipped: {self.skipped}"
+        again = f"  void {len(self.voids)}" if self.voids else ""
+        return f"{self.name:44} {verdict:6} {figures}{again}".rstrip()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,16 +46,34 @@ class Report:
         """Return the cases that failed."""
         return tuple(case for case in self.cases if case.failures)
 
+    @property
+    def voids(self) -> tuple[str, ...]:
+        """Return why tries say nothing, each with the name of its case."""
+        return tuple(f"{case.name}: {why}" for case in self.cases for why in case.voids)
+
+    @property
+    def skipped(self) -> tuple[Case, ...]:
+        """Return the cases that could not be played."""
+        return tuple(case for case in self.cases if case.skipped)
+
     def document(self) -> dict[str, Any]:
         """Return the report as JSON."""
-        head = {"campaign": self.campaign, "cases": len(self.cases), "failed": len(self.failed)}
+        head = {
+            "campaign": self.campaign,
+            "cases": len(self.cases),
+            "failed": len(self.failed),
+            "skipped": len(self.skipped),
+            "void_tries": len(self.voids),
+        }
         return {**head, **self.summary, "results": [asdict(case) for case in self.cases]}
 
     def text(self) -> str:
         """Return what was summed up, for people."""
         lines = [f"{name:32} {_short(value)}" for name, value in self.summary.items()]
-        lines += [case.row for case in self.failed]
-        lines += [f"{self.campaign}: {len(self.cases)} cases, {len(self.failed)} failed"]
+        lines += [f"void: {why}" for why in self.voids]
+        lines += [case.row for case in (*self.skipped, *self.failed)]
+        sums = f"{len(self.cases)} cases, {len(self.failed)} failed, {len(self.skipped)} skipped"
+        lines += [f"{self.campaign}: {sums}, {len(self.voids)} void tries"]
         return "\n".join(lines)
 
     def write_junit(self, path: Path) -> None:
@@ -62,9 +88,14 @@ def told(case: Case, tell: Callable[[str], None]) -> Case:
 
 
 def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:
-    """Write cases in the JUnit format, as pytest does."""
-    failed = sum(bool(case.failures) for case in cases)
-    counts = {"name": suite, "tests": str(len(cases)), "failures": str(failed), "errors": "0"}
+    """Write cases in the JUnit format; void tries as the reruns of Maven Surefire."""
+    counts = {
+        "name": suite,
+        "tests": str(len(cases)),
+        "failures": str(sum(bool(case.failures) for case in cases)),
+        "errors": "0",
+        "skipped": str(sum(bool(case.skipped) for case in cases)),
+    }
     root = ElementTree.Element("testsuites")
     node = ElementTree.SubElement(root, "testsuite", counts)
     for case in cases:
@@ -74,6 +105,11 @@ def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:
         )
         for failure in case.failures:
             ElementTree.SubElement(child, "failure", message=failure)
+        for why in case.voids:
+            again = "rerunFailure" if case.failures else "flakyFailure"
+            ElementTree.SubElement(child, again, message=why, type="void")
+        if case.skipped:
+            ElementTree.SubElement(child, "skipped", message=case.skipped)
         ElementTree.SubElement(child, "system-out").text = json.dumps(case.figures)
     ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 

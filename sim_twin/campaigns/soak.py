@@ -14,9 +14,12 @@ import psutil
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import Case, Report
+from sim_twin.campaigns.selection import chosen
 from sim_twin.stack import LockstepStack, NotReady
 
 MOST_MIB_PER_H: Final = 1.0
+LEAST_JOBS_RATIO: Final = 0.8
+"""So many jobs must end well: a robot that is stuck at the first one grows by nothing either."""
 _WARM_UP_RATIO: Final = 0.25
 """Caches of libraries fill up in the first quarter; growth is judged after it."""
 _LEAST_SAMPLES: Final = 8
@@ -25,6 +28,7 @@ _MIB: Final = 1 << 20
 _IDLE_S: Final = 20.0
 # The longest skill, to search the flat, may take 300 s by itself.
 _JOB_S: Final = 900.0
+_MUST_NOT_GROW: Final = ("open_files", "threads", "run_files", "run_mib")
 JOBS: Final = (
     "pick up the red cup and put it in the box",
     "go to the kitchen",
@@ -121,14 +125,21 @@ def growth(samples: Sequence[Sample], field: str, per: str = "sim_h") -> float:
 
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
-    """Work for `options.hours`, one unless told otherwise."""
+    """Work for `options.hours`, one unless told otherwise.
+
+    Raises:
+        NothingChosen: `options.only` is part of no case's name.
+    """
+    names = chosen((*_MUST_NOT_GROW, "memory", "jobs"), options.only, str)
     with tempfile.TemporaryDirectory(prefix="vla-soak-") as folder:
         soak = Soak(Path(folder), options.seed)
         try:
             samples = soak.work(options.hours, tell)
         finally:
             soak.close()
-    return Report(campaign="soak", cases=judge(samples), summary=_summary(soak, samples))
+    cases = (*judge(samples), jobs_case(soak.done, len(soak.failed)))
+    mine = tuple(case for case in cases if case.name in names)
+    return Report(campaign="soak", cases=mine, summary=_summary(soak, samples))
 
 
 def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
@@ -146,11 +157,23 @@ def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
         )
     ]
     warm = samples[round(_WARM_UP_RATIO * len(samples)) :]
-    for field in ("open_files", "threads", "run_files", "run_mib"):
+    for field in _MUST_NOT_GROW:
         first, last = getattr(warm[0], field), getattr(samples[-1], field)
         grown = (f"grew from {first} to {last}",) if last > first else ()
         cases.append(Case(name=field, failures=grown, figures={"first": first, "last": last}))
     return tuple(cases)
+
+
+def jobs_case(done: int, failed: int) -> Case:
+    """Return the verdict about the work itself."""
+    ratio = (done - failed) / done if done else 0.0
+    failures = (
+        (f"{ratio:.0%} of {done} jobs ended well, expected {LEAST_JOBS_RATIO:.0%} at least",)
+        if ratio < LEAST_JOBS_RATIO
+        else ()
+    )
+    figures = {"done": done, "failed": failed, "ended_well_ratio": ratio}
+    return Case(name="jobs", failures=failures, figures=figures)
 
 
 def _summary(soak: Soak, samples: Sequence[Sample]) -> dict[str, Any]:
@@ -159,6 +182,8 @@ def _summary(soak: Soak, samples: Sequence[Sample]) -> dict[str, Any]:
         "sim_h": samples[-1].sim_h,
         "jobs": soak.done,
         "jobs_failed": len(soak.failed),
+        "jobs_ended_well_per_wall_h": (soak.done - len(soak.failed)) / samples[-1].wall_h,
+        "jobs_ended_well_per_sim_h": (soak.done - len(soak.failed)) / samples[-1].sim_h,
         "why_jobs_failed": sorted(set(soak.failed)),
     }
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import Case, Report, told
+from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.switch_judge import Seen, judge, memory_case, ticks_case
 from sim_twin.campaigns.switch_profiles import BAD, GOOD, Bad, control_rate_hz
 from sim_twin.campaigns.ticks import Ticks
@@ -143,6 +144,11 @@ class _Meter:
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Switch `options.count` times, 100 unless told otherwise, then ask for every bad profile."""
     count = SWITCHES if options.count is None else options.count
+    chosen(
+        [*(f"{n:03d}/{name}" for n in range(count) for name in GOOD), *(bad.case for bad in BAD)],
+        options.only,
+        str,
+    )  # a mistake is told before anything starts
     history: list[Seen] = []
     cases: list[Case] = []
     before = Ticks(ticks=0, late=0)
@@ -159,8 +165,7 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
                     seen, case = campaign.switch(name)
                     history.append(seen)
                     cases.append(told(case, tell))
-            chosen = [bad for bad in BAD if options.only in bad.case]
-            cases += [told(campaign.refuse(bad), tell) for bad in chosen]
+            cases += [told(campaign.refuse(bad), tell) for bad in BAD if options.only in bad.case]
         except RobotFailed as error:
             cases.append(told(Case(name="robot", failures=(str(error),)), tell))
         finally:

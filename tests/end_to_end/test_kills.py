@@ -4,7 +4,7 @@ import pytest
 
 from sim_twin.campaigns import kills
 
-pytestmark = [pytest.mark.stack, pytest.mark.gl]
+pytestmark = [pytest.mark.stack(again=False), pytest.mark.gl]
 
 EARLY_S = 3.0
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_twin.campaigns.soak import Sample, growth, judge
+from sim_twin.campaigns.soak import LEAST_JOBS_RATIO, Sample, growth, jobs_case, judge
 
 
 def samples(mib_per_h: float, *, files: int = 0, count: int = 80) -> list[Sample]:
@@ -39,3 +39,10 @@ def test_a_process_that_does_not_grow_passes() -> None:
 def test_too_few_samples_say_nothing() -> None:
     with pytest.raises(ValueError, match="samples after the warm-up"):
         judge(samples(0.0, count=9))
+
+
+def test_a_robot_that_is_stuck_fails_and_one_that_misses_a_job_does_not() -> None:
+    stuck, missed = jobs_case(40, 39), jobs_case(40, round(40 * (1.0 - LEAST_JOBS_RATIO)))
+    assert stuck.failures == ("2% of 40 jobs ended well, expected 80% at least",)
+    assert not missed.failures
+    assert jobs_case(0, 0).failures
