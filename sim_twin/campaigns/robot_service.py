@@ -72,6 +72,11 @@ class RobotService:
         status = self._document("control_status", _FRESH_STATUS_S)
         return "silent" if status is None else str(status["state"])
 
+    def skill(self) -> str:
+        """Return which skill the executor is at, empty where it is at none."""
+        status = self._document("executor_status", _FRESH_S)
+        return "" if status is None else str(status.get("skill") or "")
+
     def why(self) -> str:
         """Return the cause of control's state, and what it says of it."""
         status = self._document("control_status", _FRESH_STATUS_S) or {}

@@ -2,7 +2,9 @@
 
 from collections import Counter
 
-from sim_twin.campaigns.kills import RULES, SIGNALS, injections
+import pytest
+
+from sim_twin.campaigns.kill_rules import GRAVEST, RULES, SIGNALS, Moment, injections
 
 
 def test_every_process_gets_every_signal() -> None:
@@ -21,3 +23,12 @@ def test_two_hundred_injections_take_all_pairs_about_equally_often() -> None:
 def test_the_same_seed_draws_the_same_and_another_one_others() -> None:
     assert injections(30, seed=1) == injections(30, seed=1)
     assert injections(30, seed=1) != injections(30, seed=2)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_twenty_have_the_gravest_ends_and_while_carrying(seed: int) -> None:
+    drawn = injections(20, seed, latest_s=3.0)
+    carrying = {(one.process, one.signal) for one in drawn if one.moment is Moment.CARRYING}
+    assert len({(one.process, one.signal) for one in drawn}) == 20
+    assert carrying == set(GRAVEST)
+    assert max(one.after_s for one in drawn) <= 3.0

@@ -1,0 +1,141 @@
+"""Declare what must follow from the end of each process, and draw who is ended when."""
+
+import random
+import signal
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
+COMMANDS: Final = (
+    "pick up the red cup and put it in the box",
+    "go to the kitchen",
+    "pick up the blue ball and put it on the coffee table",
+    "go to the charging station",
+)
+_EARLIEST_S, _LATEST_S = 0.5, 30.0
+"""A job of picking and placing takes about half a minute."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """Declare what must follow from the end of a process.
+
+    `rest_s` is until when everything rests, None where the robot may carry on; `ready_s` until when
+    all processes are ready again without a hand; `states` are those in which control then may be.
+    Where it `ends`, a person has asked for it: `ready_s` is until when the service has ended.
+    """
+
+    rest_s: float | None
+    ready_s: float
+    states: tuple[str, ...]
+    ends: bool = False
+
+    @property
+    def stays(self) -> bool:
+        """Tell whether nothing may move from the rest to a hand's act; lowered arms lie limp."""
+        return self.rest_s is not None and self.states == _WANTS_A_HAND
+
+
+_CARRIES_ON: Final = ("armed",)
+_WANTS_A_HAND: Final = ("disarmed", "stopped", "fault")
+# A frozen process is noticed by its silence, so it takes its row's limit longer than a dead one.
+RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
+    ("control", signal.SIGKILL): Rule(rest_s=1.5, ready_s=30.0, states=_WANTS_A_HAND),
+    ("control", signal.SIGSTOP): Rule(rest_s=1.5, ready_s=40.0, states=_WANTS_A_HAND),
+    ("control", signal.SIGTERM): Rule(rest_s=4.0, ready_s=30.0, states=_WANTS_A_HAND),
+    ("stop_door", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("stop_door", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("stop_door", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("executor", signal.SIGKILL): Rule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
+    ("executor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=40.0, states=_CARRIES_ON),
+    ("executor", signal.SIGTERM): Rule(rest_s=6.0, ready_s=30.0, states=_CARRIES_ON),
+    ("perception", signal.SIGKILL): Rule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
+    ("perception", signal.SIGSTOP): Rule(rest_s=None, ready_s=60.0, states=_CARRIES_ON),
+    ("perception", signal.SIGTERM): Rule(rest_s=None, ready_s=50.0, states=_CARRIES_ON),
+    ("speech", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("speech", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("speech", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("planner", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("planner", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("planner", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGKILL): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGSTOP): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("recorder", signal.SIGTERM): Rule(rest_s=None, ready_s=30.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGKILL): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGSTOP): Rule(rest_s=None, ready_s=70.0, states=_CARRIES_ON),
+    ("dashboard", signal.SIGTERM): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
+    ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
+    ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
+    # An orderly end takes the power: the arms come down slowly, until they lie on something.
+    ("supervisor", signal.SIGTERM): Rule(rest_s=15.0, ready_s=30.0, states=("silent",), ends=True),
+}
+
+
+GRAVEST: Final = (
+    ("control", signal.SIGKILL),
+    ("control", signal.SIGSTOP),
+    ("control", signal.SIGTERM),
+    ("supervisor", signal.SIGKILL),
+)
+"""Every round has these, however short it is; in a short one they wait for a full hand."""
+
+
+class Moment(Enum):
+    """Name what the robot should be doing when the signal comes."""
+
+    MOVING = "moving"
+    CARRYING = "carrying"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Injection:
+    """Name who gets which signal, how long after the command was given.
+
+    It then waits a while for the moment.
+    """
+
+    number: int
+    process: str
+    signal: signal.Signals
+    after_s: float
+    command: str
+    moment: Moment = Moment.MOVING
+
+    @property
+    def name(self) -> str:
+        """Return the case in words."""
+        return f"{self.number:03d}/{self.process}/{self.signal.name}@{self.after_s:.1f}s"
+
+
+def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injection]:
+    """Return every pair of process and signal about equally often, in random order and time.
+
+    Where there are fewer than there are pairs, the gravest are among them, while carrying.
+    """
+    draw = random.Random(seed)
+    pairs: list[tuple[str, signal.Signals]] = []
+    while len(pairs) < count:
+        pairs += _round(draw, count - len(pairs))
+    short = count < len(RULES)
+    return [
+        Injection(
+            number=number,
+            process=process,
+            signal=what,
+            after_s=draw.uniform(_EARLIEST_S, latest_s),
+            command=COMMANDS[number % len(COMMANDS)],
+            moment=Moment.CARRYING if short and (process, what) in GRAVEST else Moment.MOVING,
+        )
+        for number, (process, what) in enumerate(pairs)
+    ]
+
+
+def _round(draw: random.Random, most: int) -> list[tuple[str, signal.Signals]]:
+    """Return every pair once, or `most` of them with the gravest, in random order."""
+    pairs = list(RULES)
+    draw.shuffle(pairs)
+    chosen = sorted(pairs, key=lambda pair: pair not in GRAVEST)[:most]
+    draw.shuffle(chosen)
+    return chosen
