@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-# Rates that two cores keep beside the twin; the drives' period may change in motion.
+# Rates that two cores keep beside the twin; the drives' period may change in motion, and so may
+# control's priority, where others run, and how a model is loaded: its only tier with other threads.
 GOOD: Final[Mapping[str, str]] = {
     "swift": """inherits = "desktop"
 control_rate_hz = 125
@@ -18,6 +19,12 @@ control_rate_hz = 100
 executor_rate_hz = 20
 perception_rate_hz = 4
 camera_rate_hz = 4
+realtime_priority = 35
+[processes]
+recorder = { affinity = [0], nice = 12 }
+executor = { affinity = [1] }
+[models.detector]
+threads = 2
 [budgets]
 perception = { memory_mb = 550, cpu_ratio = 1.0 }
 planner = { memory_mb = 200, cpu_ratio = 0.3 }
