@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.control.axes import Flags, Floats, any_of
-from vla_deploy.control.gravity import GravityOffset
+from vla_deploy.control.gravity import FULL_DUTY_ERROR_RAD, GravityOffset
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionResult, MotionSet
 from vla_deploy.control.payload import Payload
@@ -18,6 +18,7 @@ from vla_deploy.robots.model import RobotModel
 EASED_RATIO: Final = 0.5
 # Of the joint's top speed: slower than what counts as motion while the robot has to stand.
 EASING_RATIO: Final = 0.05
+UNWINDING_RATIO: Final = 0.3
 
 
 class JointOutput:
@@ -33,6 +34,9 @@ class JointOutput:
         self._gravity = GravityOffset(robot, RobotModel(robot).gravity)
         self._eased_nm = EASED_RATIO * contact_torque(robot)
         self._easing_rad_s = EASING_RATIO * robot.velocity_max
+        self._unwinding_rad_s = UNWINDING_RATIO * robot.velocity_max
+        travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
+        self._full_error = FULL_DUTY_ERROR_RAD * np.abs(travel)
 
     @property
     def sent(self) -> Floats:
@@ -65,7 +69,8 @@ class JointOutput:
         begin = state.position_rad
         if any_of(joints & state.torque_on):
             begin = np.where(state.torque_on, self._payload.pressed(begin), begin)
-        self.seat(begin, joints)
+        self.motions.place(begin, joints)
+        self._gate.place(begin, joints)
 
     def ease_off(self, external_torque_nm: Floats, period_s: float) -> None:
         """Take back, slowly, setpoints by which joints at rest press hard on what they have met.
@@ -76,15 +81,15 @@ class JointOutput:
         error = self.sent - self._servos.state.position_rad
         presses = (np.abs(external_torque_nm) > self._eased_nm) & (error * external_torque_nm < 0.0)
         if any_of(presses):
-            step = self._easing_rad_s * period_s
-            eased = self.sent - np.minimum(np.maximum(error, -step), step)
-            self.seat(eased, presses)
+            # Further ahead than the motor can follow it presses no less: that part goes quickly.
+            winds = np.abs(error + self.weight_offset) > self._full_error
+            step = np.where(winds, self._unwinding_rad_s, self._easing_rad_s) * period_s
+            self.lead(self.sent - np.minimum(np.maximum(error, -step), step), presses)
 
     def place_all(self) -> None:
         """Let every setpoint begin where its joint is."""
         self.place(np.ones(len(self.sent), dtype=np.bool_))
 
-    def seat(self, setpoint: Floats, joints: Flags) -> None:
-        """Let the setpoints of these joints go on from here, without a motion."""
+    def lead(self, setpoint: Floats, joints: Flags) -> None:
+        """Choose the next setpoints of these joints, without a motion; the gate bounds them."""
         self.motions.place(setpoint, joints)
-        self._gate.place(setpoint, joints)

@@ -49,7 +49,7 @@ class Lowering:
         if self._servos.lost or not any_of(joints):
             return True
         setpoint = self._next(state.position_rad, self._output.weight_offset, period_s)
-        self._output.seat(setpoint, joints)
+        self._output.lead(setpoint, joints)
         self._stood_s += period_s
         if any_of(joints & (np.abs(state.position_rad - self._stood_at) > self._stands_within)):
             self._stood_at, self._stood_s = state.position_rad.copy(), 0.0
@@ -59,12 +59,16 @@ class Lowering:
         """Return setpoints that follow the weight.
 
         A setpoint leads its joint by no more than a share of what carries the weight: a joint that
-        has met something, or lags, still feels its motor against the weight.
+        has met something, or lags, still feels its motor against the weight. What has no weight to
+        follow eases off what it may press on.
         """
         span = self._full_offset - self._least_offset
         pull = np.clip((np.abs(offset) - self._least_offset) / span, 0.0, 1.0)
-        wanted = self._output.sent - np.sign(offset) * pull * self._rate * period_s
+        step, sent = self._rate * period_s, self._output.sent
+        wanted = sent - np.sign(offset) * pull * step
         furthest = position - _GIVEN_RATIO * offset
         down = np.where(offset > 0.0, np.maximum(wanted, furthest), wanted)
-        followed: Floats = np.where(offset < 0.0, np.minimum(wanted, furthest), down)
-        return followed
+        followed = np.where(offset < 0.0, np.minimum(wanted, furthest), down)
+        eased = sent - np.clip(sent - position, -step, step)
+        setpoint: Floats = np.where(pull > 0.0, followed, eased)
+        return setpoint

@@ -14,7 +14,7 @@ from vla_deploy.control.dispatch import Dispatcher, axis_limits
 from vla_deploy.control.estop_button import EstopButton
 from vla_deploy.control.joint_output import JointOutput
 from vla_deploy.control.judging import Judging
-from vla_deploy.control.lowering import LOWERING_S, Lowering
+from vla_deploy.control.lowering import LOWERING_S
 from vla_deploy.control.modes import AT_REST_MODES, Modes
 from vla_deploy.control.motions import MotionSet
 from vla_deploy.control.operator_desk import Act, OperatorDesk
@@ -26,6 +26,7 @@ from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.state_machine import Mode
 from vla_deploy.control.status import Status
 from vla_deploy.control.stopping import Stopping
+from vla_deploy.control.switching_off import SwitchingOff
 from vla_deploy.control.telemetry import Telemetry, TickClock
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.ipc import SharedSpace
@@ -122,7 +123,7 @@ class ControlNode:
         category 2 too to their Bus Watchdog and to the next control.
         """
         self._telemetry.tell_results(self._motions.stop("control is shut down"))
-        self._move_until(self._at_rest, _RAMP_DOWN_S)
+        self._wind_down(self._at_rest, _RAMP_DOWN_S)
         if power_off_asked(self._run_dir):
             self._switch_off()
         else:
@@ -134,18 +135,23 @@ class ControlNode:
             topic.close()
 
     def _switch_off(self) -> None:
-        """Let the arms come down, but for those that hold something, and take their power."""
-        joints = self._stopping.switching_off()
-        lowering = Lowering(self._robot, self._joints, self._servos, joints)
-        self._move_until(lambda: lowering.step(self.period_s), LOWERING_S)
-        self._stopping.switch_off(joints)
+        self._wheels.disable()
+        asked_before = self._desk.estop_source is not None
+        off = SwitchingOff(self._robot, self._servos, self._stopping, self._joints)
+        self._wind_down(
+            lambda: off.step(self.period_s, None if asked_before else self._desk.estop_source),
+            LOWERING_S,
+        )
+        off.end()
 
-    def _move_until(self, done: Callable[[], bool], limit_s: float) -> None:
+    def _wind_down(self, done: Callable[[], bool], limit_s: float) -> None:
         """Go on sending setpoints until this is done, or its time is over; nothing is judged."""
         deadline_ns = self._clock.now_ns() + round(limit_s * NS_PER_S)
         while not done() and self._clock.now_ns() < deadline_ns:
             self._servos.read()
+            self._desk.listen()
             self._telemetry.tell_results(self._joints.move(self.period_s))
+            self._telemetry.tell_joints(self._servos.state, self._joints.sent)
             self._base.brake(self.period_s)
             self._clock.sleep_until(self._clock.now_ns() + round(self.period_s * NS_PER_S))
 
@@ -187,16 +193,16 @@ class ControlNode:
             self._modes.notice = self._resetting.begin(
                 now_ns,
                 stopping=self._modes.mode is Mode.STOPPING,
-                met=self._judging.verdict.cause is Cause.COLLISION,
+                met=self._has_met,
             )
-        self._resetting.step()
+        self._modes.notice = self._resetting.step() or self._modes.notice
         jumped = self._judging.judge(
             self._ticks.tick,
             now_ns,
             self._joints.sent,
             energised=self._modes.mode is not Mode.DISARMED,
             estop_source=self._desk.estop_source,
-            reset_requested=self._resetting.under_way,
+            reset_requested=self._resetting.asks,
             base_at_rest=self._base.ramp.at_rest,
             standstill=self._modes.mode in _STANDSTILL_MODES,
         )
@@ -235,9 +241,14 @@ class ControlNode:
     def _ease_off(self, period_s: float) -> None:
         """Let an arm that a contact has stopped not go on pressing on whoever it has met."""
         torque_nm = self._judging.external_torque_nm
-        met = self._judging.verdict.cause is Cause.COLLISION
-        if met and torque_nm is not None and self._modes.mode is Mode.STOPPED:
+        if self._has_met and torque_nm is not None and self._modes.mode is Mode.STOPPED:
             self._joints.ease_off(torque_nm, period_s)
+
+    @property
+    def _has_met(self) -> bool:
+        """Tell whether it stands because it has met something, whatever else stops it too."""
+        verdicts = (self._judging.verdict, *self._judging.state.latched)
+        return any(verdict.cause is Cause.COLLISION for verdict in verdicts)
 
     def _take_commands(self) -> None:
         verdict, latched = self._judging.verdict, self._judging.state.estop_latched

@@ -2,8 +2,6 @@
 
 from typing import Final
 
-import numpy as np
-
 from drivers.clock import NS_PER_S
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.wheels import Wheels
@@ -28,6 +26,11 @@ class Resetting:
 
     @property
     def under_way(self) -> bool:
+        """Tell whether the judge is to be asked, or a joint still to be taken over."""
+        return self._until_ns is not None or bool(self._queue)
+
+    @property
+    def asks(self) -> bool:
         """Tell whether the judge is to be asked."""
         return self._until_ns is not None
 
@@ -53,18 +56,24 @@ class Resetting:
             self._begin_taking_over()
         return ""
 
-    def step(self) -> None:
-        """Do one tick's share: a servo a tick, so that the bus cycle never waits for it."""
-        if self._queue and not self._servos.energise(self._queue.pop(0)):
-            self._queue = []
+    def step(self) -> str:
+        """Take over one servo, so that the bus cycle never waits; return why not, or nothing."""
+        if not self._queue or self._servos.energise(self._queue.pop(0)):
+            return ""
+        self._queue = []
+        return f"reset: an arm that holds by itself is not taken over: {self._servos.failure}"
 
     def _begin_taking_over(self) -> None:
-        holding = self._servos.watchdog_tripped & self._servos.state.torque_on
-        if holding.any() and self._servos.clear_watchdogs():
-            self._queue = np.flatnonzero(holding).tolist()
+        state = self._servos.state
+        if not (self._servos.watchdog_tripped & state.torque_on).any():
+            return
+        if self._servos.clear_watchdogs():  # those of the others too: all are armed anew
+            self._queue = [int(n) for n in self._servos.unguarded if state.torque_on[n]]
 
     def note(self, now_ns: int, outcome: ResetOutcome, *, estop_asked: bool) -> str:
         """Take in what the judge made of it; return why it is given up, or nothing."""
+        if estop_asked:
+            self._queue = []
         if self._until_ns is None:
             return ""
         if outcome is ResetOutcome.DONE:

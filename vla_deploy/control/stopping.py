@@ -82,10 +82,9 @@ class Stopping:
         """Return the joints that lose their power at the end: all but those that hold something."""
         return self._plan.switched_off(self._holding())
 
-    def switch_off(self, joints: Axes) -> None:
-        """Take the power from these joints and from the wheels."""
-        self._servos.remove_power(joints)
-        self._wheels.disable()
+    def switch_off(self, joints: Axes) -> str:
+        """Take the power from these joints; return why a servo did not confirm it, or nothing."""
+        return "" if self._servos.remove_power(joints) else self._servos.failure
 
     def remove_power(self) -> str:
         """Take all power; return why a servo did not confirm it, or nothing."""

@@ -92,8 +92,11 @@ class Rig:
 
     def ask(self, *acts: str, within_s: float = 0.6) -> None:
         for act in acts:
-            self._operator.publish({"act": act, "source": "test", "reason": ""})
+            self.publish(act)
         self.run(within_s)
+
+    def publish(self, act: str) -> None:
+        self._operator.publish({"act": act, "source": "test", "reason": ""})
 
     def send(self, **command: Any) -> None:
         self._commands.publish(command)

@@ -448,6 +448,57 @@ def test_an_arm_that_comes_down_is_braked_and_never_pushed(
     assert min(lifts) >= -1  # the rounding of both
 
 
+def test_arms_that_a_crash_left_to_themselves_come_down_too(
+    armed: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lift_both_arms(armed, 0.8, 1.2)
+    armed.lockstep.kill(armed.control)
+    armed.run(0.5)
+    armed.control = armed.new_control()
+    armed.lockstep.add(armed.control)
+    armed.run(0.5)
+    speeds = sampled_while_switched_off(armed, monkeypatch, lambda: armed.true_speeds().max())
+    assert set(torque_enabled(armed).values()) == {0}
+    assert max(speeds) < 0.8
+    assert true_elbow(armed) < 0.6
+
+
+def test_an_emergency_stop_on_the_way_down_leaves_the_arms_standing_under_power(
+    armed: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    lift_both_arms(armed, 0.8, 1.2)
+    angles: list[float] = []
+
+    def press_on_the_way() -> float:
+        angles.append(true_elbow(armed))
+        if len(angles) == 250:
+            armed.publish("estop")
+        return angles[-1]
+
+    sampled_while_switched_off(armed, monkeypatch, press_on_the_way)
+    assert 0.3 < angles[-1] < 1.15
+    assert set(torque_enabled(armed).values()) == {1}
+    assert "arms keep their power: emergency stop (test)" in caplog.text
+    armed.run(0.5)
+    stays_at_standstill(armed)
+
+
+def test_a_servo_line_that_is_lost_on_the_way_down_is_told(
+    armed: Rig, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    lift_both_arms(armed, 0.8, 1.2)
+    ticks: list[float] = []
+
+    def unplug_on_the_way() -> float:
+        ticks.append(0.0)
+        if len(ticks) == 250:
+            armed.lockstep.faults.inject("servo_bus", None, "unplug")
+        return 0.0
+
+    sampled_while_switched_off(armed, monkeypatch, unplug_on_the_way)
+    assert "servos may have kept their power" in caplog.text
+
+
 def test_what_a_hand_holds_is_not_dropped_when_the_robot_is_switched_off(armed: Rig) -> None:
     space = SharedSpace(armed.lockstep.context.run_dir / "ipc", armed.lockstep.clock)
     space.cell_writer("executor_status").put_document({"holding": {"left": "cup", "right": None}})

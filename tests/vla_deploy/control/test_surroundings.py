@@ -85,6 +85,42 @@ def test_an_arm_that_pressed_when_control_died_is_taken_over_by_a_reset(armed: A
     assert abs(lead()) < 0.01
 
 
+def block_a_swing(armed: Any) -> None:
+    """Let the left arm swing against a stop that gives no way."""
+    armed.go(1, **SWING)
+    assert armed.lockstep.run_until(lambda: armed.joint("left_shoulder_pitch") > 0.7, 3.0)
+    model = armed.lockstep.twin.engine.model
+    model.jnt_range[model.joint("left_shoulder_pitch").id][1] = armed.joint("left_shoulder_pitch")
+
+
+def test_an_arm_that_presses_eases_off_after_an_emergency_stop_too(armed: Any) -> None:
+    block_a_swing(armed)
+    armed.run(0.04)
+    armed.publish("estop")
+    armed.run(5.0)
+    assert (armed.state, armed.status["cause"]) == ("stopped", "estop")
+    pitch = armed.joint("left_shoulder_pitch")
+    assert armed.joint("left_shoulder_pitch", "setpoint") - pitch < 0.03
+    armed.ask("reset")
+    armed.ask("arm")
+    assert armed.state == "armed", armed.status["detail"]
+
+
+def test_a_disarm_right_after_a_reset_leaves_no_joint_with_power(armed: Any) -> None:
+    block_a_swing(armed)
+    armed.run(0.06)
+    armed.lockstep.kill(armed.control)
+    armed.run(0.5)
+    armed.control = armed.new_control()
+    armed.lockstep.add(armed.control)
+    armed.run(0.5)
+    assert armed.status["cause"] == "collision"
+    armed.ask("reset", "disarm", within_s=1.0)
+    bank = armed.lockstep.twin.serial_devices["servos"]
+    servos = armed.robot.servo_bus.servos
+    assert {bank.register(servo.id, "torque_enable") for servo in servos} == {0}
+
+
 def test_a_stop_for_another_cause_moves_no_setpoint_back(armed: Any) -> None:
     armed.go(1, **SWING)
     armed.run(0.6)
