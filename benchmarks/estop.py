@@ -97,7 +97,7 @@ def standstill_s(phase: Phase) -> float:
     """Return how long everything takes to rest after a request in a phase of the work."""
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         stack = LockstepControl(Path(folder))
-        stack.add_lidar()
+        stack.add_senses()
         try:
             stage = Stage(stack)
             stage.begin(phase)

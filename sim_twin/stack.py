@@ -7,8 +7,8 @@ from typing import Any
 from drivers.audio.base import Samples
 from platforms import load_profile
 from sim_twin.faults import FaultInjector
-from sim_twin.lidar_node import LidarNode
 from sim_twin.lockstep import Lockstep
+from sim_twin.senses_node import SensesNode
 from sim_twin.sound.hearing import Spoken, let_arrive
 from sim_twin.sound.talker import Talker, arrival
 from vla_deploy.aside import AtOnce
@@ -57,10 +57,10 @@ class LockstepControl:
         """Return the way to make the twin's devices fail."""
         return self.lockstep.faults
 
-    def add_lidar(self) -> None:
-        """Let control see by its lidar: without it the base does not drive."""
+    def add_senses(self) -> None:
+        """Tell control what the base does not drive without: scan, attitude, pose and depth."""
         context, devices = self.lockstep.context, self.lockstep.devices
-        self.lockstep.add(LidarNode(context, self.robot, devices))
+        self.lockstep.add(SensesNode(context, self.robot, devices))
 
     def restart_control(self) -> None:
         """Start control anew, as the supervisor does after it died."""

@@ -118,7 +118,7 @@ def play(cell: Cell, seed: int = 0) -> Case:
         takes_all = cell.component in _SENSORS
         stack = (LockstepStack if takes_all else LockstepControl)(Path(folder), seed)
         if not takes_all:
-            stack.add_lidar()
+            stack.add_senses()
         try:
             return _Trial(cell, stack).run()
         except (NotSet, NotReady) as error:

@@ -56,7 +56,7 @@ class Rehearsal:
         self._stack = (LockstepStack if takes_all else LockstepControl)(tmp_path, seed)
         self._base_command = self._stack.space.cell_writer("base_command")
         if not takes_all:
-            self._stack.add_lidar()
+            self._stack.add_senses()
         self._start_s = 0.0
 
     def run(self) -> Outcome:

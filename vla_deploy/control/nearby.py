@@ -20,6 +20,8 @@ TOPICS: Mapping[ZoneSource, str] = {
     ZoneSource.LIDAR: "scan",
     ZoneSource.DEPTH: "near_obstacles",
 }
+# Of the period at which the depth camera's images are looked at: what may be missing in between.
+PERIODS_MISSED = 3.0
 _NO_POINTS: Points = np.zeros((0, 2))
 
 
@@ -43,12 +45,14 @@ class Nearby:
         self._sequence = 0
         self._points = _NO_POINTS
         self.age_s: float | None = None
+        self.due_s = 0.0
         self.fresh = False
 
     def points(self, now_ns: int, position: Floats, motion: Motion) -> Points:
         """Return the newest points as seen from where the base is now; none once they are stale.
 
-        `fresh` tells whether they came since the last call.
+        `fresh` tells whether they came since the last call, `due_s` the age beyond which the next
+        ones are overdue at the rate that their source has told.
         """
         sample = self._reader.latest()
         self.fresh = False
@@ -59,7 +63,7 @@ class Nearby:
             self._sequence, self.fresh = sample.sequence, True
             read = self._read_scan if self._source is ZoneSource.LIDAR else self._read_depth
             self._points = read(sample.data, position)
-        if self.age_s > self._deadline_s:
+        if self.age_s > max(self._deadline_s, self.due_s):
             self.fresh = True  # knowing nothing is news too: it releases what old points hold
             return _NO_POINTS
         return moved(self._points, motion.v_m_s * self.age_s, motion.w_rad_s * self.age_s)
@@ -78,6 +82,7 @@ class Nearby:
 
     def _read_depth(self, data: np.void, position: Floats) -> Points:
         """Take points that perception has cleared of the robot's own body in the image."""
+        self.due_s = PERIODS_MISSED * float(data["period_s"])
         count = int(data["count"])
         columns = [np.asarray(data[name], dtype=np.float64)[:count] for name in ("x_m", "y_m")]
         return np.column_stack(columns)

@@ -15,8 +15,9 @@ from vla_deploy.control.axes import Floats, all_of
 from vla_deploy.control.body_shapes import BodyShapes
 from vla_deploy.control.clearance_watch import ClearanceWatch
 from vla_deploy.control.contact_torque import ContactTorque
+from vla_deploy.control.thresholds import IMU_AGE_S, POSE_AGE_S
 from vla_deploy.control.zone_watch import ZoneWatch
-from vla_deploy.ipc import BY_NAME, SharedSpace
+from vla_deploy.ipc import SharedSpace
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel
 from vla_deploy.safety.balance import tip_margin_ratio
@@ -27,8 +28,6 @@ from vla_deploy.safety.zones import Footprint, Motion, braking_m
 BASE_REACTION_S = 0.1
 # Of each new sample, 10 times a second: a low-pass of 0.1 s.
 _IMU_SHARE = 0.5
-_MAX_POSE_AGE_S = BY_NAME["pose"].deadline_s
-_MAX_IMU_AGE_S = BY_NAME["imu"].deadline_s
 
 
 @dataclass(slots=True)
@@ -141,6 +140,7 @@ class SurroundingsWatch:
             zones=zones.findings,
             scan_age_s=zones.scan_age_s,
             depth_age_s=zones.depth_age_s,
+            depth_due_s=zones.depth_due_s,
         )
 
     def _look_at_keep_out(self, body: _Body) -> None:
@@ -148,7 +148,7 @@ class SurroundingsWatch:
         if sample is None:
             return
         keep_out, age_s = None, sample.age_s(body.now_ns)
-        if age_s <= _MAX_POSE_AGE_S:
+        if age_s <= POSE_AGE_S:
             x_m, y_m, yaw_rad = (float(sample.data[n]) for n in ("x_m", "y_m", "yaw_rad"))
             near = self._areas_near(x_m, y_m, body.motion)
             areas = {name: seen_from(area, x_m, y_m, yaw_rad) for name, area in near}
@@ -170,7 +170,7 @@ class SurroundingsWatch:
         if tip_over is None or sample is None:
             return
         age_s = sample.age_s(body.now_ns)
-        if age_s > _MAX_IMU_AGE_S:
+        if age_s > IMU_AGE_S:
             self._acceleration = None
             self._known = replace(self._known, tip_margin_ratio=None, imu_age_s=age_s)
             return

@@ -6,6 +6,7 @@ from drivers.dynamixel.models import MODELS
 from vla_deploy.control.axes import Floats
 from vla_deploy.ipc import BY_NAME
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.protection import ZoneSource
 from vla_deploy.safety import SafetyLimits
 
 _RANGE_MARGIN = 0.02
@@ -25,6 +26,8 @@ _STANDSTILL_SHARE = 0.1
 _STANDSTILL_WHEEL_M_S = 0.01
 # Slower than this it does not approach: it is the play of what is measured.
 _APPROACH_M_S = 0.01
+# Perception tells scan, pose and attitude from the same steps: one held up holds up all of them.
+POSE_AGE_S = IMU_AGE_S = BY_NAME["scan"].deadline_s
 
 
 def safety_limits(robot: RobotDescription) -> SafetyLimits:
@@ -33,7 +36,7 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
     A gripper has no following error: closed on an object it is blocked by intent. A wheel may be
     off by a twentieth of its top speed, at which the base creeps, and by half of what it is told:
     it lags while it speeds up, and strains on a carpet's edge. One that stands or runs away is
-    beyond that.
+    beyond that. A sense that nothing in the robot file is judged by may be silent.
     """
     margin = _RANGE_MARGIN * (robot.position_max - robot.position_min)
     lowest_v = _registers(robot, "min_voltage_limit") * _VOLTAGE_UNIT_V
@@ -64,6 +67,9 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         standstill_wheel_rad_s=_STANDSTILL_WHEEL_M_S / robot.base.wheel_radius_m,
         scan_required=True,
         scan_age_s=BY_NAME["scan"].deadline_s,
+        depth_age_s=BY_NAME["near_obstacles"].deadline_s if _looks_by_depth(robot) else np.inf,
+        pose_age_s=POSE_AGE_S if robot.home.zones else np.inf,
+        imu_age_s=IMU_AGE_S if tip_over else np.inf,
         keep_out_depth_m=0.0,
         workspace_excess_m=0.0,
         self_clearance_m=robot.protection.clearance.self_m,
@@ -72,6 +78,10 @@ def safety_limits(robot: RobotDescription) -> SafetyLimits:
         tip_margin_ratio=tip_over.min_ratio if tip_over else 0.0,
         external_torque_nm=contact_torque(robot),
     )
+
+
+def _looks_by_depth(robot: RobotDescription) -> bool:
+    return any(ZoneSource.DEPTH in zone.sources for zone in robot.protection.zones)
 
 
 def _registers(robot: RobotDescription, name: str) -> Floats:

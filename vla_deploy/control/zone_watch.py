@@ -55,6 +55,11 @@ class ZoneWatch:
         """Return the age of what the depth camera told last, None before the first."""
         return self._nearby[ZoneSource.DEPTH].age_s
 
+    @property
+    def depth_due_s(self) -> float:
+        """Return the age beyond which the depth camera is overdue at its own rate."""
+        return self._nearby[ZoneSource.DEPTH].due_s
+
     def look(self, now_ns: int, position: Floats, motion: Motion) -> None:
         """Judge all zones; nothing new around a base that stands leaves them as they were."""
         points = {

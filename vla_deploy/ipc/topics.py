@@ -241,6 +241,7 @@ TOPICS: tuple[Topic, ...] = (
         summary="depth camera: what stands up from the floor, nearest first, in the base frame",
         fields=(
             Field("count", "u4"),
+            Field("period_s", "f4", unit="s, between two looks, by the profile and its ladder"),
             Field("x_m", "f4", OBSTACLE_POINTS, "m"),
             Field("y_m", "f4", OBSTACLE_POINTS, "m"),
             Field("z_m", "f4", OBSTACLE_POINTS, "m"),

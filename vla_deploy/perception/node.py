@@ -171,16 +171,18 @@ class PerceptionNode:
         self._next_look_ns = now_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
         self._publish_image(frame)
         if self._looking.see(frame):
-            self._publish_obstacles()
+            self._publish_obstacles(1.0 / rate_hz)
 
-    def _publish_obstacles(self) -> None:
+    def _publish_obstacles(self, period_s: float) -> None:
         """Tell what stands around the base; the stamp is that of the present pose."""
         pose, now_ns = self._whereabouts.pose, self._clock.now_ns()
         points = self._looking.obstacles.around(pose, now_ns)
         padded = np.zeros((3, OBSTACLE_POINTS), dtype=np.float32)
         padded[:, : len(points)] = points.T
         x_m, y_m, z_m = padded
-        self._writers["near_obstacles"].put(count=len(points), x_m=x_m, y_m=y_m, z_m=z_m)
+        self._writers["near_obstacles"].put(
+            count=len(points), period_s=period_s, x_m=x_m, y_m=y_m, z_m=z_m
+        )
 
     def _recall_scene(self) -> None:
         """Remember what an earlier instance in this run knew of things."""

@@ -62,6 +62,9 @@ class Cause(Enum):
     TIP_OVER = "tip_over"
     BUDGET_EXHAUSTED = "budget_exhausted"
     STALE_SCAN = "stale_scan"
+    STALE_DEPTH = "stale_depth"
+    STALE_POSE = "stale_pose"
+    STALE_IMU = "stale_imu"
     STALE_COMMAND = "stale_command"
     KEEP_OUT_ZONE = "keep_out_zone"
     OBSTACLE_STOP_ZONE = "obstacle_stop_zone"
@@ -147,6 +150,12 @@ RULES: tuple[Rule, ...] = (
          probes.budget_exhausted, "see: vla-deploy status"),
     Rule(Cause.STALE_SCAN,              Reaction.BASE_RAMP,       Latch.NEVER,     1,   125,
          around.stale_scan, "without its lidar the base does not drive: look at perception"),
+    Rule(Cause.STALE_DEPTH,             Reaction.BASE_RAMP,       Latch.NEVER,     1,   125,
+         around.stale_depth, "without its depth camera the base does not drive: see perception"),
+    Rule(Cause.STALE_POSE,              Reaction.BASE_RAMP,       Latch.NEVER,     1,   125,
+         around.stale_pose, "near keep-out areas the base must know its place: see perception"),
+    Rule(Cause.STALE_IMU,               Reaction.BASE_RAMP,       Latch.NEVER,     1,   125,
+         around.stale_imu, "without its IMU nobody knows whether it tips: look at perception"),
     Rule(Cause.STALE_COMMAND,           Reaction.BASE_RAMP,       Latch.NEVER,     1,   0,
          probes.stale_command, "the commanding process is silent"),
     Rule(Cause.KEEP_OUT_ZONE,           Reaction.BASE_BLOCK,      Latch.NEVER,     2,   25,

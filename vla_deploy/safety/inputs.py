@@ -74,7 +74,7 @@ class SafetyInputs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyLimits:
-    """Carry the thresholds; an infinite entry switches one joint's check off.
+    """Carry the thresholds; an infinite entry switches a check off, of one joint or one sense.
 
     `outward_velocity` is the speed above which a joint beyond its range counts as still
     leaving it, so that the way back stays open. `position_jump` is what a joint may go beyond what
@@ -104,6 +104,9 @@ class SafetyLimits:
     standstill_wheel_rad_s: float
     scan_required: bool
     scan_age_s: float
+    depth_age_s: float
+    pose_age_s: float
+    imu_age_s: float
     keep_out_depth_m: float
     workspace_excess_m: float
     self_clearance_m: float

@@ -85,7 +85,8 @@ class Surroundings:
 
     `tip_margin_ratio` is 1 on level ground and 0 where the robot begins to tip.
     `external_torque_nm` (N for a finger) is what no model of the robot itself explains, per joint.
-    An age of None means that such a measurement has never arrived.
+    An age of None means that such a measurement has never arrived. `depth_due_s` is the age beyond
+    which the depth camera is overdue at the rate that it is asked for.
     """
 
     zones: tuple[ZoneFinding, ...] = ()
@@ -97,6 +98,7 @@ class Surroundings:
     external_torque_nm: NDArray[np.float64] | None = None
     scan_age_s: float | None = None
     depth_age_s: float | None = None
+    depth_due_s: float = 0.0
     pose_age_s: float | None = None
     imu_age_s: float | None = None
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from vla_deploy.robots.protection import ZoneKind, ZoneSource
-from vla_deploy.safety.findings import Finding, Probe, first_joint
+from vla_deploy.safety.findings import Finding, Probe, first_joint, stale
 from vla_deploy.safety.inputs import SafetyInputs, SafetyLimits
 from vla_deploy.safety.surroundings import Clearance, Surroundings, ZoneFinding
 
@@ -14,12 +14,26 @@ NEVER_SEEN = math.inf
 
 def stale_scan(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a base that moves while its lidar has told nothing for too long, or nothing ever."""
-    if not (inputs.base_moving and limits.scan_required):
+    if not limits.scan_required:
         return None
-    age_s = _told_age_s(inputs.surroundings.scan_age_s)
-    if age_s <= limits.scan_age_s:
-        return None
-    return Finding(subject="scan", measured=age_s, limit=limits.scan_age_s, age_s=age_s)
+    return _silent("scan", inputs, inputs.surroundings.scan_age_s, limits.scan_age_s)
+
+
+def stale_depth(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a base that moves while its depth camera has told nothing for too long, or ever."""
+    around = inputs.surroundings
+    limit_s = max(limits.depth_age_s, around.depth_due_s)
+    return _silent("near_obstacles", inputs, around.depth_age_s, limit_s)
+
+
+def stale_pose(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a base that moves while nobody has told where it is for too long, or ever."""
+    return _silent("pose", inputs, inputs.surroundings.pose_age_s, limits.pose_age_s)
+
+
+def stale_imu(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
+    """Find a base that moves while its IMU has told nothing for too long, or nothing ever."""
+    return _silent("imu", inputs, inputs.surroundings.imu_age_s, limits.imu_age_s)
 
 
 def in_zone(kind: ZoneKind) -> Probe:
@@ -132,6 +146,13 @@ def _too_close(
         limit=least_m,
         age_s=_joints_age_s(inputs),
     )
+
+
+def _silent(
+    subject: str, inputs: SafetyInputs, age_s: float | None, limit_s: float
+) -> Finding | None:
+    """Find a sense that a moving base is without; what never told anything is infinitely old."""
+    return stale(subject, _told_age_s(age_s) if inputs.base_moving else None, limit_s)
 
 
 def _joints_age_s(inputs: SafetyInputs) -> float:

@@ -90,7 +90,7 @@ def test_a_case_that_never_stopped_has_no_way_to_rest_in_the_sum() -> None:
 
 def test_driving_ends_before_the_wall_without_any_fault(tmp_path: Path) -> None:
     stack = LockstepControl(tmp_path)
-    stack.add_lidar()
+    stack.add_senses()
     stage = Stage(stack)
     stage.begin(Phase.DRIVING)
     engine = stack.lockstep.twin.engine
@@ -103,7 +103,7 @@ def test_driving_ends_before_the_wall_without_any_fault(tmp_path: Path) -> None:
 
 def test_carrying_holds_the_payload_and_moves(tmp_path: Path) -> None:
     stack = LockstepControl(tmp_path)
-    stack.add_lidar()
+    stack.add_senses()
     stage = Stage(stack)
     stage.begin(Phase.CARRYING)
     assert stage.holds_payload

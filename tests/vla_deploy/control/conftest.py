@@ -18,6 +18,10 @@ from vla_deploy.ipc.topics import SCAN_BEAMS
 from vla_deploy.robots import load_robot
 
 SINKS_FOR_S = 2.5
+START: dict[str, Any] = {"x_m": 1.0, "y_m": 1.0, "yaw_rad": 0.0, "match_ratio": 1.0}
+START |= {"covariance": (0.0,) * 9, "state": 0, "doubt": 0}
+LEVEL = {"yaw_rad": 0.0, "pitch_rad": 0.0, "roll_rad": 0.0, "acceleration_m_s2": (0.0, 0.0, 9.81)}
+_NO_POINTS: dict[str, Any] = {"x_m": (), "y_m": (), "z_m": ()}
 
 
 @cache
@@ -33,22 +37,29 @@ def at_rest() -> dict[str, float]:
 
 
 class EmptyFloor:
-    """Tell the scan of a lidar, with nothing around it at first, as long as it `sees`."""
+    """Tell what perception tells, with nothing around at first, of the topics in `sees`."""
 
     period_s = 0.1
 
     def __init__(self, space: SharedSpace) -> None:
-        self.sees = True
         self.ranges_m = np.full(SCAN_BEAMS, 8.0)
-        self._scan = space.cell_writer("scan")
+        self.look_period_s = 0.2
+        self.sees = {"scan", "near_obstacles", "pose", "imu"}
+        self._writers = {name: space.cell_writer(name) for name in sorted(self.sees)}
 
     def start(self) -> None:
         """Have nothing to open."""
 
     def step(self) -> None:
-        """Put one scan."""
-        if self.sees:
-            self._scan.put(range_m=self.ranges_m, beam_age_s=())
+        """Put one sample of each."""
+        told: dict[str, dict[str, Any]] = {
+            "scan": {"range_m": self.ranges_m, "beam_age_s": ()},
+            "near_obstacles": {"count": 0, "period_s": self.look_period_s} | _NO_POINTS,
+            "pose": START,
+            "imu": LEVEL,
+        }
+        for name in self.sees:
+            self._writers[name].put(**told[name])
 
     def stop(self) -> None:
         """Have nothing to close."""

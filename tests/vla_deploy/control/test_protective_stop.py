@@ -84,18 +84,57 @@ def test_motion_during_standstill_becomes_a_stop_by_category(armed: Rig) -> None
     assert armed.state == "armed"
 
 
-def test_a_blind_base_comes_to_rest_and_drives_on_when_it_sees(armed: Rig) -> None:
+@pytest.mark.parametrize(
+    ("topic", "cause", "limit_s"),
+    [
+        ("scan", "stale_scan", 0.5),
+        ("near_obstacles", "stale_depth", 1.0),
+        ("pose", "stale_pose", 0.5),
+        ("imu", "stale_imu", 0.5),
+    ],
+)
+def test_a_base_without_one_of_its_senses_comes_to_rest_and_drives_on_when_it_is_back(
+    armed: Rig, topic: str, cause: str, limit_s: float
+) -> None:
     armed.drive(0.3, 0.0, 1.0)
-    armed.lidar.sees = False
+    armed.lidar.sees.remove(topic)
     armed.go(1, head_pan=0.4)
-    armed.drive(0.3, 0.0, 1.4)
-    assert armed.status["cause"] == "stale_scan"
+    armed.drive(0.3, 0.0, limit_s - 0.1)
+    assert armed.status["cause"] == ""
+    armed.drive(0.3, 0.0, 1.0)
+    assert armed.status["cause"] == cause
+    assert (armed.status["limit"], armed.status["measured"] > limit_s) == (limit_s, True)
     assert armed.base()["v_m_s"] == pytest.approx(0.0, abs=0.01)
     assert [r["status"] for r in armed.results()] == ["done"]
-    armed.lidar.sees = True
+    armed.lidar.sees.add(topic)
     armed.drive(0.3, 0.0, 1.5)
     assert armed.state == "armed"
     assert armed.base()["v_m_s"] == pytest.approx(0.3, abs=0.02)
+
+
+def test_before_anything_is_seen_arms_move_and_the_base_does_not(rig: Rig) -> None:
+    rig.lidar.sees.clear()
+    rig.boot()
+    rig.ask("arm")
+    assert (rig.state, rig.status["cause"]) == ("armed", "")
+    rig.go(1, head_pan=0.4)
+    rig.drive(0.3, 0.0, 1.5)
+    assert [r["status"] for r in rig.results()] == ["done"]
+    assert (rig.state, rig.status["cause"]) == ("armed", "stale_scan")
+    assert abs(rig.base()["v_m_s"]) < 0.01
+    rig.lidar.sees |= {"scan", "near_obstacles", "pose", "imu"}
+    rig.drive(0.3, 0.0, 1.5)
+    assert rig.base()["v_m_s"] == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_camera_that_is_looked_at_seldom_by_its_profile_is_waited_for(armed: Rig) -> None:
+    armed.lidar.look_period_s = 1.0
+    armed.drive(0.3, 0.0, 0.5)
+    armed.lidar.sees.remove("near_obstacles")
+    armed.drive(0.3, 0.0, 2.6)
+    assert armed.status["cause"] == ""
+    armed.drive(0.3, 0.0, 0.8)
+    assert (armed.status["cause"], armed.status["limit"]) == ("stale_depth", 3.0)
 
 
 def test_what_stands_ahead_blocks_the_way_there_and_not_the_way_back(armed: Rig) -> None:

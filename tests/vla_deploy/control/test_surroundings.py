@@ -187,13 +187,16 @@ def refreshed(watch: SurroundingsWatch, rig: Any, position: np.ndarray, ticks: i
     return known
 
 
+def in_area(rig: Any) -> dict[str, Any]:
+    """Return a pose in the middle of the first keep-out area."""
+    x_m, y_m = np.mean(rig.robot.home.zones[0].polygon_m, axis=0)
+    told = {"x_m": x_m, "y_m": y_m, "yaw_rad": 0.0, "match_ratio": 1.0}
+    return {**told, "covariance": (0.0,) * 9, "state": 0, "doubt": 0}
+
+
 def test_each_part_gets_its_turn_and_tells_what_it_knows(watch: Any, rig: Any) -> None:
     space = SharedSpace(rig.lockstep.context.run_dir / "ipc", rig.lockstep.clock)
-    zone = rig.robot.home.zones[0].polygon_m
-    x_m, y_m = np.mean(zone, axis=0)
-    space.cell_writer("pose").put(
-        x_m=x_m, y_m=y_m, yaw_rad=0.0, match_ratio=1.0, covariance=(0.0,) * 9, state=0, doubt=0
-    )
+    space.cell_writer("pose").put(**in_area(rig))
     ahead = np.zeros(360, dtype=np.float32)
     ahead[:3] = 0.245
     space.cell_writer("scan").put(range_m=ahead, beam_age_s=())
@@ -214,15 +217,24 @@ def test_each_part_gets_its_turn_and_tells_what_it_knows(watch: Any, rig: Any) -
     assert known.depth_age_s is None
 
 
-def test_stale_topics_are_no_knowledge(watch: Any, rig: Any) -> None:
+def test_stale_topics_are_no_knowledge_but_of_their_age(watch: Any, rig: Any) -> None:
     space = SharedSpace(rig.lockstep.context.run_dir / "ipc", rig.lockstep.clock)
     space.cell_writer("imu").put(
         yaw_rad=0.0, pitch_rad=0.0, roll_rad=0.0, acceleration_m_s2=(0.0, 0.0, 9.81)
     )
     tuck = full_positions(rig.robot, list(rig.robot.poses["tuck"].items()))
-    assert refreshed(watch, rig, tuck).tip_margin_ratio is not None
-    rig.lockstep.run_for(1.0)
-    assert refreshed(watch, rig, tuck).tip_margin_ratio is None
+    space.cell_writer("near_obstacles").put(count=1, period_s=0.2, x_m=(0.2,), y_m=(0.0,), z_m=())
+    space.cell_writer("pose").put(**in_area(rig))
+    known = refreshed(watch, rig, tuck)
+    assert known.tip_margin_ratio is not None
+    assert known.keep_out is not None
+    assert [zone.name for zone in known.zones] == ["overhang"]
+    assert max(known.imu_age_s, known.depth_age_s, known.pose_age_s) < 0.2
+    assert known.depth_due_s == pytest.approx(0.6)
+    rig.lockstep.run_for(1.1)
+    known = refreshed(watch, rig, tuck)
+    assert (known.tip_margin_ratio, known.keep_out, known.zones) == (None, None, ())
+    assert min(known.imu_age_s, known.depth_age_s, known.pose_age_s) > 1.0
 
 
 def test_a_beam_on_the_own_arm_is_no_obstacle(rig: Any) -> None:

@@ -55,6 +55,9 @@ LIMITS = SafetyLimits(
     standstill_wheel_rad_s=0.125,
     scan_required=True,
     scan_age_s=0.5,
+    depth_age_s=0.875,
+    pose_age_s=0.75,
+    imu_age_s=0.25,
     keep_out_depth_m=0.0,
     workspace_excess_m=0.0,
     self_clearance_m=0.005,
@@ -401,6 +404,20 @@ BOUNDARIES: tuple[tuple[Cause, dict[str, Any], dict[str, Any], str], ...] = (
         around(scan_age_s=None) | {"base_moving": False},
         "scan",
     ),
+    (
+        Cause.STALE_DEPTH,
+        around(depth_age_s=0.875 + ULP),
+        around(depth_age_s=0.875),
+        "near_obstacles",
+    ),
+    (
+        Cause.STALE_DEPTH,
+        around(depth_age_s=1.5 + ULP, depth_due_s=1.5),
+        around(depth_age_s=1.5, depth_due_s=1.5),
+        "near_obstacles",
+    ),
+    (Cause.STALE_POSE, around(pose_age_s=0.75 + ULP), around(pose_age_s=0.75), "pose"),
+    (Cause.STALE_IMU, around(imu_age_s=0.25 + ULP), around(imu_age_s=0.25), "imu"),
     (Cause.KEEP_OUT_ZONE, within(ULP), within(0.0), "pet corner"),
     (
         Cause.OBSTACLE_STOP_ZONE,
@@ -438,6 +455,10 @@ SWEEPS: tuple[tuple[Cause, Callable[[float], dict[str, Any]], float, int], ...] 
     (Cause.SUPERVISOR_LOST, lambda age_s: {"supervisor_age_s": age_s}, 3.0, 1),
     (Cause.STALE_COMMAND, lambda age_s: {"base_command_age_s": age_s}, 0.25, 1),
     (Cause.STALE_SCAN, lambda age_s: around(scan_age_s=age_s), 0.5, 1),
+    (Cause.STALE_DEPTH, lambda age_s: around(depth_age_s=age_s), 0.875, 1),
+    (Cause.STALE_DEPTH, lambda age_s: around(depth_age_s=age_s, depth_due_s=1.5), 1.5, 1),
+    (Cause.STALE_POSE, lambda age_s: around(pose_age_s=age_s), 0.75, 1),
+    (Cause.STALE_IMU, lambda age_s: around(imu_age_s=age_s), 0.25, 1),
     (Cause.COLLISION, lambda torque_nm: pushed(torque_nm), 2.0, 1),
     (Cause.COLLISION, lambda torque_nm: pushed(torque_nm), -2.0, -1),
     (Cause.SELF_COLLISION, lambda gap_m: close_by("self_clearance", gap_m, 0.1), 0.005, -1),
@@ -708,9 +729,40 @@ def test_a_robot_without_a_lidar_may_drive() -> None:
     assert verdict is CLEAR
 
 
-def test_a_scan_that_never_came_is_infinitely_old() -> None:
-    _, verdict = tick(SafetyState(), **around(scan_age_s=None))
+@pytest.mark.parametrize("name", ["depth_age_s", "pose_age_s", "imu_age_s"])
+def test_a_robot_that_is_judged_by_no_such_sense_may_drive(name: str) -> None:
+    limits = replace(LIMITS, **{name: np.inf})
+    for age_s in (9.0, None):
+        blind = inputs_with(around(**{name: age_s}))
+        assert evaluate(SafetyState(), blind, limits)[1] is CLEAR
+
+
+SENSES = {
+    "scan_age_s": (Cause.STALE_SCAN, "scan", 0.5),
+    "depth_age_s": (Cause.STALE_DEPTH, "near_obstacles", 0.875),
+    "pose_age_s": (Cause.STALE_POSE, "pose", 0.75),
+    "imu_age_s": (Cause.STALE_IMU, "imu", 0.25),
+}
+
+
+@pytest.mark.parametrize("name", SENSES)
+def test_a_sense_that_never_told_anything_is_infinitely_old(name: str) -> None:
+    _, verdict = tick(SafetyState(), **around(**{name: None}))
+    assert (verdict.cause, verdict.subject, verdict.limit) == SENSES[name]
     assert verdict.measured == verdict.age_s == np.inf
+
+
+@pytest.mark.parametrize("name", SENSES)
+@pytest.mark.parametrize("age_s", [9.0, None])
+def test_a_base_that_stands_may_be_without_any_sense(name: str, age_s: float | None) -> None:
+    standing_still = around(**{name: age_s}) | {"base_moving": False}
+    assert tick(SafetyState(), **standing_still)[1] is CLEAR
+
+
+def test_a_silent_perception_is_told_by_its_scan() -> None:
+    never = dict.fromkeys(SENSES)
+    _, verdict = tick(SafetyState(), **around(**never))
+    assert verdict.cause is Cause.STALE_SCAN
 
 
 def test_nothing_known_of_the_surroundings_forbids_nothing_but_driving_blind() -> None:
@@ -780,6 +832,9 @@ def test_a_voltage_is_measured_against_the_limit_that_it_is_beyond(
         ({"base_command_age_s": 1.5}, 1.5),
         ({"supervisor_age_s": 4.0}, 4.0),
         (around(scan_age_s=0.75), 0.75),
+        (around(depth_age_s=1.25), 1.25),
+        (around(pose_age_s=1.25), 1.25),
+        (around(imu_age_s=0.75), 0.75),
     ],
 )
 def test_a_stale_cause_tells_its_age(changes: dict[str, Any], age_s: float) -> None:
@@ -951,6 +1006,9 @@ independent = st.sets(
             Cause.WORKSPACE,
             Cause.TIP_OVER,
             Cause.STALE_SCAN,
+            Cause.STALE_DEPTH,
+            Cause.STALE_POSE,
+            Cause.STALE_IMU,
             Cause.KEEP_OUT_ZONE,
             Cause.OBSTACLE_STOP_ZONE,
             Cause.OBSTACLE_SLOW_ZONE,

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from sim_twin.stack import LockstepControl
@@ -25,7 +24,7 @@ class Rig(LockstepControl):
         self.requests = self.space.ring_writer("flight_request")
         self.base_command = self.space.cell_writer("base_command")
         self.process_table = self.space.cell_writer("process_table")
-        self._scan = self.space.cell_writer("scan")
+        self._sees = False
         self.arm()
         self.settle()
         self.recorder = self.new_recorder()
@@ -53,9 +52,11 @@ class Rig(LockstepControl):
         self.lockstep.run_for(seconds)
 
     def drive(self, seconds: float) -> None:
+        if not self._sees:
+            self._sees = True
+            self.add_senses()
         for _ in range(round(seconds / 0.02)):
             self.base_command.put(v_m_s=0.2, w_rad_s=0.1)
-            self._scan.put(range_m=np.full(360, 8.0, dtype=np.float32), beam_age_s=())
             self.run(0.02)
 
     def flights(self) -> list[Flight]:

@@ -11,8 +11,6 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-import numpy as np
-
 from sim_twin.stack import LockstepControl
 from vla_deploy.telemetry.folder import FlightFolder
 from vla_deploy.telemetry.node import RecorderNode
@@ -23,11 +21,10 @@ _WALL_NS = 1_800_000_000_000_000_000
 
 
 def drive(stack: LockstepControl, seconds: float) -> None:
-    """Drive a curve, with a scan of an empty hall."""
-    command, scan = (stack.space.cell_writer(name) for name in ("base_command", "scan"))
+    """Drive a curve."""
+    command = stack.space.cell_writer("base_command")
     for _ in range(round(seconds / 0.02)):
         command.put(v_m_s=0.3, w_rad_s=0.2)
-        scan.put(range_m=np.full(360, 8.0, dtype=np.float32), beam_age_s=())
         stack.lockstep.run_for(0.02)
 
 
@@ -40,6 +37,7 @@ def reach(stack: LockstepControl, seconds: float, **targets: float) -> None:
 
 def estop_while_driving(stack: LockstepControl) -> None:
     """Press stop at full speed, reset, arm."""
+    stack.add_senses()
     drive(stack, 0.5)
     stack.operate("estop")
     drive(stack, 0.5)
@@ -56,6 +54,7 @@ def servo_bus_unplugged(stack: LockstepControl) -> None:
 
 def wheel_blocked(stack: LockstepControl) -> None:
     """Block a wheel while the base drives."""
+    stack.add_senses()
     drive(stack, 0.3)
     stack.faults.inject("drive", "left_wheel", "stuck")
     drive(stack, 0.8)

@@ -87,7 +87,7 @@ class Run:
             x_m=1.0, y_m=2.0, yaw_rad=0.5, match_ratio=1.0, covariance=(), state=0, doubt=0
         )
         put["scan"].put(range_m=np.full(360, 2.0), beam_age_s=())
-        put["near_obstacles"].put(count=1, x_m=[0.5], y_m=[0.1], z_m=[0.2])
+        put["near_obstacles"].put(count=1, period_s=0.2, x_m=[0.5], y_m=[0.1], z_m=[0.2])
         put["scene"].put_document(SCENE)
         temperatures = {"temperature_c": [40.0] * 15 + [None], "voltage_v": [12.0] * 16}
         put["control_status"].put_document({"tick": self._tick, "joints": temperatures})

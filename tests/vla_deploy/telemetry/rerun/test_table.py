@@ -150,7 +150,7 @@ def test_a_plot_has_the_robots_joints_and_a_gap_where_nothing_is_known() -> None
 
 def test_beams_and_points_are_drawn_and_not_plotted() -> None:
     assert plotted("scan") == ()
-    assert [field.name for field in plotted("near_obstacles")] == ["count"]
+    assert [field.name for field in plotted("near_obstacles")] == ["count", "period_s"]
 
 
 def test_joints_are_named_in_every_plot_that_has_a_curve_for_each() -> None:
