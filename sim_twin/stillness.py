@@ -4,18 +4,31 @@ A guest of a busy host loses a core for tens of milliseconds now and then. Only 
 every thread of the robot can tell that from a robot that is late by its own fault.
 """
 
+import json
 import os
 import subprocess
 import sys
 import threading
 import time
+from collections import deque
+from dataclasses import dataclass
 from typing import Final
 
 # Above the serial workers and control; below the kernel's own watchdogs at 99.
 PRIORITY: Final = 90
 STEP_NS: Final = 4_000_000
+LEAST_NS: Final = 500_000
+_MOST: Final = 10_000
 HELD_UP_S: Final = 0.02
 """With no answer for so much longer, control may rightly take the bus for lost."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stall:
+    """Tell when a core should have gone on, on the monotonic clock, and how much later it did."""
+
+    due_ns: int
+    seconds: float
 
 
 class StillnessWatch:
@@ -30,11 +43,16 @@ class StillnessWatch:
 
     def worst_s(self) -> float:
         """Return the longest time a core stood still since the last call."""
+        return max((stall.seconds for stall in self.stalls()), default=0.0)
+
+    def stalls(self) -> tuple[Stall, ...]:
+        """Return every time a core stood still since the last call, for half a millisecond up."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write("\n")
         self._process.stdin.flush()
-        return float(self._process.stdout.readline())
+        told = json.loads(self._process.stdout.readline())
+        return tuple(Stall(due_ns=due_ns, seconds=late_ns / 1e9) for due_ns, late_ns in told)
 
     def close(self) -> None:
         """End the process."""
@@ -45,24 +63,26 @@ class StillnessWatch:
         self._process.wait()
 
 
-def _watch(core: int, worst_ns: dict[int, int]) -> None:
+def _watch(core: int, found: "deque[tuple[int, int]]") -> None:
     os.sched_setaffinity(0, {core})
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     while True:
         due_ns = time.monotonic_ns() + STEP_NS
         time.sleep(STEP_NS / 1e9)
-        worst_ns[core] = max(worst_ns.get(core, 0), time.monotonic_ns() - due_ns)
+        late_ns = time.monotonic_ns() - due_ns
+        if late_ns >= LEAST_NS:
+            found.append((due_ns, late_ns))
 
 
 def _main() -> None:
     threading.excepthook = lambda _: None  # no priority: nothing to tell
-    worst_ns: dict[int, int] = {}
+    found: deque[tuple[int, int]] = deque(maxlen=_MOST)
     for core in os.sched_getaffinity(0):
-        threading.Thread(target=_watch, args=(core, worst_ns), daemon=True).start()
+        threading.Thread(target=_watch, args=(core, found), daemon=True).start()
     for _ in sys.stdin:
-        sys.stdout.write(f"{max(worst_ns.values(), default=0) / 1e9}\n")
+        told = [found.popleft() for _ in range(len(found))]
+        sys.stdout.write(json.dumps(told) + "\n")
         sys.stdout.flush()
-        worst_ns.clear()
 
 
 if __name__ == "__main__":

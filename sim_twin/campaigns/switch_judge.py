@@ -30,10 +30,17 @@ class Seen:
     states: frozenset[str]
     memory_mib: Mapping[str, float]
     cause: str = ""
+    late_at_commit: int | None = None
+    explained_at_commit: int = 0
 
 
 def judge(seen: Seen, outcomes: Sequence[str], reason: str = "") -> Iterator[str]:
-    """Return what was wrong with one switch; late ticks are judged over all of them."""
+    """Return what was wrong with one switch; late ticks far from its commit count over all."""
+    if seen.late_at_commit is not None and seen.late_at_commit > seen.explained_at_commit:
+        yield (
+            f"{seen.late_at_commit} ticks late in the second around the commit, the computer "
+            f"explains {seen.explained_at_commit}"
+        )
     if seen.outcome not in outcomes:
         yield f"{seen.outcome} ({seen.reason}), expected {' or '.join(outcomes)}"
     elif reason not in seen.reason:

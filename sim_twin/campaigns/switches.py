@@ -6,6 +6,7 @@ profile that cannot be kept is refused or taken back, with the robot at work all
 
 import argparse
 import itertools
+import os
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,13 +14,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from drivers.clock import NS_PER_S, MonotonicClock
+from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from sim_twin.campaigns.commit_second import Look, commit_ns, explained, late_around
 from sim_twin.campaigns.report import Case, Report, told
 from sim_twin.campaigns.selection import chosen
 from sim_twin.campaigns.switch_judge import Seen, judge, memory_case, ticks_case
 from sim_twin.campaigns.switch_profiles import BAD, GOOD, Bad, control_rate_hz
 from sim_twin.campaigns.ticks import Ticks
 from sim_twin.campaigns.working_robot import RobotFailed, WorkingRobot
+from sim_twin.stillness import StillnessWatch
 from vla_deploy.robots import load_robot
 
 SWITCHES: Final = 100
@@ -43,7 +46,8 @@ class SwitchCampaign:
         self._robot = WorkingRobot(folder / "run", self._clock, *words, log=folder / "robot.log")
         self._targets = itertools.cycle((0.6, -0.6))
         self._swing_ns = 0
-        self._meter = _Meter(self._robot)
+        self._meter = _Meter(self._robot, self._clock)
+        self._stillness = StillnessWatch()
         # Arms rest on the base without power: moving there is what a protective stop is for.
         self._robot.go(**load_robot("butler").poses["tuck"])
         self._robot.pause(_TUCK_S)
@@ -80,13 +84,16 @@ class SwitchCampaign:
 
     def close(self) -> None:
         """End the robot."""
+        self._stillness.close()
         self._robot.close()
 
     def _seen(self, target: str, least_rate_hz: float, after_s: float = 0.0) -> Seen:
         began_ns, start = self._clock.now_ns(), self._robot.ticks()
+        self._stillness.stalls()
         self._meter.begin()
         last = self._robot.use_profile(self._paths[target], meanwhile=self._look)
         self._keep_moving(after_s)
+        late, due = self._around_commit(least_rate_hz)
         seconds = (self._clock.now_ns() - began_ns) / NS_PER_S
         return Seen(
             outcome=last["outcome"],
@@ -98,7 +105,26 @@ class SwitchCampaign:
             states=frozenset(self._meter.states),
             memory_mib=self._robot.memory_mib(),
             cause=self._meter.cause,
+            late_at_commit=late,
+            explained_at_commit=due,
         )
+
+    def _around_commit(self, least_rate_hz: float) -> tuple[int | None, int]:
+        """Return the late ticks in the second around the commit, and those that are explained.
+
+        They are None where there was no commit, or control has no real-time priority.
+        """
+        looks = self._meter.looks
+        at_ns = commit_ns(looks)
+        if at_ns is None or not self._has_priority():
+            return None, 0
+        late, begin_ns, end_ns = late_around(looks, at_ns)
+        stalls = self._stillness.stalls()
+        return late, explained(stalls, begin_ns, end_ns, 1.0 / least_rate_hz)
+
+    def _has_priority(self) -> bool:
+        control = self._robot.pids().get("control")
+        return control is not None and os.sched_getscheduler(control) == os.SCHED_FIFO
 
     def _keep_moving(self, duration_s: float) -> None:
         end_ns = self._clock.now_ns() + round(duration_s * NS_PER_S)
@@ -117,8 +143,9 @@ class SwitchCampaign:
 class _Meter:
     """Note control's states and how far the setpoints go."""
 
-    def __init__(self, robot: WorkingRobot) -> None:
+    def __init__(self, robot: WorkingRobot, clock: Clock) -> None:
         self._robot = robot
+        self._clock = clock
         self.begin()
 
     def begin(self) -> None:
@@ -126,10 +153,14 @@ class _Meter:
         self.states: set[str] = set()
         self.cause = ""
         self.moved_rad = 0.0
+        self.looks: list[Look] = []
         self._before: np.ndarray[Any, np.dtype[np.float64]] | None = None
 
     def look(self) -> None:
         """Look once."""
+        phase = str(self._robot.document("profile_status").get("phase", ""))
+        late = self._robot.ticks().late
+        self.looks.append(Look(now_ns=self._clock.now_ns(), late=late, phase=phase))
         state = self._robot.state()
         self.states.add(state)
         if state != "armed":
@@ -188,6 +219,8 @@ def _case(name: str, failures: Sequence[str], seen: Seen) -> Case:
         "outcome": seen.outcome,
         "ticks": seen.ticks.ticks,
         "late": seen.ticks.late,
+        "late_at_commit": seen.late_at_commit,
+        "explained_at_commit": seen.explained_at_commit,
         "moved_rad": seen.moved_rad,
         "reason": seen.reason,
         "cause": seen.cause,

@@ -58,11 +58,17 @@ def test_a_switch_that_is_kept_in_motion_has_no_fault() -> None:
         ({"states": frozenset()}, "control was never looked at"),
         ({"ticks": Ticks(ticks=359, late=0)}, "359 ticks in 4.0 s, expected 360"),
         ({"moved_rad": 0.0}, "moved 0.000 rad"),
+        ({"late_at_commit": 1}, "1 ticks late in the second around the commit"),
+        ({"late_at_commit": 3, "explained_at_commit": 2}, "the computer explains 2"),
     ],
 )
 def test_what_a_switch_must_not_do_is_told(changes: dict[str, object], word: str) -> None:
     found = list(judge(replace(KEPT, **changes), ("kept",)))  # type: ignore[arg-type]
     assert any(word in fault for fault in found), found
+
+
+def test_late_ticks_at_a_commit_that_the_computer_explains_are_no_fault() -> None:
+    assert not list(judge(replace(KEPT, late_at_commit=2, explained_at_commit=2), ("kept",)))
 
 
 def test_a_bad_profile_that_stays_or_is_refused_for_another_reason_is_a_fault() -> None:
