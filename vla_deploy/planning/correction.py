@@ -1,6 +1,7 @@
 """Take "no, the blue one" to a plan that was read back: the same plan with another thing."""
 
 import re
+from dataclasses import replace
 from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
@@ -16,6 +17,10 @@ _CORRECTION: Final = re.compile(
 )
 _ONE: Final = re.compile(r"\bones?\b", re.IGNORECASE)
 _NAMES_THINGS: Final = ("object", "destination")
+_ARTICLE: Final = r"(?:the|an?|my|your)\b"
+_CALLED: Final = re.compile(
+    rf"\b(?P<article>{_ARTICLE})(?P<words>(?: (?!{_ARTICLE})\w+){{1,4}})", re.IGNORECASE
+)
 
 
 def correction_in(text: str) -> str:
@@ -34,7 +39,8 @@ def corrected(plan: Plan, words: str) -> Plan | None:
     """Return the plan with another thing in the place of the one that the words can replace.
 
     That is the only thing of the kind that they name, or the only thing taken where they name none.
-    None where the words are no such thing, or several things could be meant.
+    What the plan says of it is said of the other. None where the words are no such thing, or
+    several things could be meant.
     """
     wanted = _query(words)
     if wanted is None:
@@ -53,8 +59,35 @@ def corrected(plan: Plan, words: str) -> Plan | None:
     instead = words if wanted.is_named else _ONE.sub(kind, words)
     if not _ONE.search(words) and not wanted.is_named:
         instead = f"{words} {kind}"
-    told = tuple(_with(action, set(named), instead) for action in plan.actions)
+    told = tuple(
+        _saying(action, kind, instead)
+        if action.skill == "speak"
+        else _with(action, set(named), instead)
+        for action in plan.actions
+    )
     return plan.model_copy(update={"actions": told, "summary": "", "reasoning": ""})
+
+
+def _saying(action: Action, kind: str, instead: str) -> Action:
+    """Return what is said with "the blue cup" wherever it calls a cup by any words."""
+    wanted = _query(instead)
+    text = action.parameters.get("text")
+    if wanted is None or not isinstance(text, str):
+        return action
+    name = str(replace(wanted, thing_id="", order="", relation="", anchor=None))
+
+    def renamed(found: re.Match[str]) -> str:
+        words = found["words"].split()
+        for count in range(len(words), 0, -1):
+            thing = _thing(" ".join(words[:count]))
+            if thing is not None and thing.kind == kind and not thing.asked.relation:
+                the = "The" if found["article"][0].isupper() else "the"
+                return " ".join((the, name, *words[count:]))
+        return found[0]
+
+    return action.model_copy(
+        update={"parameters": {**action.parameters, "text": _CALLED.sub(renamed, text)}}
+    )
 
 
 def _with(action: Action, names: set[str], instead: str) -> Action:

@@ -191,7 +191,8 @@ class TestReadingBack:
         assert len(desk.plans()) == 1
 
     def test_a_correction_changes_the_plan_that_was_read_back(self, open_desk, rung, propose):
-        take = propose(("pick_up", {"object": "red cup"}), read_back="Shall I take the red cup?")
+        bring = (("pick_up", {"object": "red cup"}), ("speak", {"text": "Here is the red cup."}))
+        take = propose(*bring, read_back="Shall I bring the red cup?")
         desk = open_desk(rung("model", take))
         desk.sees("red cup_1", "blue cup_2")
         desk.give(text="cup, like, you know")
@@ -200,9 +201,9 @@ class TestReadingBack:
         told = desk.answers()
         assert events(told) == [("c2", "answered"), ("c1", "accepted"), ("c1", "plan")]
         assert told[-1]["rung"] == "correction"
-        assert "blue cup" in [
-            one["parameters"].get("object") for one in told[-1]["plan"]["actions"]
-        ]
+        actions = told[-1]["plan"]["actions"]
+        assert "blue cup" in [one["parameters"].get("object") for one in actions]
+        assert actions[-1]["parameters"]["text"] == "Here is the blue cup."
 
     def test_a_robot_that_was_disarmed_meanwhile_does_not_move(self, desk):
         desk.answers()
