@@ -25,6 +25,9 @@ AGAIN_S: Final = 60.0
 LOOK_EVERY_NS: Final = 2 * NS_PER_S
 _RETRY_NS: Final = 30 * NS_PER_S
 _MOST_KEPT: Final = 200
+# A long run names many things anew, perception tells 64 at once: those not seen for longest are
+# dropped here, not from the file.
+MOST_THINGS: Final = 512
 _log = logging.getLogger(__name__)
 
 
@@ -53,7 +56,7 @@ class MemoryKeeper:
         self._scene: CellReader = space.cell_reader("scene")
         self._open: OrderedDict[str, Episode] = OrderedDict()
         self._ended: list[Episode] = []
-        self._seen: dict[str, LastSeen] = {}
+        self._seen: OrderedDict[str, LastSeen] = OrderedDict()
         self._changed: dict[str, LastSeen] = {}
         self._writing: Future[None] | None = None
         self._batch: tuple[list[Episode], dict[str, LastSeen]] = ([], {})
@@ -132,6 +135,9 @@ class MemoryKeeper:
         for thing in snapshot.things:
             if thing.kind != ANY_CLASS:
                 self._note(thing, snapshot)
+        while len(self._seen) > MOST_THINGS:
+            gone, _ = self._seen.popitem(last=False)
+            self._changed.pop(gone, None)
 
     def _note(self, thing: Thing, snapshot: Snapshot) -> None:
         seen = LastSeen(
@@ -146,6 +152,7 @@ class MemoryKeeper:
         before = self._seen.get(thing.thing_id)
         if before is None or _is_news(before, seen):
             self._seen[thing.thing_id] = self._changed[thing.thing_id] = seen
+        self._seen.move_to_end(thing.thing_id)
 
     # --- writing --------------------------------------------------------------------------------
 
@@ -176,7 +183,8 @@ class MemoryKeeper:
         self._write_due_ns = now_ns + _RETRY_NS
         episodes, things = self._batch
         self._ended = [*episodes, *self._ended][-_MOST_KEPT:]
-        self._changed = {**things, **self._changed}
+        waiting = {**things, **self._changed}
+        self._changed = {name: seen for name, seen in waiting.items() if name in self._seen}
 
 
 def _is_news(before: LastSeen, now: LastSeen) -> bool:

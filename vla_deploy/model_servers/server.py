@@ -152,11 +152,17 @@ class ModelServer:
         return closed and may_pass(error) and failures < self.settings.max_attempts
 
     def _send_if_admitted(self, request: WireRequest, ends: Deadline) -> Json:
+        self._check_time(
+            ends
+        )  # before it is admitted: what is not sent tells nothing of the server
         self._breaker.admit()
         try:
             reply = self._send(request, ends)
         except Unavailable:
-            self._breaker.failed()
+            if ends.is_recalled:
+                self._breaker.abandoned()  # the person would not wait; the server may be well
+            else:
+                self._breaker.failed()
             raise
         except (AnswerUnusable, RequestRefused):
             self._breaker.succeeded()  # it answers, whatever that is worth
@@ -167,8 +173,11 @@ class ModelServer:
         self._breaker.succeeded()
         return reply
 
-    def _send(self, request: WireRequest, ends: Deadline) -> Json:
+    def _check_time(self, ends: Deadline) -> None:
         if ends.left_s <= 0.0:
             raise TimedOut(f"no time left of {ends.given_s:g} s")
+
+    def _send(self, request: WireRequest, ends: Deadline) -> Json:
+        self._check_time(ends)
         reply = self._exchange.send(request, self.format.headers(self._key), ends)
         return document_of(reply, self.settings, self._key)

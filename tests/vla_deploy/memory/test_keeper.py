@@ -10,7 +10,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.aside import AtOnce
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore, Outcome
-from vla_deploy.memory.keeper import MOST_OPEN, MemoryKeeper
+from vla_deploy.memory.keeper import AGAIN_S, MOST_OPEN, MOST_THINGS, MemoryKeeper
 
 PLAN = {"goal": "the cup is in the box", "reasoning": "one red cup", "actions": []}
 PLACES = {"coffee_table": (2.2, 1.5)}
@@ -148,6 +148,34 @@ def test_things_are_remembered_where_they_are_and_again_when_they_have_moved(des
     desk.see(cup(desk.clock.ns, x_m=4.2, rests={"relation": "in", "of": "box_1"}))
     desk.step(after_s=5.0)
     assert [one.place for one in desk.store.last_seen("cup")] == ["box_1"]
+
+
+def see_many(desk: Desk) -> None:
+    """Let perception tell of more things than the keeper knows at a time, 64 in a look."""
+    for first in range(0, MOST_THINGS + 64, 64):
+        desk.see(*(cup(desk.clock.ns, id=f"cup_{first + number + 2}") for number in range(64)))
+        desk.step(after_s=2.0)
+
+
+def test_things_of_a_long_run_are_known_by_number_and_written_anew_after_that(desk: Desk) -> None:
+    desk.see(cup(desk.clock.ns))
+    desk.step()
+    (before,) = (one for one in desk.store.last_seen("cup", count=1000) if one.thing_id == "cup_1")
+    see_many(desk)
+    desk.see(cup(desk.clock.ns))
+    desk.step(after_s=2.0)
+    (again,) = (one for one in desk.store.last_seen("cup", count=1000) if one.thing_id == "cup_1")
+    assert 0.0 < again.seen_s - before.seen_s < AGAIN_S, "it was known all the time"
+
+
+def test_things_that_wait_for_the_disk_are_bounded(desk: Desk) -> None:
+    other = sqlite3.connect(desk.store.path)
+    other.execute("BEGIN IMMEDIATE")
+    see_many(desk)
+    desk.step(after_s=60.0)
+    assert desk.keeper.document()["trouble"]
+    assert desk.keeper.document()["waiting"] == MOST_THINGS
+    other.close()
 
 
 def test_what_has_no_name_is_not_remembered(desk: Desk) -> None:

@@ -11,6 +11,7 @@ import traceback
 import pytest
 
 from vla_deploy.model_servers.chat import Chat, Message
+from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import (
     AnswerMalformed,
     AnswerTooLarge,
@@ -258,6 +259,37 @@ def test_a_failing_server_is_left_alone_and_tried_again_later(loopback, open_ser
     assert server.complete(CHAT).text == "hi"
     assert server.document()["breaker"] == "closed"
     assert server.document()["failures"] == {"ServerFailed": 1, "CircuitOpen": 1}
+
+
+def test_a_call_that_its_person_called_in_does_not_count_against_the_server(loopback, open_server):
+    recall = threading.Event()
+
+    def recalled_meanwhile(handler):
+        recall.set()
+        handler.connection.recv(1)
+
+    loopback.then(recalled_meanwhile, loopback.says("hi"))
+    server = open_server(loopback.url, breaker_failures=1)
+    with pytest.raises(TimedOut, match="nobody waits"):
+        server.complete(CHAT, deadline=Deadline.within(server.clock, 10.0, recall))
+    assert server.document()["breaker"] == "closed"
+    assert server.complete(CHAT).text == "hi"
+
+
+def test_a_call_for_which_no_time_is_left_does_not_count_against_the_server(loopback, open_server):
+    loopback.then(loopback.says("hi"))
+    server = open_server(loopback.url, breaker_failures=1)
+    with pytest.raises(TimedOut, match="no time left"):
+        server.complete(CHAT, deadline=Deadline.within(server.clock, 0.0))
+    assert (server.document()["breaker"], loopback.heard) == ("closed", [])
+
+
+def test_a_server_that_is_silent_counts_as_failing(loopback, open_server):
+    loopback.then(lambda handler: handler.connection.recv(1))
+    server = open_server(loopback.url, breaker_failures=1, read_timeout_s=0.05)
+    with pytest.raises(TimedOut):
+        server.complete(CHAT, deadline=Deadline.within(server.clock, 10.0, threading.Event()))
+    assert server.document()["breaker"] == "open"
 
 
 def test_calls_beyond_what_is_declared_wait_their_turn(loopback, open_server):
