@@ -3,8 +3,9 @@
 The first row of `_REFUSALS` that says something decides; it is told in `heard`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from enum import StrEnum
 from typing import Final
 
@@ -17,6 +18,7 @@ MOST_COMPRESSION: Final = 2.4
 NO_SPEECH: Final = 0.8
 SURE_VOICE: Final = 0.7
 CLIPPED_RATIO: Final = 0.01
+ECHOED_WORDS: Final = 4
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 
@@ -77,9 +79,19 @@ def _courtesy(case: Case) -> str:
 
 
 def _own_voice(case: Case) -> str:
-    words, own = words_of(case.reading.text), set(words_of(case.own_words))
+    """Know an echo by words in the robot's order: an answer takes up some of them, in its own."""
+    words, own = words_of(case.reading.text), words_of(case.own_words)
+    if not own:
+        return ""
     known = sum(word in own for word in words)
-    return "the robot heard itself" if own and known > 0.7 * len(words) else ""
+    echoed = words == own or _longest_run(words, own) >= ECHOED_WORDS
+    return "the robot heard itself" if echoed and known > 0.7 * len(words) else ""
+
+
+def _longest_run(words: Sequence[str], own: Sequence[str]) -> int:
+    """Return how many words follow one another in both."""
+    blocks = SequenceMatcher(None, words, own, autojunk=False)
+    return blocks.find_longest_match().size
 
 
 def _music(case: Case) -> str:

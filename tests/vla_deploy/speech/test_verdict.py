@@ -76,8 +76,31 @@ def test_what_speaks_against_it_is_told(
     assert judgement.ask_again is ask_again
 
 
-def test_a_person_who_answers_what_the_robot_said_is_heard() -> None:
-    assert judge(case(own_words="Which cup do you mean?")).verdict is Verdict.ACCEPTED
+@pytest.mark.parametrize(
+    ("said", "answer"),
+    [
+        ("Which cup do you mean?", "pick up the red cup"),
+        ("Which cup, the red one or the blue one?", "the red one"),
+        ("Do you mean the kitchen or the bedroom?", "the kitchen"),
+        ("Shall I pick up the red cup and put it in the box?", "pick up the blue cup"),
+    ],
+)
+def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: str) -> None:
+    heard = case(reading={"text": answer}, own_words=said)
+    assert judge(heard).verdict is Verdict.ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ("said", "echo"),
+    [
+        ("Shall I pick up the red cup and put it in the box?", "pick up the red cup"),
+        ("Which one?", "which one"),
+        ("I go to the kitchen.", "go to the kitchen"),
+    ],
+)
+def test_what_the_robot_said_itself_is_no_command(said: str, echo: str) -> None:
+    judgement = judge(case(reading={"text": echo}, own_words=said))
+    assert judgement.reason == "the robot heard itself"
 
 
 @pytest.mark.parametrize("text", ["Stop!", "stop stop stop", "robot, freeze", "Please halt now"])
