@@ -74,7 +74,7 @@ class ChatRung:
         self.claim.release()
 
     def _proposal(self, request: Request, told: PlanAnswer, answer: Answer) -> Proposal:
-        if told.question and not told.steps:
+        if told.question:
             raise Ambiguous(told.question)
         if not told.feasible or not told.steps:
             raise CannotBeDone(f"{self.name} sees no way to do it: {told.reasoning or 'no reason'}")

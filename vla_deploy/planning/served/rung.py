@@ -128,7 +128,7 @@ class ServedRung:
             raise _Gone(one_line(error)) from error
 
     def _checked(self, answer: PlanAnswer, request: Request) -> Candidate:
-        if answer.question and not answer.steps:
+        if answer.question:
             raise Ambiguous(answer.question)
         if not answer.feasible or not answer.steps:
             reason = answer.reasoning or "it gives no reason"

@@ -220,6 +220,12 @@ def test_a_question_of_the_model_is_asked(loopback, served, ask):
     assert asked.value.question == "Which cup? [2J"
 
 
+def test_a_question_comes_before_any_step(loopback, served, ask):
+    loopback.then(loopback.says(answer(GO, question="Which kitchen?")))
+    with pytest.raises(Ambiguous, match="Which kitchen"):
+        served(candidates=1).propose(ask(TIDY), within())
+
+
 def test_a_model_that_sees_no_way_is_believed(loopback, served, ask):
     loopback.then(loopback.says(answer(feasible=False, reasoning="it cannot fly")))
     with pytest.raises(CannotBeDone, match="server bench sees no way to do it: it cannot fly"):
