@@ -16,6 +16,7 @@ from training.stop_words.texts import WORDS, other_talk, stop_phrases
 from training.stop_words.timing import sounding, word_times
 from training.voices.clip import RATE_HZ, Clip
 from training.voices.errors import SynthesisFailed
+from training.voices.phones import NUMBERS
 
 TRAIN, HELD = "train", "held"
 Samples = NDArray[np.int16]
@@ -26,11 +27,15 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Said:
-    """Hold one clip; `events` are rows of class (1 on), start and end in seconds."""
+    """Hold one clip; `events` are rows of class (1 on), start and end in seconds.
+
+    `phones` are rows of a phone's number and where it begins; none where the engine tells none.
+    """
 
     samples: Samples
     voice: str
     events: NDArray[np.float32]
+    phones: NDArray[np.float32]
 
 
 class Clips:
@@ -60,8 +65,12 @@ class Clips:
         part, place = self._places[number]
         sound, index = self._parts[part]
         start, end = index["starts"][place], index["starts"][place + 1]
-        events = np.array(index["events"][place], np.float32).reshape(-1, 3)
-        return Said(samples=sound[start:end], voice=index["voices"][place], events=events)
+        return Said(
+            samples=sound[start:end],
+            voice=index["voices"][place],
+            events=np.array(index["events"][place], np.float32).reshape(-1, 3),
+            phones=np.array(index["phones"][place], np.float32).reshape(-1, 2),
+        )
 
 
 def speak(folder: Path, seed: int, scale: float = 1.0) -> None:
@@ -154,7 +163,9 @@ def trimmed(clip: Clip, word: str, *, is_last: bool) -> Said | None:
     rows = np.array([(number, *each) for each in times], np.float32).reshape(-1, 3)
     rows[:, 1:] = np.clip(rows[:, 1:], 0.0, last / RATE_HZ) - low / RATE_HZ
     samples = np.rint(_FULL_SCALE * clip.samples[low:high]).astype(np.int16)
-    return Said(samples=samples, voice=f"{clip.engine}/{clip.voice}", events=rows)
+    began_s = [(NUMBERS[one.phone], max(0.0, one.began_s - low / RATE_HZ)) for one in clip.sounds]
+    phones = np.array(began_s, np.float32).reshape(-1, 2)
+    return Said(samples=samples, voice=f"{clip.engine}/{clip.voice}", events=rows, phones=phones)
 
 
 def _write(path: Path, clips: list[Said]) -> None:
@@ -165,6 +176,7 @@ def _write(path: Path, clips: list[Said]) -> None:
         "voices": [clip.voice for clip in clips],
         "starts": starts.tolist(),
         "events": [clip.events.tolist() for clip in clips],
+        "phones": [clip.phones.tolist() for clip in clips],
     }
     partial = path.with_suffix(".part")
     partial.write_text(json.dumps(index), encoding="utf-8")

@@ -1,6 +1,7 @@
 """Lay clips one after another into long stretches of sound, with rooms, noise and what to learn."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -23,18 +24,35 @@ STOP_SHARE: Final = 0.42
 HARD_SHARE: Final = 0.35
 MAX_HARD: Final = 600
 WORD_SHARES: Final = (0.5, 0.25, 0.25)
+FIRST_ENGINE_SHARE: Final = 0.4
+"""Of all clips; the other engines, which speak fewer, share the rest alike."""
+PHONE_AGO_S: Final = 0.1
+"""A phone is told when what follows it can be heard too."""
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Stretch:
     """Hold one stretch: its frames, what each frame out is to say, and whose clip it is in.
 
-    `others` gives the number of the clip of other talk at each frame out, -1 where there is none.
+    `others` gives the number of the clip of other talk at each frame out, -1 where there is none;
+    `phones` the phone that sounded PHONE_AGO_S before, IGNORED where nobody knows.
     """
 
     frames: NDArray[np.float32]
     labels: Labels
     others: NDArray[np.int64]
+    phones: Labels
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Laid:
+    """Note where a clip lies, in samples, and what it says when, in seconds of the stretch."""
+
+    start: int
+    end: int
+    number: int
+    events: list[tuple[int, float, float]]
+    phones: NDArray[np.float32]
 
 
 class Mixer:
@@ -46,6 +64,7 @@ class Mixer:
         self._noise = noise
         self._count = round(duration_s * RATE_HZ)
         self._by_word = _by_word(stops)
+        self._by_engine = _by_engine(others.voices, np.ones(len(others), np.bool_))
         self.hard: list[int] = []
 
     def remember(self, numbers: list[int]) -> None:
@@ -55,31 +74,25 @@ class Mixer:
     def stretch(self, random: np.random.Generator) -> Stretch:
         """Return the next stretch."""
         sound = np.zeros(self._count, np.float32)
-        events: list[tuple[int, float, float]] = []
-        spans: list[tuple[int, int, int]] = []
+        laid: list[_Laid] = []
         place = int(random.integers(RATE_HZ // 2))
         while place < self._count - RATE_HZ // 4:
             said, number = self._pick(random)
             values, ratio = _at_another_pace(said, random)
             end = min(self._count, place + len(values))
             sound[place:end] += values[: end - place]
-            spans.append((place, end, number))
-            start_s = place / RATE_HZ
-            events += [
-                (int(k), start_s + a * ratio, start_s + b * ratio) for k, a, b in said.events
-            ]
+            laid.append(_laid(said, place, end, number, ratio))
             place = end + _gap(random)
-        heard = self._heard(sound, random)
-        return _labelled(heard, events, spans)
+        return _labelled(self._heard(sound, random), laid)
 
     def _pick(self, random: np.random.Generator) -> tuple[Said, int]:
         if random.random() < STOP_SHARE:
-            with_word = self._by_word[int(random.choice(len(WORD_SHARES), p=WORD_SHARES))]
-            return self._stops[int(with_word[random.integers(len(with_word))])], -1
+            engines = self._by_word[int(random.choice(len(WORD_SHARES), p=WORD_SHARES))]
+            return self._stops[_one_of(engines, random)], -1
         if self.hard and random.random() < HARD_SHARE:
             number = self.hard[int(random.integers(len(self.hard)))]
         else:
-            number = int(random.integers(len(self._others)))
+            number = _one_of(self._by_engine, random)
         return self._others[number], number
 
     def _heard(self, sound: Sound, random: np.random.Generator) -> Sound:
@@ -101,12 +114,37 @@ def varied(stretch: Stretch, random: np.random.Generator) -> Stretch:
     frames = stretch.frames + np.float32(random.uniform(-0.3, 0.3))
     width, low = int(random.integers(0, 6)), int(random.integers(0, frames.shape[1] - 6))
     frames[:, low : low + width] = frames.mean()
-    return Stretch(frames=frames, labels=stretch.labels, others=stretch.others)
+    return replace(stretch, frames=frames)
 
 
-def _by_word(stops: Clips) -> list[NDArray[np.int64]]:
+def _by_word(stops: Clips) -> list[list[NDArray[np.int64]]]:
     words = np.array([int(stops[k].events[0, 0]) for k in range(len(stops))])
-    return [np.flatnonzero(words == k + 1) for k in range(len(WORD_SHARES))]
+    return [_by_engine(stops.voices, words == k + 1) for k in range(len(WORD_SHARES))]
+
+
+def _by_engine(voices: Sequence[str], wanted: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Return the wanted clips of each engine, of that with most clips first."""
+    engines = np.array([voice.partition("/")[0] for voice in voices])
+    names, counts = np.unique(engines[wanted], return_counts=True)
+    return [np.flatnonzero(wanted & (engines == names[k])) for k in np.argsort(-counts)]
+
+
+def _one_of(engines: list[NDArray[np.int64]], random: np.random.Generator) -> int:
+    is_first = len(engines) == 1 or random.random() < FIRST_ENGINE_SHARE
+    clips = engines[0 if is_first else int(random.integers(1, len(engines)))]
+    return int(clips[random.integers(len(clips))])
+
+
+def _laid(said: Said, start: int, end: int, number: int, ratio: float) -> _Laid:
+    start_s = start / RATE_HZ
+    phones = said.phones * np.array((1.0, ratio), np.float32)
+    return _Laid(
+        start=start,
+        end=end,
+        number=number,
+        events=[(int(k), start_s + a * ratio, start_s + b * ratio) for k, a, b in said.events],
+        phones=phones + np.array((0.0, start_s), np.float32),
+    )
 
 
 def _at_another_pace(said: Said, random: np.random.Generator) -> tuple[Sound, float]:
@@ -127,19 +165,33 @@ def _gap(random: np.random.Generator) -> int:
     return int(random.uniform(low_s, high_s) * RATE_HZ)
 
 
-def _labelled(
-    sound: Sound, events: list[tuple[int, float, float]], spans: list[tuple[int, int, int]]
-) -> Stretch:
+def _labelled(sound: Sound, laid: list[_Laid]) -> Stretch:
     frames = log_mel(sound)
     count = (len(frames) - REACH) // STRIDE + 1
     newest = (np.arange(count) * STRIDE + REACH - 1) * HOP + WINDOW
     newest_s = newest / RATE_HZ
+    events = [event for one in laid for event in one.events]
     labels = np.zeros(count, np.int64)
     for _, start_s, end_s in events:
         labels[(newest_s > start_s + 0.1) & (newest_s < end_s + AFTER_S)] = IGNORED
     for word, _, end_s in events:
         labels[(newest_s >= end_s + FIRST_S) & (newest_s <= end_s + LAST_S)] = word
     others = np.full(count, -1, np.int64)
-    for start, end, number in spans:
-        others[(newest >= start) & (newest < end + RATE_HZ // 5)] = number
-    return Stretch(frames=frames, labels=labels, others=others)
+    for one in laid:
+        others[(newest >= one.start) & (newest < one.end + RATE_HZ // 5)] = one.number
+    return Stretch(
+        frames=frames, labels=labels, others=others, phones=_phones(newest_s - PHONE_AGO_S, laid)
+    )
+
+
+def _phones(moments_s: NDArray[np.float64], laid: list[_Laid]) -> Labels:
+    """Return the phone at each moment: silence between clips, IGNORED where the engine is mute."""
+    told = np.zeros(len(moments_s), np.int64)
+    for one in laid:
+        inside = (moments_s >= one.start / RATE_HZ) & (moments_s < one.end / RATE_HZ)
+        if not len(one.phones):
+            told[inside] = IGNORED
+            continue
+        place = np.searchsorted(one.phones[:, 1], moments_s[inside], side="right") - 1
+        told[inside] = np.where(place >= 0, one.phones[np.maximum(place, 0), 0], 0)
+    return told

@@ -9,6 +9,7 @@ from typing import Final
 import torch
 from torch import Tensor, nn
 
+from training.voices.phones import PHONES
 from vla_deploy.speech.stop_words.features import BANDS, STRIDE
 
 CHANNELS: Final = 144
@@ -42,7 +43,8 @@ class Block(nn.Module):
 class StopNet(nn.Module):
     """Give a logit for no word and for each word: (batch, BANDS, frames) to (batch, 1 + words, n).
 
-    n is (frames - REACH) // STRIDE + 1.
+    n is (frames - REACH) // STRIDE + 1. Beside it a head names the phone that sounds; it is there
+    to learn by, and is not shipped.
     """
 
     def __init__(self, words: int) -> None:
@@ -54,11 +56,17 @@ class StopNet(nn.Module):
         )
         self.blocks = nn.Sequential(*(Block(dilation) for dilation in DILATIONS))
         self.last = nn.Conv1d(CHANNELS, 1 + words, 1)
+        self.phones = nn.Conv1d(CHANNELS, len(PHONES), 1)
 
     def forward(self, frames: Tensor) -> Tensor:
         """Return the logits."""
         logits: Tensor = self.last(self.blocks(self.first(frames)))
         return logits
+
+    def with_phones(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the logits of words and of phones (batch, phones, n)."""
+        states = self.blocks(self.first(frames))
+        return self.last(states), self.phones(states)
 
 
 TEMPERATURE: Final = 3.0

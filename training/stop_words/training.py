@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from training.stop_words.corpus import TRAIN, Clips
 from training.stop_words.mixing import IGNORED, Mixer, Stretch, varied
@@ -29,6 +30,9 @@ SAVE_EVERY_STEPS: Final = 50
 HARDEST_RATIO: Final = 0.03
 """Share of the frames without a word that count most: those that come nearest to one."""
 FOOLED: Final = 0.15
+PHONE_WEIGHTS: Final = (1.0, 0.3)
+PHONES_UNTIL: Final = 0.4
+"""Share of the time in which the network learns above all to tell sounds apart."""
 POOL: Final = 300
 """Stretches that are shown again, each a few times: mixing one costs more than learning from it."""
 _LOG = logging.getLogger(__name__)
@@ -83,7 +87,7 @@ class _Run:
         self.steps = 0
         self.spent_s = 0.0
         self.hard: list[int] = []
-        self._told = np.zeros(4)
+        self._told = np.zeros(5)
         self._optimiser = torch.optim.AdamW(self.model.parameters(), weight_decay=WEIGHT_DECAY)
 
     @property
@@ -120,24 +124,29 @@ class _Run:
         labels = torch.from_numpy(np.stack([one.labels for one in stretches]))
         for group in self._optimiser.param_groups:
             group["lr"] = self._learning_rate()
-        logits = self.model(frames)
+        phones = torch.from_numpy(np.stack([one.phones for one in stretches]))
+        logits, named = self.model.with_phones(frames)
         words, quiet, hardest = _losses(logits, labels)
+        sounds = functional.cross_entropy(named, phones, ignore_index=IGNORED)
+        weight = PHONE_WEIGHTS[self.done >= PHONES_UNTIL]
         self._optimiser.zero_grad()
-        (words + quiet + hardest).backward()  # type: ignore[no-untyped-call]
+        (words + quiet + hardest + weight * sounds).backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), MAX_GRADIENT)
         self._optimiser.step()
         self._follow()
         fooled = _fooled(logits.detach(), labels, stretches)
         mixer.remember(fooled)
-        self._tell(words.item(), quiet.item(), hardest.item(), len(fooled))
+        self._tell(words.item(), quiet.item(), hardest.item(), sounds.item(), len(fooled))
 
     def _tell(self, *values: float) -> None:
         self._told += values
         if self.steps % SAVE_EVERY_STEPS == 0:
-            words, quiet, hardest, fooled = self._told / SAVE_EVERY_STEPS
-            self._told = np.zeros(4)
-            text = "step %d, %.0f %%: words %.4f, quiet %.4f, hardest %.4f, fooled by %.1f"
-            _LOG.info(text, self.steps, 100 * self.done, words, quiet, hardest, fooled)
+            told = self._told / SAVE_EVERY_STEPS
+            self._told = np.zeros(5)
+            text = (
+                "step %d, %.0f %%: words %.4f, quiet %.4f, hardest %.4f, phones %.3f, fooled %.1f"
+            )
+            _LOG.info(text, self.steps, 100 * self.done, *told)
 
     def _learning_rate(self) -> float:
         """Rise, then fall along a cosine."""
@@ -162,7 +171,7 @@ class _Run:
 
 def _losses(logits: Tensor, labels: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Return the loss where a word was, where none was, and of the worst of the latter."""
-    each = torch.nn.functional.cross_entropy(logits, labels, ignore_index=IGNORED, reduction="none")
+    each = functional.cross_entropy(logits, labels, ignore_index=IGNORED, reduction="none")
     words, none = each[labels > 0], each[labels == 0]
     hardest = torch.topk(none, max(1, int(HARDEST_RATIO * none.numel()))).values
     return words.sum() / max(1, words.numel()), none.mean(), hardest.mean()
