@@ -79,7 +79,9 @@ GRAVEST: Final = (
     ("control", signal.SIGTERM),
     ("supervisor", signal.SIGKILL),
 )
-"""Every round has these, however short it is; in a short one they wait for a full hand."""
+"""Every round has these, however short it is."""
+WITH_A_FULL_HAND: Final = (GRAVEST[0], GRAVEST[-1])
+"""In a short round these alone wait for one."""
 
 
 class Moment(Enum):
@@ -126,7 +128,9 @@ def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injec
             signal=what,
             after_s=draw.uniform(_EARLIEST_S, latest_s),
             command=COMMANDS[number % len(COMMANDS)],
-            moment=Moment.CARRYING if short and (process, what) in GRAVEST else Moment.MOVING,
+            moment=Moment.CARRYING
+            if short and (process, what) in WITH_A_FULL_HAND
+            else Moment.MOVING,
         )
         for number, (process, what) in enumerate(pairs)
     ]
