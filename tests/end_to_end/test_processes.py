@@ -13,6 +13,7 @@ import pytest
 
 from platforms import load_profile
 from sim_twin.process_stack import ProcessStack
+from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 
 pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
 
@@ -55,8 +56,8 @@ def run(start: Callable[..., Run]) -> Run:
     return start()
 
 
-def one_line(done: "subprocess.CompletedProcess[str]") -> str:
-    assert done.returncode == 2, done
+def one_line(done: "subprocess.CompletedProcess[str]", code: int = EXIT_CONFIGURATION) -> str:
+    assert done.returncode == code, done
     assert done.stderr.count("\n") == 1, done.stderr
     return done.stderr
 
@@ -261,5 +262,6 @@ def test_without_hardware_the_run_names_the_device_and_the_robot_file(base: Path
         timeout=90,
         check=False,
     )
-    assert one_line(done).startswith("vla-deploy: control did not start: /dev/serial/")
+    told = one_line(done, EXIT_DEVICE_ABSENT)
+    assert told.startswith("vla-deploy: control did not start: /dev/serial/")
     assert [path.name for path in base.iterdir()] == ["lock"]

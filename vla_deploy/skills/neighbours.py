@@ -24,10 +24,10 @@ def crowding_m(context: SkillContext, grasp: Grasp, taken: Mapping[str, Any]) ->
 
 
 def _others(context: SkillContext, taken: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return what stands around: not the thing itself, nor what it lies in or on."""
+    own = (taken.get("id"), (taken.get("rests") or {}).get("of"))
     return [
-        one
-        for one in context.link.objects
-        if one["class"] != UNKNOWN and one.get("id") != taken.get("id")
+        one for one in context.link.objects if one["class"] != UNKNOWN and one.get("id") not in own
     ]
 
 
