@@ -2,15 +2,15 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any, Final
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from drivers.clock import NS_PER_S
 from platforms import SpeechSettings
 from vla_deploy.speech.companions import Playing
 from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.echo_gate import EchoGate
 from vla_deploy.speech.frames import Frame, Framing
+from vla_deploy.speech.own_words import OwnWords
 from vla_deploy.speech.phrases import ABOVE_FLOOR_DB, OFFSET, Happening, Phrase, Phrases, Step
 from vla_deploy.speech.readings import Answer, Readings
 from vla_deploy.speech.recogniser import Reading
@@ -19,8 +19,6 @@ from vla_deploy.speech.surroundings import Music, NoiseFloor
 from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge
 from vla_deploy.speech.voice_activity import VoiceActivity
 from vla_deploy.speech.words import is_unfinished
-
-OWN_WORDS_NS: Final = NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,8 +63,7 @@ class Hearing:
         self._hot_words = hot_words
         self._framing = Framing()
         self._phrases = Phrases(settings)
-        self._own_words = ""
-        self._own_ns = 0
+        self._own_words = OwnWords()
         self._barge_ns: int | None = None
         self._told: list[Heard] = []
 
@@ -129,7 +126,8 @@ class Hearing:
             self._phrases.reset()
             self.readings.forget_draft()
         voice, level = self._activity.probability(frame.samples), level_db(frame.samples)
-        self._follow_own_voice(playing, frame)
+        self.gate.follow(playing)
+        self._own_words.follow(frame, playing)
         if self.gate.is_shut:
             voice = self._through_gate(frame, level, voice)
         else:
@@ -139,27 +137,26 @@ class Hearing:
         for happening in self._phrases.feed(frame, voice, is_loud=is_loud):
             self._on(happening)
 
-    def _follow_own_voice(self, playing: Playing | None, frame: Frame) -> None:
-        self.gate.follow(playing)
-        if playing is not None:
-            self._own_words, self._own_ns = playing.text, frame.end_ns
-
     def _through_gate(self, frame: Frame, level: float, voice: float) -> float:
         """Return how probably a person speaks while the robot does."""
         is_person = self.gate.is_person(level, voice)
         if self.gate.barges_in():
             self._barge_ns = frame.stamp_ns
+            self._own_words.note_barged_in()
             self.counts["barged_in"] += 1
         return voice if is_person else 0.0
 
     def _on(self, happening: Happening) -> None:
         phrase = happening.phrase
         self.counts[happening.step.name.lower()] += 1
-        if happening.step is Step.PAUSED:
+        if happening.step is Step.BEGAN:
+            self._own_words.note_begun(is_person=not self.gate.is_shut)
+        elif happening.step is Step.PAUSED:
             self.readings.draft(phrase, self._hot_words())
         elif happening.step is Step.ENDED:
+            phrase = replace(phrase, own_words=self._own_words.within(phrase))
             self.readings.finish(phrase, self._hot_words())
-        elif happening.step is not Step.BEGAN:
+        else:
             self.readings.forget_draft()
         if happening.step is Step.TOO_LONG:
             self._refuse(phrase, f"{self.settings.longest_phrase_s:g} s of talk are no command")
@@ -191,13 +188,8 @@ class Hearing:
             least_confidence=self.settings.least_confidence,
             languages=recogniser.declared.languages,
             music=self.music.plays,
-            own_words=self._own(answer.phrase),
         )
         judgement = judge(case)
         if answer.trouble and judgement.verdict is not Verdict.STOP:
             judgement = Judgement(verdict=Verdict.REJECTED, reason=answer.trouble, ask_again=True)
         return Heard(phrase=answer.phrase, answer=answer, confidence=sure, judgement=judgement)
-
-    def _own(self, phrase: Phrase) -> str:
-        """Return what the robot itself said while, or just before, a phrase began."""
-        return self._own_words if phrase.began_ns - self._own_ns < OWN_WORDS_NS else ""

@@ -41,6 +41,7 @@ class Phrase:
     """Hold what somebody said; `number` counts phrases, `voiced_s` is without pauses at the ends.
 
     `began_ns` and `ended_ns` are those of the voice; the samples begin before and end after it.
+    `own_words` are what the robot was saying, where it may have heard itself.
     """
 
     number: int
@@ -50,6 +51,7 @@ class Phrase:
     clipped_ratio: float
     voice: float
     samples: Sound
+    own_words: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 The first row of `_REFUSALS` that says something decides; it is told in `heard`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from enum import StrEnum
@@ -18,7 +18,9 @@ MOST_COMPRESSION: Final = 2.4
 NO_SPEECH: Final = 0.8
 SURE_VOICE: Final = 0.7
 CLIPPED_RATIO: Final = 0.01
-ECHOED_WORDS: Final = 4
+OWN_RUN: Final = 4
+OWN_RATIO: Final = 0.7
+"""The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 
@@ -33,7 +35,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Hold all that a phrase is judged by; `own_words` are those the robot itself was saying."""
+    """Hold all that a phrase is judged by."""
 
     reading: Reading
     phrase: Phrase
@@ -41,7 +43,6 @@ class Case:
     least_confidence: float
     languages: tuple[str, ...]
     music: bool = False
-    own_words: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,18 +81,11 @@ def _courtesy(case: Case) -> str:
 
 def _own_voice(case: Case) -> str:
     """Know an echo by words in the robot's order: an answer takes up some of them, in its own."""
-    words, own = words_of(case.reading.text), words_of(case.own_words)
-    if not own:
-        return ""
-    known = sum(word in own for word in words)
-    echoed = words == own or _longest_run(words, own) >= ECHOED_WORDS
-    return "the robot heard itself" if echoed and known > 0.7 * len(words) else ""
-
-
-def _longest_run(words: Sequence[str], own: Sequence[str]) -> int:
-    """Return how many words follow one another in both."""
-    blocks = SequenceMatcher(None, words, own, autojunk=False)
-    return blocks.find_longest_match().size
+    words, own = words_of(case.reading.text), words_of(case.phrase.own_words)
+    blocks = SequenceMatcher(None, own, words, autojunk=False).get_matching_blocks()
+    runs = [block.size for block in blocks]
+    is_echo = words == own or max(runs) >= OWN_RUN
+    return "the robot heard itself" if is_echo and sum(runs) > OWN_RATIO * len(words) else ""
 
 
 def _music(case: Case) -> str:

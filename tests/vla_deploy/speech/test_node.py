@@ -459,7 +459,8 @@ def test_while_a_person_speaks_into_the_page_the_room_is_heard_for_stop_words_on
 def test_the_robot_falls_silent_for_whoever_holds_the_button(bench: MakeBench) -> None:
     rig = bench()
     rig.quiet(1.0)
-    rig.voice.playing = Playing(say_id="1", text="I am on my way", level_db=-20.0)
+    question = f"Shall I {TEXT}, or the blue one?"
+    rig.voice.playing = Playing(say_id="1", text=question, level_db=-20.0)
     rig.hold(TEXT)
     rig.quiet(0.1)
     assert len(rig.voice.barged) == 1

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from platforms import SpeechSettings
 from sim_twin.sound.speech_room import SpeechRoom
 from sim_twin.sound.talker import Talker
 from vla_deploy.ipc import SharedSpace
@@ -35,6 +36,13 @@ class Raw:
 
     def feed(self, block: SoundBlock) -> None:
         self.seconds += len(block.samples) / RATE_HZ
+
+    def refuses(self, began_ns: int, ended_ns: int) -> str:
+        del began_ns, ended_ns
+        return ""
+
+    def heed(self, settings: SpeechSettings) -> None:
+        """Go by no setting."""
 
     def document(self) -> Mapping[str, Any]:
         return {}
@@ -76,6 +84,24 @@ def test_a_person_who_speaks_into_what_the_robot_says_silences_it(room: SpeechRo
     ended = room.end_of(say_id, 0.6)
     assert ended is not None
     assert ended.event == "interrupted"
+
+
+@pytest.mark.parametrize("after_s", [0.05, 0.2, 0.6])
+@pytest.mark.parametrize(
+    ("question", "answer"),
+    [
+        ("Which cup, the red one or the blue one?", "the red one"),
+        ("Shall I pick up the red cup and put it in the box?", "pick up the blue cup"),
+    ],
+)
+def test_an_answer_in_the_robots_own_words_is_taken(
+    room: SpeechRoom, question: str, answer: str, after_s: float
+) -> None:
+    room.robot_says(question)
+    room.run(after_s)
+    room.person_says(answer, Talker())
+    room.run(2.5)
+    assert [(one["text"], one["verdict"]) for one in room.heard()] == [(answer, "accepted")]
 
 
 def test_whoever_listens_to_the_stream_misses_nothing(room: SpeechRoom, raw: Raw) -> None:

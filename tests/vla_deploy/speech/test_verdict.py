@@ -64,7 +64,12 @@ def test_a_sure_reading_is_a_command() -> None:
         ({"reading": {"compression": 4.2}}, "the text repeats itself (compression 4.2", False),
         ({"phrase": {"voiced_s": 0.4}}, "12 words a second were read, at most 7", False),
         ({"music": True, "phrase": {"voice": 0.6}}, "music, or another sound", False),
-        ({"own_words": "I pick up the red cup"}, "the robot heard itself", False),
+        ({"phrase": {"own_words": "I pick up the red cup"}}, "the robot heard itself", False),
+        (
+            {"phrase": {"own_words": "Shall I go and pick up the red cup, and then the blue one?"}},
+            "the robot heard itself",
+            False,
+        ),
     ],
 )
 def test_what_speaks_against_it_is_told(
@@ -81,13 +86,16 @@ def test_what_speaks_against_it_is_told(
     [
         ("Which cup do you mean?", "pick up the red cup"),
         ("Which cup, the red one or the blue one?", "the red one"),
-        ("Do you mean the kitchen or the bedroom?", "the kitchen"),
+        ("Which one, the kitchen or the bedroom?", "the kitchen"),
         ("Shall I pick up the red cup and put it in the box?", "pick up the blue cup"),
+        ("Shall I pick up the cup and put it in the box?", "put the cup in the box"),
+        ("Shall I go to the kitchen?", "no, go to the bedroom and wait for me there"),
+        ("I can go to the kitchen and tidy up.", "go to the kitchen, then bring me the red cup"),
     ],
 )
 def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: str) -> None:
-    heard = case(reading={"text": answer}, own_words=said)
-    assert judge(heard).verdict is Verdict.ACCEPTED
+    spoken = case(reading={"text": answer}, phrase={"own_words": said, "voiced_s": 3.0})
+    assert judge(spoken).verdict is Verdict.ACCEPTED
 
 
 @pytest.mark.parametrize(
@@ -95,17 +103,20 @@ def test_a_person_who_answers_what_the_robot_said_is_heard(said: str, answer: st
     [
         ("Shall I pick up the red cup and put it in the box?", "pick up the red cup"),
         ("Which one?", "which one"),
+        ("I pick up the red cup.", "up the red cup"),
+        ("I pick up the red cup.", "I pick up the red cap"),
         ("I go to the kitchen.", "go to the kitchen"),
     ],
 )
 def test_what_the_robot_said_itself_is_no_command(said: str, echo: str) -> None:
-    judgement = judge(case(reading={"text": echo}, own_words=said))
+    judgement = judge(case(reading={"text": echo}, phrase={"own_words": said}))
     assert judgement.reason == "the robot heard itself"
 
 
 @pytest.mark.parametrize("text", ["Stop!", "stop stop stop", "robot, freeze", "Please halt now"])
 def test_a_call_to_stop_is_taken_where_a_command_would_not_be(text: str) -> None:
-    unsure = case(reading={"text": text}, confidence=0.3, own_words="stop")
+    own = {"own_words": "Please halt now, stop stop stop, robot, freeze"}
+    unsure = case(reading={"text": text}, phrase=own, confidence=0.3)
     assert judge(unsure).verdict is Verdict.STOP
     assert judge(case(reading={"text": text}, confidence=0.1)).verdict is Verdict.REJECTED
 
