@@ -10,7 +10,7 @@ from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 from vla_deploy.speech.devices import linked_microphone, linked_speaker
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.stop_words.opening import build_stop_words
+from vla_deploy.speech.stop_words.opening import build_page_stop_words, build_stop_words
 from vla_deploy.speech.voice.engines import build_voice
 
 
@@ -30,6 +30,7 @@ def build(context: NodeContext) -> SpeechNode:
         beside("recogniser"),
         voice=voice,
         listeners=[build_stop_words(context, profile, voice)],
+        page_listeners=[build_page_stop_words(context, profile)],
     )
 
 

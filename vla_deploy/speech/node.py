@@ -59,6 +59,7 @@ class SpeechNode:
         *,
         voice: Voice | None = None,
         listeners: Sequence[StreamListener] = (),
+        page_listeners: Sequence[StreamListener] = (),
         shelf: ModelShelf | None = None,
     ) -> None:
         """Take `microphone`, which opens it, None where the robot has none, and the companions."""
@@ -69,7 +70,9 @@ class SpeechNode:
         self._shelf = shelf or ModelShelf.of_run(context.run_dir, context.clock)
         self._executor = AtOnce() if executor is None else executor
         self._voice = voice
-        self._listeners = tuple(listeners)
+        self._room_listeners = tuple(listeners)
+        self._page_listeners = tuple(page_listeners)
+        self._listeners = (*self._room_listeners, *self._page_listeners)
         self._microphone: Microphone | None = None
         self._deaf = f"robot {robot.name} has no [microphone]"
         if microphone is not None:
@@ -189,13 +192,15 @@ class SpeechNode:
 
     def _hear(self, block: SoundBlock) -> None:
         """Hear the room; while a person speaks into the page, only the listeners do."""
-        for listener in self._listeners:
+        for listener in self._room_listeners:
             listener.feed(block)
         if not self._page.is_open:
             self._understand(block, self._playing(), in_page=False)
 
     def _hear_page(self, block: SoundBlock) -> None:
         """Hear a person who holds the page's button: the robot falls silent for them."""
+        for listener in self._page_listeners:
+            listener.feed(block)
         if not self._opened_ears:
             self._open_ears()
         if not self._in_page and self._voice is not None and self._playing() is not None:

@@ -3,7 +3,7 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, Final
 
@@ -18,7 +18,6 @@ from vla_deploy.speech.stop_words.errors import StopWordsError
 from vla_deploy.speech.stop_words.own_voice import OwnVoice
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
 
-SOURCE: Final = "voice"
 OFF: Final = "off"
 OFF_WHY: Final = "switched off by the profile: speech.stop_words"
 KEPT: Final = 8
@@ -27,6 +26,19 @@ OVERLAP_NS: Final = NS_PER_S // 2
 _log = logging.getLogger(__name__)
 
 OpenSpotter = Callable[[], tuple[Spotter, Mapping[str, float]]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ear:
+    """Name where a listener listens: in `speech_status`, as a source of stops, and in the log."""
+
+    name: str
+    source: str
+    how: str
+
+
+ROOM: Final = Ear(name="stop_words", source="voice", how="by voice")
+PAGE: Final = Ear(name="page_stop_words", source="page_voice", how="by voice into the page")
 
 
 class State(StrEnum):
@@ -38,13 +50,11 @@ class State(StrEnum):
 
 
 class StopWords:
-    """Be the listener "stop_words": it needs no end of phrase, no recogniser and no planner.
+    """Listen to one stream: it needs no end of phrase, no recogniser and no planner.
 
     While it is off or broken it says so in the log, in `speech_status` and to `doctor`: a robot
     whose spoken stop is dead looks like one that nobody has spoken to.
     """
-
-    name = "stop_words"
 
     def __init__(
         self,
@@ -52,8 +62,11 @@ class StopWords:
         settings: SpeechSettings,
         clock: Clock,
         playing: Callable[[], Playing | None] = lambda: None,
+        ear: Ear = ROOM,
     ) -> None:
         """Take how the model is opened, which of its thresholds holds, and what the robot says."""
+        self.name = ear.name
+        self._ear = ear
         self._open_spotter = open_spotter
         self._sensitivity = settings.stop_words
         self._clock = clock
@@ -74,7 +87,7 @@ class StopWords:
 
     def start(self, space: SharedSpace) -> None:
         """Open button and model; why it cannot be opened is told, and the robot goes on."""
-        self._button = StopButton(space, SOURCE, self._clock)
+        self._button = StopButton(space, self._ear.source, self._clock)
         self._heard = space.ring_writer("heard")
         try:
             self._spotter, self._thresholds = self._open_spotter()
@@ -156,9 +169,9 @@ class StopWords:
 
     def _break(self, why: str) -> None:
         if not self._broken:
-            _log.error("degraded: nobody can stop the robot by voice: %s", why)
+            _log.error("degraded: nobody can stop the robot %s: %s", self._ear.how, why)
         self._broken = why
 
     def _warn_if_off(self) -> None:
         if self._sensitivity == OFF:
-            _log.warning("degraded: nobody can stop the robot by voice: %s", OFF_WHY)
+            _log.warning("degraded: nobody can stop the robot %s: %s", self._ear.how, OFF_WHY)

@@ -1,4 +1,4 @@
-"""Open the spotter that a profile chooses, and build the listener around it."""
+"""Open the spotter that a profile chooses, and build the listeners around it."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -7,7 +7,7 @@ from platforms import Profile
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.node import NodeContext
 from vla_deploy.speech.companions import Voice
-from vla_deploy.speech.stop_words.listener import StopWords
+from vla_deploy.speech.stop_words.listener import PAGE, StopWords
 from vla_deploy.speech.stop_words.spotter import Spotter
 
 ROLE: Final = "key_words"
@@ -25,6 +25,12 @@ def build_stop_words(
         context.clock,
         lambda: None if voice is None else voice.playing,
     )
+
+
+def build_page_stop_words(context: NodeContext, profile: Profile) -> StopWords:
+    """Return the listener to the page, where the robot does not sound: it falls silent for it."""
+    shelf = ModelShelf.of_base(context.run_dir.parent, context.clock)
+    return StopWords(lambda: open_spotter(shelf, profile), profile.speech, context.clock, ear=PAGE)
 
 
 def open_spotter(shelf: ModelShelf, profile: Profile) -> tuple[Spotter, Mapping[str, float]]:
