@@ -1,6 +1,7 @@
 """Start, signal and reap one child process, with everything it started itself."""
 
 import contextlib
+import ctypes
 import os
 import signal
 import subprocess
@@ -47,20 +48,27 @@ class ChildProcess:
 
     def terminate(self) -> None:
         """Ask the child to stop in order."""
-        self._popen.terminate()
+        if self._is_unreaped():
+            os.kill(self.pid, signal.SIGTERM)
 
     def abort(self) -> None:
         """Let a child that hangs write down where, and end; one that is stopped goes on for that.
 
-        It does nothing else on its way: the signal is waiting for it when it goes on.
+        It does nothing else on its way: the signal is waiting for its main thread when it goes on.
+        Any other thread could take a signal of the process, and would read frames that change.
         """
-        for number in (signal.SIGABRT, signal.SIGCONT):
-            self._popen.send_signal(number)
+        if self._is_unreaped():
+            ctypes.CDLL(None).tgkill(self.pid, self.pid, int(signal.SIGABRT))
+            os.kill(self.pid, signal.SIGCONT)
 
     def kill(self) -> None:
         """End the child and its group at once."""
-        if self._popen.returncode is None:
+        if self._is_unreaped():
             self._signal_group(signal.SIGKILL)
+
+    def _is_unreaped(self) -> bool:
+        """Return whether the process id is still the child's own; looking further would reap it."""
+        return self._popen.returncode is None
 
     def _signal_group(self, number: int) -> None:
         with contextlib.suppress(ProcessLookupError):
