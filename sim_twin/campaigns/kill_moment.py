@@ -2,7 +2,7 @@
 
 import itertools
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
@@ -14,18 +14,24 @@ from vla_deploy.robots import load_robot
 MOVING_RAD_S: Final = 0.1
 """The base or an arm that is slower is about to start or to end a motion."""
 _POLL_S: Final = 0.02
+_LONGEST_S: Final = 120.0
+"""A command that waits longer than this waits for what the kill took with it."""
 _WITHIN_S: Final[Mapping[Moment, float]] = {Moment.MOVING: 10.0, Moment.CARRYING: 60.0}
 _WHEELS: Final = ("left_wheel", "right_wheel")
 
 
 class Work:
-    """Give one command after the other, and say what the robot is at."""
+    """Give one command after the other, and say what the robot is at.
+
+    A command that outlives a kill goes on, so that the next one may hit its later part.
+    """
 
     def __init__(self, robot: RobotService, machine: Machine, clock: Clock) -> None:
         self._robot = robot
         self._machine = machine
         self._clock = clock
         self._job: subprocess.Popen[bytes] | None = None
+        self._job_ns = 0
         described = load_robot("butler")
         arms = [described.group(hand.arm).joints for hand in described.hands.values()]
         self._parts = (*itertools.chain.from_iterable(arms), *_WHEELS)
@@ -40,8 +46,7 @@ class Work:
         due_ns = self._clock.now_ns() + round(injection.after_s * NS_PER_S)
         end_ns = due_ns + round(_WITHIN_S[injection.moment] * NS_PER_S)
         while True:
-            if self._job is None or self._job.poll() is not None:
-                self._job = self._robot.begin("say", next(commands))
+            self._keep_at_it(commands)
             met = self._met()
             is_carrying = bool(met["held"]) or injection.moment is not Moment.CARRYING
             now_ns = self._clock.now_ns()
@@ -53,6 +58,15 @@ class Work:
         """End the command that goes on."""
         if self._job is not None:
             self._robot.end(self._job)
+            self._job = None
+
+    def _keep_at_it(self, commands: Iterator[str]) -> None:
+        """Give the next command once the last has ended, or has waited too long."""
+        now_ns = self._clock.now_ns()
+        if now_ns - self._job_ns > _LONGEST_S * NS_PER_S:
+            self.end()
+        if self._job is None or self._job.poll() is not None:
+            self._job, self._job_ns = self._robot.begin("say", next(commands)), now_ns
 
     def _met(self) -> dict[str, Any]:
         truth = self._machine.truth()

@@ -14,8 +14,8 @@ COMMANDS: Final = (
     "pick up the blue ball and put it on the coffee table",
     "go to the charging station",
 )
-_EARLIEST_S, _LATEST_S = 0.5, 30.0
-"""A job of picking and placing takes about half a minute."""
+_EARLIEST_S, _LATEST_S = 0.5, 10.0
+"""A job of picking and placing takes about half a minute, and goes on through most kills."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,9 +93,9 @@ class Moment(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Injection:
-    """Name who gets which signal, how long after the command was given.
+    """Name who gets which signal, how long after the robot was ready, and at which command.
 
-    It then waits a while for the moment.
+    It then waits a while for the moment. A command that still goes on is not given again.
     """
 
     number: int

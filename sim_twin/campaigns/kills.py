@@ -44,23 +44,24 @@ class KillCampaign:
             self._stillness.close()
             self._machine.close()
             raise
+        self._work = Work(self._robot, self._machine, self._clock)
 
     def inject(self, injection: Injection) -> Case:
         """Do one and judge it."""
         self._stillness.worst_s()
         self._let_run_stably(injection.process)
         self._robot.make_ready()
-        work = Work(self._robot, self._machine, self._clock)
         try:
-            return self._hit(injection, work)
+            return self._hit(injection)
         finally:
-            work.end()
+            if RULES[injection.process, injection.signal].rest_s is not None:
+                self._work.end()  # the robot stopped, and with it what it was told to do
             self._hit_ns[injection.process] = self._clock.now_ns()
 
-    def _hit(self, injection: Injection, work: Work) -> Case:
+    def _hit(self, injection: Injection) -> Case:
         """Wait for the moment, send the signal, and judge what follows."""
         rule = RULES[injection.process, injection.signal]
-        met = work.meet(injection)
+        met = self._work.meet(injection)
         self._machine.begin_watch()
         began_ns = self._clock.now_ns()
         pid = self._robot.signal(injection.process, injection.signal)
@@ -85,8 +86,9 @@ class KillCampaign:
         return max(self._machine.held_up_s(), self._stillness.worst_s())
 
     def close(self) -> None:
-        """End the robot, then its machine."""
+        """End the robot's work, the robot, then its machine."""
         try:
+            self._work.end()
             self._robot.close()
         finally:
             self._stillness.close()

@@ -23,7 +23,8 @@ DIRECTIONS: Mapping[str, tuple[float, float]] = {
     "down": (0.0, 0.9),
 }
 DRIVING_GAZE = (0.0, 0.3)
-HEAD_SPEED_RATIO = 0.9
+HEAD_SPEED_RATIO = 0.75
+"""A light head behind setpoints of every tick turns faster and slower by a fifth than they do."""
 FRESH_TIMEOUT_S = 4.0
 SIGHTINGS = 2
 WATCH_TIMEOUT_S = 2.0
