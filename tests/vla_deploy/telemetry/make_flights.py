@@ -20,11 +20,11 @@ FLIGHTS = Path(__file__).parent / "flights"
 _WALL_NS = 1_800_000_000_000_000_000
 
 
-def drive(stack: LockstepControl, seconds: float) -> None:
-    """Drive a curve."""
+def drive(stack: LockstepControl, seconds: float, w_rad_s: float = 0.2) -> None:
+    """Drive a curve, or with no turning straight ahead."""
     command = stack.space.cell_writer("base_command")
     for _ in range(round(seconds / 0.02)):
-        command.put(v_m_s=0.3, w_rad_s=0.2)
+        command.put(v_m_s=0.3, w_rad_s=w_rad_s)
         stack.lockstep.run_for(0.02)
 
 
@@ -60,10 +60,41 @@ def wheel_blocked(stack: LockstepControl) -> None:
     drive(stack, 0.8)
 
 
+def zone_entered_and_left(stack: LockstepControl) -> None:
+    """Let a box be held before the base, where the lidar sees it, and be taken away again."""
+    stack.add_senses()
+    drive(stack, 0.8, w_rad_s=0.0)
+    engine = stack.lockstep.twin.engine
+    x_m, y_m, _ = engine.data.body("base").xpos
+    for ahead_m in [0.5] * 25 + [3.0] * 25:
+        engine.place("box", float(x_m) + ahead_m, float(y_m), 0.12, 0.0)
+        drive(stack, 0.02, w_rad_s=0.0)
+
+
+def arm_blocked(stack: LockstepControl) -> None:
+    """Let an arm meet a stop that gives no way; reset and arm once it has eased off."""
+    reach(stack, 0.8, left_shoulder_pitch=1.5, left_elbow=0.6)
+    model, data = stack.lockstep.twin.engine.model, stack.lockstep.twin.engine.data
+    joint = model.joint("left_shoulder_pitch")
+    model.jnt_range[joint.id][1] = data.qpos[joint.qposadr[0]]
+    stack.lockstep.run_for(1.0)
+    for act in ("reset", "arm"):
+        stack.operate(act)
+        stack.lockstep.run_for(0.1)
+
+
+def arm_into_body(stack: LockstepControl) -> None:
+    """Send an arm into the robot's own body: their clearance ends it before they touch."""
+    reach(stack, 1.2, left_shoulder_yaw=-1.17, left_shoulder_pitch=1.2, left_elbow=1.5)
+
+
 SCENES: Mapping[str, Callable[[LockstepControl], None]] = {
     "estop_while_driving": estop_while_driving,
     "servo_bus_unplugged": servo_bus_unplugged,
     "wheel_blocked": wheel_blocked,
+    "zone_entered_and_left": zone_entered_and_left,
+    "arm_blocked": arm_blocked,
+    "arm_into_body": arm_into_body,
 }
 
 

@@ -17,10 +17,14 @@ from vla_deploy.telemetry.flight import read_flight
 from vla_deploy.telemetry.judge import JUDGED_TYPES, judge_again
 
 FLIGHTS = sorted((Path(__file__).parent / "flights").glob("*.mcap"))
+DRIVING = FLIGHTS[0].with_name("estop_while_driving.mcap")
 CAUSES = {
     "estop_while_driving": "estop",
     "servo_bus_unplugged": "servo_bus_lost",
     "wheel_blocked": "wheel_following_error",
+    "zone_entered_and_left": "obstacle_stop_zone",
+    "arm_blocked": "collision",
+    "arm_into_body": "self_collision",
 }
 
 
@@ -45,7 +49,7 @@ def packed(rows: list[dict[str, Any]]) -> list[bytes]:
 
 def test_there_is_a_flight_of_every_scene_and_they_are_small() -> None:
     assert {path.stem for path in FLIGHTS} == CAUSES.keys()
-    assert sum(path.stat().st_size for path in FLIGHTS) < 300_000
+    assert sum(path.stat().st_size for path in FLIGHTS) < 700_000
 
 
 @pytest.mark.parametrize("path", FLIGHTS, ids=lambda path: path.stem)
@@ -59,7 +63,7 @@ def test_a_recorded_flight_is_judged_to_the_same_verdicts(path: Path) -> None:
 
 
 def test_a_limit_one_bit_off_is_told_with_tick_and_field(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = rows_of(FLIGHTS[0])
+    rows = rows_of(DRIVING)
     stopped = next(row for row in rows if row["verdict"].cause.value == "estop")
     stopped["verdict"] = replace(stopped["verdict"], age_s=-0.0)
     difference = judge_again(packed(rows)).difference
@@ -70,7 +74,7 @@ def test_a_limit_one_bit_off_is_told_with_tick_and_field(monkeypatch: pytest.Mon
 
 
 def test_a_state_that_does_not_follow_from_the_tick_before_is_told() -> None:
-    rows = rows_of(FLIGHTS[0])
+    rows = rows_of(DRIVING)
     at = next(i for i, row in enumerate(rows) if row["state"].estop_latched)
     rows[at] = {**rows[at], "state": replace(rows[at]["state"], latched=())}
     difference = judge_again(packed(rows)).difference
@@ -79,14 +83,14 @@ def test_a_state_that_does_not_follow_from_the_tick_before_is_told() -> None:
 
 
 def test_ticks_before_the_first_complete_one_are_counted() -> None:
-    given = packed(rows_of(FLIGHTS[0]))
+    given = packed(rows_of(DRIVING))
     judgement = judge_again(given[1:])
     assert judgement.unread == 49
     assert judgement.ticks == len(given) - 50
 
 
 def test_inputs_that_this_version_does_not_know_are_refused_by_name() -> None:
-    rows = [{**row, "inputs.smell": 1.0} for row in rows_of(FLIGHTS[0])]
+    rows = [{**row, "inputs.smell": 1.0} for row in rows_of(DRIVING)]
     with pytest.raises(FlightForeign, match="smell"):
         judge_again(packed(rows))
 
@@ -94,7 +98,7 @@ def test_inputs_that_this_version_does_not_know_are_refused_by_name() -> None:
 def test_inputs_that_are_missing_are_told_as_those_of_other_rules() -> None:
     rows = [
         {name: value for name, value in row.items() if name != "inputs.budget_stop"}
-        for row in rows_of(FLIGHTS[0])
+        for row in rows_of(DRIVING)
     ]
     with pytest.raises(FlightForeign, match=r"recorded by other rules.*budget_stop.*anew"):
         judge_again(packed(rows))
@@ -108,7 +112,7 @@ def test_spoiled_records_are_refused() -> None:
 def test_the_command_judges_flights_and_its_exit_code_tells(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = str(FLIGHTS[0])
+    path = str(DRIVING)
     assert main(["flight", "judge", path, "--json"]) == 0
     (told,) = json.loads(capsys.readouterr().out)
     assert told["difference"] is None
@@ -127,9 +131,9 @@ def test_the_command_judges_flights_and_its_exit_code_tells(
 
 
 def test_the_commands_list_and_show_flights(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["flight", "show", str(FLIGHTS[0])]) == 0
+    assert main(["flight", "show", str(DRIVING)]) == 0
     assert "GROUP_STOP for estop" in capsys.readouterr().out
-    assert main(["flight", "list", "--folder", str(FLIGHTS[0].parent)]) == 0
+    assert main(["flight", "list", "--folder", str(DRIVING.parent)]) == 0
     assert "no flights in" in capsys.readouterr().out  # the examples have no numbers
 
 
