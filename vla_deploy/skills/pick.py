@@ -99,10 +99,20 @@ def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
 
 
 def _already_held(context: SkillContext, query: ObjectQuery) -> bool:
+    """Tell whether a hand holds what is meant: by the scene, or by kind where it cannot tell.
+
+    An id means one thing, and no other of its kind.
+    """
+    scene = context.link.snapshot()
+    full = {hand: held for hand, held in context.hands.items() if held is not None}
+    if scene is not None and any(one.held_by in full for one in query.among(scene)):
+        return True
+    known = {one.held_by for one in scene.things} if scene is not None else set()
     wanted = (query.kind, query.colour)
-    return any(
-        held is not None and wanted in ((held.kind, held.colour), (held.kind, ""))
-        for held in context.hands.values()
+    return not query.track_id and any(
+        wanted in ((held.kind, held.colour), (held.kind, ""))
+        for hand, held in full.items()
+        if hand not in known
     )
 
 

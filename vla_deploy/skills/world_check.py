@@ -13,7 +13,7 @@ from typing import Final
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.references import parse_object
+from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.planning.symbolic import LOGIC, state_of
 from vla_deploy.planning.symbolic.conditions import MET, Answer, Setting
 from vla_deploy.planning.symbolic.state import Pose, State
@@ -81,14 +81,19 @@ class WorldCheck:
 
 
 def is_held(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
-    """Do the fingers feel what was taken?"""
+    """Do the fingers feel what was taken, and no other of its kind, as far as the scene knows?"""
     del before, done_ns
-    subject = setting.subject("object")
-    if subject is None:
+    scene, query = setting.scene, _query(setting)
+    if scene is None or query is None:
         return None
-    if now.holds(subject.key) or any(one.kind == subject.kind for one in now.held):
+    meant = {one.thing_id for one in query.among(scene)}
+    told = [one for one in now.held if scene.thing(one.key) is not None]
+    if any(one.key in meant for one in told):
         return MET
-    return f"no hand feels the {subject.words}"
+    alike = [one for one in now.held if one.kind == query.kind]
+    if any(not meant or one not in told for one in alike):
+        return MET
+    return f"no hand feels the {query}" + "".join(f", but {one.key}" for one in alike)
 
 
 def is_put(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
@@ -109,11 +114,8 @@ def is_put(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
 def is_found(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
     """Does perception know the thing?"""
     del now, before, done_ns
-    if setting.scene is None:
-        return None
-    try:
-        query = parse_object(str(setting.parameters["object"]))
-    except UnknownObject:
+    query = _query(setting)
+    if setting.scene is None or query is None:
         return None
     return MET if query.among(setting.scene) else f"perception knows no {query}"
 
@@ -127,6 +129,13 @@ def has_arrived(now: State, setting: Setting, before: State, done_ns: int) -> An
     pose = setting.world.sites[place].pose
     off_m = math.dist(now.spot, (pose.x_m, pose.y_m))
     return MET if off_m <= ARRIVED_M else f"the robot is {off_m:.1f} m from the {place}"
+
+
+def _query(setting: Setting) -> ObjectQuery | None:
+    try:
+        return parse_object(str(setting.parameters["object"]))
+    except UnknownObject:
+        return None
 
 
 Look = Callable[[State, Setting, State, int], Answer]

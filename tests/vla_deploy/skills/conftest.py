@@ -15,6 +15,7 @@ from vla_deploy.robots import load_robot
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.link import RobotLink
+from vla_deploy.world import Snapshot, read_snapshot
 
 BODY_RADIUS_M = 0.27
 
@@ -35,6 +36,13 @@ class StandingLink:
     objects: list[dict[str, Any]] = field(default_factory=list)
     surfaces: list[dict[str, Any]] = field(default_factory=list)
     clock: StoppedClock = field(default_factory=StoppedClock)
+    hands: dict[str, Any] = field(default_factory=dict)
+    is_silent: bool = False
+
+    def snapshot(self) -> Snapshot | None:
+        """Return what it has seen as values, None while perception tells nothing."""
+        told = {"stamp_ns": self.clock.now_ns(), "objects": self.objects}
+        return None if self.is_silent else read_snapshot(told)
 
 
 def at(x_m: float, y_m: float, yaw_rad: float = 0.0) -> FloorPose:

@@ -166,7 +166,7 @@ class Resolver:
         among: Sequence[Thing],
         by_id: bool = False,
     ) -> Referent:
-        by_id = by_id or _needs_id(read)
+        by_id = by_id or _needs_id(read) or self._is_one_in_hand(read, use)
         name = thing.thing_id if by_id else str(read.query)
         referent = Referent(name=name, kind=thing.kind, colour=thing.colour, thing=thing)
         self._decide(
@@ -174,6 +174,11 @@ class Resolver:
             tuple(one.thing_id for one in among),
         )  # fmt: skip
         return referent
+
+    def _is_one_in_hand(self, read: Expression, use: Use) -> bool:
+        """Tell whether the words for what shall be taken fit what a hand holds as well."""
+        things = self.setting.scene.things
+        return use is Use.TAKE and any(one.held_by and read.query.fits(one) for one in things)
 
     def _unseen(self, read: Expression, use: Use) -> Referent:
         """Go by words for what is not in the scene; what only points at things needs it there."""

@@ -123,9 +123,9 @@ def test_it_is_what_the_hand_holds_before_what_was_spoken_of(home: "Home") -> No
 
 
 def test_what_is_held_is_not_what_shall_be_taken(home: "Home") -> None:
-    assert (
-        name(home.ask(replace(home.things["cup_1"], held_by="left"), "cup_2"), "the cup") == "cup"
-    )
+    request = home.ask(replace(home.things["cup_1"], held_by="left"), "cup_2")
+    assert name(request, "the cup") == "cup_2", "the word alone would find the held one as well"
+    assert name(request, "the blue cup") == "blue cup"
 
 
 def test_the_only_thing_in_sight_is_it(home: "Home") -> None:
