@@ -1,11 +1,12 @@
 """Say what a planner is asked, what it proposes, and what every rung of the ladder must do."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from vla_deploy.memory.episode import LastSeen
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.picture import Image
+from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding.conversation import Conversation
@@ -38,12 +39,27 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Sureness:
+    """Hold how sure a plan is if its words were heard right, and what to do about less.
+
+    Below `decline_below` it is none; below `read_back_below` the `question` is read back.
+    """
+
+    confidence: float
+    question: str
+    read_back_below: float
+    decline_below: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
     """Hold a plan that nobody has checked yet, and which rung made it.
 
     `confidence` is 0 to 1. Where there is something to `read_back`, it is said, and nothing moves
-    before the person agrees. `saw_scene` tells that all of the scene may have shaped the plan, not
-    only the words. `origin` is the rung that made it first, where it was planned before.
+    before the person agrees; both follow from `sureness`, where there is one, and from how well the
+    words were heard. `saw_scene` tells that all of the scene may have shaped the plan, not only the
+    words; `is_momentary` that it holds what nobody can compare with later: an answer, or what an
+    image showed. `origin` is the rung that made it first, where it was planned before.
     """
 
     plan: Plan
@@ -51,7 +67,24 @@ class Proposal:
     confidence: float
     read_back: str = ""
     saw_scene: bool = False
+    is_momentary: bool = False
+    sureness: Sureness | None = None
     origin: str = ""
+
+    def as_heard(self, heard_confidence: float | None) -> "Proposal":
+        """Return it as unsure as its words were heard; None for words that were typed.
+
+        Raises:
+            Declined: that is too unsure.
+        """
+        own = self.sureness
+        if own is None:
+            return self
+        confidence = min(own.confidence, 1.0 if heard_confidence is None else heard_confidence)
+        if confidence < own.decline_below:
+            raise Declined(f"I am not sure of it ({confidence:.2f})")
+        read_back = own.question if confidence < own.read_back_below else ""
+        return replace(self, confidence=round(confidence, 3), read_back=read_back)
 
 
 class Rung(Protocol):

@@ -10,16 +10,18 @@ from typing import Any, Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.confirmation import STILL
 from vla_deploy.planning.errors import Declined
-from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.symbolic.state import Point, Pose
 from vla_deploy.world import Query, Snapshot, Thing, UnknownWord, parse_query
 
 MOST_PLANS: Final = 64
 LONGEST_S: Final = 3600.0
-# How far the robot may have moved: little where a plan has coordinates; to another part of the room
-# where it was made by whoever was told how far away things are.
-_CLOSE_GRID: Final = (0.25, 0.25, 0.26)  # m, m, rad
-_ROOM_GRID: Final = (1.0, 1.0, math.inf)
+# How far robot and things may have moved: little where a plan has coordinates, or where whoever saw
+# them all chose some by their ids or spoke of them; else within the same part of the room.
+_CLOSE: Final = (0.25, 0.26)  # m, rad
+_ROOM: Final = (1.0, math.inf)
 _COORDINATES: Final = frozenset({"x_m", "y_m", "yaw_rad"})
 _SPOKEN_OF: Final = ("object", "destination")
 # Words whose meaning is in what was said before.
@@ -28,7 +30,35 @@ _REFERS_BACK: Final = re.compile(
     r"instead|him|her|too|also|no|not|back|more|else|rest)\b"
 )
 
-Context = tuple[object, ...]
+Facts = tuple[object, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Context:
+    """Hold what a plan depends on: facts, and where robot and things were, as far as that counts.
+
+    `within` is how far they may have moved, and the robot turned, in metres and radians.
+    """
+
+    facts: Facts
+    pose: Pose | None = None
+    spots: tuple[Point, ...] = ()
+    within: tuple[float, float] = _ROOM
+
+    def is_like(self, other: "Context") -> bool:
+        """Tell whether one plans the same in another context."""
+        if self.facts != other.facts or (self.pose is None) != (other.pose is None):
+            return False
+        reach_m, turn_rad = self.within
+        spots = zip(self.spots, other.spots, strict=True)  # of the same things, by the facts
+        has_moved = any(math.dist(before, now) > reach_m for before, now in spots)
+        return not has_moved and self._stands_like(other, reach_m, turn_rad)
+
+    def _stands_like(self, other: "Context", reach_m: float, turn_rad: float) -> bool:
+        if self.pose is None or other.pose is None:
+            return True
+        turned_rad = math.remainder(other.pose[2] - self.pose[2], math.tau)
+        return math.dist(self.pose[:2], other.pose[:2]) <= reach_m and abs(turned_rad) <= turn_rad
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +89,8 @@ class PlanCache:
         """Return the plan that was accepted before.
 
         Raises:
-            Declined: there is none, or what it depends on has changed: then it is forgotten.
+            Declined: there is none, the words were hardly heard this time, or what it depends on
+                has changed: then it is forgotten.
         """
         del deadline  # a look takes no time
         key = normalised(request.text)
@@ -74,10 +105,16 @@ class PlanCache:
         self._kept.move_to_end(key)
         self._counts["hits"] += 1
         origin = kept.proposal.origin or kept.proposal.rung
-        return replace(kept.proposal, rung=self.name, origin=origin)
+        proposal = replace(kept.proposal, rung=self.name, origin=origin)
+        return proposal.as_heard(request.heard_confidence)
 
     def keep(self, request: Request, proposal: Proposal) -> None:
-        """Remember what a rung proposed and was accepted; the oldest may go for it."""
+        """Remember what a rung proposed and was accepted; the oldest may go for it.
+
+        An answer, and what was made of an image, is of the moment: it is not kept.
+        """
+        if _is_momentary(proposal):
+            return
         key = normalised(request.text)
         context = context_of(request, proposal)
         self._kept[key] = _Kept(proposal=proposal, context=context, since_ns=self._clock.now_ns())
@@ -97,7 +134,7 @@ class PlanCache:
 
     def _has_changed(self, kept: _Kept, request: Request) -> bool:
         is_old = self._clock.now_ns() - kept.since_ns > self._longest_ns
-        return is_old or context_of(request, kept.proposal) != kept.context
+        return is_old or not kept.context.is_like(context_of(request, kept.proposal))
 
 
 def normalised(text: str) -> str:
@@ -106,20 +143,46 @@ def normalised(text: str) -> str:
 
 
 def context_of(request: Request, proposal: Proposal) -> Context:
-    """Return everything that a plan for the command depends on; equal means plan the same.
+    """Return everything that a plan for the command depends on.
 
-    Whoever was shown the whole scene may have used all of it.
+    Whoever was shown the whole scene may have used all of it, and where it all is.
     """
-    scene = request.scene
-    saw_all = proposal.saw_scene
+    scene, saw_all = request.scene, proposal.saw_scene
     things = () if scene is None else scene.things if saw_all else _spoken_of(proposal.plan, scene)
-    return (
-        tuple(sorted(request.world.holding.items(), key=str)),
-        tuple(sorted(map(_told, things))),
-        _stands(request, proposal),
-        _said_before(request),
-        request.recollections if saw_all else (),
+    known = sorted(things, key=lambda one: one.thing_id)
+    gone = tuple(one.thing.thing_id for one in scene.lost) if scene is not None else ()
+    return Context(
+        facts=(
+            tuple(sorted(request.world.holding.items(), key=str)),
+            tuple(map(_told, known)),
+            _said_before(request),
+            request.here is None,
+            (request.recollections, gone) if saw_all else (),
+        ),
+        pose=request.here if saw_all or _has_coordinates(proposal.plan) else None,
+        spots=tuple(one.xy_m for one in known) if saw_all else (),
+        within=_CLOSE if _is_of_places(proposal) else _ROOM,
     )
+
+
+def _is_momentary(proposal: Proposal) -> bool:
+    """Tell whether a plan holds what was read when it was made, and nothing later can confirm."""
+    only_tells = all(action.skill in STILL for action in proposal.plan.actions)
+    return proposal.is_momentary or (proposal.saw_scene and only_tells)
+
+
+def _is_of_places(proposal: Proposal) -> bool:
+    """Tell whether a plan may be another one where things stand a little farther away."""
+    if _has_coordinates(proposal.plan):
+        return True
+    return proposal.saw_scene and any(
+        action.skill == "speak" or _names_id(action) for action in proposal.plan.actions
+    )
+
+
+def _names_id(action: Action) -> bool:
+    queries = (_query(action.parameters.get(name)) for name in _SPOKEN_OF)
+    return any(query is not None and query.thing_id for query in queries)
 
 
 def _spoken_of(plan: Plan, scene: Snapshot) -> Iterator[Thing]:
@@ -149,15 +212,7 @@ def _has_coordinates(plan: Plan) -> bool:
     return any(_COORDINATES & action.parameters.keys() for action in plan.actions)
 
 
-def _stands(request: Request, proposal: Proposal) -> tuple[int, ...]:
-    is_close = _has_coordinates(proposal.plan)
-    if request.here is None or not (is_close or proposal.saw_scene):
-        return ()
-    grid = _CLOSE_GRID if is_close else _ROOM_GRID
-    return tuple(round(value / step) for value, step in zip(request.here, grid, strict=True))
-
-
-def _said_before(request: Request) -> Context:
+def _said_before(request: Request) -> Facts:
     talk = request.conversation
     settled = tuple(sorted(talk.choices.items()))
     if not _REFERS_BACK.search(normalised(request.text)):

@@ -32,6 +32,8 @@ _POSES: Final[Mapping[str, str]] = {
     "carrying": "tuck", "resting": "rest", "relax": "rest", "lower": "rest", "sleep": "rest",
 }  # fmt: skip
 _CAN_PUT: Final = frozenset({"in", "on", "to"})
+# These are answered from what is seen, held, or remembered when they are planned.
+_OF_THE_MOMENT: Final = frozenset({"where", "ask", "tidy"})
 Handler = Callable[["Steps", Step], list[Skill]]
 
 
@@ -118,6 +120,11 @@ class Steps:
         if value is None:
             raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
         return value
+
+
+def are_of_the_moment(steps: Sequence[Step]) -> bool:
+    """Tell whether the same words may mean other actions a moment later."""
+    return any(one["do"] in _OF_THE_MOMENT or one.get("where") == "back" for one in steps)
 
 
 def _go(steps: Steps, step: Step) -> list[Skill]:

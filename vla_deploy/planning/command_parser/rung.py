@@ -16,7 +16,7 @@ from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.asking import Proposal, Request, Sureness
 from vla_deploy.planning.command_parser.certainty import (
     Oddities,
     confidence_of,
@@ -24,7 +24,7 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.planning import Steps
+from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
 from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
@@ -85,11 +85,7 @@ class CommandParser:
             parsed = self.parse(request.text, deadline)
         except InferenceError as error:
             raise Declined(one_line(error)) from error
-        heard = 1.0 if request.heard_confidence is None else request.heard_confidence
-        confidence = min(parsed.confidence, heard)
         actions = Steps(parsed.words, request).actions(parsed.steps)
-        if confidence < self._weights.decline_below:
-            raise Declined(f"I am not sure of it ({confidence:.2f})")
         if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
             # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.
             raise Declined("it asks about the one who speaks")
@@ -99,13 +95,20 @@ class CommandParser:
             summary=asked.removeprefix("Shall I ").removesuffix("?"),
             actions=actions,
         )
-        is_unsure = confidence < self._weights.read_back_below
-        return Proposal(
+        sureness = Sureness(
+            confidence=parsed.confidence,
+            question=asked,
+            read_back_below=self._weights.read_back_below,
+            decline_below=self._weights.decline_below,
+        )
+        proposal = Proposal(
             plan=plan,
             rung=self.name,
-            confidence=round(confidence, 3),
-            read_back=asked if is_unsure else "",
+            confidence=parsed.confidence,
+            is_momentary=are_of_the_moment(parsed.steps),
+            sureness=sureness,
         )
+        return proposal.as_heard(request.heard_confidence)
 
     def parse(self, text: str, deadline: Deadline) -> Parsed:
         """Return the steps that a text means, and how sure that is.

@@ -9,7 +9,7 @@ from vla_deploy.model_servers.asking import StructuredAsker
 from vla_deploy.model_servers.chat import Chat, Message, Role
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
-from vla_deploy.model_servers.picture import small_jpeg
+from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
 from vla_deploy.planning.asking import Proposal, Request
@@ -104,6 +104,7 @@ class ServedRung:
             confidence=choice.confidence,
             read_back=Says.CONFIRM.format(steps=steps) if unsure else "",
             saw_scene=True,
+            is_momentary=self._shown(request) is not None,
         )
 
     def _candidate(self, request: Request, way: str, deadline: Deadline) -> Candidate:
@@ -138,8 +139,12 @@ class ServedRung:
         return Candidate(plan=plan, checked=checked, confidence=answer.confidence)
 
     def _wish(self, request: Request, way: str) -> Wish:
-        jpeg = small_jpeg(request.image) if self.sees and request.image is not None else None
+        image = self._shown(request)
+        jpeg = None if image is None else small_jpeg(image)
         return Wish(variant=way, jpeg=jpeg, failed=request.failed)
+
+    def _shown(self, request: Request) -> Image | None:
+        return request.image if self.sees else None
 
     @property
     def _room(self) -> int:

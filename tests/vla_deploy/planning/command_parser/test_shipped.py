@@ -86,6 +86,12 @@ def test_a_plan_of_it_passes_grounding_and_validation(parser: CommandParser) -> 
     assert plan.actions[0].parameters == {"place": "kitchen"}
 
 
+def test_only_what_is_read_while_planning_is_of_the_moment(parser: CommandParser) -> None:
+    asked = parser.propose(request("have you seen my keys"), soon())
+    ordered = parser.propose(request("I'd like you to head over to the kitchen"), soon())
+    assert (asked.is_momentary, ordered.is_momentary) == (True, False)
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -272,11 +272,11 @@ def test_the_picture_is_shown_to_a_model_that_sees_and_may(loopback, served, ask
     image = np.full((48, 64, 3), 128, np.uint8)
     loopback.then(loopback.says(answer(GO)))
     assert not served().sees
-    served().propose(ask(TIDY, image=image), within())
+    assert not served().propose(ask(TIDY, image=image), within()).is_momentary
     assert "image_url" not in json.dumps(loopback.heard[-1].body)
     rung = served(vision=True)
     assert rung.sees
-    rung.propose(ask(TIDY, image=image), within())
+    assert rung.propose(ask(TIDY, image=image), within()).is_momentary
     body = json.dumps(loopback.heard[-1].body)
     assert "image_url" in body
     assert "The image shows what the robot sees now" in body
