@@ -38,13 +38,18 @@ def checked(plan: Plan, request: Request) -> Plan:
 class Served(Protocol):
     """Tell more of a rung that asks a server."""
 
-    @property
-    def sees(self) -> bool:
-        """Tell whether its model takes images, and may be shown them."""
-        ...
-
     def document(self) -> dict[str, Any]:
         """Return how its server has been doing."""
+        ...
+
+
+@runtime_checkable
+class Aided(Protocol):
+    """Tell what a rung puts before its model, besides command and scene."""
+
+    @property
+    def aids(self) -> frozenset[Aid]:
+        """Return what it can use."""
         ...
 
 
@@ -93,9 +98,8 @@ class Planner:
     @property
     def uses(self) -> frozenset[Aid]:
         """Return what any of the rungs can use."""
-        served = [rung for rung in self._slow.rungs if isinstance(rung, Served)]
-        aids = {Aid.MEMORY} if served else set()
-        return frozenset(aids | ({Aid.IMAGE} if any(rung.sees for rung in served) else set()))
+        aided = [rung.aids for rung in self._slow.rungs if isinstance(rung, Aided)]
+        return frozenset(one for aids in aided for one in aids)
 
     def document(self) -> dict[str, Any]:
         """Return how cache and servers have been doing, as JSON takes it."""

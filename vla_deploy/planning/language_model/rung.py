@@ -12,6 +12,7 @@ from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.chat import Chat
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
+from vla_deploy.planning.aids import Aid
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.knowledge import spoken_places
@@ -45,6 +46,11 @@ class ChatRung:
         self._schema = self._answer.model_json_schema()
         free_tokens = model.config.context_tokens - model.language.most_tokens
         self._room = min(_MOST_ROOM, _CHARACTERS_PER_TOKEN * free_tokens)
+
+    @property
+    def aids(self) -> frozenset[Aid]:
+        """Return what its prompts can tell besides command and scene: memories."""
+        return frozenset({Aid.MEMORY})
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
         """Return the plan that the model finds likeliest.

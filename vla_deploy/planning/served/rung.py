@@ -12,6 +12,7 @@ from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
+from vla_deploy.planning.aids import Aid
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.ladder import Check
@@ -60,6 +61,11 @@ class ServedRung:
         """Tell whether the model takes images, and may be shown them."""
         settings = self._server.settings
         return settings.vision and (settings.is_local or settings.allow_images_off_robot)
+
+    @property
+    def aids(self) -> frozenset[Aid]:
+        """Return what its prompts can tell: memories, and what the camera sees."""
+        return frozenset({Aid.MEMORY, Aid.IMAGE} if self.sees else {Aid.MEMORY})
 
     def document(self) -> dict[str, Any]:
         """Return how the server has been doing."""
