@@ -4,7 +4,7 @@ The robot file sets how far it goes (`[planning] require_confirmation`): never, 
 is unsure is always asked, since nobody has asked for it surely.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Set
 from typing import Final
 
 from vla_deploy.planning.asking import Request
@@ -29,17 +29,32 @@ FAR_BACK_M: Final = -1.0
 STILL: Final = frozenset({"speak", "wait", "stop"})
 
 
-def confirmation_of(plan: Plan, request: Request) -> str:
-    """Return the question to ask before a plan runs, or "" where it may run at once."""
-    if all(action.skill in STILL for action in plan.actions):
-        return ""
-    wanted = request.world.bounds.require_confirmation
-    risks = () if wanted is Confirm.NEVER else _RISKS
-    reasons = [reason for risk in (*_DOUBTS, *risks) if (reason := risk(plan, request))]
-    if not reasons and wanted is not Confirm.ALWAYS:
+def confirmation_of(plan: Plan, request: Request, agreed: Set[str] = frozenset()) -> str:
+    """Return the question to ask before a plan runs, or "" where it may run at once.
+
+    What was `agreed` to before is not asked about again.
+    """
+    reasons = _reasons(plan, request)
+    if reasons.keys() <= agreed:
         return ""
     question = Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
-    return " ".join([question, *(f"{reason}." for reason in reasons)])
+    return " ".join([question, *(f"{reason}." for reason in reasons.values() if reason)])
+
+
+def agreement_to(plan: Plan, request: Request) -> frozenset[str]:
+    """Return all that a person agrees to with a plan: kinds of risk, and each danger by itself."""
+    return frozenset(_reasons(plan, request))
+
+
+def _reasons(plan: Plan, request: Request) -> dict[str, str]:
+    """Return why a plan waits for a yes, by what would be agreed to."""
+    if all(action.skill in STILL for action in plan.actions):
+        return {}
+    wanted = request.world.bounds.require_confirmation
+    risks = _DOUBTS if wanted is Confirm.NEVER else {**_DOUBTS, **_RISKS}
+    told = {kind: risk(plan, request) for kind, risk in risks.items()}
+    found = {why if kind in _EACH else kind: why for kind, why in told.items() if why}
+    return {"any motion": "", **found} if wanted is Confirm.ALWAYS else found
 
 
 def _called_by_words(plan: Plan, request: Request) -> Plan:
@@ -115,7 +130,14 @@ def _goes_back_far(plan: Plan, _: Request) -> str:
     return f"I would drive {-back_m:g} m backward" if back_m < FAR_BACK_M else ""
 
 
-_DOUBTS: Final[tuple[Risk, ...]] = (_is_unsure, _is_unheard)
-_RISKS: Final[tuple[Risk, ...]] = (
-    _has_concerns, _is_long, _moves_many, _is_heavy, _puts_down_first, _goes_back_far,
-)  # fmt: skip
+_DOUBTS: Final[Mapping[str, Risk]] = {"unsure": _is_unsure, "unheard": _is_unheard}
+_RISKS: Final[Mapping[str, Risk]] = {
+    "danger": _has_concerns,
+    "long": _is_long,
+    "many": _moves_many,
+    "heavy": _is_heavy,
+    "put down first": _puts_down_first,
+    "far back": _goes_back_far,
+}
+# A yes to one of these is none to another one.
+_EACH: Final = frozenset({"danger", "heavy"})

@@ -15,7 +15,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.beside import Beside
-from vla_deploy.planning.confirmation import confirmation_of
+from vla_deploy.planning.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.correction import CORRECTED, corrected_by
 from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
@@ -195,7 +195,8 @@ class Desk:
             if answer.plan is None:
                 raise answer.error or PlanInvalid(["nobody was asked for a plan"])
             self._telling.check_length(answer.plan)
-            question = answer.read_back or confirmation_of(answer.plan, request)
+            agreed = self._under_way.agreed(command)
+            question = answer.read_back or confirmation_of(answer.plan, request, agreed)
             if question:
                 raise Ambiguous(question)
             self._hand_on(command, request, answer, answer.plan)
@@ -213,7 +214,7 @@ class Desk:
         if command.recovers:
             plan = numbered(plan, len(request.failed))
         self._telling.handed_on(command, plan, answer)
-        self._under_way.carry(command, plan, answer)
+        self._under_way.carry(command, plan, answer, agreement_to(plan, request))
         self.accounts.planned += 1
         if not command.recovers:
             self.planner.accepted(request, answer)

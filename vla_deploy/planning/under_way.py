@@ -19,18 +19,28 @@ class UnderWay:
     def __init__(self) -> None:
         self._carried: OrderedDict[str, tuple[Command, Carried]] = OrderedDict()
 
-    def carry(self, command: Command, plan: Plan, answer: Answer) -> None:
-        """Note that the executor has a plan: the first for a command, or one after a failure."""
+    def carry(
+        self, command: Command, plan: Plan, answer: Answer, agreed: frozenset[str] = frozenset()
+    ) -> None:
+        """Note that the executor has a plan: the first for a command, or one after a failure.
+
+        To what is `agreed` with the first counts for all that follow.
+        """
         known = self._carried.pop(command.command_id, None)
         proposal = answer.proposal
         strategy = proposal.origin if proposal is not None and proposal.rung == RECOVERY else ""
         if command.recovers and known is not None:
             carried = known[1].going_on(plan, strategy)
         else:
-            carried = Carried(plan=plan, given=command.plan is not None)
+            carried = Carried(plan=plan, given=command.plan is not None, agreed=agreed)
         self._carried[command.command_id] = replace(command, recovers=True), carried
         while len(self._carried) > _MOST_REMEMBERED:
             self._carried.popitem(last=False)
+
+    def agreed(self, command: Command) -> frozenset[str]:
+        """Return what the person need not be asked again for another plan of a command."""
+        carried = self.carried(command.command_id) if command.recovers else None
+        return frozenset() if carried is None else carried.agreed
 
     def carried(self, command_id: str) -> Carried | None:
         """Return what is known of a command's plans, None where nothing is."""

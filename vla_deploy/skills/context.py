@@ -17,6 +17,9 @@ from vla_deploy.skills.link import RobotLink
 Skill = Generator[None, None, None]
 """A skill yields once per executor step, returns on success, raises SkillFailed otherwise."""
 
+Rest = Callable[[], Mapping[str, float]]
+"""Return the parameters of what is left to do; raise TryAgain where nobody tells the pose."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
@@ -36,6 +39,7 @@ class SkillContext:
     """Carry everything a skill may use; `hands` is the executor's memory of each hand.
 
     `say` shows a text, `voice` has it heard; `notes` are what results say beside their status;
+    `rests` tell of relative motions, by the actions' ids, what is left of them;
     `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
     follows none.
     """
@@ -49,11 +53,16 @@ class SkillContext:
     claims: ClaimBook
     hands: dict[str, Held | None] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    rests: dict[str, Rest] = field(default_factory=dict)
     way_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
 
     def note(self, text: str) -> None:
         """Have the result of the acting action say something, whatever its status."""
         self.notes[self.link.acting] = text
+
+    def may_go_on(self, rest: Rest) -> None:
+        """Have what is left of the acting action told, should it end before it is done."""
+        self.rests[self.link.acting] = rest
 
     def holding_hand(self, wanted: str | None = None) -> str:
         """Return the hand that holds something.

@@ -102,7 +102,9 @@ def move(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         NotPossible: the map shows a wall or furniture on the way.
         TryAgain: the way stayed blocked.
     """
-    yield from straight(context, float(parameters["distance_m"]), parameters.get("speed_m_s"))
+    start, distance_m = context.link.pose, float(parameters["distance_m"])
+    context.may_go_on(lambda: {"distance_m": distance_m - _ahead_m(start, context.link.pose)})
+    yield from straight(context, distance_m, parameters.get("speed_m_s"))
 
 
 def straight(context: SkillContext, distance_m: float, speed_m_s: float | None = None) -> Skill:
@@ -119,11 +121,7 @@ def straight(context: SkillContext, distance_m: float, speed_m_s: float | None =
     patience = _Patience(context)
     while True:
         pose = context.link.pose
-        travelled_m = sign * (
-            (pose.x_m - start.x_m) * math.cos(start.yaw_rad)
-            + (pose.y_m - start.y_m) * math.sin(start.yaw_rad)
-        )
-        left_m = abs(distance_m) - travelled_m
+        left_m = abs(distance_m) - sign * _ahead_m(start, pose)
         if left_m < STRAIGHT_TOLERANCE_M:
             break
         speed = min(most_m_s, math.sqrt(1.2 * limits.acceleration_m_s2 * left_m))
@@ -145,17 +143,14 @@ def turn(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         TryAgain: control did not let the base turn for too long.
     """
     limits = limits_of(context)
-    left_rad = float(parameters["angle_rad"])
-    before_rad = context.link.pose.yaw_rad
+    angle_rad, turned = float(parameters["angle_rad"]), _Turned(context)
+    context.may_go_on(lambda: {"angle_rad": angle_rad - turned.by_rad()})
     patience = _Patience(context)
-    while abs(left_rad) > 0.02:
+    while abs(left_rad := angle_rad - turned.by_rad()) > 0.02:
         rate = min(limits.turn_rate_rad_s, 2.0 * abs(left_rad))
         twist = Twist(0.0, math.copysign(max(rate, 0.06), left_rad))
         context.link.drive(patience.pass_on(twist, ""))
         yield
-        yaw_rad = context.link.pose.yaw_rad
-        left_rad -= wrap_angle(yaw_rad - before_rad)
-        before_rad = yaw_rad
     context.link.drive(AT_REST)
     yield from stand_still(context)
 
@@ -166,6 +161,22 @@ def stand_still(context: SkillContext, duration_s: float = 0.4) -> Skill:
     while context.link.clock.now_ns() < end_ns:
         context.link.drive(AT_REST)
         yield
+
+
+class _Turned:
+    """Count how far the base has turned, also beyond half a turn."""
+
+    def __init__(self, context: SkillContext) -> None:
+        self._link = context.link
+        self._yaw_rad = context.link.pose.yaw_rad
+        self._sum_rad = 0.0
+
+    def by_rad(self) -> float:
+        """Return the angle since the beginning, counter-clockwise positive."""
+        yaw_rad = self._link.pose.yaw_rad
+        self._sum_rad += wrap_angle(yaw_rad - self._yaw_rad)
+        self._yaw_rad = yaw_rad
+        return self._sum_rad
 
 
 class _Patience:
@@ -228,6 +239,12 @@ def _leaves_free_floor(context: SkillContext, sign: float) -> bool:
     ahead, here = to_map(pose, sign * LOOK_AHEAD_M, 0.0), (pose.x_m, pose.y_m)
     planner = context.planner
     return not planner.is_free(*ahead) and planner.room_m(*ahead) < planner.room_m(*here)
+
+
+def _ahead_m(start: FloorPose, pose: FloorPose) -> float:
+    """Return how far ahead of where the robot stood it stands now, negative behind."""
+    forward_m = (pose.x_m - start.x_m) * math.cos(start.yaw_rad)
+    return forward_m + (pose.y_m - start.y_m) * math.sin(start.yaw_rad)
 
 
 def _distance(pose: FloorPose, point: NDArray[np.float64]) -> float:

@@ -1,6 +1,6 @@
 """Run one plan: actions as their dependencies allow, each bounded in time, some tried twice."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +13,7 @@ from vla_deploy.planning.plan import Action, ActionStatus, Plan
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.planning.recovery import Cause
 from vla_deploy.planning.symbolic.state import State
-from vla_deploy.skills.context import Skill, SkillContext
+from vla_deploy.skills.context import Rest, Skill, SkillContext
 from vla_deploy.skills.errors import (
     EffectMissing,
     NotPossible,
@@ -53,6 +53,8 @@ class ActionRecord:
     note: str = ""
     cause: Cause | None = None
     """By what it failed, where another plan may do better; None otherwise."""
+    left: Mapping[str, float] | None = None
+    """What is left of a relative motion that ended early; empty where nobody knows, else None."""
 
     def document(self) -> dict[str, Any]:
         """Return the record as it is told in events and results."""
@@ -277,10 +279,21 @@ class PlanExecution:
         record.status = status
         record.error = error
         record.note = self._context.notes.pop(record.action.id, "")
+        rest = self._context.rests.pop(record.action.id, None)
+        if rest is not None and status is not ActionStatus.SUCCEEDED:
+            record.left = _told(rest)
         self._tell(record)
 
     def _holder(self, action: Action) -> str:
         return f"{action.skill} ({self._command_id or 'a plan'}, {action.id})"
+
+
+def _told(rest: Rest) -> dict[str, float]:
+    """Return what is left, to the millimetre; empty where nobody knows where the robot is."""
+    try:
+        return {name: round(value, 3) for name, value in rest().items()}
+    except TryAgain:
+        return {}
 
 
 def _drop(branch: _Branch) -> None:

@@ -167,6 +167,7 @@ class ExecutorNode:
             error=setback.error,
             cause=str(setback.cause),
             done=done,
+            left={one.action.id: one.left for one in execution.records if one.left is not None},
         )
 
     def _finish(self, why_no_other: str, success: bool = False) -> None:

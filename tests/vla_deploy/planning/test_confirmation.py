@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.confirmation import confirmation_of
+from vla_deploy.planning.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.understanding.grounding import PUT_IN
@@ -81,3 +81,30 @@ def test_a_heavy_thing_is_asked_for(butler: World) -> None:
                  position_m=(2.0, 1.5, 0.5), size_m=(0.06, 0.06, 0.20))  # fmt: skip
     said = ask(butler, PICK, scene=Snapshot(stamp_ns=0, things=(full,)))
     assert said.endswith("The bottle may weigh 0.5 kg.")
+
+
+def test_what_was_agreed_to_is_not_asked_about_again(butler: World) -> None:
+    request = Request(command_id="c", text="x", world=butler, heard_confidence=0.4)
+    plan = Plan(goal="x", actions=(PICK,) * 4)
+    agreed = agreement_to(plan, request)
+    assert agreed == {"many", "unheard"}
+    assert confirmation_of(plan, request, agreed) == ""
+    back = Action(id="b", skill="move", parameters={"distance_m": -2.0})
+    farther = plan.model_copy(update={"actions": (*plan.actions, back)})
+    assert confirmation_of(farther, request, agreed).endswith("I would drive 2 m backward.")
+
+
+def test_a_yes_to_one_danger_is_none_to_another(butler: World) -> None:
+    request = Request(command_id="c", text="x", world=butler)
+    hot, sharp = (Plan(goal="x", actions=(GO,), safety_concerns=(why,)) for why in ("hot", "sharp"))
+    assert confirmation_of(hot, request, agreement_to(hot, request)) == ""
+    assert "sharp" in confirmation_of(sharp, request, agreement_to(hot, request))
+
+
+def test_where_every_motion_waits_for_a_yes_an_answer_is_none(butler: World) -> None:
+    always = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.ALWAYS))
+    request = Request(command_id="c", text="x", world=always)
+    speak = Action(id="s", skill="speak", parameters={"text": "hello"})
+    said, moved = (Plan(goal="x", actions=(one,)) for one in (speak, GO))
+    assert confirmation_of(moved, request, agreement_to(moved, request)) == ""
+    assert confirmation_of(moved, request, agreement_to(said, request))

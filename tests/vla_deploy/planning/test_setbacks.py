@@ -67,6 +67,48 @@ def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_t
     assert any("the way is blocked" in one for one in model.asked[-1].failed)
 
 
+HEARD = {"text": "go to the kitchen", "heard": {"confidence": 0.4}}
+
+
+def agreed(desk: Any, **utterance: Any) -> dict[str, Any]:
+    """Give a command that is asked about, say yes, and return its plan."""
+    desk.give(**utterance)
+    assert desk.answers()[-1]["event"] == "asked"
+    desk.give(command_id="c2", text="yes")
+    desk.answers()
+    (plan,) = desk.plans()
+    return plan
+
+
+def test_what_the_person_has_agreed_to_is_mended_without_another_yes(open_desk):
+    desk = open_desk()
+    first = agreed(desk, **HEARD)
+    (second,) = set_back(desk, first)
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
+
+
+def test_what_is_risky_in_another_way_than_what_was_agreed_to_is_not_done(open_desk, rung, propose):
+    back = propose(("move", {"distance_m": -2.0}))
+    desk = open_desk(rung("model", back))
+    plan = agreed(desk, **HEARD)
+    (plan,) = set_back(desk, plan)
+    (end,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
+    assert "I would drive 2 m backward" in end["give_up"]
+
+
+def test_who_takes_time_is_told_what_was_done_before_the_failure(open_desk, rung, propose):
+    go = propose(("speak", {"text": "I go"}), ("move", {"distance_m": 1.0}))
+    model = rung("model", go, Declined("nothing"))
+    desk = open_desk(model)
+    desk.give(text="sing one")
+    desk.answers()
+    (plan,) = desk.plans()
+    done, failed = (one["id"] for one in plan["plan"]["actions"])
+    set_back(desk, plan, action_id=failed, done=[done], left={failed: {}})
+    (told,) = model.asked[-1].failed
+    assert "done before: speak(text I go)" in told
+
+
 def test_a_plan_that_came_as_one_is_not_changed(open_desk):
     desk = open_desk()
     plan = {"goal": "go", "actions": [

@@ -81,6 +81,8 @@ class CommandParser:
             Declined: it is no command, none that can be planned, or too unsure.
             PlanningError: what it asks for cannot be done; says why.
         """
+        if request.failed:
+            raise Declined("I read words, not what was done of them: I would begin anew")
         try:
             parsed = self.parse(request.text, deadline)
         except InferenceError as error:

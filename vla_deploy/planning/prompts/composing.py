@@ -29,6 +29,8 @@ _SMALLER: Final[Mapping[str, str]] = {
     "chain_of_thought": "structured",
     "structured": "short",
 }
+# Enough for what failed and all that was done before it.
+_FAILURE_CHARACTERS: Final = 600
 _LEAST_DATA: Final = 1_500
 
 
@@ -49,7 +51,7 @@ def chat_for(request: Request, robot: str, wish: Wish, room: int = DEFAULT_ROOM)
     data_room, system = _system(request, robot, wish, room)
     situation: dict[str, Any] = situation_of(request)
     if wish.failed:
-        situation["failed_before"] = [plain(one, 300) for one in wish.failed]
+        situation["failed_before"] = [plain(one, _FAILURE_CHARACTERS) for one in wish.failed]
     command = as_data(plain(request.text, MOST_CHARACTERS))
     told = as_data(fitted(situation, data_room - len(command)))
     text = f"<situation>\n{told}\n</situation>\n<command>{command}</command>"

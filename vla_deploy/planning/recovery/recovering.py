@@ -14,6 +14,7 @@ from vla_deploy.planning.recovery.strategies import STRATEGIES, Steps
 MOST_RECOVERIES: Final = 3
 RECOVERY: Final = "recovery"
 _CONFIDENCE: Final = 0.8
+_UNCLEAR: Final = "nobody knows how much of the way was done"
 _ID_CHARACTERS: Final = 64
 _BEFORE: Final = re.compile(r"^(?:r\d+_)+")
 
@@ -21,8 +22,11 @@ _BEFORE: Final = re.compile(r"^(?:r\d+_)+")
 def recover(carried: Carried, request: Request, check: Check) -> Answer:
     """Return a plan that mends the last setback, or why none of the strategies has one.
 
-    The proposal's `origin` names the strategy.
+    The proposal's `origin` names the strategy. Where nobody knows how much of a drive or a turn was
+    done, none is tried: it would be done again.
     """
+    if not carried.setbacks[-1].is_clear:
+        return Answer(error=CannotBeDone(f"{carried.setbacks[-1].error} ({_UNCLEAR})"))
     refusals = []
     for name, strategy in STRATEGIES.items():
         steps = None if carried.tried(name) else strategy(carried, request)

@@ -19,16 +19,42 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setback:
-    """Hold which action of a plan failed, why, and which had succeeded by then."""
+    """Hold which action of a plan failed, why, and which had succeeded by then, in order.
+
+    `left` are the relative motions that had begun, with what is left of them; one of which nobody
+    knows that has no parameters.
+    """
 
     action: Action
     error: str
-    done: frozenset[str]
+    done: tuple[Action, ...]
     cause: Cause = Cause.SKILL
+    left: tuple[Action, ...] = ()
+
+    @property
+    def done_ids(self) -> frozenset[str]:
+        """Return the ids of what had succeeded."""
+        return frozenset(one.id for one in self.done)
+
+    @property
+    def is_clear(self) -> bool:
+        """Tell whether it is known of everything that had begun how much is left."""
+        return all(one.parameters for one in self.left)
+
+    def rest_of(self, action: Action) -> Action:
+        """Return what is left of an action: all of it, unless it is a motion that had begun."""
+        return next((one for one in self.left if one.id == action.id), action)
 
     def __str__(self) -> str:
-        told = ", ".join(f"{name} {value}" for name, value in self.action.parameters.items())
-        return f"{self.action.skill}({told}) failed: {self.error}"
+        parts = [f"{_words(self.action)} failed: {self.error}"]
+        parts += [f"left of it: {_words(one)}" for one in self.left if one.parameters]
+        parts += [
+            f"nobody knows how much was left of it: {one.skill}"
+            for one in self.left
+            if not one.parameters
+        ]
+        parts += [f"done before: {', '.join(map(_words, self.done))}"] if self.done else []
+        return "; ".join(parts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,11 +62,12 @@ class Carried:
     """Hold a command's plan that is being carried out, and what failed before it.
 
     `used` are the strategies that answered each setback, "" where a planner did. A plan that came
-    `given` is whoever gave it to change.
+    `given` is whoever gave it to change. `agreed` is what the person has said yes to.
     """
 
     plan: Plan
     given: bool = False
+    agreed: frozenset[str] = frozenset()
     setbacks: tuple[Setback, ...] = ()
     used: tuple[str, ...] = ()
 
@@ -55,9 +82,10 @@ class Carried:
     @property
     def left(self) -> tuple[Action, ...]:
         """Return what the last setback has left undone, in order; it needs only each other."""
-        done = self.setbacks[-1].done
+        setback = self.setbacks[-1]
+        done = setback.done_ids
         return tuple(
-            action.model_copy(
+            setback.rest_of(action).model_copy(
                 update={"depends_on": tuple(one for one in action.depends_on if one not in done)}
             )
             for action in execution_order(self.plan.actions)
@@ -68,7 +96,7 @@ class Carried:
         """Tell whether a strategy has answered the same action's failure before."""
         failed = self.setbacks[-1].action
         return any(
-            used == strategy and _same(setback.action, failed)
+            used == strategy and _same(setback.rest_of(setback.action), failed)
             for setback, used in zip(self.setbacks, self.used, strict=False)
         )
 
@@ -87,12 +115,24 @@ def read_setback(told: Mapping[str, Any], plan: Plan) -> Setback | None:
     if action is None:
         return None
     done = frozenset(str(one) for one in told.get("done", ()))
+    left: Mapping[str, Mapping[str, float]] = told.get("left", {})
     return Setback(
         action=action,
         error=str(told.get("error") or "no reason told"),
-        done=done,
+        done=tuple(one for one in execution_order(plan.actions) if one.id in done),
         cause=Cause(told.get("cause", Cause.SKILL)),
+        left=tuple(_rest(one, left[one.id]) for one in plan.actions if one.id in left),
     )
+
+
+def _rest(action: Action, left: Mapping[str, float]) -> Action:
+    parameters = {**action.parameters, **left} if left else {}
+    return action.model_copy(update={"parameters": parameters})
+
+
+def _words(action: Action) -> str:
+    told = ", ".join(f"{name} {value}" for name, value in action.parameters.items())
+    return f"{action.skill}({told})"
 
 
 def _same(one: Action, other: Action) -> bool:

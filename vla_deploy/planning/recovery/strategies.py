@@ -52,7 +52,7 @@ def take_again(carried: Carried, request: Request) -> Steps | None:
     if carried.setbacks[-1].action.skill != "place":
         return None
     state = state_of(request.world, request.scene, request.here)
-    done = carried.setbacks[-1].done
+    done = carried.setbacks[-1].done_ids
     taken = [one for one in execution_order(carried.plan.actions) if one.skill == "pick_up"]
     lost = [one for one in taken if one.id in done and not _is_held(one, state, request)]
     if not state.hands or not lost:

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
@@ -84,6 +85,12 @@ def test_a_plan_of_it_passes_grounding_and_validation(parser: CommandParser) -> 
     plan = checked(proposal.plan, asked)
     assert [one.skill for one in plan.actions] == ["navigate_to"]
     assert plan.actions[0].parameters == {"place": "kitchen"}
+
+
+def test_what_has_failed_before_is_left_to_who_can_tell_what_is_left(parser: CommandParser) -> None:
+    asked = replace(request("I'd like you to head over to the kitchen"), failed=("move() failed",))
+    with pytest.raises(Declined, match="begin anew"):
+        parser.propose(asked, soon())
 
 
 def test_only_what_is_read_while_planning_is_of_the_moment(parser: CommandParser) -> None:

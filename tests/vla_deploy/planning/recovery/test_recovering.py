@@ -11,6 +11,8 @@ from vla_deploy.planning.planner import checked
 from vla_deploy.planning.recovery import Carried, Cause, Setback, numbered, read_setback, recover
 
 TAKE = ("pick_up", {"object": "cup_1"})
+MOVE = ("move", {"distance_m": 2.0, "speed_m_s": 0.2})
+BLOCKED = {"action_id": "a0", "error": "blocked", "done": []}
 PUT = ("place", {"destination": "coffee_table", "relation": "on"})
 
 
@@ -25,7 +27,7 @@ def plan_of(*steps: tuple[str, dict[str, Any]]) -> Plan:
 
 
 def failed(plan: Plan, number: int, error: str = "it slipped", **changes: Any) -> Carried:
-    done = frozenset(one.id for one in plan.actions[:number])
+    done = plan.actions[:number]
     setback = Setback(action=plan.actions[number], error=error, done=done, **changes)
     return Carried(plan=plan).after(setback)
 
@@ -137,6 +139,56 @@ def test_history_says_what_was_tried_and_what_came_of_it(ask: Any):
         "pick_up(object cup_1) failed: it slipped; then tried: look again",
         "pick_up(object cup_1) failed: it slipped",
     )
+
+
+def test_history_says_what_was_done_and_what_is_left(ask: Any):
+    plan = plan_of(TAKE, MOVE)
+    told = {
+        "action_id": "a1",
+        "error": "blocked",
+        "done": ["a0"],
+        "left": {"a1": {"distance_m": 0.6}},
+    }
+    setback = read_setback(told, plan)
+    assert setback is not None
+    assert Carried(plan=plan).after(setback).history == (
+        "move(distance_m 2.0, speed_m_s 0.2) failed: blocked; "
+        "left of it: move(distance_m 0.6, speed_m_s 0.2); done before: pick_up(object cup_1)",
+    )
+
+
+def test_of_a_drive_that_had_begun_only_the_rest_is_driven(ask: Any):
+    setback = read_setback(BLOCKED | {"left": {"a0": {"distance_m": 0.6}}}, plan_of(MOVE))
+    assert setback is not None
+    first = Carried(plan=plan_of(MOVE)).after(setback)
+    answer = recover(first, ask("go ahead two metres"), checked)
+    assert answer.plan is not None
+    assert skills(answer.plan) == ["wait", "move"]
+    assert answer.plan.actions[1].parameters == {"distance_m": 0.6, "speed_m_s": 0.2}
+
+    again = read_setback(
+        BLOCKED | {"action_id": answer.plan.actions[1].id, "left": {}}, answer.plan
+    )
+    assert again is not None
+    second = first.going_on(answer.plan, "wait").after(again)
+    assert recover(second, ask("go ahead two metres"), checked).plan is None, "it was tried"
+
+
+def test_a_drive_that_never_began_is_driven_whole(ask: Any):
+    plan = plan_of(("navigate_to", {"place": "kitchen"}), MOVE)
+    answer = recover(failed(plan, 0, "the way is blocked"), ask("go"), checked)
+    assert answer.plan is not None
+    assert answer.plan.actions[-1].parameters["distance_m"] == 2.0
+
+
+def test_a_drive_of_which_nobody_knows_the_rest_is_not_driven_again(ask: Any):
+    setback = read_setback(BLOCKED | {"left": {"a0": {}}}, plan_of(MOVE))
+    assert setback is not None
+    carried = Carried(plan=plan_of(MOVE)).after(setback)
+    answer = recover(carried, ask("go ahead two metres"), checked)
+    assert answer.plan is None
+    assert str(answer.error) == "blocked (nobody knows how much of the way was done)"
+    assert carried.history[0].endswith("nobody knows how much was left of it: move")
 
 
 def test_a_setback_of_another_plan_is_not_read():
