@@ -8,6 +8,7 @@ import numpy as np
 
 from sim_twin.compose import STEP_S
 from sim_twin.errors import ModelMismatch
+from sim_twin.held_things import HeldThings
 from sim_twin.probes import MotionProbe, RangeProbe
 from sim_twin.shafts import Shaft, Shafts
 from sim_twin.truth import Referee
@@ -29,6 +30,7 @@ class Engine:
         self.drives = Shafts(model, self.data, drives)
         self.imu = MotionProbe(model, self.data)
         self.referee = Referee(model, self.data)
+        self._held_things = HeldThings(model, self.data)
         self.now_ns = START_NS
         """Simulated time in nanoseconds."""
         self._move_joints_into_range()
@@ -66,6 +68,7 @@ class Engine:
     def step(self) -> None:
         """Advance the physics by one step."""
         mujoco.mj_step(self.model, self.data)
+        self._held_things.step()
         self.now_ns += STEP_NS
 
     def _free_joint(self, body: str) -> int:

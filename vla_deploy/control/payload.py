@@ -9,7 +9,7 @@ from vla_deploy.ipc import CellReader
 from vla_deploy.robots import RobotDescription
 
 # An empty gripper closes to where it was sent; fingers on an object stop short of it, pressing.
-SHORT_OF_GOAL_M: Final = 0.002
+SHORT_OF_GOAL_M: Final = 0.001
 PRESSING_RATIO: Final = 0.05
 PRESS_M: Final = 0.004
 """How far behind a thing's surface a hand that holds it is sent; its Goal PWM bounds the force."""
