@@ -13,6 +13,7 @@ from vla_deploy.planning.catalogue import (
 )
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
 from vla_deploy.planning.graph import dependency_faults
+from vla_deploy.planning.instead import instead_of
 from vla_deploy.planning.knowledge import World, spoken_places
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.references import match_place, parse_object
@@ -32,11 +33,12 @@ def check_plan(
     `here` is the robot's x, y (m) and yaw (rad) in the map. What nobody tells is not judged.
 
     Raises:
-        PlanInvalid: carries all faults.
+        PlanInvalid: carries all faults, and what could be done instead.
     """
     faults = plan_faults(plan, world, scene, here)
     if faults:
-        raise PlanInvalid(faults)
+        is_well_formed = not _form_faults(plan, world)
+        raise PlanInvalid(faults, instead_of(plan, world, scene, here) if is_well_formed else "")
 
 
 def plan_faults(
@@ -46,6 +48,15 @@ def plan_faults(
 
     A plan whose actions are all right one by one is gone through symbol by symbol.
     """
+    faults = _form_faults(plan, world)
+    if faults:
+        return faults
+    faults = bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
+    return faults + symbolic_faults(plan.actions, world, scene, here)
+
+
+def _form_faults(plan: Plan, world: World) -> list[str]:
+    """Return what is wrong with a plan whatever the robot sees, holds and knows."""
     faults: list[str] = []
     if not plan.feasible:
         faults.append(
@@ -55,11 +66,7 @@ def plan_faults(
         faults.append("it has no actions")
     for action in plan.actions:
         faults += [f'action "{action.id}": {fault}' for fault in action_faults(action, world)]
-    faults += dependency_faults(plan.actions)
-    if faults:
-        return faults
-    faults += bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
-    return faults + symbolic_faults(plan.actions, world, scene, here)
+    return faults + dependency_faults(plan.actions)
 
 
 def action_faults(action: Action, world: World) -> list[str]:

@@ -1,6 +1,7 @@
 """Go through a plan symbol by symbol and name every action that could not be done."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.graph import execution_order
@@ -10,6 +11,15 @@ from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.state import Pose, State, state_of
 from vla_deploy.planning.symbolic.table import LOGIC
 from vla_deploy.world import Snapshot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Broken:
+    """Hold an action that cannot be done, where it would begin, and why by the rules it breaks."""
+
+    action: Action
+    state: State
+    rules: dict[str, str]
 
 
 def symbolic_faults(
@@ -24,9 +34,17 @@ def symbolic_faults(
     valid one by one, and their dependencies acyclic.
     """
     return [
-        f'action "{action.id}": {action.skill} breaks "{rule}": {why}'
-        for action, rule, why in _broken(actions, state_of(world, scene, here), world, scene)
+        f'action "{one.action.id}": {one.action.skill} breaks "{rule}": {why}'
+        for one in _broken(actions, state_of(world, scene, here), world, scene)
+        for rule, why in one.rules.items()
     ]
+
+
+def first_broken(
+    actions: Sequence[Action], world: World, scene: Snapshot | None, here: Pose | None
+) -> Broken | None:
+    """Return the first action that cannot be done, None where all can."""
+    return next(_broken(actions, state_of(world, scene, here), world, scene), None)
 
 
 def end_state(
@@ -72,12 +90,11 @@ def expected_s(action: Action) -> float:
 
 def _broken(
     actions: Sequence[Action], state: State, world: World, scene: Snapshot | None
-) -> Iterator[tuple[Action, str, str]]:
+) -> Iterator[Broken]:
     for action in execution_order(actions):
         logic = LOGIC[action.skill]
         setting = Setting(parameters=action.parameters, world=world, scene=scene)
-        for rule, holds in logic.needs.items():
-            why = holds(state, setting)
-            if why:
-                yield action, rule, why
+        rules = {rule: why for rule, holds in logic.needs.items() if (why := holds(state, setting))}
+        if rules:
+            yield Broken(action=action, state=state, rules=rules)
         state = logic.effect(state, setting)

@@ -24,6 +24,9 @@ BEFORE: Final = "robot before it"
 FREE_HAND: Final = "hand free"
 HOLDING: Final = "something held"
 WHICH_HAND: Final = "hand named"
+GRASPABLE: Final = "graspable"
+PAYLOAD: Final = "payload"
+TAKES_THINGS: Final = "destination takes things"
 
 LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
     {
@@ -54,8 +57,8 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 "not held": conditions.is_not_held,
                 FREE_HAND: conditions.has_free_hand,
                 BEFORE: conditions.is_before,
-                "graspable": conditions.can_be_gripped,
-                "payload": conditions.is_light_enough,
+                GRASPABLE: conditions.can_be_gripped,
+                PAYLOAD: conditions.is_light_enough,
             },
             effect=effects.takes,
             leaves=("object held",),
@@ -66,7 +69,7 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
                 WHICH_HAND: conditions.knows_which,
                 KNOWN: conditions.is_known,
                 "not onto itself": conditions.is_not_held,
-                "destination takes things": conditions.takes_things,
+                TAKES_THINGS: conditions.takes_things,
                 BEFORE: conditions.is_before,
             },
             effect=effects.puts,

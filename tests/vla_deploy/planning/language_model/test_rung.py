@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from vla_deploy.memory import MemoryStore
+from vla_deploy.memory import Episode, MemoryStore, Outcome
+from vla_deploy.memory.episode import unix_s
 from vla_deploy.planning.aids import Aid
 from vla_deploy.planning.language_model import LanguageModel
 from vla_deploy.planning.language_model.rung import ChatRung
@@ -40,10 +41,12 @@ def test_a_chat_model_is_told_what_is_remembered(
         return propose(request, deadline)
 
     monkeypatch.setattr(chat, "propose", listening)
+    before = Episode(
+        told_s=unix_s() - 60.0, command="water the yellow tulips", outcome=Outcome.FAILED
+    )
+    memory.add([before], [])
     desk = open_desk(chat, memory=memory)
-    for number, text in enumerate(("water the yellow tulips", "water the tulips once more")):
-        desk.give(command_id=f"c{number}", text=text)
-        desk.answers()
-        desk.answers()
-    assert told[0] == ()
-    assert "water the yellow tulips" in told[1][0]
+    desk.give(text="water the tulips once more")
+    desk.answers()
+    ((recollection,),) = told
+    assert "water the yellow tulips" in recollection
