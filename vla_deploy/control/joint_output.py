@@ -35,6 +35,10 @@ class JointOutput:
         self._eased_nm = EASED_RATIO * contact_torque(robot)
         self._easing_rad_s = EASING_RATIO * robot.velocity_max
         self._unwinding_rad_s = UNWINDING_RATIO * robot.velocity_max
+        self._arms = [
+            np.array([robot.joint_index[name] for name in robot.group(hand.arm).joints])
+            for hand in robot.hands.values()
+        ]
         travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
         self._full_error = FULL_DUTY_ERROR_RAD * np.abs(travel)
 
@@ -77,9 +81,12 @@ class JointOutput:
 
         A setpoint goes no further than to where its joint is, and only while the torque that is
         felt agrees that it presses that way; what carries the arm's own weight is added later.
+        An arm with a limp joint stays where it is: what falls or hangs there feels like a contact.
         """
         error = self.sent - self._servos.state.position_rad
         presses = (np.abs(external_torque_nm) > self._eased_nm) & (error * external_torque_nm < 0.0)
+        for arm in self._arms:
+            presses[arm] &= self._servos.state.torque_on[arm].all()
         if any_of(presses):
             # Further ahead than the motor can follow it presses no less: that part goes quickly.
             winds = np.abs(error + self.weight_offset) > self._full_error

@@ -106,6 +106,17 @@ def test_an_arm_that_presses_eases_off_after_an_emergency_stop_too(armed: Any) -
     assert armed.state == "armed", armed.status["detail"]
 
 
+def test_an_arm_with_a_limp_joint_eases_nothing_off(armed: Any) -> None:
+    block_a_swing(armed)
+    assert armed.lockstep.run_until(lambda: armed.status["cause"] == "collision", 1.0)
+    armed.lockstep.faults.inject("servo", "left_elbow", "overheat")
+    armed.run(0.5)
+    stands_at = armed.joint("left_shoulder_pitch", "setpoint")
+    assert stands_at - armed.joint("left_shoulder_pitch") > SETTLES_RAD  # it presses
+    armed.run(2.0)
+    assert armed.joint("left_shoulder_pitch", "setpoint") == stands_at
+
+
 def test_a_disarm_right_after_a_reset_leaves_no_joint_with_power(armed: Any) -> None:
     block_a_swing(armed)
     armed.run(0.06)
