@@ -46,6 +46,18 @@ def test_a_refusal_says_why_in_words(page: Page) -> None:
     expect(card.locator(".notice")).to_contain_text("moon")
 
 
+def test_whether_it_could_do_something_is_measured_and_nothing_moves(
+    page: Page, robot: ProcessStack
+) -> None:
+    composer = page.get_by_role("region", name="Give a command")
+    page.get_by_label("Command in words").fill("go to the kitchen")
+    composer.get_by_role("button", name="Could you?").click()
+    expect(composer.locator(".notice")).to_contain_text("It can be done.")
+    assert robot.fastest_rad_s() < STANDSTILL_RAD_S
+    page.get_by_label("Command in words").fill("go to the")
+    expect(composer.locator(".notice")).to_have_count(0)  # it judged other words
+
+
 def test_what_the_robot_asks_is_answered_by_a_button(page: Page) -> None:
     card = give(page, "pick up the cap")
     question = card.get_by_label("The robot asks")

@@ -3,10 +3,11 @@
 import { post } from "../api.js";
 import { useAct } from "../asking.js";
 import { tell } from "../messages.js";
-import { Card } from "../parts.js";
+import { Button, Card } from "../parts.js";
 import { may } from "../session.js";
 import { html, useState } from "../ui.js";
 import { HoldToTalk } from "./hold_to_talk.js";
+import { Judgement, judge } from "./judgement.js";
 
 const MOST_CHARACTERS = 1000;
 const EXAMPLES = ["go to the kitchen", "pick up the red cup and put it in the box", "come back"];
@@ -15,8 +16,14 @@ export function Composer() {
   const [text, setText] = useState("");
   const [give, isBusy] = useAct(async (words) => {
     await post("commands", { text: words });
-    setText("");
+    write("");
   });
+  const [task, setTask] = useState(null);
+  const [ask, isAsking] = useAct(async (words) => setTask(await judge(words)));
+  const write = (words) => {
+    setText(words);
+    setTask(null); // it judged other words
+  };
   const submit = (event) => {
     event.preventDefault();
     if (text.trim()) give(text.trim());
@@ -35,13 +42,16 @@ export function Composer() {
             maxlength=${MOST_CHARACTERS}
             value=${text}
             disabled=${!may("operator")}
-            onInput=${(event) => setText(event.target.value)}
+            onInput=${(event) => write(event.target.value)}
           />
           <button class="button" data-kind="main" type="submit" disabled=${!text.trim() || isBusy || !may("operator")}>Send</button>
         </form>
+        ${task && html`<${Judgement} task=${task} />`}
         <${HoldToTalk} />
         <div class="row examples" aria-label="Examples">
-          ${EXAMPLES.map((one) => html`<button type="button" class="chip" onClick=${() => setText(one)}>${one}</button>`)}
+          ${EXAMPLES.map((one) => html`<button type="button" class="chip" onClick=${() => write(one)}>${one}</button>`)}
+          <span class="grow"></span>
+          <${Button} disabled=${!text.trim()} busy=${isAsking} onClick=${() => ask(text.trim())} title="Measure whether it can be done; nothing moves">Could you?<//>
         </div>
         <${PlanField} />
       </div>

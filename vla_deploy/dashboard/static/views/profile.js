@@ -2,7 +2,7 @@
 
 import { useAnswer } from "../asking.js";
 import { useTopic } from "../following.js";
-import { Badge, Card, Empty, Failure } from "../parts.js";
+import { Badge, Card, Empty, Failure, Notice } from "../parts.js";
 import { DifferenceCard } from "../profile/difference_card.js";
 import { ProgressCard } from "../profile/progress_card.js";
 import { html, useState } from "../ui.js";
@@ -33,6 +33,7 @@ function CurrentCard({ current, live, detected }) {
   const fits = detected && current && detected.name === current.profile;
   return html`
     <${Card} title="This computer" stale=${live.stale} age_s=${live.age_s}>
+      ${current?.fault && html`<${Notice} tone="warn" icon="alert">${current.fault}<//>`}
       <dl class="facts">
         <dt>In force</dt>
         <dd><strong>${current?.profile ?? "unknown"}</strong></dd>
