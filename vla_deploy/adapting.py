@@ -172,10 +172,12 @@ class AdaptingNode:
         self._answer(change.change_id, "commit", "; ".join(refused))
 
     def _on_watch(self, message: Mapping[str, Any]) -> None:
-        """Count from now on when this process has been started for the change."""
+        """Count from now on if this process has been started for the change, or was slow once."""
         kept_ratio = message["restarted"].get(self._name)
         if kept_ratio is not None:
             self._begin_watch(message["change_id"], kept_ratio)
+        elif self._watch is not None and self._name in message["again"]:
+            self._watch.again(self._clock.now_ns())
 
     def _begin_watch(self, change_id: int, kept_ratio: float) -> None:
         self._watch = Watch(change_id, self._clock.now_ns(), kept_ratio / self.period_s)

@@ -41,6 +41,10 @@ class Watch:
         """Count a step."""
         self._steps += 1
 
+    def again(self, now_ns: int) -> None:
+        """Begin to count anew."""
+        self._began_ns, self._steps = now_ns, 0
+
     def fault(self, now_ns: int, period_s: float) -> str:
         """Say how slow the steps are, nothing when they are fast enough."""
         rate_hz = self._steps / max((now_ns - self._began_ns) / NS_PER_S, period_s)

@@ -19,5 +19,13 @@ def test_four_of_five_usual_steps_are_enough_and_three_are_not() -> None:
     assert watch.fault(NS_PER_S, 0.2) == ""
 
 
+def test_a_second_look_counts_anew() -> None:
+    watch = Watch(1, 0, usual_hz=5.0)
+    watch.again(NS_PER_S)
+    for _ in range(4):
+        watch.note()
+    assert watch.fault(2 * NS_PER_S, 0.2) == ""
+
+
 def test_a_trial_shorter_than_a_step_is_not_divided_by_nothing() -> None:
     assert Watch(1, 0, usual_hz=5.0).fault(0, 0.2) == "steps at 0.0 Hz, expected 4.0 Hz"

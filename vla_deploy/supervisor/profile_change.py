@@ -80,6 +80,8 @@ class Change:
     answers: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     restarts: dict[str, float] = field(default_factory=dict)
     """Who is to be started again, with the share of its steps that it made before."""
+    was_slow: bool = False
+    """Somebody has been watched a second time: a moment's load of others takes no profile back."""
     power_before: str = ""
     failure: str = ""
 

@@ -202,8 +202,11 @@ class ProfileSwitch:
             return
         restarted = change.settle({name: member.pid for name, member in members.items()})
         self._trial.begin()
+        self._watch(change, restarted, again=[])
+
+    def _watch(self, change: Change, restarted: Mapping[str, float], again: list[str]) -> None:
         change.enter(Phase.WATCH, self._clock.now_ns(), self._watch_ns)
-        self._publish(change, "watch", restarted=restarted)
+        self._publish(change, "watch", restarted=restarted, again=again)
 
     def _watching(self, change: Change, _: Mapping[str, Member]) -> None:
         if self._clock.now_ns() >= change.deadline_ns:
@@ -215,7 +218,12 @@ class ProfileSwitch:
         if self._is_waiting(change):
             return
         faults = [*self._trial.faults(change.target)]
-        faults += [_listed(change.refusals)] if change.refusals else []
+        slow = change.refusals
+        if slow and not (faults or change.was_slow or CONTROL in slow):
+            change.was_slow = True
+            self._watch(change, {}, again=[*slow])
+            return
+        faults += [_listed(slow)] if slow else []
         if faults:
             self._go_back(change, "; ".join(faults))
             return

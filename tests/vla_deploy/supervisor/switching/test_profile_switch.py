@@ -3,6 +3,7 @@ from typing import Any
 
 import pytest
 
+from drivers.clock import NS_PER_S
 from vla_deploy.node import NeedsRestart
 from vla_deploy.supervisor.profile_change import Member
 
@@ -67,6 +68,17 @@ def test_a_process_that_is_too_slow_after_the_switch_takes_all_of_them_back(benc
     assert "expected 800.0 Hz" in last["reason"]
     keeps_swift(bench)
     assert all(kernel.applied == ["calm", "swift"] for kernel in bench.kernels.values())
+
+
+def test_a_process_that_others_held_up_for_a_moment_takes_nothing_back(bench, profiles):
+    bench.desk.request(profiles["calm"])
+    bench.reach("watch")
+    bench.dead.add("planner")
+    began_ns = bench.clock.ns
+    assert bench.run_until(lambda: bench.clock.ns > began_ns + NS_PER_S, 20.0)
+    bench.dead.discard("planner")
+    assert bench.run_until(lambda: bench.desk.last, 20.0)
+    assert bench.desk.last["outcome"] == "kept"
 
 
 def test_late_ticks_take_all_of_them_back(bench, profiles):
