@@ -40,7 +40,9 @@ class RestWatch:
             return
         joint, speed_rad_s = fastest_joint(truth)
         if speed_rad_s > STANDSTILL_RAD_S:
-            self.rest_s, self._mover = math.inf, f"{joint} moves at {speed_rad_s:.2g} rad/s"
+            self.rest_s = math.inf
+            where = f"at {places[joint]:.3f} rad, after {since_s:.1f} s"
+            self._mover = f"{joint} moves at {speed_rad_s:.2g} rad/s, {where}"
         elif math.isinf(self.rest_s):
             self.rest_s, self._places = since_s, places
 
