@@ -86,6 +86,10 @@ class Localiser:
         """Return where the base was; the nearest known moment where `stamp_ns` is out of range."""
         return self._map_from_track().compose(self._track.at(stamp_ns))
 
+    def track_at(self, stamp_ns: int) -> Pose2D:
+        """Return where the base was by dead reckoning alone, which drifts but never jumps."""
+        return self._track.at(stamp_ns)
+
     def predict(self, stamp_ns: int, odometry: Pose2D, imu_yaw_rad: float | None) -> Pose2D:
         """Move by what wheels (way) and IMU (turn) say since the last call; return the pose.
 

@@ -83,13 +83,13 @@ class BodyState:
         ]
 
     def view_rotation(self, stamp_ns: int, base: Pose2D) -> Array:
-        """Return how the camera was turned in the map frame, 3 x 3; upright where unknown."""
+        """Return how the camera was turned in the frame of `base`, 3 x 3; upright where unknown."""
         positions = self.at(stamp_ns)
         if positions is None:
             return np.eye(3)
         c, s = math.cos(base.yaw_rad), math.sin(base.yaw_rad)
-        map_from_base = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        rotation: Array = map_from_base @ self._model.camera_pose(positions)[:3, :3]
+        frame_from_base = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        rotation: Array = frame_from_base @ self._model.camera_pose(positions)[:3, :3]
         return rotation
 
     def _grip(self, site: str, positions: Array) -> Point:

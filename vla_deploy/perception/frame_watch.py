@@ -36,7 +36,10 @@ class FrameWatch:
     def judge(
         self, frame: RgbdFrame, depth_m: Floats, rotation: NDArray[np.float64], base: Pose2D
     ) -> Verdict:
-        """Return what an image is good for; `rotation` is the camera's in the map, 3 x 3."""
+        """Return what an image is good for.
+
+        `rotation` is the camera's, 3 x 3, and `base` the robot's pose, in a frame without jumps.
+        """
         glance = Glance.of(frame.rgb, frame.depth)
         seen = replace(
             measure_frame(frame.rgb, depth_m),

@@ -30,12 +30,17 @@ MAX_CAMERA_TURN_RAD_S: Final = 0.35
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Moment:
-    """Hold an image and how the robot stood when it was taken; `view` is 3 x 3, camera to map."""
+    """Hold an image and how the robot stood when it was taken.
+
+    `track` is where it was by dead reckoning, `view` turns the camera into that frame, 3 x 3: a
+    robot that finds out where it really is has not moved.
+    """
 
     frame: RgbdFrame
     depth_m: NDArray[np.float32]
     base_from_camera: Array
     base: Pose2D
+    track: Pose2D
     body: NDArray[np.bool_]
     view: Array
     turn_rad_s: float
@@ -69,7 +74,7 @@ class Looking:
         if positions is None:
             return False
         moment = self._moment(frame, positions)
-        verdict = self._watch.judge(frame, moment.depth_m, moment.view, moment.base)
+        verdict = self._watch.judge(frame, moment.depth_m, moment.view, moment.track)
         if verdict.use < Use.OBSTACLES:
             return False
         hands = self._body.hands(positions, frame.stamp_ns)
@@ -135,20 +140,21 @@ class Looking:
         )
 
     def _moment(self, frame: RgbdFrame, positions: Array) -> Moment:
-        base = self._whereabouts.pose_at(frame.stamp_ns)
-        view = self._body.view_rotation(frame.stamp_ns, base)
+        track = self._whereabouts.track_at(frame.stamp_ns)
+        view = self._body.view_rotation(frame.stamp_ns, track)
         return Moment(
             frame=frame,
             depth_m=frame.depth_m(),
             base_from_camera=self._body.camera_pose(positions),
-            base=base,
+            base=self._whereabouts.pose_at(frame.stamp_ns),
+            track=track,
             body=self._body.mask(positions, frame.intrinsics),
             view=view,
             turn_rad_s=self._camera_turn(view, frame.stamp_ns),
         )
 
     def _camera_turn(self, view: Array, stamp_ns: int) -> float:
-        """Return how fast the camera turned, in the map frame, up to a moment."""
+        """Return how fast the camera turned up to a moment."""
         before_ns = stamp_ns - STILL_WINDOW_NS
-        before = self._body.view_rotation(before_ns, self._whereabouts.pose_at(before_ns))
+        before = self._body.view_rotation(before_ns, self._whereabouts.track_at(before_ns))
         return angle_rad(before.T @ view) * NS_PER_S / STILL_WINDOW_NS

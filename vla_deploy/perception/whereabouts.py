@@ -51,6 +51,10 @@ class Whereabouts:
         """Return where the robot was at a moment of the last seconds."""
         return self._localiser.pose_at(stamp_ns)
 
+    def track_at(self, stamp_ns: int) -> Pose2D:
+        """Return where the robot was by dead reckoning alone, which drifts but never jumps."""
+        return self._localiser.track_at(stamp_ns)
+
     def turn(self, newest: ImuSample) -> None:
         """Take what the IMU says."""
         self._imu_yaw_rad, self._imu_ns = newest.yaw_rad, newest.stamp_ns

@@ -35,6 +35,18 @@ def test_the_scene_is_right_in_the_map_although_the_start_was_wrong(
     assert (things["cup_1"]["class"], things["cup_1"]["colour"]) == ("cup", "red")
 
 
+def test_a_robot_that_finds_out_where_it_is_has_not_moved_its_camera(make_rig: MakeRig) -> None:
+    rig = make_rig(VIEW.compose(Pose2D(0.5, -0.4, 2.46)))
+    for _ in range(20):
+        rig.run_for(1.0)
+        assert rig.scene()["image"]["use"] == "all"
+        if rig.pose_error()[0] < 0.05:
+            break
+    rig.run_for(2.0)
+    assert rig.pose_error()[0] < 0.05
+    assert rig.scene()["image"] == {"use": "all", "faults": [], "refused": 0}
+
+
 def test_the_table_is_told_as_a_surface_with_its_height_and_outline(
     make_rig: MakeRig,
 ) -> None:
