@@ -72,7 +72,8 @@ class JointOutput:
         state = self._servos.state
         begin = state.position_rad
         if any_of(joints & state.torque_on):
-            begin = np.where(state.torque_on, self._payload.pressed(begin), begin)
+            pressed = self._payload.pressed(begin, state.effort_ratio)
+            begin = np.where(state.torque_on, pressed, begin)
         self.motions.place(begin, joints)
         self._gate.place(begin, joints)
 

@@ -35,14 +35,16 @@ class Payload:
         felt = {name for name, joints in self._grippers.items() if pressing[joints].any()}
         return frozenset(felt | self._told())
 
-    def pressed(self, position: Floats) -> Floats:
+    def pressed(self, position: Floats, effort_ratio: Floats) -> Floats:
         """Return where setpoints may begin anew: at the joints, but fingers that hold something
         are sent further, for a hand that is sent to where it is presses no more.
+
+        A robot that has just been started is told nothing: there the closing motor itself tells.
         """
-        begin = position.copy()
-        for name in self._told():
-            joints = self._grippers[name]
-            begin[joints] = np.maximum(position[joints] - PRESS_M, self._low[joints])
+        begin, told = position.copy(), self._told()
+        for name, joints in self._grippers.items():
+            if name in told or (effort_ratio[joints] < -PRESSING_RATIO).any():
+                begin[joints] = np.maximum(position[joints] - PRESS_M, self._low[joints])
         return begin
 
     def close(self) -> None:

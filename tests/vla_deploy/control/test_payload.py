@@ -54,14 +54,24 @@ def test_what_the_executor_told_last_stays_held(space: SharedSpace, payload: Pay
 def test_a_hand_that_begins_anew_goes_on_pressing_on_what_it_holds(
     space: SharedSpace, payload: Payload
 ) -> None:
-    position = np.full(len(ROBOT.joint_names), 0.02)
-    assert payload.pressed(position).tolist() == position.tolist()
+    position, idle = np.full(len(ROBOT.joint_names), 0.02), np.zeros(len(ROBOT.joint_names))
+    assert payload.pressed(position, idle).tolist() == position.tolist()
     told(space, left="cup", right=None)
-    begin = payload.pressed(position)
+    begin = payload.pressed(position, idle)
     assert begin[GRIPPER] == pytest.approx(0.02 - PRESS_M)
     assert np.delete(begin, GRIPPER).tolist() == np.delete(position, GRIPPER).tolist()
     nearly_closed = np.full_like(position, ROBOT.position_min[GRIPPER] + 0.5 * PRESS_M)
-    assert payload.pressed(nearly_closed)[GRIPPER] == ROBOT.position_min[GRIPPER]
+    assert payload.pressed(nearly_closed, idle)[GRIPPER] == ROBOT.position_min[GRIPPER]
+
+
+def test_a_robot_that_was_just_started_feels_what_its_hand_presses_on(payload: Payload) -> None:
+    position, effort = np.full(len(ROBOT.joint_names), 0.02), np.zeros(len(ROBOT.joint_names))
+    effort[GRIPPER] = -2 * PRESSING_RATIO
+    assert payload.pressed(position, effort)[GRIPPER] == pytest.approx(0.02 - PRESS_M)
+    effort[GRIPPER] = -0.5 * PRESSING_RATIO
+    assert payload.pressed(position, effort)[GRIPPER] == 0.02
+    effort[GRIPPER] = 2 * PRESSING_RATIO  # opening is no holding
+    assert payload.pressed(position, effort)[GRIPPER] == 0.02
 
 
 def test_a_hand_that_the_robot_does_not_have_is_not_held(
