@@ -35,10 +35,12 @@ def check_plan(
     Raises:
         PlanInvalid: carries all faults, and what could be done instead.
     """
-    faults = plan_faults(plan, world, scene, here)
+    malformed = _form_faults(plan, world)
+    if malformed:
+        raise PlanInvalid(malformed)
+    faults = _faults_here(plan, world, scene, here)
     if faults:
-        is_well_formed = not _form_faults(plan, world)
-        raise PlanInvalid(faults, instead_of(plan, world, scene, here) if is_well_formed else "")
+        raise PlanInvalid(faults, instead_of(plan, world, scene, here))
 
 
 def plan_faults(
@@ -48,9 +50,11 @@ def plan_faults(
 
     A plan whose actions are all right one by one is gone through symbol by symbol.
     """
-    faults = _form_faults(plan, world)
-    if faults:
-        return faults
+    return _form_faults(plan, world) or _faults_here(plan, world, scene, here)
+
+
+def _faults_here(plan: Plan, world: World, scene: Snapshot | None, here: Pose | None) -> list[str]:
+    """Return why a well-formed plan cannot be done as things stand."""
     faults = bounds_faults(plan.actions, world) + sharing_faults(plan.actions)
     return faults + symbolic_faults(plan.actions, world, scene, here)
 
