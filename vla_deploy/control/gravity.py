@@ -30,6 +30,13 @@ def stiffness(robot: RobotDescription) -> Floats:
     )
 
 
+def full_duty_error(robot: RobotDescription) -> Floats:
+    """Return the error at which each joint's motor gives all it has (rad, or m of a finger)."""
+    travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
+    error: Floats = FULL_DUTY_ERROR_RAD * np.abs(travel)
+    return error
+
+
 class GravityOffset:
     """Tell how far above its setpoint each joint's goal must be."""
 

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.control.axes import Flags, Floats, any_of
-from vla_deploy.control.gravity import FULL_DUTY_ERROR_RAD, GravityOffset
+from vla_deploy.control.gravity import GravityOffset, full_duty_error
 from vla_deploy.control.limits import SetpointGate
 from vla_deploy.control.motions import MotionResult, MotionSet
 from vla_deploy.control.payload import Payload
@@ -39,8 +39,7 @@ class JointOutput:
             np.array([robot.joint_index[name] for name in robot.group(hand.arm).joints])
             for hand in robot.hands.values()
         ]
-        travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
-        self._full_error = FULL_DUTY_ERROR_RAD * np.abs(travel)
+        self._full_error = full_duty_error(robot)
 
     @property
     def sent(self) -> Floats:

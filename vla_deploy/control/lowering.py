@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from vla_deploy.control.axes import Axes, Floats, any_of
-from vla_deploy.control.gravity import FULL_DUTY_ERROR_RAD
+from vla_deploy.control.gravity import full_duty_error
 from vla_deploy.control.joint_output import JointOutput
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.robots import RobotDescription
@@ -31,8 +31,7 @@ class Lowering:
         self, robot: RobotDescription, output: JointOutput, servos: ServoLine, joints: Axes
     ) -> None:
         travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
-        full = FULL_DUTY_ERROR_RAD * np.abs(travel)
-        self._least_offset, self._full_offset = np.outer(_PULL_RATIOS, full)
+        self._least_offset, self._full_offset = np.outer(_PULL_RATIOS, full_duty_error(robot))
         self._stands_within = _STANDS_RAD * np.abs(travel)
         self._rate = _RATE_RATIO * robot.velocity_max
         self._output = output
