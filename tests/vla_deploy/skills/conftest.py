@@ -1,5 +1,6 @@
 """A skill context with a robot that stands where a test says, on an empty floor with one table."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -7,14 +8,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from drivers.clock import MonotonicClock
+from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
+from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.node import ExecutorNode
 from vla_deploy.world import Snapshot, read_snapshot
 
 BODY_RADIUS_M = 0.27
@@ -26,6 +29,45 @@ class StoppedClock:
     def now_ns(self) -> int:
         """Return the time."""
         return 1_000_000_000_000
+
+
+class StepClock:
+    """Go on when a test says so."""
+
+    def __init__(self) -> None:
+        self.ns = 1000 * NS_PER_S
+
+    def now_ns(self) -> int:
+        """Return the time."""
+        return self.ns
+
+    def sleep_until(self, deadline_ns: int) -> None:
+        """Be there at once."""
+        self.ns = deadline_ns
+
+
+class Executor:
+    """The executor's node in a run of its own; control and perception are the test's to play."""
+
+    def __init__(self, run_dir: Path) -> None:
+        self.clock = StepClock()
+        context = NodeContext(
+            run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=self.clock
+        )
+        self.space = SharedSpace(run_dir / "ipc", self.clock)
+        self.node = ExecutorNode(context, load_robot("butler"), 20.0)
+        self.node.start()
+        self.events = self.space.ring_reader("task_event", from_start=True)
+
+    def give(self, *actions: dict[str, Any]) -> None:
+        """Give it a plan."""
+        plan = {"goal": "test", "actions": list(actions)}
+        self.space.ring_writer("plan").publish({"command_id": "c1", "plan": plan})
+
+    def close(self) -> None:
+        """Stop the node and let go of its topics."""
+        self.node.stop()
+        self.space.close()
 
 
 @dataclass
@@ -74,3 +116,11 @@ def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
         claims=ClaimBook(space, MonotonicClock()),
         hands={"left": None, "right": None},
     )
+
+
+@pytest.fixture
+def executor(tmp_path: Path) -> Iterator[Executor]:
+    """The executor's node, on a clock that a test steps."""
+    made = Executor(tmp_path)
+    yield made
+    made.close()

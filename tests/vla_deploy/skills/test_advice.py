@@ -1,37 +1,22 @@
 """A plan that the world is against ends with what to do before, or instead."""
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
 from vla_deploy.analysis.document import Feasible, Task
-from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.place_judge import PlaceState
-from vla_deploy.node import NodeContext
 from vla_deploy.planning.plan import Action
-from vla_deploy.robots import load_robot
 from vla_deploy.skills.advice import in_words
-from vla_deploy.skills.node import ExecutorNode
 
-ROBOT = load_robot("butler")
+if TYPE_CHECKING:
+    from conftest import Executor
+
 STEP_NS = NS_PER_S // 20
 TABLE_M = 0.45
 ARMED = {"state": "armed", "estop_latched": False, "cause": "", "detail": "", "blocked": []}
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.ns = 1000 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = deadline_ns
 
 
 def thing(name: str, colour: str, size_m: tuple[float, float, float], **changes: Any) -> Any:
@@ -61,15 +46,9 @@ BALL = thing("ball_1", "green", (0.06, 0.06, 0.06), bottom_m=TABLE_M + 0.03,
 class Room:
     """An executor, and what control and perception tell it."""
 
-    def __init__(self, tmp_path: Path) -> None:
-        self.clock = Clock()
-        context = NodeContext(
-            run_dir=tmp_path, robot="butler", profile="desktop", devices_dir=None, clock=self.clock
-        )
-        self.space = SharedSpace(tmp_path / "ipc", self.clock)
-        self.node = ExecutorNode(context, ROBOT, 20.0)
-        self.node.start()
-        self.events = self.space.ring_reader("task_event", from_start=True)
+    def __init__(self, executor: "Executor") -> None:
+        self.clock, self.space, self.node = executor.clock, executor.space, executor.node
+        self.events, self.give = executor.events, executor.give
         self.things: tuple[dict[str, Any], ...] = ()
         self.place = PlaceState.TRACKING
 
@@ -90,8 +69,7 @@ class Room:
 
     def error_of(self, *actions: dict[str, Any]) -> str:
         """Return by what a plan ends that fails before anything moves."""
-        plan = {"goal": "test", "actions": list(actions)}
-        self.space.ring_writer("plan").publish({"command_id": "c1", "plan": plan})
+        self.give(*actions)
         for _ in range(40):
             self.clock.ns += STEP_NS
             self.tell()
@@ -103,11 +81,8 @@ class Room:
 
 
 @pytest.fixture
-def room(tmp_path: Path) -> Iterator[Room]:
-    made = Room(tmp_path)
-    yield made
-    made.node.stop()
-    made.space.close()
+def room(executor: "Executor") -> Room:
+    return Room(executor)
 
 
 def pick_up(name: str) -> dict[str, Any]:

@@ -1,56 +1,31 @@
 """A drive or a turn that ends early tells what is left of it, so that nothing is done twice."""
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.place_judge import PlaceState
-from vla_deploy.node import NodeContext
-from vla_deploy.robots import load_robot
 from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S
 from vla_deploy.skills.link import PATIENCE_S, POSE_AGE_S
-from vla_deploy.skills.node import ExecutorNode
+
+if TYPE_CHECKING:
+    from conftest import Executor
 
 STEP_NS = NS_PER_S // 20
-ROBOT = load_robot("butler")
 X_M, Y_M, YAW_RAD = 1.0, 2.0, 0.0
 MOVE = {"id": "a1", "skill": "move", "parameters": {"distance_m": 1.0, "speed_m_s": 0.2}}
 TURN = {"id": "a2", "skill": "turn", "parameters": {"angle_rad": 5.0}}
 LOOK = {"id": "a4", "skill": "look_at", "parameters": {"object": "bottle"}}
 
 
-class Clock:
-    def __init__(self) -> None:
-        self.ns = 1000 * NS_PER_S
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep_until(self, deadline_ns: int) -> None:
-        self.ns = deadline_ns
-
-
 class Base:
     """An executor whose base is where the test puts it, without a lidar, and held by control."""
 
-    def __init__(self, tmp_path: Path) -> None:
-        self.clock = Clock()
-        context = NodeContext(
-            run_dir=tmp_path, robot="butler", profile="desktop", devices_dir=None, clock=self.clock
-        )
-        self.space = SharedSpace(tmp_path / "ipc", self.clock)
-        self.node = ExecutorNode(context, ROBOT, 20.0)
-        self.node.start()
-        self.events = self.space.ring_reader("task_event", from_start=True)
-
-    def give(self, *actions: dict[str, Any]) -> None:
-        plan = {"goal": "test", "actions": list(actions)}
-        self.space.ring_writer("plan").publish({"command_id": "c1", "plan": plan})
+    def __init__(self, executor: "Executor") -> None:
+        self.clock, self.space, self.node = executor.clock, executor.space, executor.node
+        self.events, self.give = executor.events, executor.give
 
     def step(self, ahead_m: float = 0.0, turned_rad: float = 0.0) -> dict[str, Any] | None:
         """Let one step pass with the base somewhere; return the setback, if one is told."""
@@ -85,11 +60,8 @@ class Base:
 
 
 @pytest.fixture
-def base(tmp_path: Path) -> Iterator[Base]:
-    made = Base(tmp_path)
-    yield made
-    made.node.stop()
-    made.space.close()
+def base(executor: "Executor") -> Base:
+    return Base(executor)
 
 
 def test_a_drive_that_was_blocked_tells_the_rest_of_the_way(base: Base) -> None:
