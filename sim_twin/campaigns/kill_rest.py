@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from sim_twin.campaigns.kill_failures import late
 from sim_twin.campaigns.kill_rules import Rule
-from sim_twin.truth import STANDSTILL_RAD_S, fastest_joint
+from sim_twin.truth import fastest_joint
 
 _REST_FOR_S: Final = 0.3
 STILL_RAD: Final = 0.05
@@ -39,7 +39,7 @@ class RestWatch:
             self._compare(places)
             return
         joint, speed_rad_s = fastest_joint(truth)
-        if speed_rad_s > STANDSTILL_RAD_S:
+        if speed_rad_s > self.rule.rest_rad_s:
             self.rest_s = math.inf
             where = f"at {places[joint]:.3f} rad, after {since_s:.1f} s"
             self._mover = f"{joint} moves at {speed_rad_s:.2g} rad/s, {where}"

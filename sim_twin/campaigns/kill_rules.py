@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from sim_twin.truth import STANDSTILL_RAD_S
+
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
 COMMANDS: Final = (
     "pick up the red cup and put it in the box",
@@ -25,12 +27,14 @@ class Rule:
     `rest_s` is until when everything rests, None where the robot may carry on; `ready_s` until when
     all processes are ready again without a hand; `states` are those in which control then may be.
     Where it `ends`, a person has asked for it: `ready_s` is until when the service has ended.
+    What moves no faster than `rest_rad_s` rests.
     """
 
     rest_s: float | None
     ready_s: float
     states: tuple[str, ...]
     ends: bool = False
+    rest_rad_s: float = STANDSTILL_RAD_S
 
     @property
     def stays(self) -> bool:
@@ -68,8 +72,11 @@ RULES: Final[Mapping[tuple[str, signal.Signals], Rule]] = {
     ("dashboard", signal.SIGTERM): Rule(rest_s=None, ready_s=40.0, states=_CARRIES_ON),
     ("supervisor", signal.SIGKILL): Rule(rest_s=4.0, ready_s=90.0, states=_WANTS_A_HAND),
     ("supervisor", signal.SIGSTOP): Rule(rest_s=6.0, ready_s=120.0, states=_WANTS_A_HAND),
-    # An orderly end takes the power: the arms come down slowly, until they lie on something.
-    ("supervisor", signal.SIGTERM): Rule(rest_s=15.0, ready_s=30.0, states=("silent",), ends=True),
+    # An orderly end takes the power: the arms come down slowly, until they lie on something. A limp
+    # one that slides on there is braked by its own motors alone: 3 cm/s at a hand counts as rest.
+    ("supervisor", signal.SIGTERM): Rule(
+        rest_s=15.0, ready_s=30.0, states=("silent",), ends=True, rest_rad_s=0.05
+    ),
 }
 
 

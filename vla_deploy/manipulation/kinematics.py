@@ -68,6 +68,12 @@ class ArmKinematics:
         """Return the grip frame in the base frame."""
         return self._model.site_pose(self._site, positions)
 
+    def points(self, positions: Array) -> Array:
+        """Return where the arm's joints and its grip are in the base frame, (n, 3)."""
+        poses = self._model.joint_poses(positions)
+        joints = [poses[name][:3, 3] for name in self._names]
+        return np.array([*joints, self.forward(positions)[:3, 3]])
+
     def camera_pose(self, positions: Array) -> Array:
         """Return the head camera's optical frame (x right, y down, z forward) in the base frame."""
         return self._model.camera_pose(positions)

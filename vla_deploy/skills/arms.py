@@ -13,6 +13,7 @@ from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.motion import follow_joints, move_joints, pause, settle
+from vla_deploy.skills.underside import leave_underside, way_back_m
 from vla_deploy.world.touch import is_denied
 
 AT_POSE_RAD = 0.05
@@ -122,21 +123,33 @@ def believe_fingers(context: SkillContext) -> None:
 
 
 def move_arm(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
-    """Bring the arms, or one arm, to a named pose of the robot file."""
+    """Bring the arms, or one arm, to a named pose of the robot file.
+
+    Raises:
+        NotPossible: the pose names no joint of that arm, or an arm is under a table.
+    """
     targets = dict(context.robot.poses[parameters["pose"]])
     if "arm" in parameters:
         joints = _arm_joints(context, parameters["arm"])
         targets = {name: value for name, value in targets.items() if name in joints}
     if not targets:
         raise NotPossible(f"the pose {parameters['pose']} names no joint of that arm")
+    if (back_m := way_back_m(context)) > 0.0:
+        raise NotPossible(f"an arm is under a table; have me drive {back_m:.2f} m back first")
     yield from move_joints(context, targets)
 
 
 def carry(context: SkillContext) -> Skill:
     """Bring both arms to where they may travel: tucked when empty, close in front when loaded.
 
-    A hand that is low over furniture is raised first: the way to its chest is no straight line.
+    A hand that is low over furniture is raised first: the way to its chest is no straight line. An
+    arm under furniture is drawn out before.
+
+    Raises:
+        NotPossible: an arm is under furniture, and the robot cannot drive back.
+        TryAgain: something stands behind the robot.
     """
+    yield from leave_underside(context)
     for hand in context.robot.hands:
         yield from _raise_clear(context, hand)
     targets: dict[str, float] = {}

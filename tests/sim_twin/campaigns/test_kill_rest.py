@@ -45,3 +45,9 @@ def test_where_no_hand_is_wanted_motion_goes_on_and_lowered_arms_lie_limp() -> N
     assert math.isnan(carried_on.rest_s)
     lowered = RestWatch(RULES["supervisor", signal.SIGTERM])
     assert not seen(lowered, (9.0, 0.0, 0.0), (20.0, 1.0, 0.0))
+
+
+def test_a_limp_arm_may_slide_on_slowly_and_one_with_power_may_not() -> None:
+    slides = ((1.0, 0.0, 0.04), (20.0, 0.5, 0.0))
+    assert not seen(RestWatch(RULES["supervisor", signal.SIGTERM]), *slides)
+    assert seen(RestWatch(KILLED), *slides)

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
@@ -79,6 +80,7 @@ class StandingLink:
     surfaces: list[dict[str, Any]] = field(default_factory=list)
     clock: StoppedClock = field(default_factory=StoppedClock)
     hands: dict[str, Any] = field(default_factory=dict)
+    positions: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     is_silent: bool = False
 
     def snapshot(self) -> Snapshot | None:
