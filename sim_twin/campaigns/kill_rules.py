@@ -2,6 +2,7 @@
 
 import random
 import signal
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -9,6 +10,7 @@ from typing import Final
 
 from sim_twin.truth import STANDSTILL_RAD_S
 
+_Pair = tuple[str, signal.Signals]
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
 COMMANDS: Final = (
     "pick up the red cup and put it in the box",
@@ -124,7 +126,7 @@ def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injec
     Where there are fewer than there are pairs, the gravest are among them, while carrying.
     """
     draw = random.Random(seed)
-    pairs: list[tuple[str, signal.Signals]] = []
+    pairs: list[_Pair] = []
     while len(pairs) < count:
         pairs += _round(draw, count - len(pairs))
     short = count < len(RULES)
@@ -143,10 +145,20 @@ def injections(count: int, seed: int, latest_s: float = _LATEST_S) -> list[Injec
     ]
 
 
-def _round(draw: random.Random, most: int) -> list[tuple[str, signal.Signals]]:
+def _round(draw: random.Random, most: int) -> list[_Pair]:
     """Return every pair once, or `most` of them with the gravest, in random order."""
     pairs = list(RULES)
     draw.shuffle(pairs)
     chosen = sorted(pairs, key=lambda pair: pair not in GRAVEST)[:most]
     draw.shuffle(chosen)
-    return chosen
+    return _spread(chosen)
+
+
+def _spread(pairs: list[_Pair]) -> list[_Pair]:
+    """Let others come between two ends of a process: it has to run stably before the next."""
+    before: Counter[str] = Counter()
+    turns: list[tuple[int, _Pair]] = []
+    for pair in pairs:
+        turns.append((before[pair[0]], pair))
+        before[pair[0]] += 1
+    return [pair for _, pair in sorted(turns, key=lambda turn: turn[0])]

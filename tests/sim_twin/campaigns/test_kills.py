@@ -27,6 +27,14 @@ def test_two_hundred_injections_take_all_pairs_about_equally_often() -> None:
     assert max(counts.values()) - min(counts.values()) <= 1
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_every_process_is_hit_once_before_any_is_hit_again(seed: int) -> None:
+    processes = {process for process, _ in RULES}
+    drawn = [one.process for one in injections(len(RULES), seed)]
+    rounds = [drawn[at : at + len(processes)] for at in range(0, len(drawn), len(processes))]
+    assert all(set(each) == processes for each in rounds)
+
+
 def test_the_same_seed_draws_the_same_and_another_one_others() -> None:
     assert injections(30, seed=1) == injections(30, seed=1)
     assert injections(30, seed=1) != injections(30, seed=2)
