@@ -15,22 +15,20 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.beside import Beside
-from vla_deploy.planning.confirmation import agreement_to, confirmation_of
+from vla_deploy.planning.conclusions import Conclusions
 from vla_deploy.planning.correction import CORRECTED, corrected_by
 from vla_deploy.planning.dialogue import Dialogue, Waiting
-from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
+from vla_deploy.planning.errors import PlanningError
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
-from vla_deploy.planning.phrasing import Says, spoken_refusal
+from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
-from vla_deploy.planning.recovery import numbered, recover
-from vla_deploy.planning.rules_rung import RulesRung
+from vla_deploy.planning.recovery import recover
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict
-from vla_deploy.planning.understanding.mentioned import mentions_of
 
 MOST_WAITING: Final = 8
 CANCELLED: Final = "cancelled on request"
@@ -49,7 +47,6 @@ class Desk:
         clock: Clock,
     ) -> None:
         self.planner = planner
-        self.accounts = Accounts()
         self.dialogue = Dialogue(clock)
         self._situation = situation
         self._telling = telling
@@ -57,6 +54,12 @@ class Desk:
         self._clock = clock
         self._queue: deque[Command] = deque()
         self._under_way = UnderWay()
+        self._conclusions = Conclusions(planner, situation, telling, self.dialogue, self._under_way)
+
+    @property
+    def accounts(self) -> Accounts:
+        """Return how it has been going."""
+        return self._conclusions.accounts
 
     # --- what comes in --------------------------------------------------------------------------
 
@@ -69,9 +72,9 @@ class Desk:
         if waiting is not None and self._is_answer(command, waiting):
             return
         if command.is_answer:
-            self._refuse(command, Says.NOTHING_ASKED)
+            self._conclusions.refuse(command, Says.NOTHING_ASKED)
         elif len(self._queue) >= MOST_WAITING:
-            self._refuse(command, Says.MANY_WAIT)
+            self._conclusions.refuse(command, Says.MANY_WAIT)
         else:
             self._queue.append(command)
             if self._beside.work is not None:
@@ -86,7 +89,7 @@ class Desk:
         self._queue.clear()
         for command in dropped:
             if command is not None:
-                self._refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
+                self._conclusions.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
         # Who says "again" after a stop cannot mean what was done before it.
         stop = Turn(said="stop", command_id=command_id, outcome=Outcome.CANCELLED)
         self.dialogue.remember(stop)
@@ -142,7 +145,9 @@ class Desk:
             self._begin_recovery(command, request)
             return
         if command.plan is not None:
-            self._conclude(command, request, self.planner.check_given(command.plan, request))
+            self._conclusions.conclude(
+                command, request, self.planner.check_given(command.plan, request)
+            )
             return
         deadline = Deadline.within(self._clock, self.planner.within_s, Event())
         self._go_slowly(command, request, self.planner.plan_at_once(request, deadline), deadline)
@@ -152,7 +157,7 @@ class Desk:
     ) -> None:
         """Ask those who take time, where nobody else has a plan."""
         if answer.is_final or not self.planner.slow_rungs:
-            self._conclude(command, request, answer)
+            self._conclusions.conclude(command, request, answer)
             return
         self._telling.planning(command, self.planner.slow_rungs)
         slowly = partial(self.planner.plan_slowly, request, deadline, answer)
@@ -172,7 +177,9 @@ class Desk:
         if done is not None:
             self._guarded(
                 done.command,
-                lambda: self._conclude(done.command, done.request, done.future.result()),
+                lambda: self._conclusions.conclude(
+                    done.command, done.request, done.future.result()
+                ),
             )
         tedious = self._beside.take_tedious()
         if tedious is not None:
@@ -184,75 +191,7 @@ class Desk:
         if error is not None:
             _log.error("planning %r failed", command.text, exc_info=error)
             self.accounts.failed += 1
-            self._refuse(command, f"the planner failed: {type(error).__name__}")
-
-    def _conclude(self, command: Command, request: Request, answer: Answer) -> None:
-        self.accounts.note(answer.attempts)
-        self.dialogue.settle()  # what was chosen concerned this command alone
-        try:
-            if answer.is_final:
-                self._situation.check_ready()
-            if answer.plan is None:
-                raise answer.error or PlanInvalid(["nobody was asked for a plan"])
-            self._telling.check_length(answer.plan)
-            agreed = self._under_way.agreed(command)
-            question = answer.read_back or confirmation_of(answer.plan, request, agreed)
-            if question:
-                raise Ambiguous(question)
-            self._hand_on(command, request, answer, answer.plan)
-        except Ambiguous as unclear:
-            if command.recovers:  # the robot stands in the middle of it: nobody is asked for long
-                self._refuse(command, unclear, answer)
-                return
-            self.accounts.asked += 1
-            waiting = self.dialogue.ask(command, request, answer, unclear)
-            self._telling.asked(command, waiting.question, waiting.plan)
-        except PlanningError as error:
-            self._refuse(command, error, answer)
-
-    def _hand_on(self, command: Command, request: Request, answer: Answer, plan: Plan) -> None:
-        if command.recovers:
-            plan = numbered(plan, len(request.failed))
-        self._telling.handed_on(command, plan, answer)
-        self._under_way.carry(command, plan, answer, agreement_to(plan, request))
-        self.accounts.planned += 1
-        if not command.recovers:
-            self.planner.accepted(request, answer)
-        self.dialogue.remember(
-            Turn(
-                said=command.text,
-                command_id=command.command_id,
-                told_ns=command.told_ns,
-                understood=plan.summary,
-                mentioned=mentions_of(plan, request.scene),
-                plan=plan,
-                here=request.here,
-                in_full=_in_full(plan, answer),
-            )
-        )
-
-    def _refuse(
-        self,
-        command: Command,
-        reason: PlanningError | str,
-        answer: Answer | None = None,
-        outcome: Outcome = Outcome.REFUSED,
-    ) -> None:
-        if command.recovers:
-            self._telling.gave_up(command.command_id, str(reason))
-            return
-        self.accounts.refused += 1
-        self._telling.refused(command, str(reason), answer)
-        if outcome is not Outcome.CANCELLED or isinstance(reason, Says):
-            self._telling.aloud(command, spoken_refusal(reason))
-        turn = Turn(
-            said=command.text,
-            command_id=command.command_id,
-            told_ns=command.told_ns,
-            outcome=outcome,
-            answer=str(reason),
-        )
-        self.dialogue.remember(turn)
+            self._conclusions.refuse(command, f"the planner failed: {type(error).__name__}")
 
     def _request(self, command: Command) -> Request:
         return self._situation.request(command, self.dialogue.talk, of_use=self.planner.uses)
@@ -272,7 +211,7 @@ class Desk:
             self._telling.answered(command, waiting.command)
             self._correct(waiting, plan)
         elif command.is_answer:
-            self._refuse(command, f"that does not answer: {waiting.question.text}")
+            self._conclusions.refuse(command, f"that does not answer: {waiting.question.text}")
         else:
             self._leave(Says.REPLACED)
             return False
@@ -312,9 +251,9 @@ class Desk:
         try:
             checked = self.planner.check(plan, request)
         except PlanningError as error:
-            self._conclude(command, request, Answer(error=error))
+            self._conclusions.conclude(command, request, Answer(error=error))
             return
-        self._conclude(command, request, Answer(plan=checked, proposal=proposal))
+        self._conclusions.conclude(command, request, Answer(plan=checked, proposal=proposal))
 
     def _ask_again(self, waiting: Waiting) -> None:
         question = self.dialogue.ask_again()
@@ -329,17 +268,13 @@ class Desk:
         request = self._request(command)
         try:
             self._situation.check_ready()
-            self._hand_on(command, request, waiting.answer, self.planner.check(plan, request))
+            self._conclusions.hand_on(
+                command, request, waiting.answer, self.planner.check(plan, request)
+            )
         except PlanningError as error:
-            self._refuse(command, error, waiting.answer)
+            self._conclusions.refuse(command, error, waiting.answer)
 
     def _leave(self, why: Says) -> None:
         waiting = self.dialogue.settle()
         if waiting is not None:
-            self._refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
-
-
-def _in_full(plan: Plan, answer: Answer) -> str:
-    """Return the words that rules have put in the place of a command; others sum it up freely."""
-    proposal = answer.proposal
-    return plan.goal if proposal is not None and proposal.rung == RulesRung.name else ""
+            self._conclusions.refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
