@@ -4,6 +4,7 @@ Wheels and IMU carry the pose on, scans fitted to the map correct it, by an exte
 Scans that do not fit make it unsure, then lost; a lost robot searches the whole map for itself.
 """
 
+from collections import deque
 from typing import Final
 
 import numpy as np
@@ -35,6 +36,10 @@ FROZEN_SCANS: Final = 4
 # A match that the filter did not expect is believed when it comes so often, and fits so well.
 STUBBORN_SCANS: Final = 3
 STUBBORN_RATIO: Final = 0.8
+# Heading that scan after scan finds off to one side is led astray, though no scan surprises alone:
+# an IMU's yaw may run away slowly.
+ASTRAY_SCANS: Final = 3
+ASTRAY_RAD: Final = 0.05
 MAX_SHIFT_M: Final = 0.4
 MAX_TURN_RAD: Final = 0.3
 
@@ -56,6 +61,7 @@ class Localiser:
         self._last_ranges: NDArray[np.float32] | None = None
         self._repeats = 0
         self._unexpected = 0
+        self._turns: deque[float] = deque(maxlen=ASTRAY_SCANS)
 
     @property
     def pose(self) -> Pose2D:
@@ -117,6 +123,8 @@ class Localiser:
         noise = match.covariance + self._timing_covariance()
         doubt = self._doubt_of(match, noise)
         if doubt is Doubt.NONE:
+            if self._is_astray(float(match.shift[2])):
+                self._filter.doubt(match.shift)
             self._filter.correct(match.shift, noise)
         self._tell(stamp_ns, doubt)
         return doubt is Doubt.NONE
@@ -142,6 +150,13 @@ class Localiser:
         if stubborn and not too_far:
             self._filter.doubt(shift)
         return Doubt.INCONSISTENT
+
+    def _is_astray(self, turn_rad: float) -> bool:
+        """Take by how much a scan turns the pose; tell whether the last ones did so one way."""
+        self._turns.append(turn_rad)
+        low, high = min(self._turns), max(self._turns)
+        far = low > ASTRAY_RAD or high < -ASTRAY_RAD
+        return far and len(self._turns) == ASTRAY_SCANS
 
     def _search(self, stamp_ns: int, scan: ScanPoints) -> None:
         """Look for the place that a lost robot's scans fit."""

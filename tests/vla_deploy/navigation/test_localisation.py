@@ -250,3 +250,26 @@ def test_past_poses_are_interpolated(flat: "TracedFlat") -> None:
     assert middle.yaw_rad == pytest.approx((2 * math.pi - 6.2) / 2, abs=1e-6)
     assert localiser.pose_at(-5).x_m == pytest.approx(1.0)
     assert localiser.pose_at(500) == localiser.pose
+
+
+def test_a_yaw_that_runs_away_slowly_leads_the_heading_astray_by_little(flat: "TracedFlat") -> None:
+    localiser = settled(flat)
+    true, odometry, imu_yaw, worst_rad = HOME, ORIGIN, 0.0, 0.0
+    began_ns = flat.now_ns
+    poses = [HOME] * 5
+    for tick in range(1, 70):
+        turn = 1.25 * 0.02
+        true, odometry = (one.compose(Pose2D(0.0, 0.0, turn)) for one in (true, odometry))
+        imu_yaw += turn + 0.3 * 0.02
+        poses = [*poses[1:], true]
+        now_ns = began_ns + tick * 20_000_000
+        localiser.predict(now_ns, odometry, imu_yaw)
+        if tick % 5 == 0:
+            ranges, beam_stamps = np.zeros(360, np.float32), np.zeros(360, np.int64)
+            for part, pose in enumerate(poses):
+                beams = np.arange(360)[(4 - part) * 72 : (5 - part) * 72]
+                ranges[beams] = flat.trace(pose)[beams]
+                beam_stamps[beams] = now_ns - (4 - part) * 20_000_000
+            localiser.correct(ranges, beam_stamps)
+            worst_rad = max(worst_rad, error_of(localiser, true)[1])
+    assert worst_rad < 0.15
