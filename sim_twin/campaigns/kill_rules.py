@@ -13,13 +13,14 @@ from sim_twin.truth import STANDSTILL_RAD_S
 _Pair = tuple[str, signal.Signals]
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
 COMMANDS: Final = (
-    "pick up the red cup and put it in the box",
-    "go to the kitchen",
+    "pick up the red cup and put it on the coffee table",
     "pick up the blue ball and put it on the coffee table",
-    "go to the charging station",
+    "pick up the red cup and put it in the box",
+    "pick up the blue ball and put it on the coffee table",
 )
+"""All are picking and placing, most of it where the robot stands; the box is some metres away."""
 _EARLIEST_S, _LATEST_S = 0.5, 10.0
-"""A job of picking and placing takes about half a minute, and goes on through most kills."""
+"""A job takes 20 to 40 seconds, and goes on through most kills."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ runs as a service does, restarted and watched by `sim_twin.service_runner` in sy
 import argparse
 import math
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -170,13 +170,20 @@ def _tried(campaign: KillCampaign, injection: Injection, tell: Callable[[str], N
         tell(f"{case.row}\n  void: this computer {voids[-1]}; again")
 
 
+def _share(met: Sequence[Mapping[str, Any]], is_so: Callable[[Mapping[str, Any]], object]) -> float:
+    return sum(bool(is_so(each)) for each in met) / max(len(met), 1)
+
+
 def _summary(cases: Sequence[Case]) -> dict[str, Any]:
     """Return what was hit in motion, and each process' longest way to rest and back to ready."""
     met = [case.figures for case in cases if "motion" in case.figures]
     summary: dict[str, Any] = {
         "unsafe": sum(bool(case.failures) for case in cases),
-        "hit_in_motion_ratio": sum(bool(each["motion"]) for each in met) / max(len(met), 1),
-        "hit_while_carrying_ratio": sum(bool(each["held"]) for each in met) / max(len(met), 1),
+        "hit_in_motion_ratio": _share(met, lambda each: each["motion"]),
+        "hit_while_carrying_ratio": _share(met, lambda each: each["held"]),
+        "hit_while_picking_ratio": _share(met, lambda each: each["skill"] == "pick_up"),
+        "hit_while_placing_ratio": _share(met, lambda each: each["skill"] == "place"),
+        "hit_while_driving_ratio": _share(met, lambda each: "wheel" in each["motion"]),
     }
     for process in sorted({process for process, _ in RULES}):
         mine = [case.figures for case in cases if case.figures and f"/{process}/" in case.name]
