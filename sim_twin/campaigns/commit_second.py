@@ -37,8 +37,11 @@ def late_around(looks: Sequence[Look], at_ns: int) -> tuple[int, int, int]:
 
 def explained(stalls: Sequence[Stall], begin_ns: int, end_ns: int, period_s: float) -> int:
     """Return how many ticks may be late for stalls of a core: one, and one more for each period."""
-    mine = (one.seconds for one in stalls if begin_ns <= one.due_ns <= end_ns)
-    return sum(1 + int(long_s / period_s) for long_s in mine if long_s >= LATE_RATIO * period_s)
+    return sum(
+        1 + int(one.seconds / period_s)
+        for one in stalls
+        if begin_ns <= one.due_ns <= end_ns and one.seconds + one.before_s >= LATE_RATIO * period_s
+    )
 
 
 def _when(look: Look) -> int:

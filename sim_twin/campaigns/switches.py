@@ -22,7 +22,7 @@ from sim_twin.campaigns.switch_judge import Seen, judge, memory_case, ticks_case
 from sim_twin.campaigns.switch_profiles import BAD, GOOD, Bad, control_rate_hz
 from sim_twin.campaigns.ticks import Ticks
 from sim_twin.campaigns.working_robot import RobotFailed, WorkingRobot
-from sim_twin.stillness import StillnessWatch
+from sim_twin.stillness import FINE_STEP_S, StillnessWatch
 from vla_deploy.robots import load_robot
 
 SWITCHES: Final = 100
@@ -47,7 +47,7 @@ class SwitchCampaign:
         self._targets = itertools.cycle((0.6, -0.6))
         self._swing_ns = 0
         self._meter = _Meter(self._robot, self._clock)
-        self._stillness = StillnessWatch()
+        self._stillness = StillnessWatch(FINE_STEP_S)
         # Arms rest on the base without power: moving there is what a protective stop is for.
         self._robot.go(**load_robot("butler").poses["tuck"])
         self._robot.pause(_TUCK_S)

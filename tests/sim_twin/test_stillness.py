@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from sim_twin.stillness import HELD_UP_S, PRIORITY, StillnessWatch
+from sim_twin.stillness import FINE_STEP_S, HELD_UP_S, PRIORITY, STEP_S, StillnessWatch
 
 ABOVE = f"""
 import os, time
@@ -28,8 +28,9 @@ def may_be_real_time() -> bool:
 
 
 @pytest.mark.skipif(not may_be_real_time(), reason="needs CAP_SYS_NICE")
-def test_a_core_that_stands_still_is_told_once() -> None:
-    watch = StillnessWatch()
+@pytest.mark.parametrize("step_s", [STEP_S, FINE_STEP_S])
+def test_a_core_that_stands_still_is_told_once(step_s: float) -> None:
+    watch = StillnessWatch(step_s)
     try:
         watch.worst_s()
         subprocess.run([sys.executable, "-c", ABOVE], check=True)

@@ -24,3 +24,8 @@ def test_a_stall_explains_one_late_tick_and_one_for_each_period() -> None:
     stalls = [Stall(due_ns=S, seconds=0.017), Stall(due_ns=S, seconds=0.001)]
     assert explained(stalls, 0, 2 * S, 0.008) == 3
     assert explained(stalls, 2 * S, 3 * S, 0.008) == 0
+
+
+def test_a_stall_may_have_been_longer_than_it_was_seen() -> None:
+    assert explained([Stall(due_ns=S, seconds=0.0012)], 0, 2 * S, 0.008) == 0
+    assert explained([Stall(due_ns=S, seconds=0.0012, before_s=0.0005)], 0, 2 * S, 0.008) == 1
