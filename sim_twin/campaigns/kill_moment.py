@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from sim_twin.campaigns.kill_rules import COMMANDS, Injection, Moment
+from sim_twin.campaigns.kill_rules import COMMANDS, PUT_DOWN, Injection, Moment
 from sim_twin.campaigns.machine import Machine
 from sim_twin.campaigns.robot_service import RobotService
 from vla_deploy.robots import load_robot
@@ -32,6 +32,7 @@ class Work:
         self._clock = clock
         self._job: subprocess.Popen[bytes] | None = None
         self._job_ns = 0
+        self._has_put_down = False
         described = load_robot("butler")
         arms = [described.group(hand.arm).joints for hand in described.hands.values()]
         self._parts = (*itertools.chain.from_iterable(arms), *_WHEELS)
@@ -66,7 +67,15 @@ class Work:
         if now_ns - self._job_ns > _LONGEST_S * NS_PER_S:
             self.end()
         if self._job is None or self._job.poll() is not None:
-            self._job, self._job_ns = self._robot.begin("say", next(commands)), now_ns
+            self._job, self._job_ns = self._robot.begin("say", self._next(commands)), now_ns
+
+    def _next(self, commands: Iterator[str]) -> str:
+        """Return what to say next; every other time, that a full hand puts down what it has."""
+        held = self._machine.truth()["held"]
+        self._has_put_down = bool(held) and not self._has_put_down
+        if self._has_put_down:
+            return PUT_DOWN.format(thing=held[0].replace("_", " "))
+        return next(commands)
 
     def _met(self) -> dict[str, Any]:
         truth = self._machine.truth()
