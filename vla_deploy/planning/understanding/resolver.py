@@ -11,7 +11,7 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
-from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.errors import NotThere, UnknownObject
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.absence import not_there
 from vla_deploy.planning.understanding.conversation import Mention, Role
@@ -221,10 +221,18 @@ class Resolver:
         return self._again(read, chosen, use, f"of the {len(spoken)} that you spoke of")
 
     def _in_hand(self, read: Expression, use: Use) -> tuple[Referent, ...]:
-        """Return what the hands hold, or the hand that is named."""
+        """Return what the hands hold, or the hand that is named.
+
+        Raises:
+            NotThere: nothing; the message says what the other hand holds.
+        """
         holding = [one for hand, one in self.setting.holding() if read.hand in ("", hand)]
         if not holding:
-            raise UnknownObject(read.said, OBJECT_CLASSES)
+            others = [
+                f"the {hand} one holds the {one.said}" for hand, one in self.setting.holding()
+            ]
+            nothing = f"my {read.hand} hand holds nothing" if read.hand else "I hold nothing"
+            raise NotThere("; ".join((nothing, *others)))
         return tuple(self._again(read, one, use, "it is in my hand") for one in holding)
 
     def _can_be(self, one: Mention, use: Use) -> bool:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.errors import Ambiguous, UnknownObject
+from vla_deploy.planning.errors import Ambiguous, NotThere, UnknownObject
 from vla_deploy.planning.understanding import Conversation, Role
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.resolver import Resolver
@@ -120,6 +120,16 @@ def test_it_is_what_the_hand_holds_before_what_was_spoken_of(home: "Home") -> No
         name(home.ask(held, "ball_1", conversation=home.spoke_of("ball_1")), "it", Use.PUT)
         == "cup_1"
     )
+
+
+def test_a_hand_that_holds_nothing_says_so_and_what_the_other_one_holds(home: "Home") -> None:
+    cup = replace(home.things["cup_1"], held_by="right")
+    request = home.ask(cup)
+    assert name(request, "what is in your right hand", Use.PUT) == "cup_1"
+    with pytest.raises(NotThere, match="my left hand holds nothing; the right one holds the red"):
+        name(request, "what is in your left hand", Use.PUT)
+    with pytest.raises(NotThere, match=r"^I hold nothing$"):
+        name(home.ask(), "what you are holding", Use.PUT)
 
 
 def test_what_is_held_is_not_what_shall_be_taken(home: "Home") -> None:
