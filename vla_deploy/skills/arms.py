@@ -1,6 +1,5 @@
 """Move arms and grippers: carry poses, named poses, open, close, and what the fingers feel."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,24 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
-from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.motion import follow_joints, move_joints, pause, settle
-from vla_deploy.skills.underside import leave_underside, way_back_m
+from vla_deploy.skills.underside import way_back_m
 from vla_deploy.world.touch import is_denied
 
-AT_POSE_RAD = 0.05
-LOADED_SPEED_RATIO, EMPTY_SPEED_RATIO = 0.6, 0.85
-# In the base frame: the hand is over furniture, and above what stands on it.
-OUT_IN_FRONT_M = 0.3
-CLEAR_HEIGHT_M = 0.6
-TUCK = "tuck"
-# Where a loaded hand travels, in the base frame: pointing down, close in front of the chest.
-CARRY_POINT_M = (0.27, 0.16, 0.72)
-CARRY_YAWS_RAD = tuple(math.radians(degrees) for degrees in range(-180, 180, 30))
-# One yaw out of reach is no loss: another is tried at once.
-RESTARTS = 2
 FULL_EFFORT = 0.5
 GENTLE_EFFORT = 0.25
 # An empty gripper stops where it was sent; fingers on an object stop this much earlier, pressing.
@@ -130,78 +117,13 @@ def move_arm(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     """
     targets = dict(context.robot.poses[parameters["pose"]])
     if "arm" in parameters:
-        joints = _arm_joints(context, parameters["arm"])
+        joints = arm_joints(context, parameters["arm"])
         targets = {name: value for name, value in targets.items() if name in joints}
     if not targets:
         raise NotPossible(f"the pose {parameters['pose']} names no joint of that arm")
     if (back_m := way_back_m(context)) > 0.0:
         raise NotPossible(f"an arm is under a table; have me drive {back_m:.2f} m back first")
     yield from move_joints(context, targets)
-
-
-def carry(context: SkillContext) -> Skill:
-    """Bring both arms to where they may travel: tucked when empty, close in front when loaded.
-
-    A hand that is low over furniture is raised first: the way to its chest is no straight line. An
-    arm under furniture is drawn out before.
-
-    Raises:
-        NotPossible: an arm is under furniture, and the robot cannot drive back.
-        TryAgain: something stands behind the robot.
-    """
-    yield from leave_underside(context)
-    for hand in context.robot.hands:
-        yield from _raise_clear(context, hand)
-    targets: dict[str, float] = {}
-    for hand in context.robot.hands:
-        wanted = _travel_targets(context, hand)
-        if not _is_at(context, wanted):
-            targets |= wanted
-    if targets:
-        loaded = any(held is not None for held in context.hands.values())
-        yield from move_joints(
-            context, targets, LOADED_SPEED_RATIO if loaded else EMPTY_SPEED_RATIO
-        )
-        yield from settle(context, list(targets))
-
-
-def _raise_clear(context: SkillContext, hand: str) -> Skill:
-    """Raise a hand that is out in front to a height from which it may swing."""
-    point_m = context.arms[hand].forward(context.link.setpoints)[:3, 3]
-    missing_m = CLEAR_HEIGHT_M - float(point_m[2])
-    if point_m[0] < OUT_IN_FRONT_M or missing_m <= 0.0:
-        return
-    for share in (1.0, 0.5, 0.25):
-        try:
-            yield from lift(context, hand, share * missing_m)
-        except OutOfReach:
-            continue  # the arm may be near its limits: less is better than nothing
-        return
-
-
-def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:
-    if context.hands.get(hand) is not None:
-        return _carry_targets(context, hand)
-    pose = context.robot.poses[TUCK]
-    return {name: pose[name] for name in _arm_joints(context, hand)}
-
-
-def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
-    """Return the carry posture nearest to the present one."""
-    arm = context.arms[hand]
-    side = 1.0 if hand == "left" else -1.0
-    point = (CARRY_POINT_M[0], side * CARRY_POINT_M[1], CARRY_POINT_M[2])
-    now = context.link.setpoints
-    found = []
-    for yaw_rad in CARRY_YAWS_RAD:
-        try:
-            found.append(arm.solve(hand_down(point, yaw_rad), now, restarts=RESTARTS).positions)
-        except ManipulationError:
-            continue  # not every yaw is within the wrist's range
-    if not found:
-        raise NotPossible(f"the {hand} hand cannot reach its carry pose {point}")
-    best = min(found, key=lambda positions: float(np.abs(positions - now).max()))
-    return _arm_targets(context, hand, best)
 
 
 def lift(context: SkillContext, hand: str, height_m: float, speed_ratio: float = 0.4) -> Skill:
@@ -225,7 +147,7 @@ def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: fl
         waypoints = context.arms[hand].straight_line(context.link.setpoints, target)
     except ManipulationError as error:
         raise OutOfReach(str(error)) from error
-    joints = _arm_joints(context, hand)
+    joints = arm_joints(context, hand)
     columns = [context.robot.joint_index[name] for name in joints]
     yield from follow_joints(context, joints, waypoints[:, columns], speed_ratio)
     yield from settle(context, joints)
@@ -235,27 +157,20 @@ def move_to_posture(
     context: SkillContext, hand: str, positions: NDArray[np.float64], speed_ratio: float
 ) -> Skill:
     """Bring a hand's arm to its part of a posture of the whole robot, and let it settle."""
-    yield from move_joints(context, _arm_targets(context, hand, positions), speed_ratio)
-    yield from settle(context, _arm_joints(context, hand))
+    yield from move_joints(context, arm_targets(context, hand, positions), speed_ratio)
+    yield from settle(context, arm_joints(context, hand))
 
 
-def or_carry(context: SkillContext, skill: Skill) -> Skill:
-    """Run a skill; where it fails, bring the arms to where they may travel before saying so."""
-    try:
-        yield from skill
-    except (TryAgain, NotPossible):
-        yield from carry(context)
-        raise
-
-
-def _arm_targets(
+def arm_targets(
     context: SkillContext, hand: str, positions: NDArray[np.float64]
 ) -> dict[str, float]:
+    """Return the part of a posture of the whole robot that is one hand's arm."""
     index = context.robot.joint_index
-    return {name: float(positions[index[name]]) for name in _arm_joints(context, hand)}
+    return {name: float(positions[index[name]]) for name in arm_joints(context, hand)}
 
 
-def _arm_joints(context: SkillContext, hand: str) -> tuple[str, ...]:
+def arm_joints(context: SkillContext, hand: str) -> tuple[str, ...]:
+    """Return the joints of a hand's arm."""
     return context.robot.group(context.robot.hands[hand].arm).joints
 
 
@@ -266,10 +181,3 @@ def _hands(context: SkillContext, parameters: Mapping[str, Any]) -> list[str]:
 def _smallest(context: SkillContext, hand: str) -> float:
     described = context.robot.hands[hand]
     return context.robot.limits[described.gripper].min * described.opening_ratio
-
-
-def _is_at(context: SkillContext, targets: Mapping[str, float]) -> bool:
-    now, index = context.link.setpoints, context.robot.joint_index
-    return all(
-        abs(float(now[index[name]]) - value) < AT_POSE_RAD for name, value in targets.items()
-    )

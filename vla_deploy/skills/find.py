@@ -9,7 +9,7 @@ import numpy as np
 from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.robots.description import FloorPose
-from vla_deploy.skills.arms import carry
+from vla_deploy.skills.carrying import carry
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.drive import drive_to
 from vla_deploy.skills.errors import NotPossible, TryAgain

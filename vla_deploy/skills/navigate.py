@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
 from vla_deploy.robots.description import FloorPose
-from vla_deploy.skills.arms import carry
+from vla_deploy.skills.carrying import carry
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.drive import drive_to
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain

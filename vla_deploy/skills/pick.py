@@ -11,15 +11,13 @@ from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
-    RESTARTS,
-    carry,
     feel,
     lift,
     move_straight,
     move_to_posture,
-    or_carry,
     set_opening,
 )
+from vla_deploy.skills.carrying import RESTARTS, carry, or_carry
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base

@@ -13,16 +13,14 @@ from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
-    RESTARTS,
     believe_fingers,
-    carry,
     lift,
     move_straight,
     move_to_posture,
     opening_of,
-    or_carry,
     set_opening,
 )
+from vla_deploy.skills.carrying import RESTARTS, carry, or_carry
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base
