@@ -26,6 +26,7 @@ _LEAST_SAMPLES: Final = 8
 _S_PER_H: Final = 3600.0
 _MIB: Final = 1 << 20
 _IDLE_S: Final = 20.0
+_RESET_S: Final = 1.0
 # The longest skill, to search the flat, may take 300 s by itself.
 _JOB_S: Final = 900.0
 _MUST_NOT_GROW: Final = ("open_files", "threads", "run_files", "run_mib")
@@ -63,44 +64,55 @@ class Soak:
         self._folder = folder
         self._clock = MonotonicClock()
         self._process = psutil.Process()
-        self._stack = LockstepStack(folder, seed)
-        self._stack.arm()
+        self.stack = LockstepStack(folder, seed)
+        self.stack.arm()
         self._began_ns = self._clock.now_ns()
-        self._began_s = self._stack.lockstep.now_s
+        self._began_s = self.stack.lockstep.now_s
         self.done = 0
+        self.stopped = 0
         self.failed: list[str] = []
 
     def work(self, hours: float, tell: Callable[[str], None]) -> list[Sample]:
         """Do job after job for so long on the wall clock, and take a sample after each."""
         samples: list[Sample] = []
         while not samples or samples[-1].wall_h < hours:
-            self._do(JOBS[self.done % len(JOBS)])
+            self.do(JOBS[self.done % len(JOBS)])
             samples.append(self._sample())
             tell(_row(self.done, samples[-1]))
         return samples
 
     def close(self) -> None:
         """End the robot."""
-        self._stack.close()
+        self.stack.close()
 
-    def _do(self, job: str) -> None:
+    def do(self, job: str) -> None:
+        """Have one job done, and note how it ended; a robot that stopped is let go on after it."""
         try:
-            outcome = self._stack.say(job, _JOB_S)
+            outcome = self.stack.say(job, _JOB_S)
         except NotReady as error:
-            self._stack.give(cancel=True)
+            self.stack.give(cancel=True)
             outcome = {"error": str(error)}
-        self._stack.events.clear()
+        self.stack.events.clear()
         self.done += 1
         if not outcome.get("success"):
             self.failed.append(f"{job}: {outcome.get('error') or outcome.get('reason')}")
-        self._stack.lockstep.run_for(_IDLE_S)
+        self.stack.lockstep.run_for(_IDLE_S)
+        self._stand_by()
+
+    def _stand_by(self) -> None:
+        """Be the person that a stop wants: see to it, and let the robot go on."""
+        if self.stack.status()["state"] != "armed":
+            self.stopped += 1
+            self.stack.operate("reset")
+            self.stack.lockstep.run_for(_RESET_S)
+            self.stack.arm()
 
     def _sample(self) -> Sample:
         memory = self._process.memory_info()
         files = [Path(root, name) for root, _, names in os.walk(self._folder) for name in names]
         return Sample(
             wall_h=(self._clock.now_ns() - self._began_ns) / NS_PER_S / _S_PER_H,
-            sim_h=(self._stack.lockstep.now_s - self._began_s) / _S_PER_H,
+            sim_h=(self.stack.lockstep.now_s - self._began_s) / _S_PER_H,
             memory_mib=(memory.rss - memory.shared) / _MIB,
             open_files=self._process.num_fds(),
             threads=threading.active_count(),
@@ -182,6 +194,7 @@ def _summary(soak: Soak, samples: Sequence[Sample]) -> dict[str, Any]:
         "sim_h": samples[-1].sim_h,
         "jobs": soak.done,
         "jobs_failed": len(soak.failed),
+        "stops_that_wanted_a_person": soak.stopped,
         "jobs_ended_well_per_wall_h": (soak.done - len(soak.failed)) / samples[-1].wall_h,
         "jobs_ended_well_per_sim_h": (soak.done - len(soak.failed)) / samples[-1].sim_h,
         "why_jobs_failed": sorted(set(soak.failed)),

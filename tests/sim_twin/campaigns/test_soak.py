@@ -1,9 +1,11 @@
 """The soak's judge must see growth, and not take noise for it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from sim_twin.campaigns.soak import LEAST_JOBS_RATIO, Sample, growth, jobs_case, judge
+from sim_twin.campaigns.soak import LEAST_JOBS_RATIO, Sample, Soak, growth, jobs_case, judge
 
 
 def samples(mib_per_h: float, *, files: int = 0, count: int = 80) -> list[Sample]:
@@ -46,3 +48,17 @@ def test_a_robot_that_is_stuck_fails_and_one_that_misses_a_job_does_not() -> Non
     assert stuck.failures == ("2% of 40 jobs ended well, expected 80% at least",)
     assert not missed.failures
     assert jobs_case(0, 0).failures
+
+
+@pytest.mark.gl
+@pytest.mark.timeout(120)
+def test_a_stop_costs_one_job_and_not_all_that_follow(tmp_path: Path) -> None:
+    soak = Soak(tmp_path, seed=0)
+    try:
+        soak.stack.operate("estop")
+        soak.stack.lockstep.run_for(1.0)
+        soak.do("look left")
+        soak.do("look left")
+        assert (soak.stopped, len(soak.failed), soak.done) == (1, 1, 2)
+    finally:
+        soak.close()
