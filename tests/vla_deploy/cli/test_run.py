@@ -23,7 +23,10 @@ def test_run_tells_whether_another_try_may_help(
     code: int,
 ) -> None:
     script = f"import sys; print('servos: no such port', file=sys.stderr); sys.exit({child_code})"
-    row = ProcessSpec(name="control", command=("-c", script), restart=ONCE_MORE)
+    # It never says that it is ready: one that only ran would be, if it took long to end.
+    row = ProcessSpec(
+        name="control", command=("-c", script), ready_topic="joint_state", restart=ONCE_MORE
+    )
     monkeypatch.setattr(run, "Supervisor", partial(Supervisor, table=(row,)))
     base = str(tmp_path / "base")
     assert main(["--runtime-base", base, "run", "--profile", "desktop"]) == code
