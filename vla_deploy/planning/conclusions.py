@@ -1,5 +1,7 @@
 """Bring what was planned for a command to its end: handed on, asked about, or refused."""
 
+from collections.abc import Callable
+
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.confirmation import agreement_to, confirmation_of
@@ -9,7 +11,6 @@ from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
 from vla_deploy.planning.phrasing import Says, spoken_refusal
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.recovery import numbered
 from vla_deploy.planning.rules_rung import RulesRung
 from vla_deploy.planning.situation import Situation
@@ -20,18 +21,21 @@ from vla_deploy.planning.understanding.mentioned import mentions_of
 
 
 class Conclusions:
-    """Conclude commands, tell of it, and keep it in mind for what is said next."""
+    """Conclude commands, tell of it, and keep it in mind for what is said next.
+
+    `accepted` hears of every plan that is handed on for a command of its own.
+    """
 
     def __init__(
         self,
-        planner: Planner,
+        accepted: Callable[[Request, Answer], None],
         situation: Situation,
         telling: Telling,
         dialogue: Dialogue,
         under_way: UnderWay,
     ) -> None:
         self.accounts = Accounts()
-        self._planner = planner
+        self._accepted = accepted
         self._situation = situation
         self._telling = telling
         self._dialogue = dialogue
@@ -70,7 +74,7 @@ class Conclusions:
         self._under_way.carry(command, plan, answer, agreement_to(plan, request))
         self.accounts.planned += 1
         if not command.recovers:
-            self._planner.accepted(request, answer)
+            self._accepted(request, answer)
         self._dialogue.remember(
             Turn(
                 said=command.text,

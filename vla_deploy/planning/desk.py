@@ -54,7 +54,14 @@ class Desk:
         self._clock = clock
         self._queue: deque[Command] = deque()
         self._under_way = UnderWay()
-        self._conclusions = Conclusions(planner, situation, telling, self.dialogue, self._under_way)
+        self._conclusions = Conclusions(
+            # Another profile brings another planner.
+            lambda request, answer: self.planner.accepted(request, answer),
+            situation,
+            telling,
+            self.dialogue,
+            self._under_way,
+        )
 
     @property
     def accounts(self) -> Accounts:

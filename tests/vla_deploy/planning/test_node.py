@@ -4,6 +4,7 @@ import pytest
 
 from platforms import load_profile
 from vla_deploy.planning.node import AWAY, UTTERANCE_AGE_S
+from vla_deploy.planning.planner import Planner
 
 
 @pytest.fixture
@@ -177,3 +178,12 @@ def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
     assert [one["event"] for one in desk.answers()] == ["accepted", "plan"]
     later.do_one()
     assert closed == ["model"]
+
+
+def test_plans_are_kept_by_the_planner_in_force(open_desk, rung, propose):
+    model = rung("model", propose(("wait", {"duration_s": 1.0})))
+    desk = open_desk(model)
+    desk.planner.commit(Planner(desk.clock, (model,)))
+    desk.give(text="sing a sea shanty")
+    desk.answers()
+    assert desk.status()["cache"]["plans"] == 1
