@@ -25,6 +25,9 @@ from vla_deploy.speech.voice.engines import build_voice
 
 READY_TIMEOUT_S = 10.0
 COMMAND_TIMEOUT_S = 300.0
+ACT_S = 3.0
+ACT_EVERY_S = 0.5
+REACHED = {"reset": "disarmed", "arm": "armed"}
 
 
 class NotReady(Exception):
@@ -92,6 +95,13 @@ class LockstepControl:
         self.operate("arm")
         if not clock.run_until(lambda: self.status()["state"] == "armed", READY_TIMEOUT_S):
             raise NotReady(f"control does not arm: {self.status()}")
+
+    def insist(self, act: str) -> None:
+        """Do an operator's act again and again, as a person would, until it has its effect."""
+        for _ in range(round(ACT_S / ACT_EVERY_S)):
+            self.operate(act)
+            if self.lockstep.run_until(lambda: self.status()["state"] == REACHED[act], ACT_EVERY_S):
+                return
 
     def speak(self, text: str, talker: Talker | None = None, snr_db: float | None = None) -> Spoken:
         """Let somebody in the room say a text; return when the words begin and end.

@@ -26,7 +26,6 @@ _LEAST_SAMPLES: Final = 8
 _S_PER_H: Final = 3600.0
 _MIB: Final = 1 << 20
 _IDLE_S: Final = 20.0
-_RESET_S: Final = 1.0
 # The longest skill, to search the flat, may take 300 s by itself.
 _JOB_S: Final = 900.0
 _MUST_NOT_GROW: Final = ("open_files", "threads", "run_files", "run_mib")
@@ -103,8 +102,7 @@ class Soak:
         """Be the person that a stop wants: see to it, and let the robot go on."""
         if self.stack.status()["state"] != "armed":
             self.stopped += 1
-            self.stack.operate("reset")
-            self.stack.lockstep.run_for(_RESET_S)
+            self.stack.insist("reset")
             self.stack.arm()
 
     def _sample(self) -> Sample:

@@ -17,8 +17,6 @@ _SAMPLE_S: Final = 0.004
 _COMMAND_EVERY: Final = 5
 _SETTLE_S: Final = 0.3
 _RETURN_S: Final = 1.3  # a lost bus is opened again once a second
-_ACT_S: Final = 3.0
-_ACT_EVERY_S: Final = 0.5
 _STILL_RAD: Final = 0.02
 _TRAVEL_S: Final = 20.0
 _TRAVEL_M: Final = 0.8
@@ -26,7 +24,6 @@ _TURN_RAD: Final = 2.5
 _DRIVE_M_S: Final = 0.3
 _REACH: Final = {"left_elbow": 1.9, "left_shoulder_pitch": 0.7, "right_elbow": 1.9}
 _WHEELS: Final = ("left_wheel", "right_wheel")
-_REACHED: Final = {"reset": "disarmed", "arm": "armed"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +127,7 @@ class Rehearsal:
         if expect.recovery and self._stack.status()["state"] == "armed":
             wrong.append("it armed again without an operator's act")
         for act in expect.recovery:
-            self._do(act)
+            self._stack.insist(act)
         if self._stack.status()["state"] != "armed":
             wrong.append(f"it did not recover: {self._stack.status()}")
         if expect.pose_error_m is not None and seen.worst_pose_m > expect.pose_error_m:
@@ -138,15 +135,6 @@ class Rehearsal:
         if expect.yaw_error_rad is not None and seen.worst_yaw_rad > expect.yaw_error_rad:
             wrong.append(f"heading off by {seen.worst_yaw_rad:.3f}, limit {expect.yaw_error_rad:g}")
         return wrong
-
-    def _do(self, act: str) -> None:
-        """Do an operator's act again and again, as a person would, until it has its effect."""
-        for _ in range(round(_ACT_S / _ACT_EVERY_S)):
-            self._stack.operate(act)
-            if self._stack.lockstep.run_until(
-                lambda: self._stack.status()["state"] == _REACHED[act], _ACT_EVERY_S
-            ):
-                return
 
     def _judge_travel(self, command: str) -> list[str]:
         stack, wanted = self._stack, self._scenario.expect.travel

@@ -1,4 +1,4 @@
-"""Move arms and grippers: carry poses, named poses, open, close, and what the fingers feel."""
+"""Move arms and grippers: straight, to postures and poses, open, close; what the fingers feel."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
@@ -75,22 +74,23 @@ def _fold_up(context: SkillContext, hand: str) -> Skill:
     An arm that sank without power lies so twisted that it follows no straight line; with all of
     its joints at once its hand would sweep over what stands there.
     """
-    now, index = context.link.setpoints, context.robot.joint_index
-    tuck, arm = context.robot.poses[TUCK], context.arms[hand]
-
-    def postures(joint: str) -> list[NDArray[np.float64]]:
-        ways = np.linspace(now[index[joint]], tuck[joint], FOLDING_STEPS)
-        return [np.where(np.arange(len(now)) == index[joint], way, now) for way in ways]
-
-    def height_m(posture: NDArray[np.float64]) -> float:
-        return float(arm.forward(posture)[2, 3])
-
-    joint = max(arm_joints(context, hand), key=lambda one: max(map(height_m, postures(one))))
-    ways = postures(joint)
-    enough = (way for way in ways if height_m(way) >= CLEAR_HEIGHT_M)
-    best = next(enough, max(ways, key=height_m))
-    yield from move_joints(context, {joint: float(best[index[joint]])}, EMPTY_SPEED_RATIO)
+    ways = {joint: _way_to_tuck(context, hand, joint) for joint in arm_joints(context, hand)}
+    joint, way = max(ways.items(), key=lambda item: max(item[1]))
+    enough = (one for one in way if one[0] >= CLEAR_HEIGHT_M)
+    _, position = next(enough, max(way))
+    yield from move_joints(context, {joint: position}, EMPTY_SPEED_RATIO)
     yield from settle(context, (joint,))
+
+
+def _way_to_tuck(context: SkillContext, hand: str, joint: str) -> list[tuple[float, float]]:
+    """Return the hand's height at positions of one joint on its way to where it is tucked."""
+    posture, index = context.link.setpoints.copy(), context.robot.joint_index[joint]
+    found = []
+    for position in np.linspace(posture[index], context.robot.poses[TUCK][joint], FOLDING_STEPS):
+        posture[index] = position
+        height_m = float(context.arms[hand].forward(posture)[2, 3])
+        found.append((height_m, float(position)))
+    return found
 
 
 def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:

@@ -1,14 +1,17 @@
 """Draw arms out from under furniture before they rise: without power they may have sunk there."""
 
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.drive import straight
 from vla_deploy.skills.errors import NotPossible
-from vla_deploy.skills.frames import on_floor, to_map
+from vla_deploy.skills.frames import on_floor
+
+Floats = NDArray[np.float64]
 
 # Around a joint's middle: half an arm's width, and what a seen surface may lack at its edge.
 BESIDE_M = 0.07
@@ -38,11 +41,15 @@ def way_back_m(context: SkillContext) -> float:
     Raises:
         NotPossible: nothing within `FARTHEST_BACK_M` frees them.
     """
-    steps = round(FARTHEST_BACK_M / STEP_BACK_M)
-    for back_m in (STEP_BACK_M * step for step in range(steps + 1)):
-        x_m, y_m = to_map(context.link.pose, -back_m, 0.0)
-        there = FloorPose(x_m=x_m, y_m=y_m, yaw_rad=context.link.pose.yaw_rad)
-        hands = [name for name in context.arms if _is_under(context, name, there)]
+    pose, parts = context.link.pose, list(_low_parts(context))
+    hands: list[str] = []
+    for step in range(round(FARTHEST_BACK_M / STEP_BACK_M) + 1):
+        back_m = STEP_BACK_M * step
+        hands = [
+            hand
+            for hand, outline, low_m in parts
+            if _reaches_into(outline, on_floor(pose, low_m - (back_m, 0.0)))
+        ]
         if not hands:
             return back_m
     raise NotPossible(
@@ -51,18 +58,16 @@ def way_back_m(context: SkillContext) -> float:
     )
 
 
-def _is_under(context: SkillContext, hand: str, pose: FloorPose) -> bool:
-    """Tell whether a part of an arm would be below a seen surface, were the base at a pose."""
-    points_m = context.arms[hand].points(context.link.positions)
-    places_m = on_floor(pose, points_m[:, :2])
-    return any(
-        _reaches_into(np.array(surface["polygon_m"], dtype=np.float32), low_m)
-        for surface in context.link.surfaces
-        if len(low_m := places_m[points_m[:, 2] < float(surface["height_m"]) - BELOW_M])
-    )
+def _low_parts(context: SkillContext) -> Iterator[tuple[str, NDArray[np.float32], Floats]]:
+    """Yield what of each hand's arm is lower than each seen surface, (n, 2) in the base frame."""
+    for hand, arm in context.arms.items():
+        points_m = arm.points(context.link.positions)
+        for surface in context.link.surfaces:
+            low = points_m[:, 2] < float(surface["height_m"]) - BELOW_M
+            yield hand, np.array(surface["polygon_m"], dtype=np.float32), points_m[low, :2]
 
 
-def _reaches_into(outline: NDArray[np.float32], places_m: NDArray[np.float64]) -> bool:
+def _reaches_into(outline: NDArray[np.float32], places_m: Floats) -> bool:
     return any(
         cv2.pointPolygonTest(outline, (float(x_m), float(y_m)), measureDist=True) > -BESIDE_M
         for x_m, y_m in places_m

@@ -1,4 +1,5 @@
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +52,18 @@ def stays(localiser: Localiser, before: Pose2D) -> bool:
     return localiser.pose.distance_m(before) < 1e-6 and localiser.pose.turn_rad(before) < 1e-3
 
 
+def scan_in_motion(
+    flat: "TracedFlat", poses: Sequence[Pose2D], stamps: Sequence[int]
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return a scan and its beams' stamps; the lidar turns clockwise over the last five poses."""
+    ranges, beam_stamps = np.zeros(360, np.float32), np.zeros(360, np.int64)
+    for part in range(5):
+        beams = np.arange(360)[(4 - part) * 72 : (5 - part) * 72]
+        ranges[beams] = flat.trace(poses[part - 5])[beams]
+        beam_stamps[beams] = stamps[part - 5]
+    return ranges, beam_stamps
+
+
 def drive(flat: "TracedFlat", *, correct: bool, seconds: float = 25.0) -> tuple[Localiser, Pose2D]:
     """Drive a closed curve with wheels 8 % too long and a drifting IMU; return what came of it."""
     localiser = Localiser(Pose2D(1.5, 1.5, 0.0), flat.map())
@@ -66,13 +79,7 @@ def drive(flat: "TracedFlat", *, correct: bool, seconds: float = 25.0) -> tuple[
         stamps.append(now_ns)
         localiser.predict(now_ns, odometry, imu_yaw)
         if correct and tick % 5 == 4:
-            # The lidar turns clockwise while the robot moves: each fifth sees another pose.
-            ranges, beam_stamps = np.zeros(360, np.float32), np.zeros(360, np.int64)
-            for part in range(5):
-                beams = np.arange(360)[(4 - part) * 72 : (5 - part) * 72]
-                ranges[beams] = flat.trace(poses[part - 5])[beams]
-                beam_stamps[beams] = stamps[part - 5]
-            localiser.correct(ranges, beam_stamps)
+            localiser.correct(*scan_in_motion(flat, poses, stamps))
     return localiser, true
 
 
@@ -255,21 +262,15 @@ def test_past_poses_are_interpolated(flat: "TracedFlat") -> None:
 def test_a_yaw_that_runs_away_slowly_leads_the_heading_astray_by_little(flat: "TracedFlat") -> None:
     localiser = settled(flat)
     true, odometry, imu_yaw, worst_rad = HOME, ORIGIN, 0.0, 0.0
-    began_ns = flat.now_ns
-    poses = [HOME] * 5
+    poses, stamps = [HOME], [flat.now_ns]
     for tick in range(1, 70):
         turn = 1.25 * 0.02
         true, odometry = (one.compose(Pose2D(0.0, 0.0, turn)) for one in (true, odometry))
         imu_yaw += turn + 0.3 * 0.02
-        poses = [*poses[1:], true]
-        now_ns = began_ns + tick * 20_000_000
-        localiser.predict(now_ns, odometry, imu_yaw)
+        poses.append(true)
+        stamps.append(flat.now_ns + tick * 20_000_000)
+        localiser.predict(stamps[-1], odometry, imu_yaw)
         if tick % 5 == 0:
-            ranges, beam_stamps = np.zeros(360, np.float32), np.zeros(360, np.int64)
-            for part, pose in enumerate(poses):
-                beams = np.arange(360)[(4 - part) * 72 : (5 - part) * 72]
-                ranges[beams] = flat.trace(pose)[beams]
-                beam_stamps[beams] = now_ns - (4 - part) * 20_000_000
-            localiser.correct(ranges, beam_stamps)
+            localiser.correct(*scan_in_motion(flat, poses, stamps))
             worst_rad = max(worst_rad, error_of(localiser, true)[1])
     assert worst_rad < 0.15
