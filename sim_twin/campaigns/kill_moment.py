@@ -33,6 +33,7 @@ class Work:
         self._job: subprocess.Popen[bytes] | None = None
         self._job_ns = 0
         self._has_put_down = False
+        self._put_down = itertools.cycle(PUT_DOWN)
         described = load_robot("butler")
         arms = [described.group(hand.arm).joints for hand in described.hands.values()]
         self._parts = (*itertools.chain.from_iterable(arms), *_WHEELS)
@@ -74,7 +75,7 @@ class Work:
         held = self._machine.truth()["held"]
         self._has_put_down = bool(held) and not self._has_put_down
         if self._has_put_down:
-            return PUT_DOWN.format(thing=held[0].replace("_", " "))
+            return next(self._put_down)
         return next(commands)
 
     def _met(self) -> dict[str, Any]:

@@ -19,8 +19,11 @@ COMMANDS: Final = (
     "pick up the blue ball and put it on the coffee table",
 )
 """All are picking and placing, most of it where the robot stands; the box is some metres away."""
-PUT_DOWN: Final = "put the {thing} on the coffee table"
-"""What a person says to a robot that a kill has left with something in its hands."""
+PUT_DOWN: Final = ("free your left hand", "free your right hand")
+"""What a person says in turn to a robot that a kill has left with something in its hands.
+
+It may know no more than that there is something.
+"""
 _EARLIEST_S, _LATEST_S = 0.5, 10.0
 """A job takes 20 to 40 seconds, and goes on through most kills."""
 

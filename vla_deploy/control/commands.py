@@ -26,13 +26,18 @@ class Goal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waypoints:
-    """Ask joints to pass timed points."""
+    """Ask joints to pass timed points.
+
+    With a `contact_ratio` they feel their way: a torque that grows by this share of a joint's
+    contact limit ends the motion as touched.
+    """
 
     motion_id: int
     axes: Axes
     joints: tuple[str, ...]
     times_s: Floats
     positions: Floats
+    contact_ratio: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +107,7 @@ def _waypoints(
         joints=tuple(map(str, joints)),
         times_s=_array(payload, "times_s", 1),
         positions=_array(payload, "positions", 2),
+        contact_ratio=_ratio(payload, "contact_ratio") if "contact_ratio" in payload else None,
     )
 
 

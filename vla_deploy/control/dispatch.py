@@ -17,6 +17,8 @@ from vla_deploy.control.commands import (
 from vla_deploy.control.motions import Ending, MotionResult, MotionSet
 from vla_deploy.control.profile_motion import plan_motion
 from vla_deploy.control.servos import ServoLine
+from vla_deploy.control.thresholds import contact_torque
+from vla_deploy.control.touch_guard import TouchGuard
 from vla_deploy.control.trajectory import TrajectoryRefused, plan_trajectory
 from vla_deploy.robots import RobotDescription
 
@@ -41,6 +43,7 @@ class Dispatcher:
         self._lower, self._upper = robot.position_min, robot.position_max
         travel = np.array([servo.travel_per_rad for servo in robot.servo_bus.servos])
         self._start_tolerance = _START_TOLERANCE_RAD * travel
+        self._contact_nm = contact_torque(robot)
         self._motions = motions
         self._servos = servos
 
@@ -84,7 +87,13 @@ class Dispatcher:
             (self._lower[axes], self._upper[axes]),
             self._start_tolerance[axes],
         )
-        return self._motions.start(command.motion_id, axes, curve)
+        return self._motions.start(command.motion_id, axes, curve, self._guard(command))
+
+    def _guard(self, command: Waypoints) -> TouchGuard | None:
+        if command.contact_ratio is None:
+            return None
+        most_nm = command.contact_ratio * self._contact_nm[command.axes]
+        return TouchGuard(command.joints, most_nm)
 
     def _check_range(self, goal: Goal) -> None:
         lower, upper = self._lower[goal.axes], self._upper[goal.axes]

@@ -13,6 +13,7 @@ import numpy as np
 
 from vla_deploy.control.axes import Axes, AxisLimits, AxisState, Flags, Floats
 from vla_deploy.control.profile_motion import plan_stop
+from vla_deploy.control.touch_guard import TouchGuard
 
 
 class Curve(Protocol):
@@ -32,6 +33,7 @@ class Ending(Enum):
     CANCELLED = "cancelled"
     REFUSED = "refused"
     STOPPED = "stopped"
+    TOUCHED = "touched"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +53,7 @@ class _Motion:
     axes: Axes
     curve: Curve
     elapsed_s: float = 0.0
+    guard: TouchGuard | None = None
 
 
 class MotionSet:
@@ -80,14 +83,16 @@ class MotionSet:
         self.state.velocity[joints] = 0.0
         self.state.acceleration[joints] = 0.0
 
-    def start(self, motion_id: int, axes: Axes, curve: Curve) -> list[MotionResult]:
+    def start(
+        self, motion_id: int, axes: Axes, curve: Curve, guard: TouchGuard | None = None
+    ) -> list[MotionResult]:
         """Begin a motion from the present state and return the motions that lost joints to it."""
         taken = set(axes.tolist())
         losers = [m for m in self._motions if not taken.isdisjoint(m.axes.tolist())]
         results = self._end(losers, Ending.CANCELLED, f"motion {motion_id} took over its joints")
         for loser in losers:
             self._ramp(np.array([a for a in loser.axes if a not in taken], dtype=np.intp))
-        self._motions.append(_Motion(motion_id, axes, curve))
+        self._motions.append(_Motion(motion_id, axes, curve, guard=guard))
         return results
 
     def cancel(self, motion_id: int) -> list[MotionResult]:
@@ -96,6 +101,16 @@ class MotionSet:
         results = self._end(cancelled, Ending.CANCELLED, "cancelled on request")
         for motion in cancelled:
             self._ramp(motion.axes)
+        return results
+
+    def feel(self, external_torque_nm: Floats) -> list[MotionResult]:
+        """Ramp to rest the joints of motions that feel their way and have met something."""
+        results = []
+        for motion in list(self._motions):
+            touch = motion.guard.touch(external_torque_nm[motion.axes]) if motion.guard else ""
+            if touch:
+                results += self._end([motion], Ending.TOUCHED, touch)
+                self._ramp(motion.axes)
         return results
 
     def stop(self, reason: str) -> list[MotionResult]:

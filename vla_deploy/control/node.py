@@ -110,6 +110,7 @@ class ControlNode:
         self._judge(now_ns)
         self._change_mode()
         self._take_commands()
+        self._feel()
         self._ease_off(period_s)
         self._telemetry.tell_results(self._joints.move(period_s))
         self._move_base(period_s)
@@ -237,6 +238,11 @@ class ControlNode:
         if any_of(jumped):
             self._joints.place(jumped)
             self._telemetry.tell_results(self._motions.stop(self._judging.verdict.text))
+
+    def _feel(self) -> None:
+        torque_nm = self._judging.external_torque_nm
+        if torque_nm is not None:
+            self._telemetry.tell_results(self._motions.feel(torque_nm))
 
     def _ease_off(self, period_s: float) -> None:
         """Let an arm that a contact has stopped not go on pressing on whoever it has met."""

@@ -191,7 +191,7 @@ TOPICS: tuple[Topic, ...] = (
         name="motion_result",
         kind=Kind.RING,
         owner="control",
-        summary="end of each motion: done, cancelled, refused, stopped, with the reason",
+        summary="end of each motion: done, touched, cancelled, refused, stopped, with the reason",
         slots=64,
         slot_bytes=2048,
     ),

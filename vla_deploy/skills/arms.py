@@ -20,6 +20,8 @@ GENTLE_EFFORT = 0.25
 HELD_OPENING_M = 0.004
 HELD_EFFORT_SHARE = 0.4
 CLOSE_TIME_S = 0.4
+# Sizes are seen to a centimetre.
+SAME_WIDTH_M = 0.012
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,17 +87,23 @@ def close_gripper(context: SkillContext, parameters: Mapping[str, Any]) -> Skill
             )
 
 
-def recall_hands(context: SkillContext) -> bool:
-    """Find out by touch what the hands hold after a restart; return False until it can be felt."""
+def recall_hands(context: SkillContext, told: Mapping[str, Held]) -> bool:
+    """Find out by touch what the hands hold after a restart; return False until it can be felt.
+
+    `told` is what the executor before said of them: believed where the fingers are as far apart.
+    """
     try:
         for hand in context.robot.hands:
             touch = feel(context, hand, _smallest(context, hand))
-            held = touch.holds(GENTLE_EFFORT)
-            context.hands[hand] = (
-                Held(kind="object", colour="", width_m=touch.opening_m, below_grip_m=0.06)
-                if held
-                else None
-            )
+            before = told.get(hand)
+            if not touch.holds(GENTLE_EFFORT):
+                context.hands[hand] = None
+            elif before is not None and abs(before.width_m - touch.opening_m) < SAME_WIDTH_M:
+                context.hands[hand] = before
+            else:
+                context.hands[hand] = Held(
+                    kind="object", colour="", width_m=touch.opening_m, below_grip_m=0.06
+                )
     except TryAgain:
         return False
     return True
@@ -137,11 +145,18 @@ def lift(context: SkillContext, hand: str, height_m: float, speed_ratio: float =
     yield from move_straight(context, hand, target, speed_ratio)
 
 
-def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: float) -> Skill:
+def move_straight(
+    context: SkillContext,
+    hand: str,
+    target: Any,
+    speed_ratio: float,
+    contact_ratio: float | None = None,
+) -> Skill:
     """Move a hand along a straight line to a grip pose in the base frame.
 
     Raises:
         OutOfReach: the arm cannot follow the line.
+        Touched: with a `contact_ratio`, the arm has met something on it, and rests there.
     """
     try:
         waypoints = context.arms[hand].straight_line(context.link.setpoints, target)
@@ -149,7 +164,7 @@ def move_straight(context: SkillContext, hand: str, target: Any, speed_ratio: fl
         raise OutOfReach(str(error)) from error
     joints = arm_joints(context, hand)
     columns = [context.robot.joint_index[name] for name in joints]
-    yield from follow_joints(context, joints, waypoints[:, columns], speed_ratio)
+    yield from follow_joints(context, joints, waypoints[:, columns], speed_ratio, contact_ratio)
     yield from settle(context, joints)
 
 

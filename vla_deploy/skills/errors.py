@@ -2,7 +2,8 @@
 
 SkillFailed
 ├── TryAgain         the world may be kinder a second time: not found, grasp lost, way blocked
-│   └── EffectMissing    the skill came to its end, and the world does not show what it should
+│   ├── EffectMissing    the skill came to its end, and the world does not show what it should
+│   └── Touched          an arm that felt its way has met something, and stands before it
 ├── NotPossible      the same try would fail the same way: out of reach, hands full
 │   ├── OutOfReach   standing elsewhere may help
 │   └── PreconditionUnmet    the world lacks what the skill needs; another plan may provide it
@@ -20,6 +21,10 @@ class TryAgain(SkillFailed):
 
 class EffectMissing(TryAgain):
     """Say what the world shows instead of what the skill should have brought about."""
+
+
+class Touched(TryAgain):
+    """Say what an arm has met on a way that it thought free."""
 
 
 class NotPossible(SkillFailed):

@@ -248,17 +248,25 @@ class RobotLink:
         return self._send(command)
 
     def send_trajectory(
-        self, joints: Sequence[str], times_s: NDArray[np.float64], positions: NDArray[np.float64]
+        self,
+        joints: Sequence[str],
+        times_s: NDArray[np.float64],
+        positions: NDArray[np.float64],
+        contact_ratio: float | None = None,
     ) -> int:
-        """Ask control to follow timed joint positions (n, joints); return the motion's id."""
-        return self._send(
-            {
-                "kind": "trajectory",
-                "joints": list(joints),
-                "times_s": times_s.tolist(),
-                "positions": positions.tolist(),
-            }
-        )
+        """Ask control to follow timed joint positions (n, joints); return the motion's id.
+
+        With a `contact_ratio` of the contact limits it ends as soon as it meets something.
+        """
+        command: dict[str, Any] = {
+            "kind": "trajectory",
+            "joints": list(joints),
+            "times_s": times_s.tolist(),
+            "positions": positions.tolist(),
+        }
+        if contact_ratio is not None:
+            command["contact_ratio"] = contact_ratio
+        return self._send(command)
 
     def _send(self, command: dict[str, Any]) -> int:
         motion_id = next(self._ids)

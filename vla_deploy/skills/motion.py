@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.errors import RobotNotReady, TryAgain
+from vla_deploy.skills.errors import RobotNotReady, Touched, TryAgain
 
 SETTLED_RAD_S = 0.03
 SETTLE_TIMEOUT_S = 1.5
@@ -36,6 +36,8 @@ def _finish(context: SkillContext, motion_id: int, what: str) -> Skill:
         yield
     if result.status == "stopped" and refusal_of(context.link.control_status):
         raise RobotNotReady(f"{what}: stopped by control: {result.reason}")
+    if result.status == "touched":
+        raise Touched(f"{what}: {result.reason}")
     if result.status != "done":
         raise TryAgain(f"{what}: {result.status}: {result.reason}")
 
@@ -57,11 +59,16 @@ def move_joints(
 
 
 def follow_joints(
-    context: SkillContext, joints: Sequence[str], waypoints: NDArray[np.float64], speed_ratio: float
+    context: SkillContext,
+    joints: Sequence[str],
+    waypoints: NDArray[np.float64],
+    speed_ratio: float,
+    contact_ratio: float | None = None,
 ) -> Skill:
     """Move through joint waypoints (n, joints) from rest to rest with minimum-jerk timing.
 
     Raises:
+        Touched: with a `contact_ratio`, the joints have met something, and rest before it.
         TryAgain: control refused or cancelled the motion, or a stop that ends by itself ended it.
         RobotNotReady: another stop ended it.
     """
@@ -71,7 +78,7 @@ def follow_joints(
         speed_ratio * np.array([limit.velocity for limit in limits]),
         np.array([limit.acceleration for limit in limits]),
     )
-    motion_id = context.link.send_trajectory(joints, times_s, positions)
+    motion_id = context.link.send_trajectory(joints, times_s, positions, contact_ratio)
     yield from _finish(context, motion_id, f"moving {_named(joints)}")
 
 

@@ -1,6 +1,8 @@
 """Run the executor: plans in, motions out, and a word about every action."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict
 from typing import Any
 
 from drivers.clock import NS_PER_S
@@ -12,6 +14,7 @@ from vla_deploy.ipc import (
     ClaimBook,
     RingReader,
     RingWriter,
+    Sample,
     SharedSpace,
 )
 from vla_deploy.manipulation.kinematics import ArmKinematics
@@ -22,7 +25,7 @@ from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.robots import RobotDescription
 from vla_deploy.skills.advice import Adviser
 from vla_deploy.skills.arms import believe_fingers, recall_hands
-from vla_deploy.skills.context import SkillContext
+from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.executor import ActionRecord, PlanExecution
 from vla_deploy.skills.link import RobotLink
 from vla_deploy.skills.recovery import Recovery
@@ -32,6 +35,12 @@ STATUS_PERIOD_NS = NS_PER_S // 10
 _SHOWN_POINTS = 200
 PLANNER_AGE_S = 2.0
 _IDLE = {False: "idle", True: "recovering"}
+
+
+def _told_hands(before: Sample | None) -> dict[str, Held]:
+    """Return what an executor before this one, in the same run, said that the hands hold."""
+    grips = {} if before is None else before.document().get("grips", {})
+    return {hand: Held(**grip) for hand, grip in grips.items()}
 
 
 class ExecutorNode:
@@ -56,6 +65,7 @@ class ExecutorNode:
         self._command_id = ""
         self._status_ns = 0
         self._knows_hands = False
+        self._told_hands: dict[str, Held] = {}
 
     def start(self) -> None:
         """Load the map, build the kinematics, open the topics."""
@@ -72,6 +82,8 @@ class ExecutorNode:
         self._skills.claims.declare(body_of(self._robot))
         self._plans = self._space.ring_reader("plan", from_start=False)
         self._events = self._space.ring_writer("task_event")
+        with closing(self._space.cell_reader("executor_status")) as before:
+            self._told_hands = _told_hands(before.latest())
         self._status = self._space.cell_writer("executor_status")
         self._planner = self._space.cell_reader("planner_status")
 
@@ -79,7 +91,7 @@ class ExecutorNode:
         """Take new plans, advance the running one, tell the status."""
         self._skills.link.refresh()
         if not self._knows_hands:
-            self._knows_hands = recall_hands(self._skills)
+            self._knows_hands = recall_hands(self._skills, self._told_hands)
         for event in self._plans.drain():
             self._take(event.payload)
         if self._execution is not None:
@@ -229,5 +241,6 @@ class ExecutorNode:
                 "holding": {
                     hand: held.kind if held else None for hand, held in self._skills.hands.items()
                 },
+                "grips": {hand: asdict(held) for hand, held in self._skills.hands.items() if held},
             }
         )

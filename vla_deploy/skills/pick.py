@@ -1,7 +1,9 @@
 """Pick an object up: see it afresh, choose a grasp, take it, feel it, lift it, feel again."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
+    arm_joints,
     feel,
     lift,
     move_straight,
@@ -19,10 +22,10 @@ from vla_deploy.skills.arms import (
 )
 from vla_deploy.skills.carrying import RESTARTS, carry, or_carry
 from vla_deploy.skills.context import Held, Skill, SkillContext
-from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
+from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered
-from vla_deploy.skills.motion import pause
+from vla_deploy.skills.motion import pause, settle
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.neighbours import crowding_m
 from vla_deploy.skills.swing import heights_above
@@ -30,9 +33,15 @@ from vla_deploy.skills.swing import heights_above
 PREGRASP_M = 0.12
 FINGER_TIPS_M = 0.03
 APPROACH_SPEED_RATIO = 0.5
+FEELING_SPEED_RATIO = 0.15
 STRAIGHT_SPEED_RATIO = 0.35
 # The fingers are sent this much past the surface they should meet.
 SQUEEZE_M = 0.012
+# Of the contact limits. On its way down, a free arm of the twin feels 0.1 of them at most.
+TOUCH_RATIO = 0.25
+MOST_TOUCHES = 3
+# The sine of the angle from which on fingers close along another line.
+ANOTHER_LINE = math.sin(math.radians(40.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,8 +67,16 @@ def pick_up(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
         return
     hands = _free_hands(context, parameters.get("arm"))
     yield from carry(context)
-    choice = yield from solve_near(context, query, lambda: _choose(context, query, hands))
-    yield from or_carry(context, _grasp(context, choice, query))
+    met: list[float] = []
+    while True:
+        choice = yield from solve_near(context, query, partial(_choose, context, query, hands, met))
+        try:
+            yield from or_carry(context, _grasp(context, choice, query))
+            break
+        except Touched:
+            met.append(choice.grasp.yaw_rad)
+            if len(met) == MOST_TOUCHES:
+                raise
     yield from carry(context)
 
 
@@ -69,10 +86,21 @@ def _grasp(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
 
 
 def _approach(context: SkillContext, choice: Choice) -> Skill:
-    yield from set_opening(context, choice.hand, choice.grasp.opening_m)
-    yield from move_to_posture(context, choice.hand, choice.above, APPROACH_SPEED_RATIO)
-    target = hand_down(choice.grasp.point_m, choice.grasp.yaw_rad)
-    yield from move_straight(context, choice.hand, target, STRAIGHT_SPEED_RATIO)
+    """Bring the open fingers around the object; where one comes down on it, raise the hand again.
+
+    Raises:
+        Touched: the fingers met something on their way down, and are above it again.
+    """
+    grasp, hand = choice.grasp, choice.hand
+    yield from set_opening(context, hand, grasp.opening_m)
+    yield from move_to_posture(context, hand, choice.above, APPROACH_SPEED_RATIO)
+    target = hand_down(grasp.point_m, grasp.yaw_rad)
+    try:
+        yield from move_straight(context, hand, target, FEELING_SPEED_RATIO, TOUCH_RATIO)
+    except Touched:
+        yield from settle(context, arm_joints(context, hand))
+        yield from move_to_posture(context, hand, choice.above, STRAIGHT_SPEED_RATIO)
+        raise
 
 
 def _take(context: SkillContext, choice: Choice, query: ObjectQuery) -> Skill:
@@ -124,8 +152,12 @@ def _free_hands(context: SkillContext, wanted: str | None) -> list[str]:
     return free
 
 
-def _choose(context: SkillContext, query: ObjectQuery, hands: list[str]) -> Choice:
+def _choose(
+    context: SkillContext, query: ObjectQuery, hands: list[str], met: Sequence[float]
+) -> Choice:
     """Return the plainest of the reachable grasps, of the hand on the object's side.
+
+    `met` are the yaws at which fingers came down on it: others are taken if there are any.
 
     Raises:
         TryAgain: the object is out of sight.
@@ -153,20 +185,26 @@ def _choose(context: SkillContext, query: ObjectQuery, hands: list[str]) -> Choi
             choice for grasp in grasps if (choice := _solve(context, hand, grasp, seen, reasons))
         ]
         if choices:
-            return _plainest(context, choices, seen)
+            return _plainest(context, choices, seen, met)
     raise OutOfReach(
         f"neither grasp of the {seen['class']} at {centre[0]:.2f}, {centre[1]:.2f}, "
         f"{centre[2]:.2f} m is within reach: {reasons[0] if reasons else 'no grasp fits'}"
     )
 
 
-def _plainest(context: SkillContext, choices: list[Choice], seen: Mapping[str, Any]) -> Choice:
-    """Return the one that leaves most room to what stands around, then the one that moves least."""
+def _plainest(
+    context: SkillContext, choices: list[Choice], seen: Mapping[str, Any], met: Sequence[float]
+) -> Choice:
+    """Return the one that leaves most room to what stands around, then the one that moves least.
+
+    One that closes along another line than those that have met the object goes before both.
+    """
     now = context.link.setpoints
 
-    def cost(one: Choice) -> tuple[float, float]:
+    def cost(one: Choice) -> tuple[bool, float, float]:
+        along = any(abs(math.sin(one.grasp.yaw_rad - yaw_rad)) < ANOTHER_LINE for yaw_rad in met)
         rounded_m = round(crowding_m(context, one.grasp, seen), 2)
-        return rounded_m, float(np.abs(one.above - now).max())
+        return along, rounded_m, float(np.abs(one.above - now).max())
 
     return min(choices, key=cost)
 

@@ -81,6 +81,7 @@ class StandingLink:
     clock: StoppedClock = field(default_factory=StoppedClock)
     hands: dict[str, Any] = field(default_factory=dict)
     positions: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    efforts: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     is_silent: bool = False
 
     def snapshot(self) -> Snapshot | None:

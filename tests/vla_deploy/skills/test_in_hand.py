@@ -2,10 +2,12 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.symbolic.state import State
+from vla_deploy.skills.arms import recall_hands
 from vla_deploy.skills.context import Held, SkillContext
 from vla_deploy.skills.errors import NotPossible
 from vla_deploy.skills.pick import pick_up
@@ -111,3 +113,21 @@ def test_what_was_meant_is_felt_though_it_is_called_otherwise_now(missing):
 
 def test_nothing_in_the_hands_is_said(missing):
     assert missing("cup_2", [thing("cup_2", "blue")]) == "no hand feels the cup_2"
+
+
+@pytest.mark.parametrize(
+    ("width_m", "kind"),
+    [(0.066, "cup"), (0.03, "object")],
+    ids=["as far apart as it is wide", "another thing is between the fingers"],
+)
+def test_after_a_restart_a_hand_holds_what_the_executor_before_said_if_it_feels_so(
+    context: SkillContext, standing: "StandingLink", width_m: float, kind: str
+) -> None:
+    gripper = context.robot.hands["left"].gripper
+    index, ratio = context.robot.joint_index[gripper], context.robot.hands["left"].opening_ratio
+    standing.positions = np.zeros(len(context.robot.joint_names))
+    standing.efforts = np.zeros(len(context.robot.joint_names))
+    standing.positions[index], standing.efforts[index] = width_m / ratio, 0.25
+    assert recall_hands(context, {"left": a_cup(), "right": A_BALL})
+    assert context.hands["left"].kind == kind
+    assert context.hands["right"] is None, "its fingers are closed upon nothing"
