@@ -13,12 +13,14 @@ from sim_twin.truth import STANDSTILL_RAD_S
 _Pair = tuple[str, signal.Signals]
 SIGNALS: Final = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM)
 COMMANDS: Final = (
-    "pick up the red cup and put it on the coffee table",
-    "pick up the blue ball and put it on the coffee table",
-    "pick up the red cup and put it in the box",
-    "pick up the blue ball and put it on the coffee table",
+    "pick up the nearest red cup and put it on the coffee table",
+    "pick up the nearest blue ball and put it on the coffee table",
+    "pick up the nearest red cup and put it in the box",
+    "pick up the nearest blue ball and put it on the coffee table",
 )
-"""All are picking and placing, most of it where the robot stands; the box is some metres away."""
+"""All are picking and placing, most of it where the robot stands; the box is some metres away.
+
+They ask for no answer: a thing that was seen from a wrong place may be remembered twice."""
 PUT_DOWN: Final = ("free your left hand", "free your right hand")
 """What a person says in turn to a robot that a kill has left with something in its hands.
 

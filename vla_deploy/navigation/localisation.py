@@ -84,6 +84,11 @@ class Localiser:
         return self._judge.doubt
 
     @property
+    def is_anchored(self) -> bool:
+        """Tell whether scans have borne out a place since the start, or since it was lost."""
+        return self._judge.is_anchored
+
+    @property
     def track_pose(self) -> Pose2D:
         """Return the dead-reckoned pose, which drifts but never jumps."""
         return self._track.pose

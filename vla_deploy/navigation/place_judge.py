@@ -73,6 +73,8 @@ class PlaceJudge:
     def __init__(self) -> None:
         self.state = PlaceState.UNSURE
         self.doubt = Doubt.STARTING
+        self.is_anchored = False
+        """Whether scans have borne out a place since the start, or since the robot was lost."""
         self._good = 0
         self._bad = 0
         self._weak = 0
@@ -94,9 +96,9 @@ class PlaceJudge:
         if self.state is not PlaceState.UNSURE:
             return
         if self._good >= SURE_AFTER_SCANS and certain:
-            self.state, self.doubt = PlaceState.TRACKING, Doubt.NONE
+            self.state, self.doubt, self.is_anchored = PlaceState.TRACKING, Doubt.NONE, True
         elif self._weak >= LOST_AFTER_SCANS:
-            self.doubt = Doubt.POOR_MATCH
+            self.doubt, self.is_anchored = Doubt.POOR_MATCH, True  # it fits no other place better
 
     def pass_time(self, now_ns: int, sigma_m: float, sigma_rad: float) -> None:
         """Tell what is known when no scan says anything."""
@@ -134,4 +136,5 @@ class PlaceJudge:
 
     def _fall(self, state: PlaceState, doubt: Doubt) -> None:
         self.state, self.doubt = state, doubt
+        self.is_anchored &= state is not PlaceState.LOST
         self._good = self._bad = self._weak = 0

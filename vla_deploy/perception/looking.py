@@ -89,8 +89,8 @@ class Looking:
             frame.stamp_ns,
         )
         still = moment.turn_rad_s <= MAX_CAMERA_TURN_RAD_S
-        # Where things are on the map is not known as long as the robot is lost.
-        placed = still and not self._whereabouts.is_lost
+        # A pose that the lidar has not borne out yet would put things where they never were.
+        placed = still and self._whereabouts.is_borne_out
         if placed and verdict.use >= Use.FORM and self._waiting is None:
             self._waiting = moment
             if verdict.use >= Use.ALL:

@@ -47,6 +47,11 @@ class Whereabouts:
         """Tell whether the pose says nothing about the map; it moves on with the wheels then."""
         return self._localiser.state is PlaceState.LOST
 
+    @property
+    def is_borne_out(self) -> bool:
+        """Tell whether the lidar has agreed with the pose since the start, or since it was lost."""
+        return self._localiser.is_anchored
+
     def pose_at(self, stamp_ns: int) -> Pose2D:
         """Return where the robot was at a moment of the last seconds."""
         return self._localiser.pose_at(stamp_ns)

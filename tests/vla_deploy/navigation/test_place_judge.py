@@ -105,3 +105,25 @@ def test_a_wide_covariance_alone_makes_it_unsure(course: Course) -> None:
 
 def test_every_doubt_has_words() -> None:
     assert set(DOUBT_TEXT) == set(Doubt)
+
+
+def test_a_place_is_borne_out_by_scans_until_the_robot_is_lost() -> None:
+    course = Course()
+    assert not course.judge.is_anchored
+    course.scans(SURE_AFTER_SCANS)
+    assert course.judge.is_anchored
+    course.scans(UNSURE_AFTER_SCANS, Doubt.POOR_MATCH)
+    assert course.judge.is_anchored, "it may be people around"
+    course.scans(LOST_AFTER_SCANS, Doubt.POOR_MATCH)
+    assert not course.judge.is_anchored
+    course.judge.found(course.now_ns)
+    assert not course.judge.is_anchored
+    course.scans(SURE_AFTER_SCANS)
+    assert course.judge.is_anchored
+
+
+def test_a_place_that_fits_badly_but_better_than_others_is_taken_in_the_end() -> None:
+    course = Course()
+    course.scans(LOST_AFTER_SCANS, ratio=0.6)
+    assert (course.judge.state, course.judge.doubt) == (PlaceState.UNSURE, Doubt.POOR_MATCH)
+    assert course.judge.is_anchored

@@ -28,7 +28,7 @@ MakeRig = Callable[..., "Rig"]
 
 def test_things_are_named_by_form_and_network_together(make_rig: MakeRig) -> None:
     rig = make_rig()
-    rig.run_for(1.0)
+    rig.run_for(1.5)
     sight = rig.scene()["sight"]
     assert (sight["mode"], sight["why"], sight["late"]) == ("network", "", 0)
     assert sight["model"]["provider"] == "CPUExecutionProvider"
