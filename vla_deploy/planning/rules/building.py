@@ -176,6 +176,8 @@ def _out_of(text: str, source: str) -> str:
 def put_down(groups: Groups, request: Request) -> list[Step]:
     """Put down what is held; with one thing in hand, or none, "it" tells nothing more."""
     said = groups.get("object", "it")
+    if said in ("everything", "all", "both", "both of them"):
+        said = "everything you are holding"
     held = [kind for kind in request.world.holding.values() if kind]
     named = {"object": said} if len(held) > 1 or PRONOUNS.get(said) != IT else {}
     return [("place", {**named, **_arm(groups)})]

@@ -10,9 +10,12 @@ from vla_deploy.planning.rules.building import Groups, is_one, parts_of, split_p
 from vla_deploy.planning.rules.intents import Intent
 from vla_deploy.planning.rules.table import RULES, Rule
 
-# Which hand to take: said at the end of a clause, whatever it is about.
+# Which hand to take: said at the end of a clause, whatever it is about. "What is in your left hand"
+# is a thing.
 _WITH_HAND: Final = re.compile(
-    r"(?P<own>.+?),? (?:(?:with|using|in) (?:the|your) (?P<arm>left|right) (?:hand|arm|gripper)|"
+    r"(?P<own>.+?),? "
+    r"(?:(?:with|using|(?<! is )(?<!'s )(?<!thing )(?<!object )(?<! one )in) (?:the|your) "
+    r"(?P<arm>left|right) (?:hand|arm|gripper)|"
     r"(?:with|using) (?:the|your) (?P<arm2>left|right)(?: one)?)"
 )
 _PACE: Final = re.compile(r",?\b(?:very |really |nice and )?(?:slowly|slow|carefully|gently)\b")

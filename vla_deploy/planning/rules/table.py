@@ -51,8 +51,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.QUESTION, rf"(?:which|what) {_OBJECT} (?:is|are|stands?|lies?)(?: there)? "
      rf"(?P<where>(?:on|in|at) .+)", telling.tell_which),
     (Intent.QUESTION, r"what (?:are you holding|do you (?:hold|have)|have you got)"
-     r"(?: in your hands?)?|what(?:'s| is) in your hands?|are you holding (?:anything|something)|"
-     r"do you (?:hold|have) (?:anything|something)(?: in your hands?)?", telling.tell_hands),
+     r"(?: in your hands?)?|what(?:'s| is) in your (?:left |right )?hands?|"
+     r"(?:are you holding|do you (?:hold|have)) (?:anything|something)(?: in your hands?)?",
+     telling.tell_hands),
     (Intent.QUESTION, r"where are you|where am i|which room (?:are you|is this)(?: in)?",
      telling.tell_place),
     (Intent.QUESTION, rf"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"

@@ -4,7 +4,7 @@ colour, kind, what it stands on or in, left or right, nearer or farther, size, t
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.errors import Ambiguous
@@ -40,6 +40,21 @@ def which_thing(things: Sequence[Thing], view: Viewpoint | None, expression: str
     kinds = {thing.kind for thing in asked}
     noun = next(iter(kinds)) if len(kinds) == 1 else "one"
     return Ambiguous(f"Which {noun}, {_either(words)}?", candidates, expression)
+
+
+def which_hand(held: Mapping[str, str], expression: str) -> Ambiguous:
+    """Return the question which of the things in the hands was meant; `held` names them by hand."""
+    candidates = [
+        Candidate(
+            name=f"what is in your {hand} hand",
+            words=f"the {said} in my {hand} hand",
+            features=frozenset((hand, *said.split())),
+        )
+        for hand, said in held.items()
+    ]
+    return Ambiguous(
+        f"Which one, {_either([one.words for one in candidates])}?", candidates, expression
+    )
 
 
 def which_place(places: Sequence[str], expression: str) -> Ambiguous:

@@ -174,9 +174,10 @@ def _arm(given: Parameters) -> Parameters:
 
 
 def _held(thing: Referent, state: State, resolver: Resolver) -> Held | None:
-    """Return the holding of a thing, which without a scene goes by its kind alone."""
+    """Return the holding of a thing, which without a scene goes by its kind alone, or its hand."""
     key = subject_of(thing.name, resolver.setting.request.scene).key
-    return next((one for one in state.held if one.key in (key, thing.kind)), None)
+    called = (one for one in state.held if one.key in (key, thing.kind))
+    return next((one for one in called if thing.hand in ("", one.hand)), None)
 
 
 def _destination(given: Parameters, resolver: Resolver, state: GetState) -> Parameters:

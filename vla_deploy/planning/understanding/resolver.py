@@ -19,7 +19,7 @@ from vla_deploy.planning.understanding.decisions import Decision
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
 from vla_deploy.planning.understanding.fitting import Use, alike, fitting, suits
 from vla_deploy.planning.understanding.parting import Place
-from vla_deploy.planning.understanding.questions import did_you_mean, which_thing
+from vla_deploy.planning.understanding.questions import did_you_mean, which_hand, which_thing
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, find
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
@@ -33,7 +33,8 @@ BY_SPEAKER: Final = 0.6
 class Referent:
     """Hold what was meant: `name` goes into the plan, an id or words; `thing` is None if unseen.
 
-    `look_at` is the furniture, if any, on which an unseen thing was said to be.
+    `look_at` is the furniture, if any, on which an unseen thing was said to be, `hand` the hand, if
+    it was said to be what that holds.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Referent:
     colour: str = ""
     thing: Thing | None = None
     look_at: str = ""
+    hand: str = ""
 
     @property
     def words(self) -> str:
@@ -200,6 +202,8 @@ class Resolver:
             several = [one for one in self.setting.latest_group() if _can_move(one, use)]
             if several:
                 return tuple(self._again(read, one, use, "you spoke of them") for one in several)
+            if use is Use.PUT and len(in_hands) > 1:
+                return self._in_hand(read, use)
         if read.pronoun == phrases.HELD:
             return self._in_hand(read, use)
         held = self.setting.held()
@@ -210,6 +214,8 @@ class Resolver:
                 return (self._again(read, one, use, "spoken of last"),)
         if held is not None and use is not Use.ONTO:
             return (self._again(read, held, use, "it is in my hand"),)
+        if use is Use.PUT and (full := dict(self.setting.holding())):
+            raise which_hand({hand: one.said for hand, one in full.items()}, read.said)
         return (self._only_thing(read, use),)
 
     def _in_list(self, read: Expression, place: Place, use: Use) -> Referent:
@@ -226,14 +232,17 @@ class Resolver:
         Raises:
             NotThere: nothing; the message says what the other hand holds.
         """
-        holding = [one for hand, one in self.setting.holding() if read.hand in ("", hand)]
+        holding = {hand: one for hand, one in self.setting.holding() if read.hand in ("", hand)}
         if not holding:
             others = [
                 f"the {hand} one holds the {one.said}" for hand, one in self.setting.holding()
             ]
             nothing = f"my {read.hand} hand holds nothing" if read.hand else "I hold nothing"
             raise NotThere("; ".join((nothing, *others)))
-        return tuple(self._again(read, one, use, "it is in my hand") for one in holding)
+        return tuple(
+            replace(self._again(read, one, use, f"it is in my {hand} hand"), hand=hand)
+            for hand, one in holding.items()
+        )
 
     def _can_be(self, one: Mention, use: Use) -> bool:
         """Tell whether what was mentioned can be meant: nothing is put upon itself."""

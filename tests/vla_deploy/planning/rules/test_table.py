@@ -240,6 +240,30 @@ def test_what_is_held_is_put_down_and_never_dropped(does: Does) -> None:
         does("open your left hand", holding=holding)
 
 
+@pytest.mark.parametrize("kinds", [("cup", "ball"), ("object", "object")], ids=" and ".join)
+def test_with_two_full_hands_the_one_that_is_meant_is_emptied(
+    does: Does, kinds: tuple[str, str]
+) -> None:
+    holding = dict(zip(("left", "right"), kinds, strict=True))
+    assert does("put down what is in your left hand", holding=holding) == (
+        "place coffee_table on left"
+    )
+    assert does("put the thing in your right hand down", holding=holding) == (
+        "place coffee_table on right"
+    )
+    for both in ("put everything down", "put down both", "put them down"):
+        assert does(both, holding=holding) == "place coffee_table on left; place coffee_table on"
+    with pytest.raises(Ambiguous, match=f"the {kinds[0]} in my left hand or the {kinds[1]} in my"):
+        does("put it down", holding=holding)
+    assert does("what is in your left hand", holding=holding) == (
+        f"speak I hold {_a(kinds[0])} in my left hand and {_a(kinds[1])} in my right hand."
+    )
+
+
+def _a(kind: str) -> str:
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
+
+
 def test_go_back_leads_to_where_the_robot_was_before(does: Does) -> None:
     talk = Conversation().after(Turn(said="go to the kitchen", here=(1.0, 2.0, 0.0)))
     assert does("go back", conversation=talk) == "navigate_to 1.0 2.0 0.0"
