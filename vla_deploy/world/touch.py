@@ -23,6 +23,8 @@ DRIFT_M: Final = 0.002
 # An effort below the threshold for longer than this is no gap between two measurements.
 SLACK_S: Final = 0.20
 OPENED_M: Final = 0.002
+# A goal that moves less between two samples stands.
+RISE_M: Final = 0.00005
 # What a felt width may differ from the thing's own.
 FITS_M: Final = 0.020
 
@@ -74,6 +76,7 @@ class Touch:
     goal_m: float = 0.0
     pressed_ns: int = 0
     settled_ns: int = 0
+    raised_ns: int = 0
 
     @property
     def is_held(self) -> bool:
@@ -100,7 +103,7 @@ def _while_held(now: Touch, sample: FingerSample) -> Touch:
     short_m = sample.opening_m - sample.goal_m
     if sample.goal_m > now.goal_m + OPENED_M:
         opened = _become(now, Grip.EMPTY, sample, cause=OPENED)
-        return replace(opened, goal_m=sample.goal_m)
+        return replace(opened, goal_m=sample.goal_m, raised_ns=sample.stamp_ns)
     if short_m <= SHORT_M:
         return _become(now, Grip.LOST, sample, cause="it slipped out: the fingers have closed")
     if _since_s(now.pressed_ns, sample) > SLACK_S:
@@ -117,11 +120,18 @@ def _while_held(now: Touch, sample: FingerSample) -> Touch:
 
 def _while_empty(now: Touch, sample: FingerSample) -> Touch:
     short_m = sample.opening_m - sample.goal_m
+    is_pressing = now.pressed_ns == sample.stamp_ns
+    presses_on = is_pressing and _since_s(now.settled_ns, sample) >= SETTLE_S
     if now.cause == OPENED and sample.goal_m >= now.goal_m - OPENED_M:
         # The fingers follow a goal that rises: they are behind it, and press no more on purpose.
-        return replace(now, goal_m=max(now.goal_m, sample.goal_m))
-    is_pressing = now.pressed_ns == sample.stamp_ns
-    if is_pressing and _since_s(now.settled_ns, sample) >= SETTLE_S:
+        rises = sample.goal_m > now.goal_m + RISE_M
+        raised_ns = sample.stamp_ns if rises else now.raised_ns
+        now = replace(now, goal_m=max(now.goal_m, sample.goal_m), raised_ns=raised_ns)
+        # A goal that stands again before it has let go, as of a control that started anew, did not.
+        presses_on = presses_on and _since_s(raised_ns, sample) >= SETTLE_S
+        if not presses_on:
+            return now
+    if presses_on:
         return _hold(now, sample)
     if now.grip is Grip.LOST and abs(sample.goal_m - now.goal_m) <= OPENED_M:
         return now  # until the hand is used again

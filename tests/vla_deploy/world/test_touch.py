@@ -156,3 +156,14 @@ def test_the_same_past_feels_the_same() -> None:
         closing_ratio=0.25,
     )
     assert feel(before, sample) == feel(replace(before), sample)
+
+
+def test_a_goal_that_jumps_up_while_the_fingers_press_on_has_not_let_go() -> None:
+    """A control that starts anew sends the fingers less far: it opens nothing."""
+    fingers = Fingers()
+    fingers.close()
+    for _ in range(4):
+        fingers.rest(CUP_M, goal_m=CUP_M - 0.008)
+    for _ in range(10):
+        touch = fingers.rest(CUP_M, goal_m=CUP_M - 0.008)
+    assert (touch.grip, touch.width_m) == (Grip.HOLDING, CUP_M)
