@@ -26,25 +26,42 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder for data and models")
     parser.add_argument("--size", choices=SIZES, default="full")
     parser.add_argument("--threads", type=int, default=1, help="of the training (default: 1)")
+    parser.add_argument("--start-from", type=Path, help="an exported fp32 model to go on from")
+    parser.add_argument("--seed", type=int, default=0, help="of training images (default: 0)")
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     if arguments.step == "all":
-        _run_all(arguments.out, arguments.size, arguments.threads)
+        _run_all(_options(arguments))
         return
-    settings = replace(SIZES[arguments.size], threads=arguments.threads)
+    settings = replace(
+        SIZES[arguments.size],
+        threads=arguments.threads,
+        start_from=arguments.start_from,
+        seed=arguments.seed,
+    )
     {**STEPS, "ship": _ship}[arguments.step](arguments.out, settings)
 
 
-def _run_all(out: Path, size: str, threads: int) -> None:
+def _options(arguments: argparse.Namespace) -> list[str]:
+    given = vars(arguments) | {"step": None}
+    return [
+        word
+        for name, value in given.items()
+        if value is not None
+        for word in (f"--{name.replace('_', '-')}", str(value))
+    ]
+
+
+def _run_all(options: list[str]) -> None:
     """Run each step in a process of its own: Mesa's LLVM and torch crash each other in one."""
-    options = ["--out", str(out), "--size", size, "--threads", str(threads)]
     for step in STEPS:
         subprocess.run([sys.executable, "-m", "training.detector", step, *options], check=True)
 
 
 def _data(out: Path, settings: Settings) -> None:
     for split, shards in settings.shards:
-        generate(out / "data", split, range(shards), settings.seed)
+        seed = settings.seed if split == "train" else JUDGED_SEED
+        generate(out / "data", split, range(shards), seed)
 
 
 # The steps below import torch and onnx, which the first does not need.
@@ -76,6 +93,8 @@ def _ship(out: Path, _settings: Settings) -> None:
 
 
 MODELS = "models"
+JUDGED_SEED = 0
+"""All models are judged on the same images."""
 STEPS: dict[str, Callable[[Path, Settings], None]] = {
     "data": _data,
     "train": _train,

@@ -22,6 +22,7 @@ TITLES = {
     "heldout": "Unseen scenes, lights and textures",
     "flat": "The flat of the twin as it is, with things not seen in training",
 }
+BEGAN = "It began with the weights of the model that was shipped before it, not with random ones."
 
 
 def describe(models: Path, settings: Settings) -> None:
@@ -104,6 +105,8 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
         "tables": tables(metrics),
         "calibration_images": settings.calibration_images,
         "size": settings.name,
+        "more": f" --seed {settings.seed} --start-from MODEL" if settings.start_from else "",
+        "began": f"{BEGAN}\n" if settings.start_from else "",
         "seed": settings.seed,
         "epochs": settings.epochs,
         "settling_epochs": settings.settling_epochs,

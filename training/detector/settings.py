@@ -1,6 +1,7 @@
 """Say how much data and how long a training; the smallest size only checks that all works."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +22,8 @@ class Settings:
     learning_rate: float = 2e-3
     calibration_images: int = 200
     threads: int = 1
+    start_from: Path | None = None
+    """The exported model to go on from, else from random weights."""
 
     def shard_count(self, split: str) -> int:
         """Return how many shards a split has."""
@@ -41,6 +44,14 @@ LONG = Settings(
     settling_epochs=3,
 )
 """About four hours on one idle core; not run yet."""
+MORE = Settings(
+    name="more",
+    shards=(("heldout", 50), ("flat", 20), ("train", 540)),
+    epochs=16,
+    settling_epochs=3,
+    learning_rate=1e-3,
+)
+"""Goes on from the shipped model, best with a seed that no training had yet: as long as `full`."""
 SHORT = Settings(
     name="short",
     shards=(("heldout", 50), ("flat", 20), ("train", 200)),
@@ -56,4 +67,4 @@ TINY = Settings(
     batch=4,
     calibration_images=4,
 )
-SIZES = {settings.name: settings for settings in (LONG, FULL, SHORT, TINY)}
+SIZES = {settings.name: settings for settings in (LONG, FULL, MORE, SHORT, TINY)}

@@ -11,10 +11,11 @@ from torch import Tensor
 
 from training.detector.batches import make_batch
 from training.detector.classes import CLASSES
-from training.detector.dataset import load
+from training.detector.dataset import Shard, load
 from training.detector.losses import losses
 from training.detector.network import CentreNet
 from training.detector.settings import Settings
+from training.warm_start import begin_from
 
 WEIGHTS = "centre_net.pt"
 STATE = "training_state.pt"
@@ -25,6 +26,7 @@ WARM_STEPS = 300
 LAST_RATE_RATIO = 0.01
 """Learning rate at the end over the highest."""
 TELL_EVERY_STEPS = 100
+TYPICAL_IMAGES = 64
 _LOG = logging.getLogger(__name__)
 
 
@@ -41,6 +43,8 @@ def train(out: Path, settings: Settings) -> None:
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     shard = load(out / "data", "train", settings.shard_count("train"))
     run = _Run(settings, device, len(shard.images) // settings.batch)
+    if settings.start_from is not None:
+        run.begin_from(settings.start_from, shard)
     for epoch in range(run.resume(out / STATE), settings.epochs + settings.settling_epochs):
         random = np.random.default_rng([settings.seed, 100, epoch])
         piece_px = settings.piece_px if epoch < settings.epochs else None
@@ -71,6 +75,14 @@ class _Run:
         self.average = copy.deepcopy(self.model).eval()
         self._steps = 0
         self._optimiser = torch.optim.AdamW(self.model.parameters(), weight_decay=WEIGHT_DECAY)
+
+    def begin_from(self, path: Path, shard: Shard) -> None:
+        """Take the weights of an exported model."""
+        typical = np.linspace(0, len(shard.images) - 1, TYPICAL_IMAGES).astype(int)
+        images = torch.from_numpy(shard.images[typical]).permute(0, 3, 1, 2).float() / 255
+        begin_from(self.model, path, images.to(self._device))
+        self.model.train()
+        self.average.load_state_dict(self.model.state_dict())
 
     def resume(self, path: Path) -> int:
         """Load what was saved, if anything, and return the next epoch."""

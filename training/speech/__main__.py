@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -20,6 +20,7 @@ class Job:
     out: Path
     size: Size
     budget_s: float
+    start_from: Path | None = None
 
 
 def main() -> None:
@@ -39,15 +40,25 @@ def main() -> None:
         "--minutes", type=float, default=180.0,
         help="of training in all; a longer one goes on from a shorter one (default: 180)",
     )  # fmt: skip
+    parser.add_argument("--start-from", type=Path, help="folder of a recogniser to go on from")
+    parser.add_argument("--seed", type=int, help="of the clips (default: by the size)")
     given = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     if given.step == "all":
         options = ["--out", str(given.out), "--size", given.size, "--minutes", str(given.minutes)]
+        options += [] if given.start_from is None else ["--start-from", str(given.start_from)]
+        options += [] if given.seed is None else ["--seed", str(given.seed)]
         for step in STEPS:
             subprocess.run([sys.executable, "-m", "training.speech", step, *options], check=True)
         return
     given.out.mkdir(parents=True, exist_ok=True)
-    job = Job(out=given.out, size=SIZES[given.size], budget_s=60.0 * given.minutes)
+    size = SIZES[given.size]
+    job = Job(
+        out=given.out,
+        size=size if given.seed is None else replace(size, seed=given.seed),
+        budget_s=60.0 * given.minutes,
+        start_from=given.start_from,
+    )
     {**STEPS, "ship": _ship}[given.step](job)
 
 
@@ -61,7 +72,7 @@ def _data(job: Job) -> None:
 def _train(job: Job) -> None:
     from training.speech.training import train
 
-    train(job.out, job.size, job.budget_s)
+    train(job.out, job.size, job.budget_s, job.start_from)
 
 
 def _export(job: Job) -> None:

@@ -6,6 +6,7 @@ What was learnt before the fall is kept, so that a longer training goes on from 
 import copy
 import json
 import logging
+import shutil
 import signal
 import time
 from pathlib import Path
@@ -22,6 +23,7 @@ from training.speech.sentences import draw_sentence
 from training.speech.sizes import Size
 from training.speech.spoiling import Spoiler
 from training.speech.tokens import TOKENIZER, Coder, make_tokenizer
+from training.speech.warm_start import NotReadable, weights_of
 
 STATE: Final = "state.pt"
 BEFORE_FALL: Final = "before_fall.pt"
@@ -36,17 +38,22 @@ FALL_FROM: Final = 0.55
 SHORT_UNTIL: Final = 0.1
 """Share of the time in which only the shorter clips are learnt from."""
 SMOOTHING: Final = 0.05
+STARTED_RATIO: Final = 0.5
+"""Of the rates of learning, where a training begins with weights that were shipped."""
 _SAVE_EVERY_STEPS: Final = 200
 _TELL_EVERY_STEPS: Final = 50
 _TALKERS: Final = 400
 _LOG = logging.getLogger(__name__)
 
 
-def train(out: Path, size: Size, budget_s: float) -> None:
+def train(out: Path, size: Size, budget_s: float, start_from: Path | None = None) -> None:
     """Train on the clips under `out` for that long in all; go on where it was broken off.
+
+    With `start_from`, the folder of a shipped recogniser, it begins with that one's weights.
 
     Raises:
         FileNotFoundError: there are no clips yet.
+        NotReadable: what to start from gives no weights.
     """
     torch.manual_seed(size.seed)
     torch.set_num_threads(1)
@@ -54,10 +61,14 @@ def train(out: Path, size: Size, budget_s: float) -> None:
     if not clips.refresh():
         raise FileNotFoundError(f"{out / 'clips'}: no clips; make them by the step data")
     random = np.random.default_rng([size.seed, time.time_ns()])
+    if start_from is not None and not (out / TOKENIZER).exists():
+        shutil.copyfile(start_from / TOKENIZER, out / TOKENIZER)
     coder = _coder(out / TOKENIZER, size)
     talk = [clips.clips[int(n)].samples for n in random.integers(len(clips.clips), size=_TALKERS)]
     maker = Maker(coder, Spoiler(talk, random))
     run = _Run(out, size, coder.count, budget_s)
+    if start_from is not None:
+        run.begin_from(start_from / "model.bin")
     stopping = _Stopping()
     while run.progress() < 1.0:
         clips.refresh()
@@ -104,6 +115,23 @@ class _Run:
         self._steps, self._spent_s, self._heard_s, self._fell = 0, 0.0, 0.0, False
         self._resume()
         self._began_s = time.monotonic()
+
+    def begin_from(self, path: Path) -> None:
+        """Take the weights of a shipped recogniser, unless this training has begun already.
+
+        Rates stay lower then: what is learnt is not to be shaken up. The head that names sounds was
+        not shipped, and learns anew.
+        """
+        if self._steps:
+            return
+        for optimiser in self._optimisers:
+            for group in optimiser.param_groups:
+                group["highest"] *= STARTED_RATIO
+        values = {name: torch.from_numpy(rows) for name, rows in weights_of(path).items()}
+        missing, unknown = self.model.load_state_dict(values, strict=False)
+        if unknown or any(not name.startswith("sounds.") for name in missing):
+            raise NotReadable(f"{path}: missing {missing}, unknown {unknown}; is it of this size?")
+        self.average.load_state_dict(self.model.state_dict())
 
     def progress(self) -> float:
         """Return the share of the time that has gone."""

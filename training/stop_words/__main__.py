@@ -3,6 +3,7 @@
 import argparse
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from training.stop_words.corpus import speak
@@ -20,11 +21,24 @@ def main() -> None:
     parser.add_argument("step", choices=[*STEPS, "ship", "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for clips and models")
     parser.add_argument("--size", choices=SIZES, default="full")
+    parser.add_argument("--minutes", type=float, help="how long to learn (default: by the size)")
+    parser.add_argument("--start-from", type=Path, help="an exported model to go on from")
+    parser.add_argument("--seed", type=int, default=0, help="of clips and learning (default: 0)")
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     steps = {**STEPS, "ship": _ship}
     for name in STEPS if arguments.step == "all" else [arguments.step]:
-        steps[name](arguments.out, SIZES[arguments.size])
+        steps[name](arguments.out, _settings_of(arguments))
+
+
+def _settings_of(arguments: argparse.Namespace) -> Settings:
+    size = SIZES[arguments.size]
+    return replace(
+        size,
+        cpu_minutes=arguments.minutes or size.cpu_minutes,
+        start_from=arguments.start_from,
+        seed=arguments.seed,
+    )
 
 
 def _speak(out: Path, settings: Settings) -> None:

@@ -1,6 +1,7 @@
 """Say how much is spoken and how long is learnt; the smallest size only checks that all works."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +22,13 @@ class Settings:
     learning_rate: float = 3e-3
     judged_hours: float = 0.5
     judged_stops: int = 200
+    start_from: Path | None = None
+    """The exported model to go on from, else from random weights."""
+
+    @property
+    def highest_rate(self) -> float:
+        """Return the highest learning rate: what is learnt already is not to be shaken up."""
+        return self.learning_rate if self.start_from is None else self.learning_rate / 3.0
 
 
 FULL = Settings(name="full")

@@ -18,6 +18,7 @@ from training.stop_words.network import StopNet
 from training.stop_words.rooms import NoiseBank
 from training.stop_words.settings import Settings
 from training.stop_words.texts import WORDS
+from training.warm_start import begin_from
 
 WEIGHTS: Final = "stop_net.pt"
 STATE: Final = "training_state.pt"
@@ -33,6 +34,7 @@ FOOLED: Final = 0.15
 PHONE_WEIGHTS: Final = (1.0, 0.3)
 PHONES_UNTIL: Final = 0.4
 """Share of the time in which the network learns above all to tell sounds apart."""
+TYPICAL: Final = 16
 POOL: Final = 300
 """Stretches that are shown again, each a few times: mixing one costs more than learning from it."""
 _LOG = logging.getLogger(__name__)
@@ -51,6 +53,9 @@ def train(out: Path, settings: Settings) -> None:
     others = Clips(out / "clips", TRAIN, "others")
     bank = NoiseBank(others, np.random.default_rng([settings.seed, 1]))
     mixer = Mixer(Clips(out / "clips", TRAIN, "stops"), others, bank, settings.stretch_s)
+    if settings.start_from is not None and run.steps == 0:
+        random = np.random.default_rng([settings.seed, 3])
+        run.begin_from(settings.start_from, [mixer.stretch(random) for _ in range(TYPICAL)])
     mixer.hard = run.hard
     pool: deque[Stretch] = deque(maxlen=POOL)
     began_s = time.process_time() - run.spent_s
@@ -94,6 +99,12 @@ class _Run:
     def done(self) -> float:
         """Return the share of the time that is spent."""
         return self.spent_s / (60.0 * self._settings.cpu_minutes)
+
+    def begin_from(self, path: Path, typical: list[Stretch]) -> None:
+        """Take the weights of an exported model; the phones' head, which is not in it, is new."""
+        begin_from(self.model, path, torch.from_numpy(np.stack([one.frames.T for one in typical])))
+        self.model.train()
+        self.average.load_state_dict(self.model.state_dict())
 
     def resume(self, path: Path) -> None:
         """Load what was saved, if anything."""
@@ -154,7 +165,7 @@ class _Run:
         rise = min(1.0, (done + 1e-3) / WARM_RATIO)
         fall = 0.5 * (1.0 + np.cos(np.pi * done))
         low = LAST_RATE_RATIO
-        return float(self._settings.learning_rate * rise * (low + (1.0 - low) * fall))
+        return float(self._settings.highest_rate * rise * (low + (1.0 - low) * fall))
 
     @torch.no_grad()
     def _follow(self) -> None:
