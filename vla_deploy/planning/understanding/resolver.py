@@ -206,6 +206,9 @@ class Resolver:
                 return self._in_hand(read, use)
         if read.pronoun == phrases.HELD:
             return self._in_hand(read, use)
+        just_said = [one for one in self.setting.mentions if one.role is Role.OBJECT]
+        if use is Use.PUT and just_said and self._can_be(just_said[-1], use):
+            return (self._again(read, just_said[-1], use, "you have just said it"),)
         held = self.setting.held()
         if use is Use.PUT and held is not None:
             return (self._again(read, held, use, "it is in my hand"),)

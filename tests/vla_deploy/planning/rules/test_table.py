@@ -240,6 +240,14 @@ def test_what_is_held_is_put_down_and_never_dropped(does: Does) -> None:
         does("open your left hand", holding=holding)
 
 
+@pytest.mark.parametrize("held", ["cup", "object"])
+def test_with_one_hand_full_it_is_what_the_command_speaks_of(does: Does, held: str) -> None:
+    assert does("pick up the green ball and put it in the box", holding={"right": held}) == (
+        "pick_up green ball left; place box in left"
+    )
+    assert does("put it in the box", holding={"right": held}) == "place box in"
+
+
 @pytest.mark.parametrize("kinds", [("cup", "ball"), ("object", "object")], ids=" and ".join)
 def test_with_two_full_hands_the_one_that_is_meant_is_emptied(
     does: Does, kinds: tuple[str, str]
