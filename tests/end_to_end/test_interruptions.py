@@ -89,13 +89,13 @@ def test_fingers_that_close_on_nothing_are_reported(stack: LockstepStack) -> Non
     assert all(joints[name]["position"] == pytest.approx(tuck[name], abs=0.1) for name in tuck)
 
 
-def test_a_restarted_executor_feels_what_the_hand_holds(stack: LockstepStack) -> None:
+def test_a_restarted_executor_recalls_what_the_hand_holds(stack: LockstepStack) -> None:
     assert stack.say("pick up the red cup")["success"]
     stack.lockstep.kill(stack.executor)
     rate_hz = load_profile("desktop").executor_rate_hz
     stack.lockstep.add(ExecutorNode(stack.lockstep.context, stack.robot, rate_hz))
     stack.lockstep.run_for(1.0)
-    assert holding(stack) == {"left": "object", "right": None}
+    assert holding(stack) == {"left": "cup", "right": None}
     assert stack.lockstep.truth()["held"] == ["red_cup"]
     assert stack.say("put it on the coffee table")["success"]
     assert stack.lockstep.truth()["held"] == []

@@ -37,7 +37,8 @@ def carry(context: SkillContext) -> Skill:
         NotPossible: an arm is under furniture, and the robot cannot drive back.
         TryAgain: something stands behind the robot.
     """
-    yield from leave_underside(context)
+    if not all(_is_at(context, _travel_targets(context, hand)) for hand in context.robot.hands):
+        yield from leave_underside(context)
     for hand in context.robot.hands:
         yield from _raise_clear(context, hand)
     targets: dict[str, float] = {}

@@ -142,10 +142,22 @@ def turn(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     Raises:
         TryAgain: control did not let the base turn for too long.
     """
-    limits = limits_of(context)
     angle_rad, turned = float(parameters["angle_rad"]), _Turned(context)
     context.may_go_on(lambda: {"angle_rad": angle_rad - turned.by_rad()})
-    patience = _Patience(context)
+    yield from _turn(context, angle_rad, turned)
+
+
+def turn_by(context: SkillContext, angle_rad: float) -> Skill:
+    """Turn on the spot by an angle, as a part of another skill.
+
+    Raises:
+        TryAgain: control did not let the base turn for too long.
+    """
+    yield from _turn(context, angle_rad, _Turned(context))
+
+
+def _turn(context: SkillContext, angle_rad: float, turned: "_Turned") -> Skill:
+    limits, patience = limits_of(context), _Patience(context)
     while abs(left_rad := angle_rad - turned.by_rad()) > 0.02:
         rate = min(limits.turn_rate_rad_s, 2.0 * abs(left_rad))
         twist = Twist(0.0, math.copysign(max(rate, 0.06), left_rad))

@@ -1,17 +1,22 @@
 """Go to a place, a point, or to where an object can be reached."""
 
+import math
 from collections.abc import Callable, Generator, Mapping
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.carrying import carry
 from vla_deploy.skills.context import Skill, SkillContext
-from vla_deploy.skills.drive import drive_to
+from vla_deploy.skills.drive import drive_to, turn_by
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
+from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import DRIVING_GAZE, remembered, see, turn_head
 from vla_deploy.skills.stand import standing_poses
+
+# Where the heading goes, left of a thing that a hand before one shoulder may hide.
+PAST_HAND_RAD: Final = {("left",): 0.15, ("right",): -0.15, ("left", "right"): 0.0}
 
 T = TypeVar("T")
 Solving = Generator[None, None, T]
@@ -78,13 +83,34 @@ def solve_near(context: SkillContext, query: ObjectQuery, solve: Callable[[], T]
         TryAgain: the object is not where it was.
         OutOfReach: it is, from both poses.
     """
-    yield from see(context, query)
+    yield from _see_past_hands(context, query)
     try:
         return solve()
     except OutOfReach:
         yield from reach(context, query, anew=True)
-    yield from see(context, query)
+    yield from _see_past_hands(context, query)
     return solve()
+
+
+def _see_past_hands(context: SkillContext, query: ObjectQuery) -> Skill:
+    """See an object; where a full hand may hide it, turn that hand out of the way and look again.
+
+    Raises:
+        TryAgain: the object is not where it was.
+    """
+    try:
+        yield from see(context, query)
+    except TryAgain:
+        known, full = remembered(context, query), _full_hands(context)
+        if known is None or not full:
+            raise
+        x_m, y_m, _ = to_base(context.link.pose, known["position_m"])
+        yield from turn_by(context, math.atan2(y_m, x_m) + PAST_HAND_RAD[full])
+        yield from see(context, query)
+
+
+def _full_hands(context: SkillContext) -> tuple[str, ...]:
+    return tuple(sorted(hand for hand, held in context.hands.items() if held is not None))
 
 
 def _place(context: SkillContext, name: str) -> FloorPose:

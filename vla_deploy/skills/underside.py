@@ -6,10 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import NS_PER_S
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.drive import straight
 from vla_deploy.skills.errors import NotPossible
 from vla_deploy.skills.frames import on_floor
+from vla_deploy.skills.motion import wait_until
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +23,8 @@ STEP_BACK_M = 0.05
 FARTHEST_BACK_M = 0.6
 # While arms are out, and may hang beside a table's leg.
 BACK_OFF_M_S = 0.1
+# A robot that has just started sees no furniture before it knows where it is.
+SEEN_WITHIN_S, LOOK_PATIENCE_S = 2.0, 5.0
 
 
 def leave_underside(context: SkillContext) -> Skill:
@@ -30,6 +34,7 @@ def leave_underside(context: SkillContext) -> Skill:
         NotPossible: no way straight back frees it, or the map shows no room for it.
         TryAgain: something stands behind the robot.
     """
+    yield from wait_until(context, lambda: _has_looked(context), LOOK_PATIENCE_S)
     distance_m = way_back_m(context)
     if distance_m > 0.0:
         yield from straight(context, -distance_m, BACK_OFF_M_S)
@@ -56,6 +61,11 @@ def way_back_m(context: SkillContext) -> float:
         f"the {hands[0]} arm is under a table, and driving {FARTHEST_BACK_M} m back would not free"
         " it; draw it out by hand"
     )
+
+
+def _has_looked(context: SkillContext) -> bool:
+    age_ns = context.link.clock.now_ns() - context.link.scene_stamp_ns
+    return age_ns <= SEEN_WITHIN_S * NS_PER_S
 
 
 def _low_parts(context: SkillContext) -> Iterator[tuple[str, NDArray[np.float32], Floats]]:
