@@ -1,4 +1,4 @@
-"""A finger that comes down on a cup feels it: the hand rises, looks again, and takes it."""
+"""A hand that comes down on something feels it: it rises, looks again, and tries anew."""
 
 import numpy as np
 import pytest
@@ -7,23 +7,27 @@ from sim_twin.stack import LockstepStack
 
 pytestmark = pytest.mark.gl
 
-HAND, CUP = "left_grip", "red_cup"
+HAND, CUP, BOX = "left_grip", "red_cup", "box"
 NUDGE_M = 0.014
+# The box's wall comes under the cup.
+BOX_NUDGE_M = 0.10
 ABOVE_M = (0.08, 0.14)
 STILL_M = 0.0005
 
 
-def _way_to_the_cup_m(stack: LockstepStack) -> np.ndarray:
+def _way_m(stack: LockstepStack, body: str) -> np.ndarray:
     data = stack.lockstep.twin.engine.data
-    return np.array(data.body(CUP).xpos - data.site(HAND).xpos)
+    return np.array(data.body(body).xpos - data.site(HAND).xpos)
 
 
-def _is_about_to_come_down(stack: LockstepStack) -> bool:
-    """Tell whether the hand stands still above the cup."""
-    before_m = _way_to_the_cup_m(stack)
+def _is_about_to_come_down(
+    stack: LockstepStack, body: str, above_m: tuple[float, float], beside_m: float
+) -> bool:
+    """Tell whether the hand stands still above a thing."""
+    before_m = _way_m(stack, body)
     stack.lockstep.run_for(0.02)
-    way_m = _way_to_the_cup_m(stack)
-    is_above = float(np.hypot(*way_m[:2])) < 0.02 and ABOVE_M[0] < -way_m[2] < ABOVE_M[1]
+    way_m = _way_m(stack, body)
+    is_above = float(np.hypot(*way_m[:2])) < beside_m and above_m[0] < -way_m[2] < above_m[1]
     return is_above and float(np.abs(way_m - before_m).max()) < STILL_M
 
 
@@ -38,9 +42,9 @@ def _nudge(stack: LockstepStack) -> None:
 @pytest.mark.timeout(240)
 def test_a_cup_that_is_nudged_under_the_hand_is_taken_all_the_same(stack: LockstepStack) -> None:
     command = stack.give(text="pick up the red cup")
-    assert stack.lockstep.run_until(lambda: _is_about_to_come_down(stack), 60.0)
+    assert stack.lockstep.run_until(lambda: _is_about_to_come_down(stack, CUP, ABOVE_M, 0.02), 60.0)
     _nudge(stack)
-    assert stack.lockstep.run_until(lambda: -_way_to_the_cup_m(stack)[2] > ABOVE_M[1], 30.0), (
+    assert stack.lockstep.run_until(lambda: -_way_m(stack, CUP)[2] > ABOVE_M[1], 30.0), (
         "the hand rises again"
     )
     assert stack.status()["state"] == "armed"
@@ -49,3 +53,23 @@ def test_a_cup_that_is_nudged_under_the_hand_is_taken_all_the_same(stack: Lockst
     assert outcome is not None
     assert outcome["success"], outcome["error"]
     assert CUP in stack.lockstep.truth()["held"]
+
+
+@pytest.mark.timeout(300)
+def test_a_cup_that_comes_down_on_the_rim_of_a_box_is_raised_and_put_into_it(
+    stack: LockstepStack,
+) -> None:
+    engine = stack.lockstep.twin.engine
+    command = stack.give(text="pick up the red cup and put it in the box")
+    above = (0.15, 0.30)
+    assert stack.lockstep.run_until(lambda: _is_about_to_come_down(stack, BOX, above, 0.03), 120.0)
+    x_m, y_m, z_m = engine.data.body(BOX).xpos
+    engine.place(BOX, x_m - BOX_NUDGE_M, y_m, z_m, 0.0)
+    assert stack.lockstep.run_until(lambda: stack.outcome(command) is not None, 120.0)
+    outcome = stack.outcome(command)
+    assert outcome is not None
+    assert outcome["success"], outcome["error"]
+    tries = [str(one.get("error")) for one in stack.events if one["event"] == "action"]
+    assert any("has met something" in error for error in tries), tries
+    assert stack.status()["state"] == "armed"
+    assert stack.lockstep.inside(CUP, BOX)["inside"]

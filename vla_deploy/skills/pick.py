@@ -13,10 +13,9 @@ from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import Grasp, grasps_from_above, hand_down
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
-    arm_joints,
     feel,
+    feel_way,
     lift,
-    move_straight,
     move_to_posture,
     set_opening,
 )
@@ -25,7 +24,7 @@ from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered
-from vla_deploy.skills.motion import pause, settle
+from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.neighbours import crowding_m
 from vla_deploy.skills.swing import heights_above
@@ -33,12 +32,9 @@ from vla_deploy.skills.swing import heights_above
 PREGRASP_M = 0.12
 FINGER_TIPS_M = 0.03
 APPROACH_SPEED_RATIO = 0.5
-FEELING_SPEED_RATIO = 0.15
 STRAIGHT_SPEED_RATIO = 0.35
 # The fingers are sent this much past the surface they should meet.
 SQUEEZE_M = 0.012
-# Of the contact limits. On its way down, a free arm of the twin feels 0.1 of them at most.
-TOUCH_RATIO = 0.25
 MOST_TOUCHES = 3
 # The sine of the angle from which on fingers close along another line.
 ANOTHER_LINE = math.sin(math.radians(40.0))
@@ -96,9 +92,8 @@ def _approach(context: SkillContext, choice: Choice) -> Skill:
     yield from move_to_posture(context, hand, choice.above, APPROACH_SPEED_RATIO)
     target = hand_down(grasp.point_m, grasp.yaw_rad)
     try:
-        yield from move_straight(context, hand, target, FEELING_SPEED_RATIO, TOUCH_RATIO)
+        yield from feel_way(context, hand, target)
     except Touched:
-        yield from settle(context, arm_joints(context, hand))
         yield from move_to_posture(context, hand, choice.above, STRAIGHT_SPEED_RATIO)
         raise
 

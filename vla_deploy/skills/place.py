@@ -14,15 +14,15 @@ from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
     believe_fingers,
+    feel_way,
     lift,
-    move_straight,
     move_to_posture,
     opening_of,
     set_opening,
 )
 from vla_deploy.skills.carrying import RESTARTS, carry, or_carry
 from vla_deploy.skills.context import Held, Skill, SkillContext
-from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
+from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
 from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered, turn_head, watch
 from vla_deploy.skills.motion import pause
@@ -42,7 +42,11 @@ YAWS_RAD = tuple(2 * math.pi * step / 16 for step in range(16))
 LOST_OPENING_M = 0.012
 LOOK_AT_TABLE = (0.0, 0.85)
 LET_GO_M = 0.03
-ABOVE_SPEED_RATIO, DOWN_SPEED_RATIO = 0.5, 0.35
+ABOVE_SPEED_RATIO = 0.5
+# What stands so much early has come down: things are seen and held to a few centimetres. What was
+# only felt may reach down much farther than was taken for granted.
+EARLY_M, EARLY_UNKNOWN_M = 0.04, 0.10
+UNKNOWN = "object"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,9 +79,7 @@ def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
 
 def _put_down(context: SkillContext, hand: str, held: Held, release: Release) -> Skill:
     yield from move_to_posture(context, hand, release.above, ABOVE_SPEED_RATIO)
-    down = context.arms[hand].forward(context.link.setpoints)
-    down[:3, 3] = release.point_m
-    yield from move_straight(context, hand, down, DOWN_SPEED_RATIO)
+    yield from _lower(context, hand, held, release)
     believe_fingers(context)
     if context.hands[hand] is None:
         raise NotPossible(f"the {hand} hand has lost the {held.kind} before it was put down")
@@ -85,6 +87,24 @@ def _put_down(context: SkillContext, hand: str, held: Held, release: Release) ->
     context.hands[hand] = None
     yield from pause(context, 0.3)
     yield from lift(context, hand, release.above_m)
+
+
+def _lower(context: SkillContext, hand: str, held: Held, release: Release) -> Skill:
+    """Feel the way down until what is held stands, or would.
+
+    Raises:
+        Touched: something is in the way high above that; the hand is over it again.
+    """
+    arm = context.arms[hand]
+    down = arm.forward(context.link.setpoints)
+    down[:3, 3] = release.point_m
+    try:
+        yield from feel_way(context, hand, down)
+    except Touched:
+        left_m = float(arm.forward(context.link.positions)[2, 3]) - release.point_m[2]
+        if left_m > (EARLY_UNKNOWN_M if held.kind == UNKNOWN else EARLY_M):
+            yield from move_to_posture(context, hand, release.above, ABOVE_SPEED_RATIO)
+            raise
 
 
 def _release(

@@ -1,6 +1,5 @@
 """Find free spots on the surfaces in front of the robot."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,11 +8,14 @@ import numpy as np
 
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.frames import to_map
+from vla_deploy.world.document import read_thing
+from vla_deploy.world.footprint import depth_inside_m
 
 REACH_X_M = (0.38, 0.42, 0.46, 0.50)
 # On the hand's own side first.
 REACH_Y_M = (0.12, 0.04, 0.20, -0.04, -0.12)
-KEEP_APART_M = 0.14
+# From a thing's outline to the middle of what is put down: half of that, and an opening finger.
+APART_M = 0.10
 EDGE_M = 0.06
 SURFACE_HEIGHT_M = (0.25, 0.75)
 
@@ -37,6 +39,5 @@ def _fits(context: SkillContext, surface: Mapping[str, Any], x_m: float, y_m: fl
     outline = np.array(surface["polygon_m"], dtype=np.float32)
     if cv2.pointPolygonTest(outline, spot, measureDist=True) < EDGE_M:
         return False
-    return all(
-        math.dist(spot, one["position_m"][:2]) > KEEP_APART_M for one in context.link.objects
-    )
+    things = map(read_thing, context.link.objects)
+    return all(depth_inside_m(spot, one) < -APART_M for one in things if not one.held_by)

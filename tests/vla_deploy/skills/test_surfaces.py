@@ -1,9 +1,11 @@
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import pytest
 
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.frames import to_map
-from vla_deploy.skills.surfaces import EDGE_M, KEEP_APART_M, free_spots
+from vla_deploy.skills.surfaces import APART_M, EDGE_M, free_spots
 
 if TYPE_CHECKING:
     from conftest import StandingLink
@@ -28,12 +30,29 @@ def test_a_hand_begins_on_its_own_side(context: SkillContext, standing: "Standin
     assert free_spots(context, "right")[0][1] < 0.0
 
 
-def test_spots_keep_apart_from_things(context: SkillContext, standing: "StandingLink") -> None:
+def thing(kind: str, size_m: float, **more: Any) -> dict[str, Any]:
+    place = {"position_m": [1.44, 2.10, 0.5], "size_m": [size_m, size_m, 0.1]}
+    return {"id": f"{kind}_1", "class": kind, "colour": "", **place, **more}
+
+
+@pytest.mark.parametrize(("kind", "size_m"), [("cup", 0.08), ("box", 0.23)])
+def test_spots_keep_apart_from_the_outlines_of_things(
+    context: SkillContext, standing: "StandingLink", kind: str, size_m: float
+) -> None:
     standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
-    standing.objects = [{"position_m": [1.44, 2.10, 0.5]}]
-    for x_m, y_m, _ in free_spots(context, "left"):
+    standing.objects = [thing(kind, size_m)]
+    spots = free_spots(context, "left")
+    assert spots
+    for x_m, y_m, _ in spots:
         spot = to_map(standing.pose, x_m, y_m)
-        assert math.dist(spot, (1.44, 2.10)) > KEEP_APART_M
+        assert math.dist(spot, (1.44, 2.10)) > size_m / 2 + APART_M
+
+
+def test_what_a_hand_holds_takes_no_room(context: SkillContext, standing: "StandingLink") -> None:
+    standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
+    free = free_spots(context, "left")
+    standing.objects = [thing("cup", 0.08, held_by="left")]
+    assert free_spots(context, "left") == free
 
 
 def test_the_floor_and_high_shelves_are_no_place_to_put_things(
