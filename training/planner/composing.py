@@ -58,10 +58,17 @@ class Composer:
 
     def example(self, random: Random) -> Example:
         """Return one command with its answer."""
-        kind = random.choices(self._kinds, self._kind_weights)[0]
-        clauses, sentence = self._steps(random) if kind == "steps" else self._alone(kind, random)
+        clauses, sentence = self._drawn(random)
         sentence = _with_fillers(misheard(sentence, random), random)
-        return Example(" ".join(word.text for word in sentence), _answer(clauses, sentence))
+        return Example(_text(sentence), _answer(clauses, sentence))
+
+    def spoken(self, random: Random) -> str:
+        """Return one command as somebody says it, before anything mishears it."""
+        return _text(_with_fillers(self._drawn(random)[1], random))
+
+    def _drawn(self, random: Random) -> tuple[list[Clause], list[Said]]:
+        kind = random.choices(self._kinds, self._kind_weights)[0]
+        return self._steps(random) if kind == "steps" else self._alone(kind, random)
 
     def _alone(self, kind: str, random: Random) -> tuple[list[Clause], list[Said]]:
         if kind == "unknown" and self._chatter and random.random() < 0.6:
@@ -141,6 +148,10 @@ class Composer:
             else []
         )
         return [*before, *words, *after]
+
+
+def _text(sentence: list[Said]) -> str:
+    return " ".join(word.text for word in sentence)
 
 
 def _answer(clauses: list[Clause], sentence: list[Said]) -> str:

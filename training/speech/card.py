@@ -63,6 +63,7 @@ def card(metrics: dict[str, Any], model: Path, size: Size) -> str:
         "voices": voices(metrics),
         "talk": metrics["other_sounds"]["count"],
         "least_confidence": metrics["least_confidence"],
+        "beam": metrics["beam"],
         **{
             f"{name}_unsure": _share(metrics["other_sounds"][f"{name}_unsure_ratio"])
             for name in ("talk", "foreign", "noise")

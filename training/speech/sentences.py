@@ -1,5 +1,7 @@
 """Draw sentences: commands in many wordings, questions, answers, other talk, strings of words.
 
+A quarter are commands as the command parser learns them: what one understands the other hears.
+
 A quarter of all are words strung together at random, so that the recogniser learns to hear words
 and not to guess them from what usually follows.
 """
@@ -11,6 +13,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+
+from training.speech.planner_commands import draw_planner_command
 
 Random = np.random.Generator
 
@@ -117,21 +121,24 @@ def _string(kinds: tuple[str, ...]) -> Callable[[Random], str]:
     return draw
 
 
+MOST_WORDS: Final = 20
+"""What is longer than all that was learnt from, the recogniser does not follow to its end."""
 SHARES: Final[Mapping[Callable[[Random], str], float]] = {
-    _command: 0.43,
-    _question: 0.1,
-    _answer: 0.07,
-    _talk: 0.17,
+    _command: 0.26,
+    draw_planner_command: 0.25,
+    _question: 0.08,
+    _answer: 0.06,
+    _talk: 0.12,
     _string(_COMMAND_KINDS): 0.13,
     _string(_TALK_KINDS): 0.1,
 }
 
 
 def draw_sentence(random: Random) -> str:
-    """Draw one sentence that is not among the held-out ones, at most 16 words long."""
+    """Draw one sentence that is not among the held-out ones, and not too long."""
     drawers = list(SHARES)
     while True:
         drawer = drawers[int(random.choice(len(drawers), p=list(SHARES.values())))]
         text = drawer(random)
-        if len(text.split()) <= 16 and text not in held_out():
+        if len(text.split()) <= MOST_WORDS and text not in held_out():
             return text

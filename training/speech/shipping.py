@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from drivers.clock import MonotonicClock
+from platforms import load_profile
 from training.speech import calibration, judging
 from training.speech.card import card, read_metrics
 from training.speech.sizes import Size
@@ -21,7 +22,9 @@ from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 
 SHIPPED: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "commands-whisper"
 CARD, METRICS, MODEL = "card.md", "metrics.json", "model"
-LEAST_CONFIDENCE: Final = 0.5
+_SPEECH: Final = load_profile("desktop").speech
+BEAM: Final = _SPEECH.beam
+LEAST_CONFIDENCE: Final = _SPEECH.least_confidence
 _SUMMARY: Final = "Spoken commands in the English of synthetic voices; never heard a person"
 _CALIBRATION_CLIPS: Final = 300
 _HOT_WORD_CLIPS: Final = 40
@@ -60,6 +63,7 @@ def _measure(recogniser: Recogniser, out: Path, size: Size) -> dict[str, Any]:
         **figures,
         "sureness": judging.sureness(recogniser, reads, LEAST_CONFIDENCE),
         "least_confidence": LEAST_CONFIDENCE,
+        "beam": BEAM,
         "other_sounds": {**others, "count": len(sentences("talk")[:_OTHER_SOUNDS])},
         "training": {**training, "clips": size.clips_per_shard * len(list(shards(out / "clips")))},
     }
@@ -67,7 +71,7 @@ def _measure(recogniser: Recogniser, out: Path, size: Size) -> dict[str, Any]:
 
 def _open(manifest: Manifest, folder: Path) -> Recogniser:
     model = Model(manifest=manifest, folder=folder, is_embedded=False)
-    return open_recogniser(model, PLAIN_CHOICE, beam=1, clock=MonotonicClock())
+    return open_recogniser(model, PLAIN_CHOICE, beam=BEAM, clock=MonotonicClock())
 
 
 def _manifest(folder: Path, whisper: Whisper) -> Manifest:

@@ -3,7 +3,16 @@ from pathlib import Path
 
 import numpy as np
 
-from training.speech.sentences import draw_sentence, fill, held_out, normal, read_tables, tables
+from training.speech.planner_commands import draw_planner_command
+from training.speech.sentences import (
+    MOST_WORDS,
+    draw_sentence,
+    fill,
+    held_out,
+    normal,
+    read_tables,
+    tables,
+)
 
 
 def test_drawn_sentences_are_seeded_plain_and_never_those_for_judging() -> None:
@@ -39,3 +48,17 @@ def test_a_file_of_patterns_keeps_commas_and_one_of_words_is_split_at_them(tmp_p
 
 def test_texts_are_compared_without_case_and_punctuation() -> None:
     assert normal("Don't  stop, Robot!") == "don't stop robot"
+
+
+def test_commands_of_the_command_parser_are_among_them_as_words_alone() -> None:
+    random = np.random.default_rng(6)
+    drawn = [draw_planner_command(random) for _ in range(300)]
+    assert all(re.fullmatch(r"[a-z']+( [a-z']+)*", text) for text in drawn)
+    words = {word for text in drawn for word in text.split()}
+    assert "meters" in words and not words & {"metres", "cm", "gray"}
+
+
+def test_no_sentence_is_longer_than_the_longest_that_is_learnt() -> None:
+    random = np.random.default_rng(7)
+    lengths = [len(draw_sentence(random).split()) for _ in range(500)]
+    assert 16 < max(lengths) <= MOST_WORDS

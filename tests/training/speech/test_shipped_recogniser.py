@@ -8,7 +8,7 @@ import pytest
 
 from drivers.clock import MonotonicClock
 from training.speech.card import AIMS, read_metrics, verdict
-from training.speech.shipping import CARD, LEAST_CONFIDENCE, METRICS, SHIPPED
+from training.speech.shipping import BEAM, CARD, LEAST_CONFIDENCE, METRICS, SHIPPED
 from training.speech.trials import heard, noises_alone
 from training.voices.cast import Speaker, say
 from training.voices.clip import Style
@@ -27,7 +27,7 @@ COMMANDS = ("pick up the red cup and put it in the box", "go to the kitchen", "s
 @pytest.fixture(scope="module")
 def recogniser() -> Iterator[Recogniser]:
     model = Model(manifest=read_manifest(SHIPPED), folder=SHIPPED, is_embedded=True)
-    opened = open_recogniser(model, PLAIN_CHOICE, beam=1, clock=MonotonicClock())
+    opened = open_recogniser(model, PLAIN_CHOICE, beam=BEAM, clock=MonotonicClock())
     yield opened
     opened.close()
 
