@@ -9,6 +9,7 @@ from typing import Final
 
 from training.planner import words
 from training.planner.amounts import angle, duration, length
+from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 Word = tuple[str, bool]
 Source = Callable[[Random], list[Word]]
@@ -88,7 +89,7 @@ def what(random: Random) -> list[Word]:
         return [*unmeant(random.choice(ARTICLES)), *_description(random, depth=1), *said("and"),
                 *unmeant(random.choice(ARTICLES)), *_description(random, depth=1)]  # fmt: skip
     if chance < 0.26:
-        return said(f"{random.choice(words.OBJECT_CLASSES)}_{random.randint(1, 12)}")
+        return said(f"{random.choice(OBJECT_CLASSES)}_{random.randint(1, 12)}")
     return thing(random)
 
 
