@@ -19,6 +19,7 @@ from vla_deploy.exit_codes import (
     EXIT_DEVICE_ABSENT,
     EXIT_OK,
 )
+from vla_deploy.heap import give_large_blocks_back
 from vla_deploy.host_settings import REALTIME_PROCESS, HostSettings
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.ipc import IpcError
@@ -63,6 +64,7 @@ def main(
     """
     context = _context(name, arguments)
     _name_process(name)
+    give_large_blocks_back()
     stop_signals = _catch_stop_signals()
     with process_log(name, context.robot, context.run_dir):
         try:

@@ -16,6 +16,7 @@ from drivers.clock import NS_PER_S, MonotonicClock
 from sim_twin.campaigns.report import Case, Report
 from sim_twin.campaigns.selection import chosen
 from sim_twin.stack import LockstepStack, NotReady
+from vla_deploy.heap import give_large_blocks_back
 
 MOST_MIB_PER_H: Final = 1.0
 LEAST_JOBS_RATIO: Final = 0.8
@@ -141,6 +142,7 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
         NothingChosen: `options.only` is part of no case's name.
     """
     names = chosen((*_MUST_NOT_GROW, "memory", "jobs"), options.only, str)
+    give_large_blocks_back()  # as every process of the robot does
     with tempfile.TemporaryDirectory(prefix="vla-soak-") as folder:
         soak = Soak(Path(folder), options.seed)
         try:
