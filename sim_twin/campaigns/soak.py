@@ -23,6 +23,10 @@ LEAST_JOBS_RATIO: Final = 0.8
 """So many jobs must end well: a robot that is stuck at the first one grows by nothing either."""
 _WARM_UP_RATIO: Final = 0.25
 """Caches of libraries fill up in the first quarter; growth is judged after it."""
+_SMALL_BLOCK_BYTES: Final = 1024
+_BLOCKS_KEPT: Final = 7
+"""numpy keeps so many freed blocks of each size below for the next array (NBUCKETS and NCACHE in
+its `alloc.c`): 3.5 MiB in all, which a robot that works fills up over hours, size by size."""
 _LEAST_SAMPLES: Final = 8
 _S_PER_H: Final = 3600.0
 _MIB: Final = 1 << 20
@@ -120,6 +124,13 @@ class Soak:
         )
 
 
+def fill_cache_of_small_arrays() -> None:
+    """Have numpy keep all the small blocks that it ever will: what grows after that is no cache."""
+    for size_bytes in range(1, _SMALL_BLOCK_BYTES):
+        held = [np.empty(size_bytes, np.uint8) for _ in range(_BLOCKS_KEPT)]
+        del held
+
+
 def growth(samples: Sequence[Sample], field: str, per: str = "sim_h") -> float:
     """Return the slope of a figure after the warm-up, per hour.
 
@@ -143,6 +154,7 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """
     names = chosen((*_MUST_NOT_GROW, "memory", "jobs"), options.only, str)
     give_large_blocks_back()  # as every process of the robot does
+    fill_cache_of_small_arrays()
     with tempfile.TemporaryDirectory(prefix="vla-soak-") as folder:
         soak = Soak(Path(folder), options.seed)
         try:

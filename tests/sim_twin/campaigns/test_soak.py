@@ -1,11 +1,41 @@
 """The soak's judge must see growth, and not take noise for it."""
 
+import ctypes
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sim_twin.campaigns.soak import LEAST_JOBS_RATIO, Sample, Soak, growth, jobs_case, judge
+from sim_twin.campaigns.soak import (
+    LEAST_JOBS_RATIO,
+    Sample,
+    Soak,
+    fill_cache_of_small_arrays,
+    growth,
+    jobs_case,
+    judge,
+)
+
+
+class _Told(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_size_t) for name in (
+        "arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks",
+        "fordblks", "keepcost",
+    )]  # fmt: skip
+
+
+def _used_bytes() -> int:
+    mallinfo2 = ctypes.CDLL(None).mallinfo2
+    mallinfo2.restype = _Told
+    return int(mallinfo2().uordblks)
+
+
+def test_small_arrays_of_any_size_take_nothing_more_once_the_cache_is_full() -> None:
+    fill_cache_of_small_arrays()
+    before_bytes = _used_bytes()
+    for size_bytes in range(1, 1024):
+        np.empty(size_bytes, np.uint8)
+    assert abs(_used_bytes() - before_bytes) < 4096
 
 
 def samples(mib_per_h: float, *, files: int = 0, count: int = 80) -> list[Sample]:
