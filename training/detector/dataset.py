@@ -1,6 +1,7 @@
 """Draw labelled images in shards; the same seed gives the same images, whatever is drawn first."""
 
 import logging
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -102,14 +103,14 @@ def draw_image(
             return spoil(image, random), labels
 
 
-def load(folder: Path, split: str, shards: int) -> Shard:
-    """Return the first shards of a split as one; rows count images through.
+def load(folder: Path, split: str, numbers: Iterable[int]) -> Shard:
+    """Return those shards of a split as one; rows count images through.
 
     Raises:
         FileNotFoundError: a shard is missing.
     """
     images, labels, start = [], [], 0
-    for number in range(shards):
+    for number in numbers:
         path = shard_path(folder, split, number)
         if not path.exists():
             raise FileNotFoundError(

@@ -35,7 +35,7 @@ def evaluate(folder: Path, data: Path, files: Mapping[str, str], settings: Setti
     """
     report: dict[str, Any] = {"iou": MATCH_IOU, "sure_score": SURE_SCORE, "splits": {}}
     for split in ("heldout", "flat"):
-        shard = load(data, split, settings.shard_count(split))
+        shard = load(data, split, range(settings.shard_count(split)))
         report["splits"][split] = {"images": len(shard.images), "models": {}}
         for precision, name in files.items():
             figures = judge_file(folder / name, shard)

@@ -48,8 +48,9 @@ def quantise(out: Path, models: Path, settings: Settings) -> None:
     Raises:
         FileNotFoundError: the fp32 file or the data are not there.
     """
-    shard = load(out / "data", "train", settings.shard_count("train"))
     random = np.random.default_rng([settings.seed, 200])
+    numbers = random.permutation(settings.shard_count("train"))[: settings.calibration_images]
+    shard = load(out / "data", "train", numbers)
     picks = random.permutation(len(shard.images))[: settings.calibration_images]
     paths = {Variant(name): models / file for name, file in FILES.items() if name != "fp32"}
     images = shard.images[picks]

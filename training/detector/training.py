@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from numpy.typing import NDArray
+from torch import Tensor, nn
 
 from training.detector.batches import make_batch
 from training.detector.classes import CLASSES
@@ -15,18 +16,21 @@ from training.detector.dataset import Shard, load
 from training.detector.losses import losses
 from training.detector.network import CentreNet
 from training.detector.settings import Settings
+from training.muon import Muon
 from training.warm_start import begin_from
 
 WEIGHTS = "centre_net.pt"
 STATE = "training_state.pt"
 AVERAGE_DECAY = 0.999
-WEIGHT_DECAY = 0.02
+PLAIN_RATE_RATIO = 0.1
+"""Learning rate of what Muon does not move, over its own."""
+PLAIN_WEIGHT_DECAY = 0.02
 MAX_GRADIENT = 10.0
-WARM_STEPS = 300
+WARM_STEPS = 150
 LAST_RATE_RATIO = 0.01
 """Learning rate at the end over the highest."""
-TELL_EVERY_STEPS = 100
-TYPICAL_IMAGES = 64
+TELL_EVERY_STEPS = 250
+TYPICAL_SHARDS, TYPICAL_IMAGES = 40, 64
 _LOG = logging.getLogger(__name__)
 
 
@@ -41,21 +45,44 @@ def train(out: Path, settings: Settings) -> None:
     torch.manual_seed(settings.seed)
     torch.set_num_threads(settings.threads)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    shard = load(out / "data", "train", settings.shard_count("train"))
-    run = _Run(settings, device, len(shard.images) // settings.batch)
+    run, shards = _Run(settings, device), settings.shard_count("train")
     if settings.start_from is not None:
-        run.begin_from(settings.start_from, shard)
+        run.begin_from(settings.start_from, load(out / "data", "train", _typical(shards)))
     for epoch in range(run.resume(out / STATE), settings.epochs + settings.settling_epochs):
         random = np.random.default_rng([settings.seed, 100, epoch])
-        piece_px = settings.piece_px if epoch < settings.epochs else None
-        order = random.permutation(len(shard.images))
-        told = [
-            run.step(*make_batch(shard, order[k : k + settings.batch], random, piece_px))
-            for k in range(0, len(order) - settings.batch + 1, settings.batch)
-        ]
+        numbers = random.permutation(shards)[: settings.epoch_shards]
+        told = _learn(run, load(out / "data", "train", numbers), random, epoch)
         _LOG.info("epoch %d: things %.3f, names %.3f, boxes %.3f", epoch, *np.mean(told, axis=0))
         run.save(out / STATE, epoch + 1)
         _write(run.average.state_dict(), out / WEIGHTS)
+
+
+def _typical(shards: int) -> NDArray[np.int_]:
+    return np.linspace(0, shards - 1, min(shards, TYPICAL_SHARDS)).astype(int)
+
+
+def _learn(run: "_Run", shard: Shard, random: np.random.Generator, epoch: int) -> list[list[float]]:
+    """Learn from each image once; return the losses of all steps."""
+    settings = run.settings
+    piece_px = settings.piece_px if epoch < settings.epochs else None
+    order = random.permutation(len(shard.images))
+    steps = len(order) // settings.batch
+    return [
+        run.step(
+            *make_batch(shard, picks, random, piece_px), learning_rate=_rate(settings, epoch + done)
+        )
+        for picks, done in zip(
+            order[: steps * settings.batch].reshape(steps, -1),
+            np.arange(steps) / steps,
+            strict=True,
+        )
+    ]
+
+
+def _rate(settings: Settings, epochs: float) -> float:
+    """Return the learning rate after so many epochs: it falls while the training settles."""
+    fallen = max(0.0, (epochs - settings.epochs) / settings.settling_epochs)
+    return settings.learning_rate * (1 - (1 - LAST_RATE_RATIO) * fallen)
 
 
 def _write(values: dict[str, Any], path: Path) -> None:
@@ -67,14 +94,18 @@ def _write(values: dict[str, Any], path: Path) -> None:
 class _Run:
     """Hold what a training changes."""
 
-    def __init__(self, settings: Settings, device: torch.device, steps_per_epoch: int) -> None:
+    def __init__(self, settings: Settings, device: torch.device) -> None:
         self._device = device
-        self._settings = settings
-        self._per_epoch = steps_per_epoch
+        self.settings = settings
         self.model = CentreNet(len(CLASSES)).to(device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.model).eval()
         self._steps = 0
-        self._optimiser = torch.optim.AdamW(self.model.parameters(), weight_decay=WEIGHT_DECAY)
+        convolutions, rest = _split(self.model)
+        self._optimisers = {
+            1.0: Muon(convolutions, settings.learning_rate),
+            PLAIN_RATE_RATIO: torch.optim.AdamW(rest, weight_decay=PLAIN_WEIGHT_DECAY),
+        }
+        """By their share of the learning rate."""
 
     def begin_from(self, path: Path, shard: Shard) -> None:
         """Take the weights of an exported model."""
@@ -91,7 +122,8 @@ class _Run:
         state = torch.load(path, map_location=self._device, weights_only=True)
         self.model.load_state_dict(state["model"])
         self.average.load_state_dict(state["average"])
-        self._optimiser.load_state_dict(state["optimiser"])
+        for optimiser, kept in zip(self._optimisers.values(), state["optimisers"], strict=True):
+            optimiser.load_state_dict(kept)
         self._steps = state["steps"]
         return int(state["epoch"])
 
@@ -100,13 +132,13 @@ class _Run:
         state = {
             "model": self.model.state_dict(),
             "average": self.average.state_dict(),
-            "optimiser": self._optimiser.state_dict(),
+            "optimisers": [one.state_dict() for one in self._optimisers.values()],
             "steps": self._steps,
             "epoch": epoch,
         }
         _write(state, path)
 
-    def step(self, images: Tensor, targets: list[Tensor]) -> list[float]:
+    def step(self, images: Tensor, targets: list[Tensor], learning_rate: float) -> list[float]:
         """Learn from one batch; return the losses of things, names and boxes."""
         images = images.to(self._device).contiguous(memory_format=torch.channels_last)
         images = images.to(torch.bfloat16).mul_(1 / 255)
@@ -114,25 +146,21 @@ class _Run:
         with torch.autocast(self._device.type, torch.bfloat16):
             maps = self.model.raw(images)
         parts = losses(maps, (names, ignored, edges, share))
-        for group in self._optimiser.param_groups:
-            group["lr"] = self._learning_rate()
-        self._optimiser.zero_grad()
+        self.model.zero_grad()
         torch.stack(parts).sum().backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), MAX_GRADIENT)
-        self._optimiser.step()
+        self._move(learning_rate * min(1.0, (self._steps + 1) / WARM_STEPS))
         self._follow()
         values = [part.item() for part in parts]
         if self._steps % TELL_EVERY_STEPS == 0:
             _LOG.info("step %d: things %.3f, names %.3f, boxes %.3f", self._steps, *values)
         return values
 
-    def _learning_rate(self) -> float:
-        """Rise, stay, and fall while the training settles."""
-        settings = self._settings
-        rise = min(1.0, (self._steps + 1) / WARM_STEPS)
-        settled = (self._steps / self._per_epoch - settings.epochs) / settings.settling_epochs
-        fallen = min(1.0, max(0.0, settled))
-        return settings.learning_rate * rise * (1 - (1 - LAST_RATE_RATIO) * fallen)
+    def _move(self, learning_rate: float) -> None:
+        for share, optimiser in self._optimisers.items():
+            for group in optimiser.param_groups:
+                group["lr"] = share * learning_rate
+            optimiser.step()
 
     @torch.no_grad()
     def _follow(self) -> None:
@@ -145,3 +173,12 @@ class _Run:
                 value.lerp_(new[name], 1 - decay)
             else:
                 value.copy_(new[name])
+
+
+def _split(model: CentreNet) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
+    """Return the weights that Muon moves, and all others: the first and last layer, and vectors."""
+    convolutions, rest = [], []
+    for name, weight in model.named_parameters():
+        inner = weight.ndim == 4 and not name.startswith(("stem.", "last."))
+        (convolutions if inner else rest).append(weight)
+    return convolutions, rest
