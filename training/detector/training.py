@@ -16,7 +16,6 @@ from training.detector.dataset import Shard, load
 from training.detector.losses import losses
 from training.detector.network import CentreNet
 from training.detector.settings import Settings
-from training.muon import Muon
 from training.warm_start import begin_from
 
 WEIGHTS = "centre_net.pt"
@@ -24,7 +23,7 @@ STATE = "training_state.pt"
 AVERAGE_DECAY = 0.999
 PLAIN_RATE_RATIO = 0.1
 """Learning rate of what Muon does not move, over its own."""
-PLAIN_WEIGHT_DECAY = 0.02
+WEIGHT_DECAY, PLAIN_WEIGHT_DECAY = 0.05, 0.02
 MAX_GRADIENT = 10.0
 WARM_STEPS = 150
 LAST_RATE_RATIO = 0.01
@@ -69,13 +68,10 @@ def _learn(run: "_Run", shard: Shard, random: np.random.Generator, epoch: int) -
     steps = len(order) // settings.batch
     return [
         run.step(
-            *make_batch(shard, picks, random, piece_px), learning_rate=_rate(settings, epoch + done)
+            *make_batch(shard, order[k * settings.batch :][: settings.batch], random, piece_px),
+            learning_rate=_rate(settings, epoch + k / steps),
         )
-        for picks, done in zip(
-            order[: steps * settings.batch].reshape(steps, -1),
-            np.arange(steps) / steps,
-            strict=True,
-        )
+        for k in range(steps)
     ]
 
 
@@ -100,9 +96,10 @@ class _Run:
         self.model = CentreNet(len(CLASSES)).to(device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.model).eval()
         self._steps = 0
-        convolutions, rest = _split(self.model)
-        self._optimisers = {
-            1.0: Muon(convolutions, settings.learning_rate),
+        self._convolutions, rest = _split(self.model)
+        self._matrices = [nn.Parameter(_as_matrix(one.detach())) for one in self._convolutions]
+        self._optimisers: dict[float, torch.optim.Optimizer] = {
+            1.0: torch.optim.Muon(self._matrices, weight_decay=WEIGHT_DECAY),
             PLAIN_RATE_RATIO: torch.optim.AdamW(rest, weight_decay=PLAIN_WEIGHT_DECAY),
         }
         """By their share of the learning rate."""
@@ -157,6 +154,9 @@ class _Run:
         return values
 
     def _move(self, learning_rate: float) -> None:
+        for matrix, convolution in zip(self._matrices, self._convolutions, strict=True):
+            assert convolution.grad is not None
+            matrix.grad = _as_matrix(convolution.grad)
         for share, optimiser in self._optimisers.items():
             for group in optimiser.param_groups:
                 group["lr"] = share * learning_rate
@@ -182,3 +182,8 @@ def _split(model: CentreNet) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
         inner = weight.ndim == 4 and not name.startswith(("stem.", "last."))
         (convolutions if inner else rest).append(weight)
     return convolutions, rest
+
+
+def _as_matrix(weight: Tensor) -> Tensor:
+    """Return a convolution's weights as Muon wants them: a view, since their channels lie last."""
+    return weight.permute(0, 2, 3, 1).flatten(1)
