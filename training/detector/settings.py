@@ -9,8 +9,8 @@ class Settings:
     """Hold what decides the result besides the code; shards per split hold 20 images each.
 
     First come `epochs` on pieces of the images, which show most of the things for half the work,
-    then `settling_epochs` on whole images, through which the learning rate falls. An epoch sees
-    `epoch_shards` of the training shards, others each time, or all where there are fewer.
+    then `settling_epochs` on whole images. An epoch sees `epoch_shards` of the training shards,
+    others each time, or all where there are fewer.
     """
 
     name: str
@@ -43,8 +43,8 @@ FULL = Settings(
 LONG = Settings(
     name="long",
     shards=(("heldout", 50), ("flat", 20), ("train", 2400)),
-    epochs=52,
-    settling_epochs=4,
+    epochs=36,
+    settling_epochs=3,
 )
 """What the shipped model was made by."""
 MORE = Settings(

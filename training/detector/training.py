@@ -26,8 +26,8 @@ PLAIN_RATE_RATIO = 0.1
 WEIGHT_DECAY, PLAIN_WEIGHT_DECAY = 0.05, 0.02
 MAX_GRADIENT = 10.0
 WARM_STEPS = 150
-LAST_RATE_RATIO = 0.01
-"""Learning rate at the end over the highest."""
+FALL_FROM = 0.2
+"""Share of the epochs after which the learning rate falls, to nothing at the end."""
 TELL_EVERY_STEPS = 250
 TYPICAL_SHARDS, TYPICAL_IMAGES = 40, 64
 _LOG = logging.getLogger(__name__)
@@ -76,9 +76,9 @@ def _learn(run: "_Run", shard: Shard, random: np.random.Generator, epoch: int) -
 
 
 def _rate(settings: Settings, epochs: float) -> float:
-    """Return the learning rate after so many epochs: it falls while the training settles."""
-    fallen = max(0.0, (epochs - settings.epochs) / settings.settling_epochs)
-    return settings.learning_rate * (1 - (1 - LAST_RATE_RATIO) * fallen)
+    """Return the learning rate after so many epochs: steady at first, then falling to the end."""
+    left = 1.0 - epochs / (settings.epochs + settings.settling_epochs)
+    return settings.learning_rate * min(1.0, left / (1.0 - FALL_FROM))
 
 
 def _write(values: dict[str, Any], path: Path) -> None:
