@@ -19,6 +19,12 @@ LEAST_GAIN = 0.2
 DOUBTFUL_GAIN = 0.05
 # Half-hidden sights in a row are wrong in the same way: so many of them count as one.
 DOUBTFUL_LOOKS = 9.0
+KNOWN_LOOKS = 5
+ODD_SIZE_RATIO = 1.5
+MOST_ODD_SIGHTS = 8
+"""Nothing changes its size: what was seen `KNOWN_LOOKS` times and is told so much larger or smaller
+was cut out of the image with what stands beside it, unless more sights than these in a row say so.
+"""
 # Not to recognise a thing says little against one that knew it.
 CLASS_WEIGHTS: Mapping[str, float] = MappingProxyType({OTHER: 0.25})
 TOLD_NAMES = 3
@@ -50,7 +56,8 @@ class Track:
     """Hold one thing; `object_id` is empty until it is confirmed, `held_by` names a hand.
 
     `aliases` are the last ids under which the same thing was known before it was found to be the
-    same; `cause` tells why it is no longer where it was.
+    same; `cause` tells why it is no longer where it was; `odd_sights` counts the last sights in a
+    row that told quite another size.
     """
 
     estimate: Estimate
@@ -61,6 +68,7 @@ class Track:
     last_seen_ns: int
     seen_count: int = 0
     misses: int = 0
+    odd_sights: int = 0
     object_id: str = ""
     aliases: tuple[str, ...] = ()
     held_by: str = ""
@@ -163,10 +171,20 @@ def absorb(track: Track, sighting: Sighting, stamp_ns: int, *, was_moved: bool) 
         track.estimate = corrected(track.estimate, sighting.seen, looks)
     if detection.class_name == track.class_name:
         # What is taken for another kind was cut out of the image in another way.
-        track.size_m = _blend(track.size_m, detection.size_m, gain)
-        turn_rad = half_turn(detection.yaw_rad - track.yaw_rad)
-        track.yaw_rad = half_turn(track.yaw_rad + gain * turn_rad)
-        track.confidence += gain * (detection.confidence - track.confidence)
+        _take_form(track, detection, gain)
+
+
+def _take_form(track: Track, detection: Detection, gain: float) -> None:
+    """Move size, yaw and confidence towards those of a sight, unless it is an odd one."""
+    small_m, large_m = sorted(math.hypot(*one.size_m[:2]) for one in (track, detection))
+    is_odd = track.seen_count > KNOWN_LOOKS and large_m > ODD_SIZE_RATIO * small_m
+    track.odd_sights = track.odd_sights + 1 if is_odd else 0
+    if 0 < track.odd_sights <= MOST_ODD_SIGHTS:
+        return
+    track.size_m = _blend(track.size_m, detection.size_m, gain)
+    turn_rad = half_turn(detection.yaw_rad - track.yaw_rad)
+    track.yaw_rad = half_turn(track.yaw_rad + gain * turn_rad)
+    track.confidence += gain * (detection.confidence - track.confidence)
 
 
 def take_in_hand(track: Track, hand: str, grip_m: Vector, stamp_ns: int) -> None:

@@ -109,10 +109,7 @@ class Readings:
             except RunFailed as error:
                 yield Answer(phrase=asked.phrase, reading=None, trouble=str(error))
                 continue
-            late_ns = self._clock.now_ns() - asked.phrase.ended_ns
-            trouble = (
-                f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
-            )
+            trouble = self._late(asked.phrase)
             yield Answer(phrase=asked.phrase, reading=reading, trouble=trouble)
 
     def close(self) -> None:

@@ -7,7 +7,7 @@ from vla_deploy.perception.detection import Detection
 from vla_deploy.perception.filtering import Estimate
 from vla_deploy.perception.in_view import View
 from vla_deploy.perception.noise import covariance_of
-from vla_deploy.perception.track import Sighting
+from vla_deploy.perception.track import KNOWN_LOOKS, MOST_ODD_SIGHTS, Sighting
 from vla_deploy.perception.tracking import Tracker
 
 CLEAR, HIDDEN = View.CLEAR, View.HIDDEN
@@ -239,6 +239,27 @@ def test_half_hidden_sights_of_its_box_make_a_cup_no_larger() -> None:
         objects = watcher.image(box, wall, shard, view=HIDDEN)
     kept = {one["id"]: one for one in objects}
     assert kept["cup_1"]["size_m"] == [0.066, 0.066, 0.095]
+
+
+def test_a_cup_that_is_seen_as_one_with_its_box_now_and_then_gets_no_larger() -> None:
+    watcher = Watcher()
+    both = seen(size_m=(0.215, 0.215, 0.126))
+    for _ in range(KNOWN_LOOKS):
+        watcher.image(seen())
+    for _ in range(3):
+        for _ in range(MOST_ODD_SIGHTS):
+            (cup,) = watcher.image(both)
+            assert cup["size_m"] == [0.066, 0.066, 0.095]
+        watcher.image(seen(occluded=True))
+
+
+def test_a_size_that_was_wrong_from_the_start_is_given_up() -> None:
+    watcher = Watcher()
+    for _ in range(2 * KNOWN_LOOKS):
+        watcher.image(seen(size_m=(0.215, 0.215, 0.126)))
+    for _ in range(MOST_ODD_SIGHTS + 15):
+        (cup,) = watcher.image(seen())
+    assert cup["size_m"] == pytest.approx([0.066, 0.066, 0.095], rel=0.1)
 
 
 def test_crossing_sights_of_two_alike_things_are_shared_out_as_a_whole() -> None:
