@@ -43,8 +43,8 @@ FULL = Settings(
 LONG = Settings(
     name="long",
     shards=(("heldout", 50), ("flat", 20), ("train", 2400)),
-    epochs=36,
-    settling_epochs=3,
+    epochs=32,
+    settling_epochs=2,
 )
 """What the shipped model was made by."""
 MORE = Settings(
