@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
         report = _read(_chosen(reports, arguments.crash))
         print(json.dumps(report, indent=2) if arguments.json else as_text(report))
         return 0
-    rows = [{"crash": name, **_read(path)} for name, path in reports.items()]
+    rows = [{"crash": name, **_read_or_why_not(path)} for name, path in reports.items()]
     if arguments.json:
         print(json.dumps(rows, indent=2))
     else:
@@ -59,7 +59,17 @@ def _read(path: Path) -> dict[str, Any]:
     return report
 
 
+def _read_or_why_not(path: Path) -> dict[str, Any]:
+    """Read a report; one that is not whole hides no other one."""
+    try:
+        return _read(path)
+    except UsageError as error:
+        return {"unreadable": str(error)}
+
+
 def _row(report: dict[str, Any]) -> str:
+    if "unreadable" in report:
+        return f"{report['crash']:<24} unreadable: {report['unreadable']}"
     return f"{report['crash']:<24} {report['time']}  {report['reason']}"
 
 

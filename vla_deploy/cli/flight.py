@@ -13,6 +13,7 @@ from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.supervisor.runtime import default_base
 from vla_deploy.telemetry.channels import TICKS, tick_bytes
+from vla_deploy.telemetry.errors import FlightUnreadable
 from vla_deploy.telemetry.flight import Flight, read_flight
 from vla_deploy.telemetry.folder import FlightFolder, folder_of
 from vla_deploy.telemetry.judge import Judgement, judge_again, rules_digest
@@ -56,15 +57,21 @@ def _add(
 def run_list(arguments: argparse.Namespace) -> int:
     """Print one line per flight."""
     folder = _folder(arguments)
-    flights = [_summary(read_flight(path)) for path in folder.flights()]
+    flights = [_summary_or_why_not(path) for path in folder.flights()]
     if arguments.json:
         print(json.dumps(flights, indent=2))
     elif not flights:
         print(f"no flights in {folder.path}; one is saved at every stop and crash")
     for one in () if arguments.json else flights:
-        causes = ", ".join(dict.fromkeys(cause["what"] for cause in one["causes"]))
-        print(f"{one['file']}  {one['duration_s']:.0f} s  {one['robot']}  {causes}")
+        print(_row(one))
     return 0
+
+
+def _row(flight: Mapping[str, Any]) -> str:
+    if "unreadable" in flight:
+        return f"{flight['file']}  unreadable: {flight['unreadable']}"
+    causes = ", ".join(dict.fromkeys(cause["what"] for cause in flight["causes"]))
+    return f"{flight['file']}  {flight['duration_s']:.0f} s  {flight['robot']}  {causes}"
 
 
 def run_show(arguments: argparse.Namespace) -> int:
@@ -119,6 +126,14 @@ def run_save(arguments: argparse.Namespace) -> int:
 
 def _folder(arguments: argparse.Namespace) -> FlightFolder:
     return FlightFolder(arguments.folder or folder_of(arguments.runtime_base or default_base()))
+
+
+def _summary_or_why_not(path: Path) -> Mapping[str, Any]:
+    """Sum a flight up; one that is cut off or spoiled hides no other one."""
+    try:
+        return _summary(read_flight(path))
+    except FlightUnreadable as error:
+        return {"file": path.name, "unreadable": str(error)}
 
 
 def _summary(flight: Flight) -> Mapping[str, Any]:

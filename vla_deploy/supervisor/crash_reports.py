@@ -114,15 +114,17 @@ class CrashReports:
 
 
 def _write_whole(path: Path, text: str) -> None:
-    """Write a file or, as on a full disk, leave none.
+    """Write a file whole or, as on a full disk, leave none.
 
     Raises:
         OSError: it cannot be written.
     """
+    partial = path.with_name(f".{path.name}.part")
     try:
-        path.write_text(text, encoding="utf-8")
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
     except OSError:
-        path.unlink(missing_ok=True)
+        partial.unlink(missing_ok=True)
         raise
 
 

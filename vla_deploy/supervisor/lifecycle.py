@@ -48,7 +48,8 @@ class Act(Enum):
 class Record:
     """Remember one process; `until_ns` ends its back-off, its start, its abortion or its stop.
 
-    `failures` counts since it last ran stably.
+    `failures` counts since it last ran stably; `failed_ns` are the last failures' times, stable
+    runs or not.
     """
 
     state: State = State.WAITING
@@ -56,6 +57,7 @@ class Record:
     ready_ns: int = 0
     was_ready: bool = False
     failures: int = 0
+    failed_ns: tuple[int, ...] = ()
     restarts: int = 0
     exit_code: int | None = None
     reason: str = ""
@@ -210,12 +212,19 @@ def abort(record: Record, reason: str, now_ns: int) -> Step:
 def _failed(spec: ProcessSpec, record: Record, seen: Seen, now_ns: int) -> Record:
     policy, failures = spec.restart, record.failures + 1
     why = record.reason if record.state is State.ABORTING else _end_in_words(seen)
-    failed = replace(record, failures=failures, exit_code=seen.exit_code, reason=why)
+    failed_ns = (*record.failed_ns, now_ns)[-policy.most_in_window - 1 :]
+    failed = replace(
+        record, failures=failures, failed_ns=failed_ns, exit_code=seen.exit_code, reason=why
+    )
     # What the file or the wiring says will not change by trying again before it ever worked.
     if seen.exit_code == EXIT_CONFIGURATION and not record.was_ready:
         return replace(failed, state=State.GIVEN_UP)
     if failures > policy.max_restarts:
         why = f"{why}; given up after {failures} failures, never {policy.stable_s:g} s in order"
+        return replace(failed, state=State.GIVEN_UP, reason=why)
+    spanned_ns = now_ns - failed_ns[0]
+    if len(failed_ns) > policy.most_in_window and spanned_ns <= policy.window_s * NS_PER_S:
+        why = f"{why}; given up after {len(failed_ns)} failures in {spanned_ns / NS_PER_S:.0f} s"
         return replace(failed, state=State.GIVEN_UP, reason=why)
     until_ns = now_ns + round(delay_s(policy, failures) * NS_PER_S)
     return replace(failed, state=State.BACKOFF, until_ns=until_ns)

@@ -22,7 +22,9 @@ class RestartPolicy:
     """Declare when an ended process is started again, and when no more.
 
     One that has been ready for `stable_s` starts with a clean sheet: its failures are forgotten.
-    Failures are counted, not timed: one that hangs, or never gets ready, takes minutes to fail.
+    Failures in a row are counted, not timed: one that hangs, or never gets ready, takes minutes to
+    fail. One that fails more than `most_in_window` times within `window_s` is given up as well,
+    however stably it ran in between.
     """
 
     initial_s: float = 0.25
@@ -30,6 +32,8 @@ class RestartPolicy:
     cap_s: float = 5.0
     max_restarts: int = 5
     stable_s: float = 30.0
+    window_s: float = 600.0
+    most_in_window: int = 12
 
 
 class GivingUp(Enum):

@@ -170,6 +170,17 @@ def test_crashes_are_told_as_json(crashed, capsys):
     assert shown["pid"] == 42
 
 
+def test_a_crash_report_that_was_cut_off_hides_no_other_one(crashed, capsys):
+    cut = crashed.with_name("base-state") / "crashes" / "000009-speech.json"
+    cut.write_text('{"time": "2026')
+    code, told, _ = run(crashed, capsys, "crashes", "list")
+    rows = json.loads("\n".join(run(crashed, capsys, "crashes", "list", "--json")[1]))
+    assert (code, len(told)) == (0, len(rows))
+    assert told[-1].startswith("000009-speech ")
+    assert "not whole" in told[-1]
+    assert [("unreadable" in row) for row in rows] == [False] * (len(rows) - 1) + [True]
+
+
 def test_an_unknown_crash_is_refused(crashed, capsys):
     code, _, error = run(crashed, capsys, "crashes", "show", "7")
     assert (code, error) == (

@@ -181,6 +181,24 @@ def test_no_row_of_the_robots_table_is_given_up_for_failures_between_stable_runs
         play.now_s += row.restart.initial_s
 
 
+@pytest.mark.parametrize("row", TABLE, ids=lambda row: row.name)
+def test_one_that_fails_again_and_again_between_stable_runs_is_given_up(row):
+    play, failures = Play((replace(row, with_previous=False),)), 0
+    while play.state(row.name) is not State.GIVEN_UP:
+        assert failures <= row.restart.most_in_window
+        play.step()
+        play.step(**{row.name: READY})
+        play.now_s += row.restart.stable_s
+        play.step(**{row.name: READY})
+        assert play.records[row.name].failures == 0
+        play.step(**{row.name: Seen(exit_code=-9)})
+        failures += 1
+        play.now_s += row.restart.initial_s
+
+    assert failures == row.restart.most_in_window + 1
+    assert f"given up after {failures} failures in 363 s" in play.records[row.name].reason
+
+
 def test_one_that_the_computer_cannot_start_is_tried_again_and_given_up_like_any_other():
     play = Play(ROWS[:1])
     refused = Seen(refused="[Errno 11] Resource temporarily unavailable")

@@ -137,6 +137,23 @@ def test_the_commands_list_and_show_flights(capsys: pytest.CaptureFixture[str]) 
     assert "no flights in" in capsys.readouterr().out  # the examples have no numbers
 
 
+def test_a_flight_that_was_cut_off_hides_no_other_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = DRIVING.read_bytes()
+    (tmp_path / "000001-stop.mcap").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "000002-stop.mcap").write_bytes(whole)
+
+    assert main(["flight", "list", "--folder", str(tmp_path)]) == 0
+    cut, good = capsys.readouterr().out.splitlines()
+    assert main(["flight", "list", "--folder", str(tmp_path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+
+    assert cut.startswith("000001-stop.mcap  unreadable: ")
+    assert good.startswith("000002-stop.mcap  ")
+    assert ["unreadable" in one for one in told] == [True, False]
+
+
 def test_a_missing_flight_is_a_user_error(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
