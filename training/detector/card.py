@@ -105,10 +105,11 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
         "tables": tables(metrics),
         "calibration_images": settings.calibration_images,
         "size": settings.name,
-        "more": f" --seed {settings.seed} --start-from MODEL" if settings.start_from else "",
+        "more": " --start-from MODEL" if settings.start_from else "",
         "began": f"{BEGAN}\n" if settings.start_from else "",
         "seed": settings.seed,
         "epochs": settings.epochs,
+        "epoch_images": settings.epoch_shards * IMAGES_PER_SHARD,
         "settling_epochs": settings.settling_epochs,
     }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
