@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Final
 
 from sim_twin.campaigns import fault_matrix, kills, pressure, soak, switches
-from sim_twin.campaigns.report import Report
+from sim_twin.campaigns.orderly_end import end_on_sigterm
+from sim_twin.campaigns.report import Report, make_room
 from sim_twin.campaigns.selection import NothingChosen
+from vla_deploy.cli.example import OneLineParser
+from vla_deploy.cli.validate import duration_h, whole_number
 
 CAMPAIGNS: Final[Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], Report]]] = {
     "faults": fault_matrix.run,
@@ -22,21 +25,44 @@ _EXAMPLES: Final = """examples:
   vla-deploy validate faults --junit out/faults.xml
   vla-deploy validate faults --only servo_bus --json
   vla-deploy validate kills --count 20"""
+_EXIT_INTERRUPTED: Final = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run it; exit code 0 only where no case failed, 2 where `--only` chooses none."""
+    """Run it; exit code 0 only where no case failed, 2 where the options cannot be met."""
     options = _parser().parse_args(argv)
     progress = _to_stderr if options.json else _to_stdout
     try:
+        _make_room(options.junit)
         report = CAMPAIGNS[options.campaign](options, progress)
-    except NothingChosen as error:
+    except (NothingChosen, _NoRoom) as error:
         _to_stderr(f"validate {options.campaign}: {error}")
         return 2
+    except KeyboardInterrupt:
+        return _EXIT_INTERRUPTED
+    _to_stdout(json.dumps(report.document(), indent=2) if options.json else report.text())
     if options.junit is not None:
         report.write_junit(options.junit)
-    _to_stdout(json.dumps(report.document(), indent=2) if options.json else report.text())
     return 1 if report.failed else 0
+
+
+def start(argv: Sequence[str] | None = None) -> int:
+    """Run it as a process of its own, which SIGTERM ends in order."""
+    end_on_sigterm()
+    return main(argv)
+
+
+class _NoRoom(Exception):
+    """Say why no report can be written where `--junit` wants it."""
+
+
+def _make_room(junit: Path | None) -> None:
+    """Make the folder of the report before anything is played: hours later it is too late."""
+    try:
+        if junit is not None:
+            make_room(junit)
+    except OSError as error:
+        raise _NoRoom(f"--junit {junit}: {error.strerror}: {error.filename}") from error
 
 
 def _to_stdout(line: str) -> None:
@@ -49,7 +75,7 @@ def _to_stderr(line: str) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="vla-deploy validate",
         description=__doc__,
         epilog=_EXAMPLES,
@@ -57,14 +83,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("campaign", choices=tuple(CAMPAIGNS))
     parser.add_argument("--only", default="", help="play only cases whose name contains this")
-    parser.add_argument("--count", type=int, help="how many injections or switches")
-    parser.add_argument("--hours", type=float, default=1.0, help="how long to soak")
+    parser.add_argument("--count", type=whole_number, help="how many injections or switches")
+    parser.add_argument("--hours", type=duration_h, default=1.0, help="how long to soak")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--workers", type=int, default=2, help="how many cases at a time")
+    parser.add_argument("--workers", type=whole_number, default=2, help="how many cases at a time")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML too")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     return parser
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(start())

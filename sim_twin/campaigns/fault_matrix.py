@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from sim_twin.campaigns.orderly_end import end_on_sigterm
 from sim_twin.campaigns.phases import PAYLOAD, NotSet, Phase, Stage
 from sim_twin.campaigns.report import Case, Report
 from sim_twin.campaigns.selection import chosen
@@ -117,9 +118,9 @@ def play(cell: Cell, seed: int = 0) -> Case:
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
         takes_all = cell.component in _SENSORS
         stack = (LockstepStack if takes_all else LockstepControl)(Path(folder), seed)
-        if not takes_all:
-            stack.add_senses()
         try:
+            if not takes_all:
+                stack.add_senses()
             return _Trial(cell, stack).run()
         except (NotSet, NotReady) as error:
             return Case(name=cell.name, failures=(f"the stage could not be set: {error}",))
@@ -213,7 +214,9 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Play every case whose name contains `options.only`, several at a time."""
     robot = load_robot("butler")
     mine = chosen(cells(robot), options.only, lambda cell: cell.name)
-    with multiprocessing.get_context("spawn").Pool(options.workers, maxtasksperchild=20) as pool:
+    with multiprocessing.get_context("spawn").Pool(
+        options.workers, initializer=end_on_sigterm, maxtasksperchild=20
+    ) as pool:
         cases = []
         for case in pool.imap(partial(play, seed=options.seed), mine):
             tell(case.row)

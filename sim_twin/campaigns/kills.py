@@ -5,6 +5,7 @@ runs as a service does, restarted and watched by `sim_twin.service_runner` in sy
 """
 
 import argparse
+import contextlib
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -24,6 +25,7 @@ from sim_twin.campaigns.selection import chosen
 from sim_twin.stillness import StillnessWatch
 from vla_deploy.supervisor.table import RestartPolicy
 
+INJECTIONS: Final = 200
 _POLL_S: Final = 0.02
 _SETTLE_S: Final = 1.0
 _TRIES: Final = 3
@@ -87,12 +89,11 @@ class KillCampaign:
 
     def close(self) -> None:
         """End the robot's work, the robot, then its machine."""
-        try:
-            self._work.end()
-            self._robot.close()
-        finally:
-            self._stillness.close()
-            self._machine.close()
+        with contextlib.ExitStack() as closing:  # each, even where one of them fails
+            closing.callback(self._machine.close)
+            closing.callback(self._stillness.close)
+            closing.callback(self._robot.close)
+            closing.callback(self._work.end)
 
     def _let_run_stably(self, process: str) -> None:
         """Hit a process only after a stable run: six failures in a row are another matter."""
@@ -139,7 +140,8 @@ class KillCampaign:
 
 def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
     """Do `options.count` injections, 200 unless told otherwise."""
-    drawn = injections(options.count or 200, options.seed)
+    count = INJECTIONS if options.count is None else options.count
+    drawn = injections(count, options.seed)
     return inject_all(chosen(drawn, options.only, lambda each: each.name), options.seed, tell)
 
 

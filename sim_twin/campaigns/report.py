@@ -1,6 +1,8 @@
 """Report a campaign's cases as a table, as JSON and as JUnit XML."""
 
+import errno
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -85,6 +87,19 @@ def told(case: Case, tell: Callable[[str], None]) -> Case:
     """Tell a case as soon as it is over, and return it."""
     tell(case.row)
     return case
+
+
+def make_room(path: Path) -> None:
+    """Make the folder of a file that is to be written later.
+
+    Raises:
+        OSError: it cannot be made, or no file can be written there.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise PermissionError(errno.EACCES, "it cannot be written", str(path))
 
 
 def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:

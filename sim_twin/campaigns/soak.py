@@ -69,7 +69,11 @@ class Soak:
         self._clock = MonotonicClock()
         self._process = psutil.Process()
         self.stack = LockstepStack(folder, seed)
-        self.stack.arm()
+        try:
+            self.stack.arm()
+        except BaseException:
+            self.stack.close()
+            raise
         self._began_ns = self._clock.now_ns()
         self._began_s = self.stack.lockstep.now_s
         self.done = 0
@@ -137,9 +141,9 @@ def growth(samples: Sequence[Sample], field: str, per: str = "sim_h") -> float:
     Raises:
         ValueError: there are too few samples to tell.
     """
-    warm = samples[round(_WARM_UP_RATIO * len(samples)) :]
-    if len(warm) < _LEAST_SAMPLES:
-        raise ValueError(f"{len(warm)} samples after the warm-up, expected {_LEAST_SAMPLES}")
+    too_few, warm = _too_few(samples), _warm(samples)
+    if too_few:
+        raise ValueError(too_few)
     hours = np.array([getattr(sample, per) for sample in warm])
     values = np.array([float(getattr(sample, field)) for sample in warm])
     slope: float = np.polynomial.Polynomial.fit(hours, values, 1).convert().coef[-1]
@@ -167,7 +171,10 @@ def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
 
 
 def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
-    """Return a case for each thing that must not grow."""
+    """Return a case for each thing that must not grow; too short a soak cannot judge them."""
+    too_few = _too_few(samples)
+    if too_few:
+        return tuple(Case(name=name, skipped=too_few) for name in ("memory", *_MUST_NOT_GROW))
     slope = growth(samples, "memory_mib")
     too_much = (f"grows by {slope:.2f} MiB/h, limit {MOST_MIB_PER_H:g}",)
     cases = [
@@ -180,12 +187,23 @@ def judge(samples: Sequence[Sample]) -> tuple[Case, ...]:
             },
         )
     ]
-    warm = samples[round(_WARM_UP_RATIO * len(samples)) :]
+    warm = _warm(samples)
     for field in _MUST_NOT_GROW:
         first, last = getattr(warm[0], field), getattr(samples[-1], field)
         grown = (f"grew from {first} to {last}",) if last > first else ()
         cases.append(Case(name=field, failures=grown, figures={"first": first, "last": last}))
     return tuple(cases)
+
+
+def _warm(samples: Sequence[Sample]) -> Sequence[Sample]:
+    return samples[round(_WARM_UP_RATIO * len(samples)) :]
+
+
+def _too_few(samples: Sequence[Sample]) -> str:
+    """Return why the samples say nothing of growth, empty where they are enough."""
+    count = len(_warm(samples))
+    enough = count >= _LEAST_SAMPLES
+    return "" if enough else f"{count} samples after the warm-up, expected {_LEAST_SAMPLES}"
 
 
 def jobs_case(done: int, failed: int) -> Case:

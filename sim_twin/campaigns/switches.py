@@ -48,9 +48,11 @@ class SwitchCampaign:
         self._swing_ns = 0
         self._meter = _Meter(self._robot, self._clock)
         self._stillness = StillnessWatch(FINE_STEP_S)
-        # Arms rest on the base without power: moving there is what a protective stop is for.
-        self._robot.go(**load_robot("butler").poses["tuck"])
-        self._robot.pause(_TUCK_S)
+        try:
+            self._tuck()
+        except BaseException:
+            self.close()
+            raise
 
     def before(self) -> Ticks:
         """Return the ticks of a while without any switch, in the same motion."""
@@ -86,6 +88,12 @@ class SwitchCampaign:
         """End the robot."""
         self._stillness.close()
         self._robot.close()
+
+    def _tuck(self) -> None:
+        """Fold the arms."""
+        # Arms rest on the base without power: moving there is what a protective stop is for.
+        self._robot.go(**load_robot("butler").poses["tuck"])
+        self._robot.pause(_TUCK_S)
 
     def _seen(self, target: str, least_rate_hz: float, after_s: float = 0.0) -> Seen:
         began_ns, start = self._clock.now_ns(), self._robot.ticks()

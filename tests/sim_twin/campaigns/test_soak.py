@@ -68,9 +68,17 @@ def test_a_process_that_does_not_grow_passes() -> None:
     assert not any(case.failures for case in judge(samples(0.2)))
 
 
-def test_too_few_samples_say_nothing() -> None:
+@pytest.mark.parametrize("count", [1, 5, 9])
+def test_too_few_samples_say_nothing_of_growth(count: int) -> None:
+    cases = judge(samples(9.0, files=6, count=count))
+    assert [case.name for case in cases] == [case.name for case in judge(samples(0.0))]
+    assert all("samples after the warm-up, expected 8" in case.skipped for case in cases)
+    assert not any(case.failures for case in cases)
+
+
+def test_too_few_samples_have_no_slope() -> None:
     with pytest.raises(ValueError, match="samples after the warm-up"):
-        judge(samples(0.0, count=9))
+        growth(samples(0.0, count=9), "memory_mib")
 
 
 def test_a_robot_that_is_stuck_fails_and_one_that_misses_a_job_does_not() -> None:

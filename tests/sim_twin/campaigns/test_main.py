@@ -1,0 +1,86 @@
+"""Options that cannot be met are refused before anything is played, and no report is lost."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sim_twin.campaigns import __main__ as campaigns
+from sim_twin.campaigns import kills
+from sim_twin.campaigns.report import Case, Report
+
+REPORT = Report(campaign="faults", cases=(Case(name="servo_bus/off/idle", failures=("fell",)),))
+
+
+@pytest.fixture
+def played(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    names: list[str] = []
+
+    def play(options: argparse.Namespace, _tell: Callable[[str], None]) -> Report:
+        names.append(options.campaign)
+        return REPORT
+
+    monkeypatch.setattr(campaigns, "CAMPAIGNS", dict.fromkeys(campaigns.CAMPAIGNS, play))
+    return names
+
+
+@pytest.mark.parametrize(
+    ("campaign", "option", "value"),
+    [
+        *(("kills", "--count", value) for value in ("0", "-1", "many")),
+        *(("faults", "--workers", value) for value in ("0", "-1", "2.5")),
+        *(("soak", "--hours", value) for value in ("0", "-1", "nan", "inf", "long")),
+    ],
+)
+def test_a_figure_that_plays_nothing_is_refused_in_one_line(
+    campaign: str,
+    option: str,
+    value: str,
+    played: list[str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        campaigns.main([campaign, option, value])
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"argument {option}: expected" in line
+    assert (ended.value.code, played) == (2, [])
+
+
+def test_a_campaign_plays_as_many_as_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kills, "inject_all", lambda drawn, _seed, _tell: drawn)
+    for count, expected in ((None, kills.INJECTIONS), (3, 3), (0, 0)):
+        options = argparse.Namespace(count=count, seed=0, only="")
+        assert len(kills.run(options, print)) == expected  # type: ignore[arg-type]
+
+
+def test_the_folder_of_the_junit_file_is_made(tmp_path: Path, played: list[str]) -> None:
+    junit = tmp_path / "new" / "er" / "x.xml"
+    assert campaigns.main(["faults", "--junit", str(junit)]) == 1
+    assert junit.is_file()
+    assert played == ["faults"]
+
+
+@pytest.mark.parametrize(("name", "why"), [("", "it is a folder"), ("file/x.xml", "exists")])
+def test_a_junit_file_that_cannot_be_is_refused_before_anything_is_played(
+    name: str, why: str, tmp_path: Path, played: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    assert campaigns.main(["faults", "--junit", str(tmp_path / name)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("validate faults: --junit ")
+    assert why in line
+    assert played == []
+
+
+@pytest.mark.usefixtures("played")
+def test_the_report_is_told_before_its_file_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(_report: Report, _path: Path) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr(Report, "write_junit", full)
+    with pytest.raises(OSError, match="no space left"):
+        campaigns.main(["faults", "--junit", str(tmp_path / "x.xml")])
+    assert "1 cases, 1 failed" in capsys.readouterr().out
