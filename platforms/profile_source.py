@@ -80,7 +80,7 @@ def _chain(path: Path) -> list[tuple[Path, Table]]:
 def _parse(path: Path) -> Table:
     try:
         return tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError, RecursionError) as error:
         raise ProfileError((f"{path}: expected a TOML file: {error}",)) from error
 
 

@@ -218,6 +218,11 @@ def test_broken_toml_and_missing_files_name_the_path(faults_of, tmp_path):
         load_profile(tmp_path / "gone.toml")
 
 
+def test_toml_that_is_nested_without_end_is_a_fault(faults_of):
+    (fault,) = faults_of(f"depth = {'[' * 5000}")
+    assert "expected a TOML file: maximum recursion depth" in fault
+
+
 def test_every_shipped_profile_file_is_named(tmp_path):
     assert {f"{name}.toml" for name in profile_names()} == {
         path.name for path in PROFILES.iterdir() if path.suffix == ".toml"

@@ -5,7 +5,8 @@ import difflib
 import json
 import os
 import shlex
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +34,9 @@ from vla_deploy.install.commands import (
 from vla_deploy.install.disk import apply_changes, read_files, remove_if_empty
 from vla_deploy.install.layout import DEFAULT_PREFIX
 from vla_deploy.install.manifest import afterwards, during, read_manifest, write_manifest
+from vla_deploy.install.service_profile import service_profile
+from vla_deploy.install.tools import missing_tools, require_tools
 from vla_deploy.robots import load_robot
-from vla_deploy.supervisor.profile_choice import detect
 
 INSTALL_EXAMPLES = """  vla-deploy install --robot butler --dry-run
   sudo vla-deploy install --robot butler --profile jetson_orin_nx
@@ -110,11 +112,15 @@ def run_install(arguments: argparse.Namespace) -> int:
         twin=arguments.twin,
         credentials=tuple(arguments.credential),
     )
-    profile = load_profile(choice.profile or detect(layout.root)[0])
-    files = system_files(load_robot(choice.robot), profile, choice, layout)
+    start = service_profile(choice.profile, layout)
+    if start.fault:
+        _warn(start.fault)
+    files = system_files(load_robot(choice.robot), load_profile(start.name), choice, layout)
     known = read_manifest(layout)
     changes = install_changes(files, known, read_files(layout, paths_of(files, known)))
     commands = after_install(files) if layout.is_this_computer else ()
+    if not arguments.dry_run:
+        require_tools(commands)
     _report(arguments, changes, commands)
     if not arguments.dry_run:
         write_manifest(layout, during(known, changes), choice)
@@ -134,6 +140,8 @@ def run_uninstall(arguments: argparse.Namespace) -> int:
     before = before_uninstall(known) if known and layout.is_this_computer else ()
     after = after_uninstall(layout, purge=arguments.purge)
     after = after if layout.is_this_computer or arguments.purge else ()
+    faults = missing_tools((*before, *after))
+    before, after = _runnable(before, faults), _runnable(after, faults)
     _report(arguments, changes, (*before, *after))
     if not arguments.dry_run:
         _run(before)
@@ -164,6 +172,19 @@ def _credential(text: str) -> Credential:
     if not found or not Path(path).is_absolute():
         raise argparse.ArgumentTypeError(f"expected NAME=/path/of/file, got {text!r}")
     return Credential(name=name, path=Path(path))
+
+
+def _runnable(commands: Iterable[Command], faults: Mapping[str, str]) -> tuple[Command, ...]:
+    """Return the commands whose program can work; say of each other one why it is skipped."""
+    commands = tuple(commands)
+    for command in commands:
+        if command[0] in faults:
+            _warn(f"skipped: {shlex.join(command)}: {faults[command[0]]}")
+    return tuple(command for command in commands if command[0] not in faults)
+
+
+def _warn(text: str) -> None:
+    print(f"vla-deploy: {text}", file=sys.stderr)
 
 
 def _run(commands: Iterable[Command]) -> None:

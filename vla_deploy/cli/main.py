@@ -13,6 +13,8 @@ from vla_deploy.cli.errors import CommandFailed, user_errors
 from vla_deploy.cli.example import OneLineParser
 
 EXIT_BROKEN_PIPE = 141  # as a shell tells the end by SIGPIPE
+# The service is started anew after 1, never after 2; a disk that was full may have room again.
+EXIT_OF_OS_ERROR = {"run": 1}
 EPILOG = """examples:
   vla-deploy demo                                 pick and place on the twin
   vla-deploy run --twin                           keep a twin running
@@ -64,6 +66,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever reads, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_BROKEN_PIPE
+    except OSError as error:
+        print(f"vla-deploy: {_told(error)}", file=sys.stderr)
+        return EXIT_OF_OS_ERROR.get(arguments.command, 2)
+
+
+def _told(error: OSError) -> str:
+    """Return which file could not be used and why, in one line."""
+    if error.filename is None or not error.strerror:
+        return str(error) or type(error).__name__
+    return f"{os.fsdecode(error.filename)}: {error.strerror}"
 
 
 if __name__ == "__main__":

@@ -15,6 +15,8 @@ from platforms.profile_source import Source, flat, read_source
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import Session, attach
+from vla_deploy.install.layout import SERVICE_RUNTIME, Layout
+from vla_deploy.install.service_profile import slice_too_small
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.supervisor.profile_change import Outcome, Phase
 from vla_deploy.supervisor.profile_choice import choice_of, detect, start_profile
@@ -157,7 +159,7 @@ def validate_profile(arguments: argparse.Namespace) -> int:
 def use_profile(arguments: argparse.Namespace) -> int:
     """Choose a profile; a running robot takes it over at once, or says why not."""
     name = _absolute(arguments.name)
-    load_profile(name)
+    _warn_of_small_slice(arguments, name)
     if running(arguments.runtime_base or default_base()) is None:
         return _choose(arguments, name)
     session = attach(arguments.runtime_base)
@@ -171,6 +173,15 @@ def use_profile(arguments: argparse.Namespace) -> int:
         raise CommandFailed(f"profile {name} {outcome['outcome']}: {outcome['reason']}")
     note = f" {outcome['reason']}" if outcome["reason"] else ""
     return _tell(arguments, outcome, f"profile {name}: {outcome['outcome']}{note}")
+
+
+def _warn_of_small_slice(arguments: argparse.Namespace, name: str) -> None:
+    """Say so where the service's control group was sized for a smaller profile."""
+    profile = load_profile(name)
+    is_service = (arguments.runtime_base or default_base()) == SERVICE_RUNTIME
+    warning = slice_too_small(profile, Layout()) if is_service else ""
+    if warning:
+        sys.stderr.write(f"vla-deploy: {warning}\n")
 
 
 def _choose(arguments: argparse.Namespace, name: str) -> int:

@@ -5,6 +5,7 @@ InstallError
 ├── ArgumentRefused   a name or path cannot stand in a unit
 ├── NotPermitted      writing there needs another user
 ├── ReleaseRefused    the release cannot be added, used or removed as asked; nothing was changed
+├── ToolMissing       a program of the system is not there, or reaches nobody; nothing was changed
 ├── CommandFailed     a program of the system did not do what it was asked
 └── SwitchFailed      the new release did not prove itself; the one before is back in use
 """
@@ -32,6 +33,10 @@ class ReleaseRefused(InstallError):
 
 class SwitchFailed(InstallError):
     """Say which step failed, and what is in use now."""
+
+
+class ToolMissing(InstallError):
+    """Say which, and what to do instead."""
 
 
 class CommandFailed(InstallError):

@@ -190,3 +190,27 @@ def test_what_is_about_the_twin_is_refused_without_one(
 ) -> None:
     assert main(["run", option]) == 2
     assert "add --twin" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["install", "--root", "/proc/self"],
+        ["uninstall", "--root", __file__],
+        ["--runtime-base", "/proc/self/x", "profile", "use", "desktop"],
+    ],
+)
+def test_a_place_that_cannot_be_written_is_one_line_and_exit_code_2(words, capsys):
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("vla-deploy: /")
+    assert error.count("\n") == 1
+
+
+def test_the_service_tries_again_after_a_fault_of_the_system(capsys, monkeypatch):
+    def fill_up(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("vla_deploy.cli.run.main", fill_up)
+    assert main(["run", "--twin"]) == 1
+    assert capsys.readouterr().err == "vla-deploy: [Errno 28] No space left on device\n"

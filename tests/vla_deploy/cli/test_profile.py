@@ -188,3 +188,10 @@ def test_use_follows_the_phases_until_its_own_request_has_ended(ask, capsys):
 def test_a_supervisor_that_never_answers_is_told(ask):
     with pytest.raises(CommandFailed, match="the supervisor tells nothing of profile calm"):
         ask()
+
+
+def test_use_warns_where_the_services_slice_is_too_small(vla, base, monkeypatch):
+    monkeypatch.setattr(profile, "SERVICE_RUNTIME", base)
+    monkeypatch.setattr(profile, "slice_too_small", lambda *_: "too small")
+    code, _, error = vla("use", "desktop", "--dry-run")
+    assert (code, error) == (0, "vla-deploy: too small\n")

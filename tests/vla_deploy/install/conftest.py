@@ -24,6 +24,9 @@ mount --bind {packages} {image}/opt/packages
 mount --bind {source} {image}/opt/source
 mount --rbind {image}/opt /opt
 mount --bind {image}/etc /etc
+# An interpreter that finds its library in somebody's home does not see that from the sandbox.
+echo /opt/python/lib >/etc/ld.so.conf.d/00-python.conf
+ldconfig
 mount -t tmpfs tmpfs /run
 mount -t tmpfs tmpfs /var/lib
 mount -t tmpfs tmpfs /var/log
