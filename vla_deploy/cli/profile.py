@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.clock import NS_PER_S
-from platforms import ProfileError, load_profile
+from platforms import Profile, ProfileError, load_profile
 from platforms.power_switch import PowerSwitch
 from platforms.profile import PROFILES, profile_from, profile_names
 from platforms.profile_source import Source, flat, read_source
@@ -159,7 +159,7 @@ def validate_profile(arguments: argparse.Namespace) -> int:
 def use_profile(arguments: argparse.Namespace) -> int:
     """Choose a profile; a running robot takes it over at once, or says why not."""
     name = _absolute(arguments.name)
-    _warn_of_small_slice(arguments, name)
+    _warn_of_small_slice(arguments, load_profile(name))
     if running(arguments.runtime_base or default_base()) is None:
         return _choose(arguments, name)
     session = attach(arguments.runtime_base)
@@ -175,9 +175,8 @@ def use_profile(arguments: argparse.Namespace) -> int:
     return _tell(arguments, outcome, f"profile {name}: {outcome['outcome']}{note}")
 
 
-def _warn_of_small_slice(arguments: argparse.Namespace, name: str) -> None:
+def _warn_of_small_slice(arguments: argparse.Namespace, profile: Profile) -> None:
     """Say so where the service's control group was sized for a smaller profile."""
-    profile = load_profile(name)
     is_service = (arguments.runtime_base or default_base()) == SERVICE_RUNTIME
     warning = slice_too_small(profile, Layout()) if is_service else ""
     if warning:
