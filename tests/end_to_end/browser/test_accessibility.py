@@ -38,6 +38,18 @@ def test_axe_has_no_grave_objection(page: Page, view: str, theme: str) -> None:
     assert judged(page) == []
 
 
+def test_a_change_of_theme_reaches_every_word_at_once(page: Page) -> None:
+    see(page, "now")
+    before = None
+    for theme in ("light", "dark") * 4:
+        page.emulate_media(color_scheme=theme)
+        colour = page.evaluate(
+            "() => getComputedStyle(document.querySelector('.brand-name')).color"
+        )
+        assert colour != before
+        before = colour
+
+
 def focused(page: Page) -> str:
     """Return the accessible name of what has the focus, nearly as a screen reader would."""
     name = page.evaluate(
