@@ -9,7 +9,7 @@ THING_PRIOR = -4.0
 SIZE_LOG_RANGE = (-2.0, 4.6)
 """Bounds of ln(side of a box / stride)."""
 FIRST_SIZE_LOG = 1.3
-QUARTER, EIGHTH, SIXTEENTH, JOINED = 32, 80, 160, 96
+QUARTER, EIGHTH, SIXTEENTH, JOINED = 32, 112, 256, 128
 """Channels at each size."""
 
 

@@ -42,8 +42,8 @@ FULL = Settings(
 """About half an hour on one idle core."""
 LONG = Settings(
     name="long",
-    shards=(("heldout", 50), ("flat", 20), ("train", 2400)),
-    epochs=32,
+    shards=(("heldout", 50), ("flat", 20), ("train", 4800)),
+    epochs=48,
     settling_epochs=2,
 )
 """What the shipped model was made by."""
