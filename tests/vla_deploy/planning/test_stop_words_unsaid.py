@@ -21,6 +21,7 @@ SPEAKERS: Final = ("planning", "memory", "world", "speech/telling.py")
 NOT_SAID: Final = frozenset(
     {
         "planning/rules/clauses.py",  # what a person may say
+        "planning/command_parser/passed_over.py",
         "planning/rules/ordering.py",
         "planning/rules/table.py",
         "planning/errors.py",  # to be read: `spoken_refusal` says it in other words

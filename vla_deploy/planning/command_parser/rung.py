@@ -24,6 +24,7 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
+from vla_deploy.planning.command_parser.passed_over import refuse_passed_over
 from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
 from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
@@ -87,6 +88,7 @@ class CommandParser:
             parsed = self.parse(request.text, deadline)
         except InferenceError as error:
             raise Declined(one_line(error)) from error
+        refuse_passed_over(parsed.steps, parsed.words)
         actions = Steps(parsed.words, request).actions(parsed.steps)
         if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
             # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.

@@ -65,8 +65,10 @@ _COURTESY: Final = re.compile(
     r"(?:hello|hi|hey|good (?:morning|day|afternoon|evening))(?: there| robot| butler)?|"
     r"excuse me|pardon(?: me)?|thanks(?: .*)?|thank you(?: .*)?|cheers|please|"
     r"(?:if|when|whenever) you(?: don't mind|'re ready| are ready| have (?:a|the) (?:\w+))|"
-    r"if it(?:'s| is) not too much trouble|if possible|right(?: then)?|you know what|listen|look"
+    r"if it(?:'s| is) not too much trouble|if possible|you know what|listen"
 )
+# At the beginning these ask for nothing either; later on they are a side, and something to do.
+_OPENING: Final = re.compile(r"right(?: then)?|look")
 # Before these the speaker has changed his mind about what he has just said.
 _REPAIR: Final = re.compile(
     r"(?:no,? wait|wait,? no|oh no|no|sorry|i (?:mean|meant|said)|or rather|rather|"
@@ -80,11 +82,18 @@ def is_stop(text: str) -> bool:
         return False
     said = " ".join(words_of(polite_off(text).replace("'", "")))
     urged = _URGED.sub("", said)
+    if _STOP_DOING.fullmatch(urged):
+        return True
     return said in _STOPS or (urged in _STOPS and urged.startswith(_HALTS))
 
 
 # What people say before it who want it now; "no, never mind" may still answer a question.
 _URGED: Final = re.compile(r"^(?:(?:and|then|but|no|wait|oh|hey|i (?:said|say)|just|now) )+")
+# "Stop driving to the kitchen", but not "stop looking and come here".
+_STOP_DOING: Final = re.compile(
+    r"(?:stop|quit|cease) (?!(?:any|some|every|no)thing)[a-z]{2,}ing\b"
+    r"(?!.* (?:and|then|but|instead)\b).*"
+)
 _HALTS: Final = ("stop", "halt", "freeze", "dont move", "do not move", "hold still", "stand still")
 _STOPS: Final = frozenset(" ".join(words_of(spoken)) for spoken in STOP_WORDS) | {"stop that"}
 
@@ -120,6 +129,8 @@ def _without(text: str, patterns: tuple[re.Pattern[str], ...]) -> str:
 def segments(text: str) -> list[str]:
     """Return what stands between the conjunctions of a sentence, courtesies left out."""
     parts = [polite_off(part) for part in _SPLIT.split(text) if part.strip(" .!?,")]
+    if len(parts) > 1 and _OPENING.fullmatch(parts[0]):
+        parts = parts[1:]
     return [part for part in parts if not _COURTESY.fullmatch(part)] or parts
 
 

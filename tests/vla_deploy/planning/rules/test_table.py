@@ -307,6 +307,8 @@ def test_what_is_urgent_ranks_before_what_is_not(flat: "Flat") -> None:
         "I said stop",
         "wait, don't move",
         "then halt",
+        "stop driving to the kitchen",
+        "please quit looking for the cup",
     ],
 )
 def test_ways_to_say_stop(text: str) -> None:
@@ -314,7 +316,16 @@ def test_ways_to_say_stop(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["no, never mind", "stop before the table", "but first the box", "again", "and now"]
+    "text",
+    [
+        "no, never mind",
+        "stop before the table",
+        "but first the box",
+        "again",
+        "and now",
+        "stop looking and come here",
+        "stop nothing",
+    ],
 )
 def test_what_is_no_stop(text: str) -> None:
     assert not is_stop(text)
@@ -334,3 +345,8 @@ SENTENCES = st.one_of(st.text(max_size=80), st.lists(WORDS, max_size=14).map(" "
 @given(SENTENCES)
 def test_any_words_are_refused_by_name_or_make_a_valid_plan(flat: "Flat", text: str) -> None:
     flat.refuses_or_plans(text)
+
+
+def test_a_side_said_last_is_no_courtesy(flat: "Flat") -> None:
+    with pytest.raises(NotUnderstood):
+        flat.plan("turn left and right")

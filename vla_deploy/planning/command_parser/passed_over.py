@@ -1,0 +1,145 @@
+"""Refuse an answer that passes over what turns a command round: "rather than", "if", "no".
+
+The model copies what it knows and has no field for such words, so a step made of the rest may do
+the very thing that was not to be done. Reading that back would hide the word as well.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step
+from vla_deploy.planning.command_parser.spans import find_span
+from vla_deploy.planning.errors import CannotBeDone
+
+# These only talk or stand; whatever was meant, nothing is moved by mistake.
+_HARMLESS: Final = frozenset(
+    {"say", "ask", "where", "wait", "stop", "nothing", "impossible", "unknown"}
+)
+_COPIED: Final = "~"
+_BEGIN: Final = r"^(?:(?:please|butler|robot|hey|ok|okay|well|so|and|but|oh|no|sorry) )*"
+_HOUR: Final = r"(?:one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|noon|\d+)"
+_PERSON: Final = r"(?:i|we|he|she|they|someone|somebody|anyone|anybody|everyone|everybody|people)"
+_WHO_IS: Final = (
+    r"(?:i'm|i am|i was|i'll|i've|we're|we are|we were|we'll|we've|he's|he is|he was|she's|she is|"
+    r"she was|they're|they are|they were)"
+)
+_DO: Final = r"(?:go|drive|move|bring|pick|take|put|find|fetch|get|place|grab|carry|turn)\b"
+_DOING: Final = (
+    r"(?:going|driving|moving|bringing|picking|taking|putting|finding|fetching|carrying|off)\b"
+)
+_DONE: Final = r"(?:went|drove|moved|brought|picked|took|put|found|placed|grabbed|carried|been)\b"
+# What may stand before an "if" that asks to see whether something is so, or is polite.
+_TO_SEE: Final = (
+    "see", "check", "look", "know", "wonder", "wondering", "appreciate it", "appreciate", "glad",
+    "happy", "grateful", "tell me", "nice", "great", "good", "kind", "helpful", "lovely", "mind",
+    "chance",
+)  # fmt: skip
+_IF: Final = "".join(rf"(?<!\b{word} )" for word in _TO_SEE) + (
+    r"\bif (?!you\b|that's\b|it's (?:not|no)\b|i may\b|.*\bpossible\b)"
+)
+_SAID: Final[Mapping[str, tuple[str, ...]]] = {
+    "it leaves something out": (
+        r"\b(?:except|excepting|apart from|aside from|other than|rather than|instead of)\b",
+        r"\b(?:any|anything|anywhere|every|everything|everywhere|all|somewhere)\b.*\bbut\b",
+    ),
+    "it says what not to do": (
+        r"\b(?:avoid|avoiding|refrain|refuse|refusing|beware|dare|hands off|off limits)\b",
+        r"\bwithout (?:\w+ing )?(?:through |into |near )?(?:(?:the|a|an|my|your|our)\b|~)",
+        r"\b(?:stop|quit|cease) \w+ing\b|\bbut (?:stop|wait|halt)\b",
+        r"\bleave (?:\w+ )*~(?: ~)* (?:where|alone|as)\b",
+        r"\b(?:me|us|take|bring|up|put|fetch|get|grab) no ~",
+    ),
+    "I do things at once, not later, again and again, or under a condition": (
+        _IF,
+        r"\bas soon as (?!possible|you)|\b(?:until|till) (?!i |eye |you\b)|\bwhenever (?!you\b)",
+        r"\b(?:unless|in case|as long as|provided)\b",
+        rf"\b(?:when|once|while) (?:{_PERSON}|the|it|it's)\b",
+        rf"\b(?:after|before) (?:{_PERSON}|dinner|lunch|breakfast)\b",
+        r"(?<!\blook )(?<!\bgo )\b(?:after|before) ~$",
+        r"\b(?:tomorrow|tonight|someday|remind|reminder|twice|thrice|times)\b",
+        r"^(?!.*\bso (?:that )?(?:i|we)\b).*\blater(?: today)?$",
+        r"\b(?:in|after|within|every) (?:\w+ ){0,3}(?:minutes?|seconds?|hours?|days?)$",
+        r"\b(?:in|after|every) (?:\w+ ){1,2}(?:minutes?|seconds?|hours?|days?)\b",
+        rf"\bat (?:half past |quarter (?:past|to) )?{_HOUR}(?: o'clock)?$",
+    ),
+    "I choose my speed myself": (r"\bper (?:second|minute|hour)\b",),
+    "it tells or asks of something, instead of telling me to do it": (
+        rf"{_BEGIN}(?:have|has|had) (?:you|i|we|he|she|they) (?!seen|noticed|found)",
+        rf"{_BEGIN}(?:did|was|were) (?:you|i|we|he|she|they) (?!see|notice|find)",
+        rf"{_BEGIN}(?:when (?:will|would|do|did|are)|why|what if|what happens)\b",
+        rf"{_BEGIN}how (?:do|did|can|would|will) (?:you|i|we) {_DO}",
+        rf"{_BEGIN}(?:do you want|are you allowed) to {_DO}",
+        rf"{_BEGIN}(?:are you|you are|you're|you were) {_DOING}",
+        rf"{_BEGIN}(?:i|we|he|she|they)(?: have| had| did| just)? {_DONE}",
+        rf"{_BEGIN}(?:i|he|she|they)(?: will| shall)? {_DO}",
+        rf"{_BEGIN}{_WHO_IS} (?:just |only |not )?(?:{_DO}|{_DOING}|{_DONE})",
+        r"^(?:i'm|i am|we're|we are) (?:in|at|on) (?:the )?~$",
+        r"~ (?:went|fell) (?:in|on|to|into|onto)\b",
+        r"\b(?:he|she|they|wife|husband|mother|father|mom|dad|boss) (?:told|asked|said|wants)\b",
+        rf"{_BEGIN}(?:tell|ask) (?!me\b|us\b|yourself\b)\w+ to\b",
+    ),
+}
+_NOT_WHERE: Final = r"(?<!\bi )\b(?:leave|leaving|exit|vacate|away from|out of|clear of)"
+# The same for some steps alone: "leave the cup on the table" puts it there.
+_SAID_OF: Final = (
+    ("go", "it says where not to be", rf"{_NOT_WHERE} (?:the |my |our |your )?~"),
+    ("put", "it says where not to be", r"\baway from\b"),
+    ("move", "I drive straight ahead, not to or from something", r"\btowards? (?!me\b|us\b)"),
+)
+# Sides that a sentence names, and steps have: "turn right and left" is two of them.
+_SIDE: Final = re.compile(
+    r"\bleft\b|(?<!all )\bright\b(?! now| away| there| here| then| in| on| at| up| over)"
+)
+_SIDEWAYS: Final = frozenset({"turn", "look", "move"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """Hold what no answer with such a step may pass over, by why; "" stands for any step."""
+
+    step: str
+    why: str
+    said: re.Pattern[str]
+
+
+_RULES: Final = (
+    *(_Rule("", why, re.compile(one)) for why, patterns in _SAID.items() for one in patterns),
+    *(_Rule(step, why, re.compile(one)) for step, why, one in _SAID_OF),
+)
+
+
+def refuse_passed_over(steps: Sequence[Step], command: Sequence[str]) -> None:
+    """Refuse an answer that moves something and passes over what changes its meaning.
+
+    Raises:
+        CannotBeDone: it does; says over what.
+    """
+    moving = {step["do"] for step in steps} - _HARMLESS
+    if not moving:
+        return
+    rest = _rest(steps, command)
+    for rule in _RULES:
+        found = rule.said.search(rest) if not rule.step or rule.step in moving else None
+        if found:
+            said = _shown(found, rest, command)
+            raise CannotBeDone(f'I would pass over "{said}": {rule.why}; say just what to do now')
+    if moving <= _SIDEWAYS and len(_SIDE.findall(rest)) > len(steps):
+        raise CannotBeDone("more sides were named than I understood; say one after the other")
+
+
+def _rest(steps: Sequence[Step], command: Sequence[str]) -> str:
+    """Return the command with a sign in the place of each word that a step has copied."""
+    copied: set[int] = set()
+    for step in steps:
+        for field in COPIED_FIELDS & step.keys():
+            span = find_span(step[field].split(), command)
+            copied.update(() if span is None else span.places)
+    return " ".join(_COPIED if at in copied else word for at, word in enumerate(command))
+
+
+def _shown(found: re.Match[str], rest: str, command: Sequence[str]) -> str:
+    """Return the words of the command that a pattern found."""
+    first = rest[: found.start()].count(" ")
+    return " ".join(command[first : first + len(found[0].split())])
