@@ -15,7 +15,13 @@ from vla_deploy.cli.example import add_command, add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.map_check import as_characters, check_for_robot, describe
-from vla_deploy.navigation.map_file import MapFile, MapMode, read_map_file, write_map_file
+from vla_deploy.navigation.map_file import (
+    MapFile,
+    MapMode,
+    image_of,
+    read_map_file,
+    write_map_file,
+)
 from vla_deploy.robots import load_robot
 
 EXAMPLES: Final = """  vla-deploy map record maps/home.yaml        drive it around, then Ctrl-C
@@ -50,7 +56,8 @@ def register(commands: Any) -> None:
     )
     for act in (show, check, convert):
         act.add_argument("map", type=Path, help="its YAML file")
-    convert.add_argument("to", type=Path, help="the YAML file to write")
+    convert.add_argument("to", type=Path, help="the YAML file to write; its image lies beside it")
+    convert.add_argument("--replace", action="store_true", help="replace a map of that name")
     for name, run in _RUNS.items():
         acts.choices[name].add_argument("--json", action="store_true", help="print JSON")
         acts.choices[name].set_defaults(run=run)
@@ -60,8 +67,7 @@ def run_record(arguments: argparse.Namespace) -> int:
     """Draw a map until Ctrl-C, then write it."""
     from vla_deploy.perception.map_recorder import MapRecorder  # takes pinocchio with it
 
-    if arguments.map.exists() and not arguments.replace:
-        raise UsageError(f"{arguments.map} is there already; choose another, or: --replace")
+    _require_free(arguments.map, replace=arguments.replace)
     session = attach(arguments.runtime_base)
     space = SharedSpace(session.run_dir / "ipc", session.clock)
     recorder = MapRecorder(load_robot(arguments.robot), space, arguments.resolution)
@@ -104,6 +110,8 @@ def run_show(arguments: argparse.Namespace) -> int:
     """Draw a map."""
     file = read_map_file(arguments.map)
     if arguments.png is not None:
+        if arguments.png.suffix.lower() != ".png":
+            raise UsageError(f"{arguments.png}: expected a name that ends in .png")
         if not cv2.imwrite(str(arguments.png), file.shades):
             raise CommandFailed(f"{arguments.png}: cannot write the image")
         _print({"png": str(arguments.png)}, arguments.json)
@@ -128,12 +136,29 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 def run_convert(arguments: argparse.Namespace) -> int:
     """Write a map anew: trinary, not negated, as a PGM."""
-    if arguments.to.resolve() == arguments.map.resolve():
+    written = {one.resolve() for one in _written(arguments.to)}
+    if arguments.map.resolve() in written or image_of(arguments.map).resolve() in written:
         raise UsageError(f"{arguments.to}: choose another file, the map itself is kept")
+    _require_free(arguments.to, replace=arguments.replace)
     file = read_map_file(arguments.map)
     write_map_file(arguments.to, as_trinary(file))
     _print({"map": str(arguments.to)}, arguments.json)
     return 0
+
+
+def _written(to: Path) -> tuple[Path, Path]:
+    return to, to.with_suffix(".pgm")
+
+
+def _require_free(to: Path, *, replace: bool) -> None:
+    """Accept that a map is written.
+
+    Raises:
+        UsageError: one of its files is there, and is not to be replaced.
+    """
+    there = [str(one) for one in _written(to) if one.exists()]
+    if there and not replace:
+        raise UsageError(f"{' and '.join(there)} is there already; choose another, or: --replace")
 
 
 def as_trinary(file: MapFile) -> MapFile:

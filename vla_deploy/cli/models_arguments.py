@@ -1,6 +1,7 @@
 """Declare the arguments of `vla-deploy models`."""
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -206,7 +207,7 @@ def _quantise(acts: Any) -> None:
         help="to measure with: a folder with YOLO text files, or a COCO file",
     )
     quantise.add_argument(
-        "--max-drop", type=float, default=1.0, metavar="POINTS", help="of mAP50 (default: 1.0)"
+        "--max-drop", type=_points, default=1.0, metavar="POINTS", help="of mAP50 (default: 1.0)"
     )
     quantise.add_argument("--as", dest="new_name", help="install it under another name")
     quantise.add_argument(
@@ -235,6 +236,17 @@ def _size(text: str) -> tuple[int, int]:
     if match is None:
         raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, such as 640x480, got {text!r}")
     return int(match[1]), int(match[2])
+
+
+def _points(text: str) -> float:
+    """Return a share in points of mAP50; nan would let any drop pass."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= 100.0:
+        raise argparse.ArgumentTypeError(f"expected points from 0 to 100, got {text!r}")
+    return value
 
 
 def _count(text: str) -> int:

@@ -7,7 +7,7 @@ from typing import Final, TypeVar
 
 from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.manifest import Manifest
-from vla_deploy.inference.manifest_file import write_manifest
+from vla_deploy.inference.manifest_file import read_manifest, write_manifest
 from vla_deploy.inference.store import Model, ModelStore
 
 CARD: Final = "card.md"
@@ -37,6 +37,7 @@ def keep_tried(
 
     Raises:
         ModelUnknown: the name cannot be used.
+        ManifestInvalid: what the person gave makes no manifest that can be read.
         OSError: the model cannot be stored.
         InferenceError: it does not run, as `try_out` says.
     """
@@ -47,6 +48,7 @@ def keep_tried(
         if card is not None:
             shutil.copyfile(card, draft / CARD)
         write_manifest(draft, manifest)
+        read_manifest(draft)
         told = try_out(Model(manifest=manifest, folder=draft, is_embedded=False))
         folder = store.install(draft)
     finally:

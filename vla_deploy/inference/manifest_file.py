@@ -1,6 +1,7 @@
 """Read and write `model.toml`, the manifest that lies beside a model's files."""
 
 import json
+import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
@@ -178,5 +179,7 @@ def _is_nested(value: object) -> bool:
 
 
 def _value(value: object) -> str:
-    """Return a plain value as TOML, which JSON's form is for all that a manifest holds."""
+    """Return a plain value as TOML, which JSON's form is but for numbers that are none."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
     return json.dumps(value, ensure_ascii=False)

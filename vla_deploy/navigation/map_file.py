@@ -32,7 +32,9 @@ UNKNOWN_SHADE: Final = 205
 FREE_SHADE: Final = 254
 REQUIRED_KEYS: Final = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
 RESOLUTION_RANGE_M: Final = (0.001, 5.0)
-MOST_CELLS: Final = 100_000_000
+MOST_CELLS: Final = 25_000_000
+"""250 m by 250 m at 0.05 m: reading so many takes 0.9 GB, which the smallest board just has."""
+MOST_ORIGIN_M: Final = 100_000.0
 UNKNOWN: Final = -1
 _RAW_MOST: Final = 100
 _SWITCH: Final = {"0": False, "1": True, "false": False, "true": True, "no": False, "yes": True}
@@ -107,6 +109,18 @@ def read_map_file(yaml_path: Path) -> MapFile:
     )
 
 
+def image_of(yaml_path: Path) -> Path:
+    """Return the image that a map's file names.
+
+    Raises:
+        MapInvalid: the file is missing or not readable, or names none.
+    """
+    entries = _read_entries(yaml_path)
+    if "image" not in entries:
+        raise MapInvalid(f"{yaml_path}: missing image; see ROS map_server's format")
+    return yaml_path.parent / _text(entries["image"])
+
+
 def write_map_file(yaml_path: Path, file: MapFile, *, comment: str = "") -> None:
     """Write a map: `<name>.yaml` and `<name>.pgm` beside it; readers see the old or the new one.
 
@@ -150,9 +164,9 @@ def _faults(entries: Mapping[str, str | list[str]]) -> list[str]:
         told = entries["resolution"]
         faults.append(f"resolution: expected metres from {low_m} to {high_m:g}, got {told}")
     origin = _numbers(entries["origin"])
-    if len(origin) != 3 or not all(map(math.isfinite, origin)) or origin[2] != 0.0:
+    if len(origin) != 3 or origin[2] != 0.0 or not max(map(abs, origin)) <= MOST_ORIGIN_M:
         faults.append(
-            f"origin: expected [x, y, 0.0] in metres, got {entries['origin']}; "
+            f"origin: expected [x, y, 0.0] within {MOST_ORIGIN_M:g} m, got {entries['origin']}; "
             "a turned map must be drawn straight first"
         )
     free, occupied = _number(entries["free_thresh"]), _number(entries["occupied_thresh"])

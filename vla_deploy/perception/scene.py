@@ -59,7 +59,7 @@ class Scene:
             SceneUnreadable: the document is no scene.
         """
         read_snapshot(document)
-        self._tracker.recall(document["objects"])
+        self._tracker.recall(document["objects"], document.get("lost", ()))
 
     def look(
         self,

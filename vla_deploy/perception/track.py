@@ -220,6 +220,7 @@ def recalled(told: Mapping[str, Any]) -> Track:
         object_id=str(told["id"]),
         aliases=tuple(told.get("aliases", ())),
         rests=Rest(**told["rests"]) if "rests" in told else None,
+        cause=str(told.get("cause", "")),
     )
     track.classes.recall(told["classes"], looks)
     track.colours.recall(told["colours"], looks)

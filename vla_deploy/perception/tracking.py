@@ -107,11 +107,17 @@ class Tracker:
         if held is not None:
             let_fall(held, cause)
 
-    def recall(self, told: Iterable[Mapping[str, Any]]) -> None:
-        """Take over the things of a scene that was told before, as not in view now."""
-        for one in told:
-            track = recalled(one)
-            self._tracks.append(track)
+    def recall(
+        self, told: Iterable[Mapping[str, Any]], lost: Iterable[Mapping[str, Any]] = ()
+    ) -> None:
+        """Take over the things of a scene that was told before, as not in view now.
+
+        Ids of those that are `lost` stay theirs: another thing must not be taken for them.
+        """
+        known, vanished = [recalled(one) for one in told], [recalled(one) for one in lost]
+        self._tracks.extend(known)
+        self._vanished.extend(vanished)
+        for track in (*known, *vanished):
             for name in (track.object_id, *track.aliases):
                 kind, _, number = name.rpartition("_")
                 self._used[kind] = max(self._used[kind], int(number))

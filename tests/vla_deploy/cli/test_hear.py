@@ -71,3 +71,18 @@ def test_silence_says_nothing_and_faults_are_one_line(hear: Hear, tmp_path: Path
     code, _, errors = hear(str(path), "--model", "unheard-of")
     assert code == 2
     assert "unheard-of is not here" in errors
+
+
+@pytest.mark.parametrize(("at", "value"), [(24, 1), (22, 64)])
+def test_a_recording_that_no_microphone_makes_is_refused_in_one_line(
+    hear: Hear, recording: str, at: int, value: int
+) -> None:
+    header = bytearray(Path(recording).read_bytes())
+    header[at : at + 2] = value.to_bytes(2, "little")  # rate, or channels
+    Path(recording).write_bytes(header)
+
+    code, _, errors = hear(recording, "--model", "says-left")
+
+    assert code == 2
+    assert "no WAV file" in errors
+    assert len(errors.splitlines()) == 1

@@ -61,11 +61,31 @@ def test_a_map_of_another_mode_is_converted_without_a_change_of_meaning(tmp_path
     assert back.occupancy().tolist() == [[100, -1, -1], [0, -1, 100]]
 
 
+def test_a_conversion_replaces_nothing_unasked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shades = np.array([[0, 100]], dtype=np.uint8)
+    raw = MapFile(shades=shades, resolution_m=0.1, origin_m=(1.0, 2.0), mode=MapMode.RAW)
+    for name in ("raw.yaml", "other.yaml"):
+        write_map_file(tmp_path / name, raw)
+    image = (tmp_path / "raw.pgm").read_bytes()
+    # Its YAML file is free, but not the image beside it, and that is the image of the source.
+    renamed = (tmp_path / "raw.yaml").rename(tmp_path / "old.yaml")
+
+    assert main(["map", "convert", str(renamed), str(tmp_path / "raw.yaml"), "--replace"]) == 2
+    assert main(["map", "convert", str(renamed), str(tmp_path / "other.yaml")]) == 2
+    assert "--replace" in capsys.readouterr().err
+    assert (tmp_path / "raw.pgm").read_bytes() == image
+    assert main(["map", "convert", str(renamed), str(tmp_path / "other.yaml"), "--replace"]) == 0
+    assert read_map_file(tmp_path / "other.yaml").mode is MapMode.TRINARY
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["check", "gone.yaml"], "gone.yaml: cannot read the map"),
         (["convert", "a.yaml", "a.yaml"], "choose another file"),
+        (["show", str(KEPT), "--png", "noext"], "ends in .png"),
         (["record", "new.yaml", "--seconds", "1"], "no robot runs"),
     ],
 )

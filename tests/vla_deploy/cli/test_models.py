@@ -52,6 +52,30 @@ def added(vla, files):
     return "mugs"
 
 
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--score", "7"), ("--score", "nan"), ("--iou", "5"), ("--fill", "999"), ("--licence", "")],
+)
+def test_a_model_that_could_not_be_read_back_is_not_added(vla, files, option, value):
+    code, _, errors = vla(
+        "add", "mugs", "--onnx", files["onnx"], "--classes", files["classes"], option, value
+    )
+
+    assert code == 2
+    assert option.strip("-") in errors.replace("score_threshold", "score")
+    assert "mugs" not in vla("list")[1]
+
+
+@pytest.mark.parametrize("drop", ["nan", "-5", "inf", "much"])
+def test_no_limit_of_the_drop_is_no_limit_to_ask_for(vla, files, added, drop, capsys):
+    words = ("--images", files["photos"], "--labelled", files["photos"], "--max-drop", drop)
+    with pytest.raises(SystemExit) as ended:
+        vla("quantise", added, *words)
+
+    assert ended.value.code == 2
+    assert "expected points from 0 to 100" in capsys.readouterr().err
+
+
 def test_a_model_is_added_listed_shown_and_removed(vla, files, base):
     code, out, _ = vla(
         "add", "mugs", "--onnx", files["onnx"], "--classes", files["classes"], "--json"

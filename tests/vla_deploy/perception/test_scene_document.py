@@ -80,3 +80,15 @@ def test_what_was_told_is_taken_over_by_the_next_instance() -> None:
         assert after["confidence"] == pytest.approx(before["confidence"], abs=0.002)
     heir._tracker._used["bottle"] += 1
     assert heir._tracker._used["bottle"] == 302  # a new one gets a number of its own
+
+
+def test_what_was_lost_keeps_its_id_for_the_next_instance() -> None:
+    scene = Scene()
+    scene._tracker._tracks = [replace(a_track(1), aliases=())]
+    scene._tracker._vanished = [replace(a_track(7), aliases=(), cause="it fell")]
+    heir = Scene()
+    heir.recall(scene.document())
+    assert [(one["id"], one["cause"]) for one in heir.document()["lost"]] == [
+        ("bottle_107", "it fell")
+    ]
+    assert heir._tracker._used["bottle"] == 107

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vla_deploy.inference.errors import RunFailed
 from vla_deploy.inference.manifest import Detection, Dimension, Tensor
 from vla_deploy.perception.detectors.boxes import Boxes, sound, without_doubles
 
@@ -62,8 +63,14 @@ def end_to_end_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iter
 
 
 def read_end_to_end(outputs: Outputs, detection: Detection) -> Boxes:
-    """Return the boxes of (1, n, 6), which have no doubles: v10, and exports with NMS in them."""
+    """Return the boxes of (1, n, 6), which have no doubles: v10, and exports with NMS in them.
+
+    Raises:
+        RunFailed: the rows are of another length, which the graph had left open.
+    """
     table = np.asarray(outputs[0][0], dtype=np.float32)
+    if table.shape[1] != _END_TO_END:
+        raise RunFailed(f"told rows of {table.shape[1]} numbers, expected {_END_TO_END}")
     boxes = Boxes(corners_px=table[:, :4], scores=table[:, 4], classes=_class_numbers(table[:, 5]))
     return sound(boxes, detection.score_threshold)
 
@@ -84,9 +91,16 @@ def counted_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterato
 
 
 def read_counted(outputs: Outputs, detection: Detection) -> Boxes:
-    """Return the boxes of four outputs; what lies behind the count is left over from before."""
+    """Return the boxes of four outputs; what lies behind the count is left over from before.
+
+    Raises:
+        RunFailed: the count is none, or more than there are rows.
+    """
     number, corners, scores, classes = outputs
-    count = int(number.reshape(-1)[0])
+    told, most = float(number.reshape(-1)[0]), corners.shape[1]
+    if not 0 <= told <= most:
+        raise RunFailed(f"told a count of {told:g} boxes, expected 0 to {most}")
+    count = int(told)
     boxes = Boxes(
         corners_px=np.asarray(corners[0, :count], dtype=np.float32),
         scores=np.asarray(scores[0, :count], dtype=np.float32),

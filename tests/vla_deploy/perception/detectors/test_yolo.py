@@ -1,4 +1,5 @@
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -11,9 +12,23 @@ from vla_deploy.inference.session import open_session
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.detector import Detector
+from vla_deploy.perception.detectors.yolo import read_counted, read_end_to_end
 
 COLOURS = {"red": (255, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255)}
 SCORE, IOU = 0.25, 0.3
+
+
+@pytest.mark.parametrize("count", [-1.0, 3.0, math.inf, math.nan])
+def test_a_count_that_cannot_be_is_refused(count: float, blob_manifest) -> None:
+    rows = (np.zeros((1, 2, 4)), np.full((1, 2), 0.9), np.zeros((1, 2)))
+
+    with pytest.raises(RunFailed, match="expected 0 to 2"):
+        read_counted((np.array([[count]]), *rows), blob_manifest.detection)
+
+
+def test_rows_of_another_length_are_refused(blob_manifest) -> None:
+    with pytest.raises(RunFailed, match="rows of 5 numbers, expected 6"):
+        read_end_to_end((np.zeros((1, 2, 5)),), blob_manifest.detection)
 
 
 def tensors(*shapes: tuple[str, tuple[int, ...], str]) -> tuple[Tensor, ...]:
