@@ -14,6 +14,12 @@ from typing import Any, Final
 from vla_deploy.perception.frame_statistics import FrameStatistics
 
 
+STALE_DEPTH_RATIO: Final = 0.05
+# An emulated camera has no noise in its colours: at up to a third of the rows that have contrast
+# the robot's own arms stay the same before a plain wall.
+STALE_COLOUR_RATIO: Final = 0.6
+
+
 class Use(IntEnum):
     """Say what an image is good for: each use includes those below it."""
 
@@ -47,14 +53,28 @@ LIMITS: Final[tuple[Limit, ...]] = (
         measure=lambda seen: seen.stale_ratio,
         most=0.95,
         leaves=Use.NOTHING,
-        meaning="share of rows that are to the bit those of the image before",
+        meaning="share of rows whose depth is to the bit that of the image before",
     ),
     Limit(
         fault="torn",
         measure=lambda seen: seen.stale_ratio if seen.stale_ratio <= 0.95 else 0.0,
         most=0.05,
         leaves=Use.NOTHING,
-        meaning="share of rows that are to the bit those of the image before",
+        meaning="share of rows whose depth is to the bit that of the image before",
+    ),
+    Limit(
+        fault="stale depth",
+        measure=lambda seen: seen.stale_depth_ratio,
+        most=STALE_DEPTH_RATIO,
+        leaves=Use.NOTHING,
+        meaning="share of rows of depth that are to the bit those before, while the camera moved",
+    ),
+    Limit(
+        fault="stale colours",
+        measure=lambda seen: seen.stale_colour_ratio,
+        most=STALE_COLOUR_RATIO,
+        leaves=Use.OBSTACLES,
+        meaning="share of rows of colour that are to the bit those before, while the camera moved",
     ),
     Limit(
         fault="frozen while the camera moved",

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Floats
+from drivers.camera.base import RgbdFrame
+from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Floats, Mask
 
 Image = NDArray[np.uint8]
 
@@ -20,6 +21,11 @@ PLAIN_LEVELS: Final = 6.0
 """Contrast of an image in which nothing could be seen to move, such as one of a bare wall."""
 SAME_LEVELS: Final = 0.7
 ROW_STRIDE: Final = 4
+LEAST_KNOWN_RATIO: Final = 0.25
+"""Share of a row that must have depth: of fewer pixels, all may be the same by chance."""
+SATURATED_DEPTH: Final = np.iinfo(np.uint16).max
+TELLING_SHARE: Final = 0.25
+"""Share of a row that must be noisy for the row to tell, and of the rows that must tell."""
 LEAST_SIGMA_M: Final = 0.0005
 _SECOND_DIFFERENCE: Final = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 _ITS_MEAN_OF_NOISE: Final = 6.0 * math.sqrt(2.0 / math.pi)
@@ -33,7 +39,8 @@ class FrameStatistics:
     """Hold the measures of one image.
 
     `unmoved_rad` is by how much the camera has turned since images began to show the same; 0 where
-    they do not, or show too little to tell. Ratios are shares of pixels or rows, from 0 to 1.
+    they do not, or show too little to tell. `stale_depth_ratio` and `stale_colour_ratio` are 0 as
+    long as the camera has not moved meanwhile. Ratios are shares of pixels or rows, from 0 to 1.
     `silent_s` is for how long none has come.
     """
 
@@ -44,24 +51,37 @@ class FrameStatistics:
     hole_ratio: float = 0.0
     depth_noise_ratio: float = 0.0
     stale_ratio: float = 0.0
+    stale_depth_ratio: float = 0.0
+    stale_colour_ratio: float = 0.0
     unmoved_rad: float = 0.0
     silent_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Glance:
-    """Hold what is kept of an image to compare the next one with."""
+    """Hold what is kept of an image to compare the next one with.
+
+    `depth_rows` and `colour_rows` are true for rows that cannot be the same when the camera moves.
+    """
 
     rgb: Image
     depth: NDArray[np.uint16]
     thumb: Floats
+    depth_rows: Mask
+    colour_rows: Mask
 
     @classmethod
-    def of(cls, rgb: Image, depth: NDArray[np.uint16]) -> "Glance":
+    def of(cls, frame: RgbdFrame) -> "Glance":
         """Return what is to be kept of an image."""
-        grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+        grey = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY)
         small = cv2.resize(grey, THUMB_PX, interpolation=cv2.INTER_AREA)
-        return cls(rgb=rgb, depth=depth, thumb=small.astype(np.float32))
+        return cls(
+            rgb=frame.rgb,
+            depth=frame.depth,
+            thumb=small.astype(np.float32),
+            depth_rows=_noisy_rows(frame),
+            colour_rows=grey[:, ::ROW_STRIDE].std(axis=1) >= PLAIN_LEVELS,
+        )
 
     def shows_the_same(self, other: "Glance") -> bool:
         """Tell whether two images show the same view of something that has contrast."""
@@ -70,12 +90,28 @@ class Glance:
         return not plain and change < SAME_LEVELS
 
     def stale_ratio(self, other: "Glance") -> float:
-        """Return the share of rows in which not one bit differs; no sensor is as still as that."""
+        """Return the share of rows in which not one bit of depth differs.
+
+        No sensor's depth is as still as that. Colours may be, in a row that is black or white, and
+        they may come anew beside a depth that does not.
+        """
+        if self.depth.shape != other.depth.shape:
+            return 0.0
+        known = np.count_nonzero(self.depth, axis=1) >= LEAST_KNOWN_RATIO * self.depth.shape[1]
+        same = (self.depth == other.depth).all(axis=1) & known
+        return float(np.count_nonzero(same)) / len(same)
+
+    def stale_depth_ratio(self, other: "Glance") -> float:
+        """Return the share of rows with noisy depth in which not one bit of depth differs."""
+        if self.depth.shape != other.depth.shape:
+            return 0.0
+        return _share_of((self.depth == other.depth).all(axis=1), self.depth_rows)
+
+    def stale_colour_ratio(self, other: "Glance") -> float:
+        """Return the share of rows with contrast in which not one bit of colour differs."""
         if self.rgb.shape != other.rgb.shape:
             return 0.0
-        rows = (self.depth == other.depth).all(axis=1) & self.depth.any(axis=1)
-        same = (self.rgb[rows] == other.rgb[rows]).all(axis=(1, 2))
-        return float(np.count_nonzero(same)) / len(rows)
+        return _share_of((self.rgb == other.rgb).all(axis=(1, 2)), self.colour_rows)
 
 
 def measure_frame(rgb: Image, depth_m: Floats) -> FrameStatistics:
@@ -88,6 +124,25 @@ def measure_frame(rgb: Image, depth_m: Floats) -> FrameStatistics:
         hole_ratio=1.0 - int(np.count_nonzero(depth_m)) / depth_m.size,
         depth_noise_ratio=_depth_noise(depth_m[::ROW_STRIDE]),
     )
+
+
+def _noisy_rows(frame: RgbdFrame) -> Mask:
+    """Return which rows have depth that a stereo camera could not tell twice alike.
+
+    Nearer than this, its noise is lost in the rounding: along a near wall depth may stay the same.
+    """
+    noisy_from_m = math.sqrt(0.5 * frame.depth_unit_m / DEPTH_SIGMA_PER_M)
+    far = (frame.depth >= noisy_from_m / frame.depth_unit_m) & (frame.depth < SATURATED_DEPTH)
+    rows: Mask = np.count_nonzero(far, axis=1) >= TELLING_SHARE * far.shape[1]
+    return rows
+
+
+def _share_of(same: Mask, telling: Mask) -> float:
+    """Return the share of the telling rows that are the same; 0 where too few tell."""
+    count = int(np.count_nonzero(telling))
+    if count < TELLING_SHARE * len(telling):
+        return 0.0
+    return int(np.count_nonzero(same & telling)) / count
 
 
 def _share_between(rgb: Image, low: int, high: int) -> float:

@@ -1,8 +1,7 @@
 """Watch the images that come, and whether any do: each by itself and beside those before."""
 
-import math
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +10,15 @@ from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.cloud import Floats
-from vla_deploy.perception.frame_check import Use, Verdict, judge_frame
+from vla_deploy.perception.frame_check import (
+    STALE_COLOUR_RATIO,
+    STALE_DEPTH_RATIO,
+    Use,
+    Verdict,
+    judge_frame,
+)
+from vla_deploy.perception.frame_repeats import Repeats, Stand
 from vla_deploy.perception.frame_statistics import FrameStatistics, Glance, measure_frame
-from vla_deploy.perception.rotation import angle_rad
-
-VIEW_DISTANCE_M: Final = 3.0
-"""Driving by one metre changes the view as turning by one over this does."""
 
 
 class FrameWatch:
@@ -24,7 +26,9 @@ class FrameWatch:
 
     def __init__(self) -> None:
         self._last: Glance | None = None
-        self._still: tuple[Glance, NDArray[np.float64], Pose2D] | None = None
+        self._still: tuple[Glance, Stand] | None = None
+        self._depth_repeats = Repeats(Glance.stale_depth_ratio, STALE_DEPTH_RATIO)
+        self._colour_repeats = Repeats(Glance.stale_colour_ratio, STALE_COLOUR_RATIO)
         self._came_ns: int | None = None
         self._verdict = Verdict(use=Use.ALL, faults=())
         self._refused = 0
@@ -40,11 +44,13 @@ class FrameWatch:
 
         `rotation` is the camera's, 3 x 3, and `base` the robot's pose, in a frame without jumps.
         """
-        glance = Glance.of(frame.rgb, frame.depth)
+        glance, stand = Glance.of(frame), Stand(rotation=rotation, base=base)
         seen = replace(
             measure_frame(frame.rgb, depth_m),
             stale_ratio=0.0 if self._last is None else glance.stale_ratio(self._last),
-            unmoved_rad=self._unmoved_rad(glance, rotation, base),
+            stale_depth_ratio=self._depth_repeats.ratio(glance, stand),
+            stale_colour_ratio=self._colour_repeats.ratio(glance, stand),
+            unmoved_rad=self._unmoved_rad(glance, stand),
         )
         self._last = glance
         self._verdict = judge_frame(seen)
@@ -59,10 +65,8 @@ class FrameWatch:
         verdict = silence if silence.faults else self._verdict
         return {**verdict.document(), "refused": self._refused}
 
-    def _unmoved_rad(self, glance: Glance, rotation: NDArray[np.float64], base: Pose2D) -> float:
+    def _unmoved_rad(self, glance: Glance, stand: Stand) -> float:
         if self._still is None or not glance.shows_the_same(self._still[0]):
-            self._still = (glance, rotation, base)
+            self._still = (glance, stand)
             return 0.0
-        _, before, stood = self._still
-        driven_m = math.hypot(base.x_m - stood.x_m, base.y_m - stood.y_m)
-        return angle_rad(before.T @ rotation) + driven_m / VIEW_DISTANCE_M
+        return self._still[1].change_rad(stand)

@@ -110,6 +110,21 @@ def test_an_image_of_the_same_bits_is_frozen_although_it_is_stamped_anew() -> No
     assert seen.document(0)["refused"] == 1
 
 
+def test_depth_that_stands_still_beside_live_colours_is_frozen() -> None:
+    depth = room()[1]
+    frames = [frame(room(number, 2 * number)[0], depth) for number in range(3)]
+    told = watch(*frames).document(0)
+    assert told["use"] == "nothing"
+    assert any(fault.startswith("frozen: 1, limit 0.95") for fault in told["faults"])
+
+
+def test_a_row_with_hardly_any_depth_may_be_the_same_by_chance() -> None:
+    thin = [np.zeros_like(room()[1]) for _ in range(2)]
+    for one in thin:
+        one[:, :3] = 500
+    assert "frozen" not in str(watch(*(frame(room(1)[0], one) for one in thin)).document(0))
+
+
 @pytest.mark.parametrize("rows", [12, 110])
 def test_an_image_with_rows_of_the_one_before_is_torn(rows: int) -> None:
     (rgb, depth), (old_rgb, old_depth) = room(1, shift_px=20), room(0)
@@ -129,6 +144,53 @@ def test_a_view_that_stays_while_the_camera_moves_is_frozen_although_it_is_noisy
     assert fault.startswith("frozen while the camera moved")
     moving = watch(frame(*room(0)), frame(*room(1, shift_px=20)), turn_rad=turn_rad, base=base)
     assert moving.document(0)["faults"] == []
+
+
+def split(new: tuple[Image, Image], old: tuple[Image, Image], part: str, rows: int) -> RgbdFrame:
+    """Return a new image of which so many rows of one part are those of an old one."""
+    (rgb, depth), (old_rgb, old_depth) = new, old
+    if part == "depth":
+        depth[:rows] = old_depth[:rows]
+    else:
+        rgb[:rows] = old_rgb[:rows]
+    return frame(rgb, depth)
+
+
+@pytest.mark.parametrize(
+    ("part", "rows", "use"),
+    [
+        ("depth", HEIGHT, "nothing"),
+        ("depth", 12, "nothing"),
+        ("colours", HEIGHT, "obstacles"),
+        ("colours", 100, "obstacles"),
+    ],
+)
+def test_one_part_that_stays_while_the_camera_moves_is_stale_although_the_other_does_not(
+    part: str, rows: int, use: str
+) -> None:
+    for driven_m, told in ((0.1, use), (0.01, "all")):
+        second = split(room(1, shift_px=4), room(0), part, rows)
+        seen = watch(frame(*room(0)), second, base=Pose2D(1.0 + driven_m, 1.0, 0.0))
+        document = seen.document(0)
+        assert document["use"] == told
+        assert all(fault.startswith(f"stale {part}") for fault in document["faults"])
+
+
+def test_depth_that_stays_is_stale_however_slowly_the_camera_moves() -> None:
+    seen, depth = FrameWatch(), room(0)[1]
+    uses = []
+    for number in range(12):
+        one = frame(room(number, number)[0], depth)
+        here = Pose2D(1.0 + 0.005 * number, 1.0, 0.0)
+        uses.append(seen.judge(one, one.depth_m(), turned(0.0), here).use)
+    assert uses[0] is Use.ALL
+    assert uses[-1] is Use.NOTHING
+
+
+def test_a_near_wall_without_noise_in_its_depth_is_not_taken_for_stale() -> None:
+    near = np.full((HEIGHT, WIDTH), 400, np.uint16)
+    frames = [frame(room(number, 20 * number)[0], near) for number in range(2)]
+    assert watch(*frames, base=Pose2D(1.5, 1.0, 0.0)).document(0)["faults"] == []
 
 
 def test_a_bare_wall_looks_the_same_from_everywhere_and_is_not_taken_for_frozen() -> None:
