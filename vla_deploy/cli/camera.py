@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import sys
+import tempfile
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +18,7 @@ from vla_deploy.cli.camera_images import (
     add_board_arguments,
     add_image_arguments,
     board_of,
+    require_size,
     shots_of,
 )
 from vla_deploy.cli.errors import CommandFailed, UsageError
@@ -31,11 +33,13 @@ from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.camera_calibration import (
     LENS_FILE,
     MOUNTING_FILE,
+    read_lens,
     require_plausible,
     write_lens,
     write_mounting,
 )
-from vla_deploy.robots.description import LensCalibration, Mounting
+from vla_deploy.robots.description import Camera, LensCalibration, Mounting
+from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.model import RobotModel
 
 TOOL: Final = "vla-deploy camera calibrate"
@@ -114,10 +118,11 @@ def calibrate(arguments: argparse.Namespace) -> int:
     shots, chosen = _chosen(arguments, robot)
     if not shots:
         raise CommandFailed("no image came; is the camera at work? see: vla-deploy status")
-    height, width = next(iter(shots.values())).rgb.shape[:2]
-    fit = fit_lens(chosen.views, (width, height), arguments.model)
+    fit = fit_lens(chosen.views, (robot.camera.width, robot.camera.height), arguments.model)
     file = arguments.output or robot.mjcf_path.parent / LENS_FILE
-    write_lens(file, _as_lens(fit), robot.camera)
+    lens = _as_lens(fit)
+    _require_readable(file, lens, robot.camera)
+    write_lens(file, lens, robot.camera)
     report = {**dataclasses.asdict(fit), "left_out": chosen.left_out, "file": str(file)}
     at = fit.intrinsics
     text = (
@@ -204,6 +209,7 @@ def _chosen(
 
     def images() -> Any:
         for shot in shots_of(arguments, robot):
+            require_size(shot, robot.camera)
             shots[shot.name] = shot
             yield shot.name, shot.rgb
 
@@ -211,6 +217,21 @@ def _chosen(
         print(f"{view.name}: {len(view.pixels)} corners", file=sys.stderr)
 
     return shots, select(images(), board_of(arguments), enough=arguments.views, tell=tell)
+
+
+def _require_readable(file: Path, lens: LensCalibration, camera: Camera) -> None:
+    """Accept a lens that can be read back: one that is refused keeps the robot from loading.
+
+    Raises:
+        RobotFileError: it cannot be a lens of this camera; all its faults are listed.
+    """
+    with tempfile.TemporaryDirectory(prefix="vla-deploy-lens-") as folder:
+        aside = Path(folder) / LENS_FILE
+        write_lens(aside, lens, camera)
+        try:
+            read_lens(aside, camera)
+        except RobotFileError as error:
+            raise RobotFileError(file, error.faults) from error
 
 
 def _head_views(

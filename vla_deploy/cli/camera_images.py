@@ -18,6 +18,7 @@ from vla_deploy.perception.camera_tools.board import Board, Image
 from vla_deploy.perception.history import JointHistory
 from vla_deploy.perception.model_tools.images import image_paths, read_image
 from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.description import Camera
 from vla_deploy.robots.model import full_positions
 from vla_deploy.robots.schema import is_number
 
@@ -77,6 +78,20 @@ def board_of(arguments: argparse.Namespace) -> Board:
         )
     except ValueError as error:
         raise UsageError(str(error)) from error
+
+
+def require_size(shot: Shot, camera: Camera) -> None:
+    """Accept an image of the camera's size.
+
+    Raises:
+        UsageError: it is of another: the lens in force is one for the robot file's size only.
+    """
+    height, width = shot.rgb.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise UsageError(
+            f"{shot.name}: got {width} x {height} px, expected {camera.width} x {camera.height}, "
+            "the camera's in the robot file; take images at that size, do not scale them"
+        )
 
 
 def shots_of(arguments: argparse.Namespace, robot: RobotDescription) -> Iterator[Shot]:

@@ -4,6 +4,7 @@ import functools
 import json
 import math
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
@@ -32,6 +33,13 @@ HEAD = [(pan, tilt) for pan in (-0.22, 0.0, 0.22) for tilt in (0.44, 0.6, 0.76)]
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     return Path(shutil.copytree(ROBOTS_DIR / "butler", tmp_path / "butler"))
+
+
+@pytest.fixture(scope="module")
+def lens_images(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    images = tmp_path_factory.mktemp("images") / "lens"
+    put_images_for_the_lens(images)
+    return images
 
 
 @functools.cache
@@ -134,6 +142,41 @@ def test_nothing_is_written_for_images_of_nothing(
     assert not (folder / "camera.yaml").exists()
     assert camera("check", "--robot", folder, "--images", tmp_path / "empty") == 1
     assert camera("calibrate", "--robot", folder, "--images", tmp_path / "nowhere") == 2
+
+
+@pytest.mark.parametrize("odd", [[0], [7], range(12)])
+def test_images_of_another_size_are_refused_and_the_lens_before_stays(
+    folder: Path,
+    tmp_path: Path,
+    lens_images: Path,
+    capsys: pytest.CaptureFixture[str],
+    odd: Iterable[int],
+) -> None:
+    shutil.copytree(lens_images, tmp_path / "lens")
+    for number in odd:
+        path = str(tmp_path / "lens" / f"{number:02d}.png")
+        cv2.imwrite(path, cv2.resize(cv2.imread(path), (640, 480)))
+    before = "image_width: 320\n"
+    (folder.parent / "kept.yaml").write_text(before)
+    words = ("--images", tmp_path / "lens", "--output", folder.parent / "kept.yaml")
+    assert camera("calibrate", "--robot", folder, *words) == 2
+    assert "got 640 x 480 px, expected 320 x 240" in capsys.readouterr().err
+    assert (folder.parent / "kept.yaml").read_text() == before
+
+
+def test_a_lens_that_the_robot_would_refuse_is_not_written(
+    folder: Path, lens_images: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # The robot file tells of a camera that sees a third as much.
+    file = folder / "robot.toml"
+    text = file.read_text()
+    fovy_rad = load_robot(folder).camera.fovy_rad
+    assert f"fovy_rad = {fovy_rad}" in text
+    file.write_text(text.replace(f"fovy_rad = {fovy_rad}", f"fovy_rad = {fovy_rad / 3:.3f}"))
+    assert camera("calibrate", "--robot", folder, "--images", lens_images) == 2
+    assert "camera.yaml: " in (told := capsys.readouterr().err)
+    assert "as the robot file's fovy_rad has it" in told
+    assert not (folder / "camera.yaml").exists()
 
 
 @pytest.mark.parametrize(
