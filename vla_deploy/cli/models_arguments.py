@@ -22,7 +22,6 @@ EXAMPLES: Final = """  vla-deploy models list
   vla-deploy models verify
 """
 _SIZE: Final = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4})")
-_PIXEL: Final = 1 / 255
 Run = Callable[[argparse.Namespace], int]
 
 
@@ -120,7 +119,9 @@ def _add_image_arguments(add: argparse.ArgumentParser) -> None:
     )
     add.add_argument("--fill", type=int, default=114, help="grey of the padding (default: 114)")
     add.add_argument(
-        "--scale", type=float, default=_PIXEL, help="factor for pixels (default: 1/255)"
+        "--scale",
+        type=float,
+        help="factor for pixels (default: 1/255, or 1 where the input is of integers)",
     )
     add.add_argument(
         "--mean", type=float, nargs=3, default=[0.0, 0.0, 0.0], help="subtracted after the factor"

@@ -26,6 +26,7 @@ from vla_deploy.robots.schema import (
 )
 
 DTYPES: Final = ("float32", "float16", "uint8", "int8", "int32", "int64", "bool")
+PIXEL_DTYPES: Final = ("float32", "float16", "uint8", "int32", "int64")
 COLOURS: Final = ("rgb", "bgr")
 DETECTOR: Final = "detector"
 _NAME: Final = re.compile(r"[a-z0-9][a-z0-9_.-]{0,63}")
@@ -247,6 +248,20 @@ def _image_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
     if len(document["inputs"]) != 1 or not fits:
         got = [record["shape"] for record in document["inputs"]]
         yield Fault(key="inputs", got=f"shapes {got}", expected=f"one of shape {wanted}")
+    yield from _pixel_faults(image, document["inputs"][0]["dtype"])
+
+
+def _pixel_faults(image: Mapping[str, Any], dtype: str) -> Iterator[Fault]:
+    """Hold the normalisation against the input's type: integers would cut shares of 255 to 0."""
+    if dtype not in PIXEL_DTYPES:
+        expected = f"one of {', '.join(PIXEL_DTYPES)}, which hold pixels"
+        yield Fault(key="inputs[0].dtype", got=repr(dtype), expected=expected)
+    if dtype.startswith("float"):
+        return
+    for key, plain in (("scale", 1), ("mean", [0, 0, 0]), ("std", [1, 1, 1])):
+        if image[key] != plain:
+            expected = f"{plain}, as its input is of {dtype}: pixels as they are"
+            yield Fault(key=f"detection.image.{key}", got=repr(image[key]), expected=expected)
 
 
 def _rows(value: object) -> list[Mapping[str, Any]]:

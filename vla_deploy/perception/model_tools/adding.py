@@ -26,12 +26,14 @@ from vla_deploy.perception.detectors.detector import ROLE, Detector
 from vla_deploy.perception.model_tools.trial import Trial, try_out
 
 _CHANNELS: Final = 3
+_SHARE: Final = 1 / 255
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """Hold what a person tells of a model; what is None is taken from the file itself.
 
+    Pixels are divided by 255 where `scale` is None, but for an input of integers.
     `size_px` is width and height, for a graph whose input has none.
     """
 
@@ -46,7 +48,7 @@ class Request:
     colour: str
     fit: Fit
     fill: int
-    scale: float
+    scale: float | None
     mean: tuple[float, float, float]
     std: tuple[float, float, float]
     score_threshold: float
@@ -162,11 +164,15 @@ def _image_input(request: Request, graph: Graph) -> tuple[Tensor, ImageInput]:
         colour=request.colour,
         fit=request.fit,
         fill=request.fill,
-        scale=request.scale,
+        scale=_scale(tensor) if request.scale is None else request.scale,
         mean=request.mean,
         std=request.std,
     )
     return Tensor(name=tensor.name, shape=shape, dtype=tensor.dtype), image
+
+
+def _scale(tensor: Tensor) -> float:
+    return _SHARE if tensor.dtype.startswith("float") else 1.0
 
 
 def _classes(request: Request, graph: Graph) -> tuple[str, ...]:

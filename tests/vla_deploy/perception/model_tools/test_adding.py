@@ -8,12 +8,16 @@ from onnx import numpy_helper
 
 from vla_deploy.inference.errors import (
     ImagesInvalid,
+    ManifestInvalid,
     ModelFileSpoiled,
     ModelMismatch,
     ModelUnknown,
     RunFailed,
 )
 from vla_deploy.inference.manifest import Fit, Layout, Variant
+from vla_deploy.inference.opening import PLAIN_CHOICE
+from vla_deploy.inference.session import open_session
+from vla_deploy.perception.detectors.detector import Detector
 from vla_deploy.perception.model_tools.adding import Request, add_model
 
 NAMES = "{0: 'red', 1: 'green', 2: 'blue'}"
@@ -54,6 +58,20 @@ def add(tmp_path, shelf, blobs):
     return add
 
 
+def of_bytes(graph):
+    """Make the input one of bytes, which the graph itself divides by 255."""
+    (image,) = graph.graph.input
+    head = [
+        onnx.helper.make_node("Cast", ["bytes"], ["wide"], to=onnx.TensorProto.FLOAT),
+        onnx.helper.make_node("Mul", ["wide", "share"], [image.name]),
+    ]
+    for place, node in enumerate(head):
+        graph.graph.node.insert(place, node)
+    graph.graph.initializer.append(numpy_helper.from_array(np.float32(1 / 255), "share"))
+    image.name, image.type.tensor_type.elem_type = "bytes", onnx.TensorProto.UINT8
+    return graph
+
+
 def free(graph, *axes: int):
     """Make dimensions of the input free, as an export with dynamic axes has them."""
     for axis in axes:
@@ -81,6 +99,36 @@ def test_a_detector_that_sees_things_where_nothing_is_is_kept_and_said_so(add):
     _, trial = add(mean=(0.0, 0.9, 0.9))
     assert trial.boxes["white"] > 0
     assert str(trial).endswith("it sees things where nothing is: is the input as it was trained?")
+
+
+def test_an_input_of_bytes_gets_pixels_as_they_are(add, blobs, shelf):
+    model, _ = add(of_bytes(blobs.raw()), scale=None)
+    assert (model.manifest.inputs[0].dtype, model.manifest.detection.image.scale) == ("uint8", 1.0)
+    detector = Detector(open_session(model, PLAIN_CHOICE, engines=shelf.engines, clock=shelf.clock))
+    rgb, things = blobs.photograph(0)
+    assert sorted(detector.detect(rgb).classes) == sorted(number for number, *_ in things)
+    detector.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"scale": 1 / 255}, "detection.image.scale: got 0.00392"),
+        ({"scale": 1.0, "mean": (0.5, 0.0, 0.0)}, "detection.image.mean: got [0.5, 0.0, 0.0]"),
+        ({"scale": 1.0, "std": (2.0, 1.0, 1.0)}, "detection.image.std: got [2.0, 1.0, 1.0]"),
+    ],
+)
+def test_an_input_of_bytes_takes_no_shares_of_255(add, blobs, shelf, changes, told):
+    with pytest.raises(ManifestInvalid, match=re.escape(told)):
+        add(of_bytes(blobs.raw()), **changes)
+    assert shelf.store.names() == ()
+
+
+@pytest.mark.parametrize("names", ["{0: 'red', 1: 'red', 2: 'blue'}", "{0: 'red', 1: '', 2: 'b'}"])
+def test_an_export_with_names_that_are_none_is_not_added(add, blobs, shelf, names):
+    with pytest.raises(ManifestInvalid, match=r"detection\.classes: got .*none twice"):
+        add(blobs.raw(names=names), classes=None)
+    assert shelf.store.names() == ()
 
 
 def test_an_export_with_nms_in_the_graph_is_recognised(add, blobs):
