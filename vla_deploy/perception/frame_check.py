@@ -13,8 +13,6 @@ from typing import Any, Final
 
 from vla_deploy.perception.frame_statistics import FrameStatistics
 
-
-STALE_DEPTH_RATIO: Final = 0.05
 # An emulated camera has no noise in its colours: at up to a third of the rows that have contrast
 # the robot's own arms stay the same before a plain wall.
 STALE_COLOUR_RATIO: Final = 0.6
@@ -61,13 +59,6 @@ LIMITS: Final[tuple[Limit, ...]] = (
         most=0.05,
         leaves=Use.NOTHING,
         meaning="share of rows whose depth is to the bit that of the image before",
-    ),
-    Limit(
-        fault="stale depth",
-        measure=lambda seen: seen.stale_depth_ratio,
-        most=STALE_DEPTH_RATIO,
-        leaves=Use.NOTHING,
-        meaning="share of rows of depth that are to the bit those before, while the camera moved",
     ),
     Limit(
         fault="stale colours",

@@ -1,13 +1,13 @@
-"""Tell whether colour, or depth, repeats itself to the bit while the camera moves."""
+"""Tell whether colours repeat themselves to the bit while the camera moves."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import NS_PER_S
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.frame_statistics import Glance
 from vla_deploy.perception.rotation import angle_rad
@@ -15,13 +15,16 @@ from vla_deploy.perception.rotation import angle_rad
 VIEW_DISTANCE_M: Final = 3.0
 """Driving by one metre changes the view as turning by one over this does."""
 MOVED_RAD: Final = 0.01
-"""Change of view by which no row that tells stays the same; at rest, pose and joints say less."""
+"""Change of view by which rows with contrast change; at rest, pose and joints say less."""
+REST_NS: Final = 20 * NS_PER_S
+"""A change of view of less than `MOVED_RAD` in this time is none: dead reckoning drifts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stand:
     """Hold how the camera was turned, 3 x 3, and where the base stood, in a frame without jumps."""
 
+    stamp_ns: int
     rotation: NDArray[np.float64]
     base: Pose2D
 
@@ -31,24 +34,41 @@ class Stand:
         return angle_rad(self.rotation.T @ other.rotation) + driven_m / VIEW_DISTANCE_M
 
 
-class Repeats:
-    """Hold the image since when too many rows are the same, and where the camera stood then.
+class Travel:
+    """Add up by how much the view has changed since a stand; at rest nothing is added."""
 
-    The view of a robot at rest may repeat itself by right: a row counts only once it has moved.
+    def __init__(self, began: Stand) -> None:
+        self._from = began
+        self._before_rad = 0.0
+
+    def rad(self, stand: Stand) -> float:
+        """Return the change of view up to a stand."""
+        change_rad = self._from.change_rad(stand)
+        moved_rad = self._before_rad + change_rad
+        if stand.stamp_ns - self._from.stamp_ns >= REST_NS:
+            if change_rad >= MOVED_RAD:
+                self._before_rad = moved_rad
+            self._from = stand
+        return moved_rad
+
+
+class Repeats:
+    """Hold the image since when too many rows of colour are the same, and where the camera stood.
+
+    What a robot at rest sees may repeat itself by right: a row counts only once the camera moved.
     """
 
-    def __init__(self, same_ratio: Callable[[Glance, Glance], float], most: float) -> None:
-        """Watch a part of the images, of which `most` may be the same."""
-        self._same_ratio = same_ratio
+    def __init__(self, most: float) -> None:
+        """Watch images of which a share of at most `most` may be the same."""
         self._most = most
-        self._began: tuple[Glance, Stand] | None = None
+        self._began: tuple[Glance, Travel] | None = None
 
     def ratio(self, glance: Glance, stand: Stand) -> float:
         """Return the share of rows that are the same, 0 unless the camera moved meanwhile."""
-        began, self._began = self._began, (glance, stand)
+        began, self._began = self._began, (glance, Travel(stand))
         if began is None:
             return 0.0
-        ratio = self._same_ratio(glance, began[0])
+        ratio = glance.stale_colour_ratio(began[0])
         if ratio > self._most:
             self._began = began
-        return ratio if began[1].change_rad(stand) >= MOVED_RAD else 0.0
+        return ratio if began[1].rad(stand) >= MOVED_RAD else 0.0

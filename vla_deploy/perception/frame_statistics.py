@@ -21,11 +21,12 @@ PLAIN_LEVELS: Final = 6.0
 """Contrast of an image in which nothing could be seen to move, such as one of a bare wall."""
 SAME_LEVELS: Final = 0.7
 ROW_STRIDE: Final = 4
-LEAST_KNOWN_RATIO: Final = 0.25
-"""Share of a row that must have depth: of fewer pixels, all may be the same by chance."""
 SATURATED_DEPTH: Final = np.iinfo(np.uint16).max
 TELLING_SHARE: Final = 0.25
-"""Share of a row that must be noisy for the row to tell, and of the rows that must tell."""
+"""Share of a row that must be noisy for the row to tell, and of the rows that must tell.
+
+Of fewer pixels, all may be the same by chance.
+"""
 LEAST_SIGMA_M: Final = 0.0005
 _SECOND_DIFFERENCE: Final = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 _ITS_MEAN_OF_NOISE: Final = 6.0 * math.sqrt(2.0 / math.pi)
@@ -39,8 +40,8 @@ class FrameStatistics:
     """Hold the measures of one image.
 
     `unmoved_rad` is by how much the camera has turned since images began to show the same; 0 where
-    they do not, or show too little to tell. `stale_depth_ratio` and `stale_colour_ratio` are 0 as
-    long as the camera has not moved meanwhile. Ratios are shares of pixels or rows, from 0 to 1.
+    they do not, or show too little to tell. `stale_colour_ratio` is 0 as long as the
+    camera has not moved meanwhile. Ratios are shares of pixels or rows, from 0 to 1.
     `silent_s` is for how long none has come.
     """
 
@@ -51,7 +52,6 @@ class FrameStatistics:
     hole_ratio: float = 0.0
     depth_noise_ratio: float = 0.0
     stale_ratio: float = 0.0
-    stale_depth_ratio: float = 0.0
     stale_colour_ratio: float = 0.0
     unmoved_rad: float = 0.0
     silent_s: float = 0.0
@@ -61,7 +61,8 @@ class FrameStatistics:
 class Glance:
     """Hold what is kept of an image to compare the next one with.
 
-    `depth_rows` and `colour_rows` are true for rows that cannot be the same when the camera moves.
+    `depth_rows` are true for rows of depth that cannot be the same twice, `colour_rows` for rows of
+    colour that cannot when the camera moves.
     """
 
     rgb: Image
@@ -90,19 +91,11 @@ class Glance:
         return not plain and change < SAME_LEVELS
 
     def stale_ratio(self, other: "Glance") -> float:
-        """Return the share of rows in which not one bit of depth differs.
+        """Return the share of rows with noisy depth in which not one bit of depth differs.
 
         No sensor's depth is as still as that. Colours may be, in a row that is black or white, and
         they may come anew beside a depth that does not.
         """
-        if self.depth.shape != other.depth.shape:
-            return 0.0
-        known = np.count_nonzero(self.depth, axis=1) >= LEAST_KNOWN_RATIO * self.depth.shape[1]
-        same = (self.depth == other.depth).all(axis=1) & known
-        return float(np.count_nonzero(same)) / len(same)
-
-    def stale_depth_ratio(self, other: "Glance") -> float:
-        """Return the share of rows with noisy depth in which not one bit of depth differs."""
         if self.depth.shape != other.depth.shape:
             return 0.0
         return _share_of((self.depth == other.depth).all(axis=1), self.depth_rows)

@@ -10,14 +10,8 @@ from drivers.camera.base import RgbdFrame
 from drivers.clock import NS_PER_S
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.perception.cloud import Floats
-from vla_deploy.perception.frame_check import (
-    STALE_COLOUR_RATIO,
-    STALE_DEPTH_RATIO,
-    Use,
-    Verdict,
-    judge_frame,
-)
-from vla_deploy.perception.frame_repeats import Repeats, Stand
+from vla_deploy.perception.frame_check import STALE_COLOUR_RATIO, Use, Verdict, judge_frame
+from vla_deploy.perception.frame_repeats import Repeats, Stand, Travel
 from vla_deploy.perception.frame_statistics import FrameStatistics, Glance, measure_frame
 
 
@@ -26,9 +20,8 @@ class FrameWatch:
 
     def __init__(self) -> None:
         self._last: Glance | None = None
-        self._still: tuple[Glance, Stand] | None = None
-        self._depth_repeats = Repeats(Glance.stale_depth_ratio, STALE_DEPTH_RATIO)
-        self._colour_repeats = Repeats(Glance.stale_colour_ratio, STALE_COLOUR_RATIO)
+        self._still: tuple[Glance, Travel] | None = None
+        self._repeats = Repeats(STALE_COLOUR_RATIO)
         self._came_ns: int | None = None
         self._verdict = Verdict(use=Use.ALL, faults=())
         self._refused = 0
@@ -44,12 +37,12 @@ class FrameWatch:
 
         `rotation` is the camera's, 3 x 3, and `base` the robot's pose, in a frame without jumps.
         """
-        glance, stand = Glance.of(frame), Stand(rotation=rotation, base=base)
+        glance = Glance.of(frame)
+        stand = Stand(stamp_ns=frame.stamp_ns, rotation=rotation, base=base)
         seen = replace(
             measure_frame(frame.rgb, depth_m),
             stale_ratio=0.0 if self._last is None else glance.stale_ratio(self._last),
-            stale_depth_ratio=self._depth_repeats.ratio(glance, stand),
-            stale_colour_ratio=self._colour_repeats.ratio(glance, stand),
+            stale_colour_ratio=self._repeats.ratio(glance, stand),
             unmoved_rad=self._unmoved_rad(glance, stand),
         )
         self._last = glance
@@ -67,6 +60,6 @@ class FrameWatch:
 
     def _unmoved_rad(self, glance: Glance, stand: Stand) -> float:
         if self._still is None or not glance.shows_the_same(self._still[0]):
-            self._still = (glance, stand)
+            self._still = (glance, Travel(stand))
             return 0.0
-        return self._still[1].change_rad(stand)
+        return self._still[1].rad(stand)

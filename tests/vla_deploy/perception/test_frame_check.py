@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -146,51 +147,47 @@ def test_a_view_that_stays_while_the_camera_moves_is_frozen_although_it_is_noisy
     assert moving.document(0)["faults"] == []
 
 
-def split(new: tuple[Image, Image], old: tuple[Image, Image], part: str, rows: int) -> RgbdFrame:
-    """Return a new image of which so many rows of one part are those of an old one."""
-    (rgb, depth), (old_rgb, old_depth) = new, old
-    if part == "depth":
-        depth[:rows] = old_depth[:rows]
-    else:
-        rgb[:rows] = old_rgb[:rows]
-    return frame(rgb, depth)
+@pytest.mark.parametrize("rows", [HEIGHT, 100])
+def test_colours_that_stay_while_the_camera_moves_leave_obstacles(rows: int) -> None:
+    (rgb, depth), (old_rgb, old_depth) = room(1, shift_px=4), room(0)
+    rgb[:rows] = old_rgb[:rows]
+    frames = frame(old_rgb, old_depth), frame(rgb, depth)
+    stale = watch(*frames, base=Pose2D(1.1, 1.0, 0.0)).document(0)
+    assert stale["use"] == "obstacles"
+    assert [fault.partition(":")[0] for fault in stale["faults"]] == ["stale colours"]
+    assert watch(*frames, base=Pose2D(1.01, 1.0, 0.0)).document(0)["faults"] == []
 
 
-@pytest.mark.parametrize(
-    ("part", "rows", "use"),
-    [
-        ("depth", HEIGHT, "nothing"),
-        ("depth", 12, "nothing"),
-        ("colours", HEIGHT, "obstacles"),
-        ("colours", 100, "obstacles"),
-    ],
-)
-def test_one_part_that_stays_while_the_camera_moves_is_stale_although_the_other_does_not(
-    part: str, rows: int, use: str
-) -> None:
-    for driven_m, told in ((0.1, use), (0.01, "all")):
-        second = split(room(1, shift_px=4), room(0), part, rows)
-        seen = watch(frame(*room(0)), second, base=Pose2D(1.0 + driven_m, 1.0, 0.0))
-        document = seen.document(0)
-        assert document["use"] == told
-        assert all(fault.startswith(f"stale {part}") for fault in document["faults"])
-
-
-def test_depth_that_stays_is_stale_however_slowly_the_camera_moves() -> None:
-    seen, depth = FrameWatch(), room(0)[1]
+def test_colours_that_stay_are_stale_however_slowly_the_camera_moves() -> None:
+    seen, rgb = FrameWatch(), room(0)[0]
     uses = []
     for number in range(12):
-        one = frame(room(number, number)[0], depth)
+        one = frame(rgb, room(number)[1])
         here = Pose2D(1.0 + 0.005 * number, 1.0, 0.0)
         uses.append(seen.judge(one, one.depth_m(), turned(0.0), here).use)
     assert uses[0] is Use.ALL
-    assert uses[-1] is Use.NOTHING
+    assert uses[-1] is Use.OBSTACLES
 
 
-def test_a_near_wall_without_noise_in_its_depth_is_not_taken_for_stale() -> None:
+@pytest.mark.parametrize("driven_m", [0.0, 0.5])
+def test_a_wall_too_near_for_noise_in_its_depth_is_not_taken_for_frozen(driven_m: float) -> None:
     near = np.full((HEIGHT, WIDTH), 400, np.uint16)
     frames = [frame(room(number, 20 * number)[0], near) for number in range(2)]
-    assert watch(*frames, base=Pose2D(1.5, 1.0, 0.0)).document(0)["faults"] == []
+    seen = watch(*frames, base=Pose2D(1.0 + driven_m, 1.0, 0.0))
+    assert seen.document(0)["faults"] == []
+
+
+@pytest.mark.parametrize("noise_seeds", [1, 1000], ids=["without noise", "noisy"])
+def test_a_robot_at_rest_whose_yaw_drifts_has_not_moved_its_camera(noise_seeds: int) -> None:
+    seen, second_ns = FrameWatch(), 1_000_000_000
+    drift_rad_s = math.radians(0.5) / 60.0
+    for second in range(1200):
+        rgb, depth = room(second % noise_seeds)[0], room(second)[1]
+        one = replace(frame(rgb, depth), stamp_ns=second * second_ns)
+        assert seen.judge(one, one.depth_m(), turned(drift_rad_s * second), HERE).use is Use.ALL
+    after = replace(frame(rgb, room(1200)[1]), stamp_ns=1200 * second_ns)
+    verdict = seen.judge(after, after.depth_m(), turned(drift_rad_s * 1200 + 0.2), HERE)
+    assert verdict.use is Use.NOTHING
 
 
 def test_a_bare_wall_looks_the_same_from_everywhere_and_is_not_taken_for_frozen() -> None:
