@@ -145,13 +145,16 @@ def quantise_model(arguments: argparse.Namespace) -> int:
     if model.is_embedded and not arguments.new_name:
         raise UsageError(f"{arguments.name} comes with the software; name your own by --as NAME")
     classes = model.manifest.detection.classes if model.manifest.detection else ()
+    labelled = read_labelled(arguments.labelled, classes)
+    calibration = spread_paths(arguments.images, arguments.limit)
+    models_detector.require_others(calibration, labelled)
     try:
         done = quantise(
             shelf.store,
             model,
             name=arguments.new_name or arguments.name,
-            calibration=spread_paths(arguments.images, arguments.limit),
-            labelled=read_labelled(arguments.labelled, classes),
+            calibration=calibration,
+            labelled=labelled,
             max_drop_points=arguments.max_drop,
             engines=shelf.engines,
             clock=shelf.clock,

@@ -2,13 +2,14 @@
 
 import argparse
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from vla_deploy.cli.errors import UsageError
 from vla_deploy.inference.manifest import Measured, Variant
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.perception.model_tools.accuracy import Accuracy
-from vla_deploy.perception.model_tools.labelled import read_labelled
+from vla_deploy.perception.model_tools.labelled import LabelledImage, read_labelled
 from vla_deploy.perception.model_tools.measuring import measure_files, worst
 from vla_deploy.perception.model_tools.quantising import Quantised
 
@@ -25,6 +26,21 @@ def calibrate_detector(arguments: argparse.Namespace, shelf: ModelShelf) -> Told
     document = {variant: dataclasses.asdict(one) for variant, one in accuracy.items()}
     lines = [*_map_lines(accuracy), *worth_lines(worst(accuracy).measured)]
     return document, "\n".join([*lines, f"written to the manifest of {arguments.name}"])
+
+
+def require_others(calibration: Sequence[Path], labelled: Sequence[LabelledImage]) -> None:
+    """Accept labelled images that are none of those to calibrate with.
+
+    Raises:
+        UsageError: some are: on what it was fitted to, a file sees better than elsewhere.
+    """
+    known = {path.resolve() for path in calibration}
+    shared = [one.path for one in labelled if one.path.resolve() in known]
+    if shared:
+        raise UsageError(
+            f"--labelled: {len(shared)} of its {len(labelled)} images, such as {shared[0]}, are "
+            "among those of --images; expected others, which it was not calibrated with"
+        )
 
 
 def quantised_text(done: Quantised) -> str:

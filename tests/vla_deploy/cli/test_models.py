@@ -33,16 +33,19 @@ def files(tmp_path, blobs):
     onnx_file, classes, photos = tmp_path / "b.onnx", tmp_path / "names.txt", tmp_path / "photos"
     onnx_file.write_bytes(blobs.raw().SerializeToString())
     classes.write_text("red\ngreen\nblue\n")
-    photos.mkdir()
-    for seed in range(4):
-        rgb, things = blobs.photograph(seed)
-        cv2.imwrite(str(photos / f"{seed}.png"), rgb[..., ::-1])
-        rows = [
-            f"{number} {x / 96} {y / 64} {blobs.box_px / 96} {blobs.box_px / 64}"
-            for number, x, y in things
-        ]
-        (photos / f"{seed}.txt").write_text("\n".join(rows))
-    return {"onnx": str(onnx_file), "classes": str(classes), "photos": str(photos)}
+    others = tmp_path / "others"
+    for folder, seeds in ((photos, range(4)), (others, range(4, 8))):
+        folder.mkdir()
+        for seed in seeds:
+            rgb, things = blobs.photograph(seed)
+            cv2.imwrite(str(folder / f"{seed}.png"), rgb[..., ::-1])
+            rows = [
+                f"{number} {x / 96} {y / 64} {blobs.box_px / 96} {blobs.box_px / 64}"
+                for number, x, y in things
+            ]
+            (folder / f"{seed}.txt").write_text("\n".join(rows))
+    paths = {"onnx": onnx_file, "classes": classes, "photos": photos, "others": others}
+    return {name: str(path) for name, path in paths.items()}
 
 
 @pytest.fixture
@@ -123,7 +126,7 @@ def test_what_is_wrong_with_a_model_is_one_line_and_code_2(vla, files, tmp_path)
 
 def test_quantise_makes_the_files_that_bench_then_measures(vla, files, added):
     code, out, _ = vla(
-        "quantise", added, "--images", files["photos"], "--labelled", files["photos"]
+        "quantise", added, "--images", files["others"], "--labelled", files["photos"]
     )
     assert code == 0
     assert "over 4 images with 12 things; drop 0.00 points; installed as mugs" in out
@@ -134,6 +137,17 @@ def test_quantise_makes_the_files_that_bench_then_measures(vla, files, added):
     assert figures["int8_speedup"] > 0
     code, out, _ = vla("bench", added, "--rounds", "2", "--images", files["photos"])
     assert "times as fast as fp32" in out
+
+
+def test_images_to_measure_with_are_others_than_those_to_calibrate_with(
+    vla, files, added, tmp_path
+):
+    again = tmp_path / "again"
+    again.symlink_to(files["photos"])
+    code, _, errors = vla("quantise", added, "--images", files["photos"], "--labelled", str(again))
+    assert code == 2
+    assert "4 of its 4 images, such as" in errors
+    assert errors.count("\n") == 1
 
 
 def test_calibrate_writes_down_what_a_detectors_words_are_worth(vla, files, added):
@@ -163,7 +177,7 @@ def test_a_quantised_model_that_sees_worse_is_refused_with_code_1(vla, files, ad
     Path(files["onnx"]).write_bytes(blobs.raw(red_gain=3000.0).SerializeToString())
     vla("add", added, "--onnx", files["onnx"], "--classes", files["classes"], "--replace")
     code, _, errors = vla(
-        "quantise", added, "--images", files["photos"], "--labelled", files["photos"]
+        "quantise", added, "--images", files["others"], "--labelled", files["photos"]
     )
     assert code == 1
     assert "points, allowed are 1 (fp32 1.0000" in errors

@@ -19,12 +19,25 @@ from vla_deploy.inference.errors import ImagesInvalid
 from vla_deploy.perception.detectors.boxes import Floats, Indices
 from vla_deploy.perception.detectors.image_input import Image
 from vla_deploy.perception.model_tools.images import image_paths, read_image
+from vla_deploy.robots.schema import TEXT, Check, Shape, is_number
 
 _NAMES: Final = "classes.txt"
-_COCO_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "images": ("id", "file_name"),
-    "annotations": ("image_id", "category_id", "bbox"),
-    "categories": ("id", "name"),
+_ID: Final = Check(
+    expected="a number or a text", holds=lambda value: is_number(value) or isinstance(value, str)
+)
+_BOX: Final = Check(
+    expected="left, top, width, height",
+    holds=lambda value: (
+        isinstance(value, list)
+        and len(value) == 4
+        and all(map(is_number, value))
+        and min(value[2:]) > 0
+    ),
+)
+_COCO: Final[Mapping[str, Shape]] = {
+    "images": {"id": _ID, "file_name": TEXT},
+    "annotations": {"image_id": _ID, "category_id": _ID, "bbox": _BOX},
+    "categories": {"id": _ID, "name": TEXT},
 }
 _VALUES: Final = 5
 
@@ -99,7 +112,7 @@ def _yolo(folder: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
 def _check_names(file: Path, classes: tuple[str, ...]) -> None:
     if not file.is_file():
         return
-    names = tuple(line.strip() for line in file.read_text().splitlines() if line.strip())
+    names = tuple(line.strip() for line in _lines(file) if line.strip())
     if names != classes:
         raise ImagesInvalid(
             f"{file}: expected the model's classes {list(classes)}, got {list(names)}"
@@ -124,10 +137,17 @@ def _rows(file: Path, class_count: int) -> list[list[float]]:
         ImagesInvalid: a line is not five numbers, each in its range.
     """
     rows = []
-    for number, line in enumerate(file.read_text().splitlines(), start=1):
+    for number, line in enumerate(_lines(file), start=1):
         if line.strip():
             rows.append(_row(f"{file}:{number}", line, class_count))
     return rows
+
+
+def _lines(file: Path) -> list[str]:
+    try:
+        return file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ImagesInvalid(f"{file}: expected a text file in UTF-8: {error}") from error
 
 
 def _row(where: str, line: str, class_count: int) -> list[float]:
@@ -167,23 +187,32 @@ def _coco(file: Path, classes: tuple[str, ...]) -> Iterator[LabelledImage]:
 
 def _document(file: Path) -> Mapping[str, Any]:
     try:
-        document = json.loads(file.read_text())
-    except (OSError, ValueError) as error:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
         raise ImagesInvalid(f"{file}: expected a COCO file: {error}") from error
     missing = [
         key
-        for key in _COCO_KEYS
+        for key in _COCO
         if not isinstance(document, dict) or not isinstance(document.get(key), list)
     ]
     if missing:
         raise ImagesInvalid(f"{file}: expected a COCO file, it has no list {', '.join(missing)}")
-    for group, keys in _COCO_KEYS.items():
+    for group, shape in _COCO.items():
         for number, row in enumerate(document[group]):
-            lacking = [key for key in keys if not isinstance(row, dict) or key not in row]
-            if lacking:
-                raise ImagesInvalid(f"{file}: {group}[{number}] has no {', '.join(lacking)}")
+            _check_row(f"{file}: {group}[{number}]", row, shape)
     checked: Mapping[str, Any] = document
     return checked
+
+
+def _check_row(where: str, row: object, shape: Shape) -> None:
+    """Accept a table that has what is needed; what else it has is of no interest."""
+    table = row if isinstance(row, dict) else {}
+    lacking = [key for key in shape if key not in table]
+    if lacking:
+        raise ImagesInvalid(f"{where} has no {', '.join(lacking)}")
+    for key, check in shape.items():
+        if not check.holds(table[key]):
+            raise ImagesInvalid(f"{where}.{key}: expected {check.expected}, got {table[key]!r}")
 
 
 def _class_numbers(
@@ -212,9 +241,6 @@ def _coco_image(
     for annotation in annotations:
         if annotation["category_id"] not in numbers:
             raise ImagesInvalid(f"{file}: category {annotation['category_id']} is not declared")
-        box = annotation["bbox"]
-        if not (isinstance(box, list) and len(box) == 4 and min(box[2:]) > 0):
-            raise ImagesInvalid(f"{file}: bbox: expected left, top, width, height, got {box}")
     boxes = np.array([one["bbox"] for one in annotations], dtype=np.float32).reshape(-1, 4)
     corners = np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
     found = np.array([numbers[one["category_id"]] for one in annotations], dtype=np.intp)

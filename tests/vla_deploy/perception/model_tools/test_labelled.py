@@ -1,4 +1,5 @@
 import json
+import math
 
 import cv2
 import numpy as np
@@ -77,6 +78,14 @@ def test_a_line_that_is_no_label_is_told(tmp_path, image, line, told):
     assert told in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["a.txt", "classes.txt"])
+def test_labels_that_are_no_text_are_told(tmp_path, image, name):
+    image("a.png")
+    (tmp_path / name).write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ImagesInvalid, match=f"{name}: expected a text file in UTF-8"):
+        read_labelled(tmp_path, CLASSES)
+
+
 def test_a_list_of_classes_in_another_order_is_told(tmp_path, image):
     image("a.png")
     (tmp_path / "classes.txt").write_text("ball\ncup\n")
@@ -118,6 +127,21 @@ def test_a_coco_file_is_read_by_the_names_of_its_categories(tmp_path, image, fol
             "bbox: expected left, top, width, height, got [5, 5, 0, 1]",
         ),
         ({"images": [{"id": 7, "file_name": "c.png"}]}, "image 'c.png' is neither "),
+        ({"images": [{"id": 7, "file_name": 7}]}, "images[0].file_name: expected a text, got 7"),
+        ({"images": [{"id": [7], "file_name": "a.png"}]}, "images[0].id: expected a number or a"),
+        ({"categories": [{"id": [3], "name": "cup"}]}, "categories[0].id: expected a number or a"),
+        ({"categories": [{"id": 3, "name": ["cup"]}]}, "categories[0].name: expected a text, got"),
+        (
+            {"annotations": [{"image_id": [7], "category_id": 3, "bbox": [5, 5, 1, 1]}]},
+            "annotations[0].image_id: expected a number or a text, got [7]",
+        ),
+        *(
+            (
+                {"annotations": [{"image_id": 7, "category_id": 3, "bbox": [5, 5, *size]}]},
+                "annotations[0].bbox: expected left, top, width, height, got [5, 5, ",
+            )
+            for size in (["x", 8], [math.nan, 1], [1, math.inf], [True, 1])
+        ),
     ],
 )
 def test_a_coco_file_with_a_fault_is_told(tmp_path, image, document, told):
