@@ -6,12 +6,12 @@ import numpy as np
 
 from platforms import Profile
 from vla_deploy.inference.errors import ModelMismatch, RunFailed
-from vla_deploy.inference.graph_check import number_faults
+from vla_deploy.inference.graph_check import output_faults
 from vla_deploy.inference.manifest import Detection
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.session import ModelSession
 from vla_deploy.inference.stats import SessionStats
-from vla_deploy.perception.detectors.adapters import ADAPTERS
+from vla_deploy.perception.detectors.adapters import ADAPTERS, Outputs
 from vla_deploy.perception.detectors.boxes import Boxes
 from vla_deploy.perception.detectors.image_input import Image, fit_image
 
@@ -52,10 +52,10 @@ class Detector:
         tensor, placement = fit_image(rgb, self._detection.image, self._input.dtype)
         outputs = self._session.run({self._input.name: tensor})
         ordered = tuple(outputs[name] for name in self._outputs)
-        faults = tuple(number_faults(outputs))
+        faults = tuple(output_faults(outputs, self._session.model.manifest))
         if faults:
             raise RunFailed(f"{self._session.model.manifest.name}: {'; '.join(faults)}")
-        boxes = self._adapter.read(ordered, self._detection)
+        boxes = self._read(ordered)
         self._check(boxes)
         return placement.to_image(boxes)
 
@@ -66,6 +66,17 @@ class Detector:
     def close(self) -> None:
         """Release the memory."""
         self._session.close()
+
+    def _read(self, outputs: Outputs) -> Boxes:
+        """Read outputs whose shapes the graph may have left open until now."""
+        try:
+            return self._adapter.read(outputs, self._detection)
+        except (RunFailed, IndexError, ValueError) as error:
+            name, adapter = self._session.model.manifest.name, self._detection.adapter
+            shapes = " and ".join(str(list(output.shape)) for output in outputs)
+            raise RunFailed(
+                f"{name}: outputs {shapes}, which adapter {adapter} cannot read: {error}"
+            ) from error
 
     def _check(self, boxes: Boxes) -> None:
         """Refuse what would name a thing wrongly or hold noise for sure."""

@@ -35,9 +35,16 @@ def raw_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[st
 
 
 def read_raw(outputs: Outputs, detection: Detection) -> Boxes:
-    """Return the boxes of (1, 4 + classes, n) or (1, n, 4 + classes); doubles are removed here."""
+    """Return the boxes of (1, 4 + classes, n) or (1, n, 4 + classes); doubles are removed here.
+
+    Raises:
+        RunFailed: it is neither, which the graph had left open.
+    """
     table = np.asarray(outputs[0][0], dtype=np.float32)
-    if table.shape[0] != _COORDINATES + len(detection.classes):
+    channels = _COORDINATES + len(detection.classes)
+    if channels not in table.shape:
+        raise RunFailed(f"told {list(table.shape)} numbers, expected {channels} of each box")
+    if table.shape[0] != channels:
         table = table.T
     by_class = table[_COORDINATES:]
     classes = by_class.argmax(axis=0)
@@ -97,7 +104,8 @@ def read_counted(outputs: Outputs, detection: Detection) -> Boxes:
         RunFailed: the count is none, or more than there are rows.
     """
     number, corners, scores, classes = outputs
-    told, most = float(number.reshape(-1)[0]), corners.shape[1]
+    told = float(number.reshape(-1)[0])
+    most = min(rows.shape[1] for rows in (corners, scores, classes))
     if not 0 <= told <= most:
         raise RunFailed(f"told a count of {told:g} boxes, expected 0 to {most}")
     count = int(told)

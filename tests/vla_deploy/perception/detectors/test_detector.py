@@ -11,9 +11,9 @@ from platforms import Profile, load_profile
 from vla_deploy.adapting import AdaptingNode
 from vla_deploy.aside import background
 from vla_deploy.inference.errors import ManifestInvalid, ModelUnknown, RunFailed
-from vla_deploy.inference.manifest import Variant
+from vla_deploy.inference.manifest import Tensor, Variant
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.inference.store import ModelStore
+from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.perception.detectors.detector import Detector, open_detector
 
@@ -73,6 +73,51 @@ def rgb():
     image = np.full((64, 96, 3), 90, dtype=np.uint8)
     image[16:32, 16:32] = (255, 0, 0)
     return image
+
+
+class Answering:
+    """Stand for a session whose graph left the shapes of its outputs open, and answers so."""
+
+    def __init__(self, model: Model, outputs: dict[str, np.ndarray]) -> None:
+        self.model, self.outputs = model, outputs
+
+    def run(self, _: object) -> dict[str, np.ndarray]:
+        return self.outputs
+
+
+@pytest.mark.parametrize(
+    ("adapter", "shapes"),
+    [
+        ("yolo", [(1, 5, 96)]),
+        ("yolo", [(1, 7)]),
+        ("yolo_end_to_end", [(1, 2, 5)]),
+        ("yolo_end_to_end", [(0, 2, 6)]),
+        ("yolo_counted", [(1, 1), (1, 2, 5), (1, 2), (1, 2)]),
+        ("yolo_counted", [(1, 1), (1, 2, 4), (1, 0), (1, 2)]),
+        ("yolo_counted", [(1, 0), (1, 2, 4), (1, 2), (1, 2)]),
+        ("centre_net", [(1, 2, 8, 12), (1, 4, 4, 6)]),
+    ],
+)
+def test_outputs_of_another_shape_fail_the_frame_and_nothing_else(
+    tmp_path, blob_manifest, rgb, adapter, shapes
+):
+    detection = dataclasses.replace(blob_manifest.detection, adapter=adapter)
+    fitting = {
+        "yolo": [(1, 7, "n")], "yolo_end_to_end": [(1, "n", 6)],
+        "yolo_counted": [(1, 1), (1, "n", 4), (1, "n"), (1, "n")],
+        "centre_net": [(1, 3, "h", "w"), (1, 4, "h", "w")],
+    }[adapter]  # fmt: skip
+    free = [tuple(f"d{axis}" for axis, _ in enumerate(shape)) for shape in fitting]
+    if adapter == "centre_net":
+        free = fitting
+    outputs = tuple(
+        Tensor(name=str(number), shape=shape, dtype="float32") for number, shape in enumerate(free)
+    )
+    manifest = dataclasses.replace(blob_manifest, detection=detection, outputs=outputs)
+    answers = {str(number): np.ones(shape, np.float32) for number, shape in enumerate(shapes)}
+    model = Model(manifest=manifest, folder=tmp_path, is_embedded=False)
+    with pytest.raises(RunFailed, match=r"^blobs: "):
+        Detector(Answering(model, answers)).detect(rgb)
 
 
 @pytest.mark.parametrize(("tier", "name"), [(0, "medium"), (1, "small"), (7, "small")])
