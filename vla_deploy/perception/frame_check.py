@@ -110,6 +110,15 @@ LIMITS: Final[tuple[Limit, ...]] = (
         meaning="share of pixels that are white beyond measure",
     ),
     Limit(
+        # A real wall has more noise and shade than this. Where the twin's walls are not near, a
+        # quarter of the pixels or more have another colour.
+        fault="plain",
+        measure=lambda seen: seen.plain_ratio,
+        most=0.98,
+        leaves=Use.OBSTACLES,
+        meaning="share of pixels of one and the same colour",
+    ),
+    Limit(
         fault="noisy",
         measure=lambda seen: seen.colour_noise_levels,
         most=25.0,

@@ -16,6 +16,9 @@ Image = NDArray[np.uint8]
 DARK_LEVEL: Final = 30
 WHITE_LEVEL: Final = 252
 EMPTY_LEVEL: Final = 2
+ONE_COLOUR_LEVELS: Final = 1
+NEAR_WALL_M: Final = 1.0
+"""A wall nearer than this may fill the view, and without noise it may have but one colour."""
 THUMB_PX: Final = (40, 30)
 PLAIN_LEVELS: Final = 6.0
 """Contrast of an image in which nothing could be seen to move, such as one of a bare wall."""
@@ -47,6 +50,7 @@ class FrameStatistics:
 
     dark_ratio: float = 0.0
     saturated_ratio: float = 0.0
+    plain_ratio: float = 0.0
     colour_noise_levels: float = 0.0
     missing_ratio: float = 0.0
     hole_ratio: float = 0.0
@@ -112,6 +116,7 @@ def measure_frame(rgb: Image, depth_m: Floats) -> FrameStatistics:
     return FrameStatistics(
         dark_ratio=_share_between(rgb, 0, DARK_LEVEL),
         saturated_ratio=_share_between(rgb, WHITE_LEVEL, 255),
+        plain_ratio=_plain_share(rgb, depth_m),
         colour_noise_levels=_colour_noise(rgb),
         missing_ratio=_missing_rows(rgb, depth_m),
         hole_ratio=1.0 - int(np.count_nonzero(depth_m)) / depth_m.size,
@@ -141,6 +146,19 @@ def _share_of(same: Mask, telling: Mask) -> float:
 def _share_between(rgb: Image, low: int, high: int) -> float:
     """Return the share of pixels of which every channel is within bounds."""
     within = cv2.inRange(rgb, (low,) * 3, (high,) * 3)
+    return cv2.countNonZero(within) / int(within.size)
+
+
+def _plain_share(rgb: Image, depth_m: Floats) -> float:
+    """Return the share of pixels that have the colour of the middle one.
+
+    It is 0 where a near wall may fill half of the view, and where all is dark or white.
+    """
+    colour = np.median(rgb[::ROW_STRIDE, ::ROW_STRIDE].reshape(-1, 3), axis=0)
+    is_near = int(np.count_nonzero(depth_m >= NEAR_WALL_M)) < 0.5 * depth_m.size
+    if is_near or colour.max() <= DARK_LEVEL or colour.min() >= WHITE_LEVEL:
+        return 0.0
+    within = cv2.inRange(rgb, colour - ONE_COLOUR_LEVELS, colour + ONE_COLOUR_LEVELS)
     return cv2.countNonZero(within) / int(within.size)
 
 

@@ -76,9 +76,14 @@ def half_empty(rgb: Image, depth: Image, random: np.random.Generator) -> tuple[I
     return rgb * kept[:, None, None].astype(np.uint8), depth * kept[:, None].astype(np.uint16)
 
 
+def painted(*colour: int) -> Change:
+    return lambda rgb, depth, random: (np.full_like(rgb, colour), depth)
+
+
 SPOILED: dict[str, tuple[Change, Use]] = {
     "dark": (lambda rgb, depth, _: (rgb // 12, depth), Use.OBSTACLES),
     "saturated": (lambda rgb, depth, _: (np.maximum(rgb, 253), depth), Use.OBSTACLES),
+    "plain": (painted(0, 135, 0), Use.OBSTACLES),
     "noisy": (noisy(40.0), Use.OBSTACLES),
     "grainy": (noisy(20.0), Use.FORM),
     "cut off": (half_empty, Use.NOTHING),
@@ -102,6 +107,23 @@ def test_a_spoiled_image_is_used_for_no_more_than_it_shows(fault: str) -> None:
     verdict = judge_frame(measure_frame(rgb, depth.astype(np.float32) / np.float32(1000.0)))
     assert verdict.use is use
     assert [text.partition(":")[0] for text in verdict.faults] == [fault]
+
+
+@pytest.mark.parametrize("colour", [(255, 0, 255), (128, 128, 128), (0, 0, 255)])
+def test_one_colour_over_a_room_that_has_depth_is_none_of_its_own(
+    colour: tuple[int, int, int],
+) -> None:
+    rgb, depth = room()
+    told = watch(frame(np.full_like(rgb, colour), depth)).document(0)
+    assert told["use"] == "obstacles"
+    assert [fault.partition(":")[0] for fault in told["faults"]] == ["plain"]
+
+
+@pytest.mark.parametrize(("noise_levels", "depth_mm"), [(0.0, 600), (2.0, 3000)])
+def test_a_bare_wall_is_not_taken_for_a_plain_image(noise_levels: float, depth_mm: int) -> None:
+    wall = np.random.default_rng(0).normal(190.0, noise_levels, (HEIGHT, WIDTH, 3))
+    depth = np.full((HEIGHT, WIDTH), depth_mm, np.uint16)
+    assert watch(frame(wall.astype(np.uint8), depth)).document(0)["faults"] == []
 
 
 def test_an_image_of_the_same_bits_is_frozen_although_it_is_stamped_anew() -> None:
