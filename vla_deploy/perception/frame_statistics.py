@@ -12,6 +12,7 @@ from drivers.camera.base import RgbdFrame
 from vla_deploy.perception.cloud import DEPTH_SIGMA_PER_M, Floats, Mask
 
 Image = NDArray[np.uint8]
+Depth = NDArray[np.uint16]
 
 DARK_LEVEL: Final = 30
 WHITE_LEVEL: Final = 252
@@ -70,7 +71,7 @@ class Glance:
     """
 
     rgb: Image
-    depth: NDArray[np.uint16]
+    depth: Depth
     thumb: Floats
     depth_rows: Mask
     colour_rows: Mask
@@ -94,15 +95,15 @@ class Glance:
         change = float(np.abs(self.thumb - other.thumb).mean())
         return not plain and change < SAME_LEVELS
 
-    def stale_ratio(self, other: "Glance") -> float:
+    def stale_ratio(self, depth: Depth) -> float:
         """Return the share of rows with noisy depth in which not one bit of depth differs.
 
         No sensor's depth is as still as that. Colours may be, in a row that is black or white, and
         they may come anew beside a depth that does not.
         """
-        if self.depth.shape != other.depth.shape:
+        if self.depth.shape != depth.shape:
             return 0.0
-        return _share_of((self.depth == other.depth).all(axis=1), self.depth_rows)
+        return _share_of((self.depth == depth).all(axis=1), self.depth_rows)
 
     def stale_colour_ratio(self, other: "Glance") -> float:
         """Return the share of rows with contrast in which not one bit of colour differs."""

@@ -16,19 +16,20 @@ from vla_deploy.perception.frame_statistics import FrameStatistics, Glance, meas
 
 
 class FrameWatch:
-    """Hold the last image, the one since when nothing has moved in them, and the last verdict."""
+    """Hold the last images, the one since when nothing has moved in them, and the last verdict."""
 
     def __init__(self) -> None:
-        self._last: Glance | None = None
+        self._before: tuple[RgbdFrame, ...] = ()
         self._still: tuple[Glance, Travel] | None = None
         self._repeats = Repeats(STALE_COLOUR_RATIO)
         self._came_ns: int | None = None
         self._verdict = Verdict(use=Use.ALL, faults=())
         self._refused = 0
 
-    def came(self, now_ns: int) -> None:
-        """Take note that an image has come."""
+    def came(self, frame: RgbdFrame, now_ns: int) -> None:
+        """Take note that an image has come: the next one may be torn with it, judged or not."""
         self._came_ns = now_ns
+        self._before = (*self._before[-2:], frame)
 
     def judge(
         self, frame: RgbdFrame, depth_m: Floats, rotation: NDArray[np.float64], base: Pose2D
@@ -41,11 +42,13 @@ class FrameWatch:
         stand = Stand(stamp_ns=frame.stamp_ns, rotation=rotation, base=base)
         seen = replace(
             measure_frame(frame.rgb, depth_m),
-            stale_ratio=0.0 if self._last is None else glance.stale_ratio(self._last),
+            stale_ratio=max(
+                (glance.stale_ratio(one.depth) for one in self._before if one is not frame),
+                default=0.0,
+            ),
             stale_colour_ratio=self._repeats.ratio(glance, stand),
             unmoved_rad=self._unmoved_rad(glance, stand),
         )
-        self._last = glance
         self._verdict = judge_frame(seen)
         self._refused += self._verdict.use is Use.NOTHING
         return self._verdict

@@ -64,9 +64,9 @@ class Looking:
         self._watch = FrameWatch()
         self._waiting: Moment | None = None
 
-    def came(self, now_ns: int) -> None:
+    def came(self, frame: RgbdFrame, now_ns: int) -> None:
         """Take note that an image has come, whether it is looked at or not."""
-        self._watch.came(now_ns)
+        self._watch.came(frame, now_ns)
 
     def see(self, frame: RgbdFrame) -> bool:
         """Take a new image; return whether the obstacles around are new."""

@@ -164,7 +164,7 @@ class PerceptionNode:
         frame, now_ns = self._sensors.image(), self._clock.now_ns()
         if frame is None:
             return
-        self._looking.came(now_ns)
+        self._looking.came(frame, now_ns)
         if now_ns < self._next_look_ns:
             return
         rate_hz = self._profile.perception_rate_hz * self._rate_ratio

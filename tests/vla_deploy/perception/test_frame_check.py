@@ -47,8 +47,8 @@ def watch(*frames: RgbdFrame, turn_rad: float = 0.0, base: Pose2D = HERE) -> Fra
     seen = FrameWatch()
     for number, one in enumerate(frames):
         where = HERE if number == 0 else base
+        seen.came(one, 0)
         seen.judge(one, one.depth_m(), turned(number * turn_rad), where)
-        seen.came(0)
     return seen
 
 
@@ -154,6 +154,15 @@ def test_an_image_with_rows_of_the_one_before_is_torn(rows: int) -> None:
     rgb[:rows], depth[:rows] = old_rgb[:rows], old_depth[:rows]
     (fault,) = watch(frame(*room(0)), frame(rgb, depth)).document(0)["faults"]
     assert fault.startswith("torn")
+
+
+def test_an_image_is_torn_with_one_that_came_and_was_not_judged() -> None:
+    (rgb, depth), skipped = room(2, shift_px=40), frame(*room(1, shift_px=20))
+    rgb[:60], depth[:60] = skipped.rgb[:60], skipped.depth[:60]
+    seen, torn = watch(frame(*room(0))), frame(rgb, depth)
+    seen.came(skipped, 0)
+    seen.came(torn, 0)
+    assert seen.judge(torn, torn.depth_m(), turned(0.0), HERE).use is Use.NOTHING
 
 
 @pytest.mark.parametrize(
