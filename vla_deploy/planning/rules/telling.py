@@ -1,6 +1,7 @@
 """Answer questions from what the robot knows now: what it sees, what it holds, where things are."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from vla_deploy.memory.episode import unix_s
@@ -11,11 +12,13 @@ from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.building import Groups, Step, find
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.insertions import is_surface
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words
 
 MOST_TOLD = 6
+_IN_ROOM = re.compile(r"\bin (?:the )?(.+)$")
 ABILITIES = (
     "I can go to places, look for things, pick them up, put them in the box or on a table, "
     "bring them to you, tidy up, tell you what I see, and stand still when you tell me to."
@@ -78,7 +81,7 @@ def tell_whether(groups: Groups, request: Request) -> list[Step]:
     """Say whether a thing is in sight."""
     found = _known(groups["object"], request)
     if not found:
-        return _say("No, I do not see that.")
+        return _say(_of_room(groups["object"], request) or "No, I do not see that.")
     return _say(f"Yes, I see {listed(found)}.")
 
 
@@ -91,7 +94,8 @@ def tell_which(groups: Groups, request: Request) -> list[Step]:
 def tell_number(groups: Groups, request: Request) -> list[Step]:
     """Say how many such things are known."""
     count = len(_known(groups["object"], request))
-    return _say(f"I see {count or 'none'}.")
+    unsure = "" if count else _of_room(groups["object"], request)
+    return _say(unsure or f"I see {count or 'none'}.")
 
 
 def listed(things: Sequence[Thing]) -> str:
@@ -106,6 +110,16 @@ def _known(text: str, request: Request) -> list[Thing]:
         return []
     setting = Setting(request)
     return fitting(read_expression(text, setting.furniture), Use.SEE, setting)
+
+
+def _of_room(text: str, request: Request) -> str:
+    """Say that nobody knows all that is in a room, if words are about one, else ""."""
+    found = _IN_ROOM.search(text)
+    room = match_place(found[1], request.world.places) if found else None
+    if room is None or is_surface(room, request.world):
+        return ""
+    where = room.replace("_", " ")
+    return f"I know what I see on furniture, not all that is in the {where}; ask me to look there."
 
 
 def _remembered(text: str, request: Request) -> list[Step]:

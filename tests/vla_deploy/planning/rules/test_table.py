@@ -136,6 +136,10 @@ COMMANDS = {
         "what is on the side table": "speak I see an orange box on the side table.",
         "is the ball on the table?": "speak Yes, I see a green ball.",
         "is there a bottle?": "speak No, I do not see that.",
+        "is there a bottle in the kitchen?": (
+            "speak I know what I see on furniture, not all that is in the kitchen; "
+            "ask me to look there."
+        ),
         "how many cups are there?": "speak I see 2.",
         "which ball is on the coffee table?": "speak It is a green ball.",
         "which cups are on the side table": "speak I see none there.",
