@@ -63,6 +63,10 @@ ANY_WORDS: Final = re.compile(
     r"(?:either|any|whichever|any one|anyone|i don'?t care|doesn'?t matter|"
     r"it doesn'?t matter|you choose|your choice|whatever)(?: (?:one|of them|will do|is fine))*"
 )
+# Several, where one was asked for: no other command, and nothing that could be gone on with.
+ALL_WORDS: Final = re.compile(
+    r"(?:both|all|each|every one)(?: (?:of (?:them|those|these)|two|three))*"
+)
 # Places in the row of the candidates, from 1.
 PLACES: Final = {**ORDINALS, "former": 1, "latter": 2}
 # What says nothing of which one is meant.
@@ -72,7 +76,7 @@ _SILENT: Final = frozenset(
         "it", "is", "its", "that", "this", "thing", "on", "in", "at", "to", "of", "with", "my",
         "your", "side", "and", "uh", "um", "er", "well", "just", "give", "me", "bring", "use",
         "from", "yes", "no", "rather", "other", "are", "which", "there", "over",
-        "that's", "it's",
+        "that's", "it's", "said",
     }
 )  # fmt: skip
 # Words of the questions themselves.
@@ -128,6 +132,8 @@ def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | No
         return (Verdict.YES if YES_WORDS.fullmatch(said) else Verdict.ANEW), None
     if ANY_WORDS.fullmatch(said):
         return Verdict.CHOSEN, question.candidates[0]
+    if ALL_WORDS.fullmatch(said):
+        return Verdict.UNCLEAR, None
     agrees = YES_WORDS.fullmatch(said) is not None
     if agrees and len(question.candidates) == 1:
         return Verdict.CHOSEN, question.candidates[0]
