@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
     clock = MonotonicClock()
     planner = planner_for(robot, profile, clock, base)
     answer = planner.plan(_request(arguments, robot))
-    print(json.dumps(told(answer), indent=2) if arguments.json else as_text(answer))
+    away = planner.away
+    print(json.dumps(told(answer, away), indent=2) if arguments.json else as_text(answer, away))
     if isinstance(answer.error, Ambiguous):
         return EXIT_ASKED
     if answer.error is not None:
@@ -68,8 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def told(answer: Answer) -> dict[str, Any]:
-    """Return an answer as scripts read it."""
+def told(answer: Answer, away: Mapping[str, str]) -> dict[str, Any]:
+    """Return an answer as scripts read it, and who could not be asked, by why."""
     proposal = answer.proposal
     is_asked = isinstance(answer.error, Ambiguous)
     return {
@@ -80,12 +81,14 @@ def told(answer: Answer) -> dict[str, Any]:
         "question": str(answer.error) if is_asked else None,
         "refused": None if answer.error is None or is_asked else str(answer.error),
         "attempts": [one.document() for one in answer.attempts],
+        "away": dict(away),
     }
 
 
-def as_text(answer: Answer) -> str:
-    """Return an answer as lines for a person."""
+def as_text(answer: Answer, away: Mapping[str, str]) -> str:
+    """Return an answer as lines for a person, and who could not be asked."""
     lines = [_attempt_line(one) for one in answer.attempts]
+    lines += [f"{name} away: {why}" for name, why in away.items()]
     if answer.plan is not None:
         lines += [
             f"  {one.id:<14} {action_words(one.skill, one.parameters)}"

@@ -63,6 +63,16 @@ def test_what_nobody_can_plan_is_refused_with_what_each_said(plan):
     assert said == ["rules", "cache", "command_parser"]
 
 
+def test_a_server_that_is_not_there_is_told(plan, tmp_path):
+    profile = tmp_path / "served.toml"
+    profile.write_text('inherits = "desktop"\n[planning]\nservers = ["attic"]\n')
+
+    code, printed = plan("pick up the red cup", "--profile", str(profile))
+    assert code == 0
+    assert "attic away: " in printed
+    assert "attic" in json.loads(plan("stop", "--profile", str(profile), "--json")[1])["away"]
+
+
 @pytest.mark.parametrize("content", ["[1, 2]", "{", '{"objects": 3}', '{"things": [7]}'])
 def test_a_file_that_is_no_scene_is_refused_in_one_line(tmp_path, capsys, content):
     (tmp_path / "bad.json").write_text(content)
