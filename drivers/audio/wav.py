@@ -30,7 +30,7 @@ def read_wav(path: Path) -> tuple[AudioFormat, Samples]:
         raise DeviceMissing(f"{path}: no such file; correct the path") from error
     except (wave.Error, EOFError, ValueError) as error:
         raise WrongDevice(
-            f"{path}: no WAV file of 16-bit samples ({error or 'cut off'}); convert it"
+            f"{path}: no WAV file of 16-bit samples ({str(error) or 'cut off'}); convert it"
         ) from error
     return format_, np.frombuffer(data, "<i2").astype(np.int16).reshape(-1, format_.channels)
 

@@ -90,10 +90,7 @@ def read_map_file(yaml_path: Path) -> MapFile:
         MapInvalid: a file is missing or not readable, or keys are missing or out of range; the
             message tells all of them.
     """
-    entries = _read_entries(yaml_path)
-    missing = [key for key in REQUIRED_KEYS if key not in entries]
-    if missing:
-        raise MapInvalid(f"{yaml_path}: missing {', '.join(missing)}; see ROS map_server's format")
+    entries = _whole_entries(yaml_path)
     faults = list(_faults(entries))
     if faults:
         raise MapInvalid(f"{yaml_path}: {'; '.join(faults)}")
@@ -113,12 +110,9 @@ def image_of(yaml_path: Path) -> Path:
     """Return the image that a map's file names.
 
     Raises:
-        MapInvalid: the file is missing or not readable, or names none.
+        MapInvalid: the file is missing or not readable, or keys are missing.
     """
-    entries = _read_entries(yaml_path)
-    if "image" not in entries:
-        raise MapInvalid(f"{yaml_path}: missing image; see ROS map_server's format")
-    return yaml_path.parent / _text(entries["image"])
+    return yaml_path.parent / _text(_whole_entries(yaml_path)["image"])
 
 
 def write_map_file(yaml_path: Path, file: MapFile, *, comment: str = "") -> None:
@@ -164,7 +158,8 @@ def _faults(entries: Mapping[str, str | list[str]]) -> list[str]:
         told = entries["resolution"]
         faults.append(f"resolution: expected metres from {low_m} to {high_m:g}, got {told}")
     origin = _numbers(entries["origin"])
-    if len(origin) != 3 or origin[2] != 0.0 or not max(map(abs, origin)) <= MOST_ORIGIN_M:
+    is_near = all(abs(one_m) <= MOST_ORIGIN_M for one_m in origin)  # nan is not
+    if len(origin) != 3 or not is_near or origin[2] != 0.0:
         faults.append(
             f"origin: expected [x, y, 0.0] within {MOST_ORIGIN_M:g} m, got {entries['origin']}; "
             "a turned map must be drawn straight first"
@@ -196,6 +191,15 @@ def _read_shades(path: Path) -> Shades:
     if image.size > MOST_CELLS:
         raise MapInvalid(f"{path}: expected at most {MOST_CELLS} cells, got {image.size}")
     return np.asarray(image, dtype=np.uint8)
+
+
+def _whole_entries(path: Path) -> dict[str, str | list[str]]:
+    """Return what a map's file says, with all keys that it must have."""
+    entries = _read_entries(path)
+    missing = [key for key in REQUIRED_KEYS if key not in entries]
+    if missing:
+        raise MapInvalid(f"{path}: missing {', '.join(missing)}; see ROS map_server's format")
+    return entries
 
 
 def _read_entries(path: Path) -> dict[str, str | list[str]]:

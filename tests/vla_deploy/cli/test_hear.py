@@ -86,3 +86,12 @@ def test_a_recording_that_no_microphone_makes_is_refused_in_one_line(
     assert code == 2
     assert "no WAV file" in errors
     assert len(errors.splitlines()) == 1
+
+
+def test_a_recording_that_is_cut_off_in_its_header_is_told(hear: Hear, recording: str) -> None:
+    Path(recording).write_bytes(Path(recording).read_bytes()[:30])
+
+    code, _, errors = hear(recording, "--model", "says-left")
+
+    assert code == 2
+    assert "(cut off)" in errors

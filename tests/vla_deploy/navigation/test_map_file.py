@@ -152,6 +152,7 @@ def test_a_png_is_as_good_as_a_pgm(tmp_path: Path) -> None:
         ("[-10.000000, -7.500000, 0.000000]", "[a, b, c]", "origin: expected"),
         ("[-10.000000, -7.500000, 0.000000]", "[1e9, 0, 0]", "origin: expected"),
         ("[-10.000000, -7.500000, 0.000000]", "[nan, 0, 0]", "origin: expected"),
+        ("[-10.000000, -7.500000, 0.000000]", "[0, nan, 0]", "origin: expected"),
         ("0.196", "0.9", "rising"),
         ("0.65", "65", "rising"),
         ("negate: 0", "negate: maybe", "negate: expected"),
