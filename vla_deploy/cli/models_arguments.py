@@ -1,13 +1,13 @@
 """Declare the arguments of `vla-deploy models`."""
 
 import argparse
-import math
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from vla_deploy.cli.example import add_command, add_top_command
+from vla_deploy.cli.number_arguments import number_within
 from vla_deploy.inference.manifest import Fit
 from vla_deploy.inference.manifest_schema import COLOURS
 from vla_deploy.perception.detectors.adapters import ADAPTERS
@@ -208,7 +208,11 @@ def _quantise(acts: Any) -> None:
         help="to measure with: a folder with YOLO text files, or a COCO file",
     )
     quantise.add_argument(
-        "--max-drop", type=_points, default=1.0, metavar="POINTS", help="of mAP50 (default: 1.0)"
+        "--max-drop",
+        type=number_within(0.0, 100.0, "points from 0 to 100"),
+        default=1.0,
+        metavar="POINTS",
+        help="of mAP50 (default: 1.0)",
     )
     quantise.add_argument("--as", dest="new_name", help="install it under another name")
     quantise.add_argument(
@@ -237,17 +241,6 @@ def _size(text: str) -> tuple[int, int]:
     if match is None:
         raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT, such as 640x480, got {text!r}")
     return int(match[1]), int(match[2])
-
-
-def _points(text: str) -> float:
-    """Return a share in points of mAP50; nan would let any drop pass."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= 100.0:
-        raise argparse.ArgumentTypeError(f"expected points from 0 to 100, got {text!r}")
-    return value
 
 
 def _count(text: str) -> int:

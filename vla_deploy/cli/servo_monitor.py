@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from drivers.dynamixel.tools import BenchLink, scan_speed
 from drivers.dynamixel.tools.bench_link import THREE_TRIES
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_command
+from vla_deploy.cli.number_arguments import number_within
 from vla_deploy.cli.servo_wire import ServoWire, add_wire_arguments, servo_id, wire_of
 
 STATUS = (64, 7)  # torque_enable .. hardware_error_status
@@ -56,7 +56,11 @@ def register(commands: Any) -> None:
         "--count", type=_count, default=0, metavar="N", help="stop after so many (default: never)"
     )
     monitor.add_argument(
-        "--rate", type=_rate, default=5.0, metavar="HZ", help="0.1 to 100 (default: 5)"
+        "--rate",
+        type=number_within(0.1, 100.0, "0.1 to 100"),
+        default=5.0,
+        metavar="HZ",
+        help="0.1 to 100 (default: 5)",
     )
     monitor.set_defaults(run=run)
 
@@ -65,16 +69,6 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text!r}")
     return int(text)
-
-
-def _rate(text: str) -> float:
-    try:
-        rate_hz = float(text)
-    except ValueError:
-        rate_hz = math.nan
-    if not 0.1 <= rate_hz <= 100.0:
-        raise argparse.ArgumentTypeError(f"expected 0.1 to 100, got {text!r}")
-    return rate_hz
 
 
 def run(arguments: argparse.Namespace) -> int:

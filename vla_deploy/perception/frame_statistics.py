@@ -155,9 +155,10 @@ def _plain_share(rgb: Image, depth_m: Floats) -> float:
 
     It is 0 where a near wall may fill half of the view, and where all is dark or white.
     """
+    if int(np.count_nonzero(depth_m >= NEAR_WALL_M)) < 0.5 * depth_m.size:
+        return 0.0
     colour = np.median(rgb[::ROW_STRIDE, ::ROW_STRIDE].reshape(-1, 3), axis=0)
-    is_near = int(np.count_nonzero(depth_m >= NEAR_WALL_M)) < 0.5 * depth_m.size
-    if is_near or colour.max() <= DARK_LEVEL or colour.min() >= WHITE_LEVEL:
+    if colour.max() <= DARK_LEVEL or colour.min() >= WHITE_LEVEL:
         return 0.0
     within = cv2.inRange(rgb, colour - ONE_COLOUR_LEVELS, colour + ONE_COLOUR_LEVELS)
     return cv2.countNonZero(within) / int(within.size)

@@ -99,7 +99,8 @@ def write_lens(file: Path, lens: LensCalibration, camera: Camera) -> None:
     """Replace the file in one act; the one before stays as `<file>.bak`.
 
     Raises:
-        RobotFileError: it cannot be written; the old file stays.
+        RobotFileError: reading would refuse it, which keeps the robot from loading, or it cannot be
+            written; the old file stays.
     """
     at = lens.intrinsics
     document = {
@@ -119,6 +120,9 @@ def write_lens(file: Path, lens: LensCalibration, camera: Camera) -> None:
         "made_at": lens.made_at,
         "tool": lens.tool,
     }
+    faults = tuple(lens_faults(document, camera, MODELS))
+    if faults:
+        raise RobotFileError(file, faults)
     replace_text(file, yaml.safe_dump(document, sort_keys=False, default_flow_style=None))
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.inference.manifest import Certainty
-from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, IMPLIED, Step
-from vla_deploy.planning.command_parser.spans import find_span
+from vla_deploy.planning.command_parser.grammar import IMPLIED, Step
+from vla_deploy.planning.command_parser.spans import copied_spans
 from vla_deploy.world.vocabulary import COLOURS, OBJECT_CLASSES, SYNONYMS
 
 # Said before the right words: what was said before them does not count any more.
@@ -45,14 +45,11 @@ def oddities_of(steps: Sequence[Step], command: Sequence[str], known: Collection
     used: set[int] = set()
     copied: set[str] = set()
     jumps = 0
-    for step in steps:
-        for field in COPIED_FIELDS & step.keys():
-            words = step[field].split()
-            span = find_span(words, command)
-            copied.update(words)
-            used.update(() if span is None else span.places)
-            implied = step[field] in IMPLIED
-            jumps += span.jumps if span is not None else int(not implied) * len(words)
+    for value, span in copied_spans(steps, command):
+        words = value.split()
+        copied.update(words)
+        used.update(() if span is None else span.places)
+        jumps += span.jumps if span is not None else int(value not in IMPLIED) * len(words)
     rest = [word for at, word in enumerate(command) if at not in used]
     is_corrected = any(word in _TAKEN_BACK for word in rest)
     return Oddities(

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step
-from vla_deploy.planning.command_parser.spans import find_span
+from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.spans import copied_spans
 from vla_deploy.planning.errors import CannotBeDone
 
 # These only talk or stand; whatever was meant, nothing is moved by mistake.
@@ -131,11 +131,8 @@ def refuse_passed_over(steps: Sequence[Step], command: Sequence[str]) -> None:
 
 def _rest(steps: Sequence[Step], command: Sequence[str]) -> str:
     """Return the command with a sign in the place of each word that a step has copied."""
-    copied: set[int] = set()
-    for step in steps:
-        for field in COPIED_FIELDS & step.keys():
-            span = find_span(step[field].split(), command)
-            copied.update(() if span is None else span.places)
+    spans = [span for _, span in copied_spans(steps, command) if span is not None]
+    copied = {place for span in spans for place in span.places}
     return " ".join(_COPIED if at in copied else word for at, word in enumerate(command))
 
 

@@ -1,9 +1,10 @@
 """Find where in a command the words of a field were copied from."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step
 from vla_deploy.world.vocabulary import ARTICLES
 
 # Said between the words of one expression, they change nothing; the articles tell how many.
@@ -29,6 +30,15 @@ class Span:
     places: tuple[int, ...]
     spoken: tuple[str, ...]
     jumps: int
+
+
+def copied_spans(
+    steps: Sequence[Step], command: Sequence[str]
+) -> Iterator[tuple[str, Span | None]]:
+    """Yield what each field of the steps holds that is copied, and where in the command it is."""
+    for step in steps:
+        for field in COPIED_FIELDS & step.keys():
+            yield step[field], find_span(step[field].split(), command)
 
 
 def find_span(words: Sequence[str], command: Sequence[str]) -> Span | None:

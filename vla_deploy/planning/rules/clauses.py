@@ -82,9 +82,8 @@ def is_stop(text: str) -> bool:
         return False
     said = " ".join(words_of(polite_off(text).replace("'", "")))
     urged = _URGED.sub("", said)
-    if _STOP_DOING.fullmatch(urged):
-        return True
-    return said in _STOPS or (urged in _STOPS and urged.startswith(_HALTS))
+    is_halt = urged in _STOPS and urged.startswith(_HALTS)
+    return said in _STOPS or is_halt or _STOP_DOING.fullmatch(urged) is not None
 
 
 # What people say before it who want it now; "no, never mind" may still answer a question.

@@ -100,5 +100,5 @@ def test_two_sides_for_two_steps_pass() -> None:
 
 
 def test_the_words_are_told() -> None:
-    with pytest.raises(CannotBeDone, match=r'"stay away from the kitchen"|"away from the kitchen"'):
+    with pytest.raises(CannotBeDone, match='"away from the kitchen"'):
         refuse_passed_over([GO], ["please", "stay", "away", "from", "the", "kitchen"])
