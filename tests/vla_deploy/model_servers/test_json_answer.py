@@ -63,6 +63,7 @@ def test_what_models_write_around_their_answer_is_left_out(text: str, found: lis
         "{" * 200_000,
         '{"a"' * 200_000,
         '<think>{"a": 1}',
+        '{"outer": {"a\\"{}',  # cut off inside a string
     ],
 )
 def test_hostile_text_is_malformed_and_costs_little(text: str):
