@@ -23,6 +23,7 @@ logging.getLogger("faster_whisper").setLevel(logging.WARNING)
 MODEL_ERRORS: tuple[type[Exception], ...] = (RuntimeError, ValueError, OSError, KeyError, TypeError)
 VERSION: str = f"faster-whisper {faster_whisper.__version__}"
 _MARGIN_FRAMES = 40
+_FRAMES_PER_STATE = 2
 
 
 class TrimmedWhisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimported,unused-ignore]
@@ -36,7 +37,12 @@ class TrimmedWhisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-u
     def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
         """Return what the encoder makes of features, (mel bands, frames)."""
         kept = self.content_frames + _MARGIN_FRAMES
-        return super().encode(np.ascontiguousarray(features[..., : kept + kept % 2]))
+        kept += kept % _FRAMES_PER_STATE
+        # CTranslate2 takes what has as many rows as there are mel bands for features, and would
+        # encode its own states once more (`WhisperEncoder::is_encoded`).
+        if kept // _FRAMES_PER_STATE == features.shape[-2]:
+            kept += _FRAMES_PER_STATE
+        return super().encode(np.ascontiguousarray(features[..., :kept]))
 
 
 Whisper = faster_whisper.WhisperModel

@@ -46,6 +46,19 @@ def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: 
     assert confidence(reading, recogniser.declared.calibration) >= LEAST_CONFIDENCE
 
 
+def test_a_command_is_read_right_at_any_length(recogniser: Recogniser) -> None:
+    try:
+        ctypes.CDLL("libespeak-ng.so.1")
+    except OSError:
+        pytest.skip("no libespeak-ng1")
+    spoken = say("turn left by ninety degrees", Speaker(engine="espeak", voice="en-us"), Style())
+    clip = heard(spoken, np.random.default_rng(0), 30.0)
+    rate_hz, step_s = 16_000, 0.04
+    counts = [round(rate_hz * step_s * number) for number in range(50)]
+    read = {recogniser.read(np.pad(clip.samples, (count, 0))).text for count in counts}
+    assert read == {spoken.text}
+
+
 def test_noise_gives_no_sure_words(recogniser: Recogniser) -> None:
     for clip in noises_alone(8, np.random.default_rng(1)):
         reading = recogniser.read(clip.samples)

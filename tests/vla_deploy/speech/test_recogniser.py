@@ -66,6 +66,25 @@ def test_trimmed_sound_costs_a_small_part_of_a_padded_window(scripted_whisper: A
     assert frames == [140, 3000]
 
 
+def test_no_length_of_sound_is_encoded_twice(scripted_whisper: Any) -> None:
+    """CTranslate2 takes states for features where there are as many of them as mel bands."""
+    recogniser = opened(scripted_whisper.model("ours", "turn left", context=Context.TRIMMED))
+    model = recogniser._whisper
+    encode = model.model.encode
+    states: list[tuple[int, ...]] = []
+
+    def spied(features: Any, *, to_cpu: bool = False) -> Any:
+        states.append(encode(features, to_cpu=True).shape)
+        return encode(features, to_cpu=to_cpu)
+
+    model.model = _Spied(model.model, encode=spied)
+    for milliseconds in range(1100, 1300, 20):
+        recogniser.read(np.zeros(16 * milliseconds, np.float32))
+    mel_bands = model.feature_extractor.mel_filters.shape[0]
+    assert mel_bands - 1 in [shape[1] for shape in states], "the lengths around it were tried"
+    assert mel_bands not in [shape[1] for shape in states]
+
+
 class _Spied:
     """Let a test see what a model is asked."""
 
