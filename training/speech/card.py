@@ -10,10 +10,12 @@ from training.voices.cast import (
     ACCENTS,
     HELD_OUT_ACCENT,
     HELD_OUT_VARIANTS,
+    PACKAGED_VOICES,
     ROBOTIC_VARIANTS,
     VARIANTS,
 )
 
+METRICS: Final = "metrics.json"
 TEMPLATE: Final = Path(__file__).with_name("card_template.md")
 AIMS: Final = {
     "wer_held_out_voices": 0.02,
@@ -42,6 +44,7 @@ def verdict(metrics: dict[str, Any]) -> str:
 
 def card(metrics: dict[str, Any], model: Path, size: Size) -> str:
     """Return the model card."""
+    training = metrics["training"]
     values = {
         "verdict": verdict(metrics),
         "size_kib": sum(path.stat().st_size for path in model.glob("*.bin")) // 1024,
@@ -53,10 +56,16 @@ def card(metrics: dict[str, Any], model: Path, size: Size) -> str:
         "variants": len(VARIANTS) + len(ROBOTIC_VARIANTS),
         "held_out_accent": HELD_OUT_ACCENT,
         "held_out_variants": ", ".join(HELD_OUT_VARIANTS),
-        "clips": metrics["training"]["clips"],
-        "heard_h": f"{metrics['training']['heard_s'] / 3600:.0f}",
-        "steps": metrics["training"]["steps"],
-        "minutes": f"{metrics['training']['budget_s'] / 60:.0f}",
+        "clips": training["clips"],
+        "packaged": ", ".join(
+            f"{engine} ({', '.join(names)})" for engine, names in PACKAGED_VOICES.items()
+        ),
+        "heard_h": f"{training['heard_s'] / 3600:.0f}",
+        "steps": training["steps"],
+        "minutes": f"{training['budget_s'] / 60:.0f}",
+        "seed": training["seed"],
+        "went_on": went_on(training["heard_before_s"]),
+        "start_from": " --start-from THE-ONE-SHIPPED-BEFORE" * (training["heard_before_s"] > 0.0),
         "name": size.name,
         "sentences": metrics["sentences"],
         "table": table(metrics),
@@ -72,6 +81,16 @@ def card(metrics: dict[str, Any], model: Path, size: Size) -> str:
         "right_accepted": _share(metrics["sureness"]["right_accepted_ratio"]),
     }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
+
+
+def went_on(heard_before_s: float) -> str:
+    """Return what the training began with."""
+    if not heard_before_s:
+        return "It began with weights at random."
+    return (
+        "It began with the weights of the recogniser that was shipped before it, which had heard "
+        f"{heard_before_s / 3600:.0f} h."
+    )
 
 
 def table(metrics: dict[str, Any]) -> str:

@@ -8,9 +8,10 @@ from typing import Final
 import numpy as np
 
 from training.speech.sentences import draw_sentence
-from training.voices.cast import draw_speaker, draw_style, say
+from training.voices.cast import draw_of_all, draw_style, say
 from training.voices.clip import Clip
 from training.voices.clip_store import write_shard
+from training.voices.errors import SynthesisFailed
 
 CLIPS_PER_SHARD: Final = 1000
 _LOG = logging.getLogger(__name__)
@@ -20,7 +21,7 @@ def generate(folder: Path, shards: int, seed: int, clips: int = CLIPS_PER_SHARD)
     """Write the shards that are missing.
 
     Raises:
-        EngineMissing: eSpeak NG or flite is not installed.
+        EngineMissing: an engine is not installed.
     """
     for number in range(shards):
         write_shard(folder / f"{number:04d}", _clips(number, seed, clips))
@@ -29,5 +30,12 @@ def generate(folder: Path, shards: int, seed: int, clips: int = CLIPS_PER_SHARD)
 
 def _clips(number: int, seed: int, count: int) -> Iterator[Clip]:
     random = np.random.default_rng([seed, number])
-    for _ in range(count):
-        yield say(draw_sentence(random), draw_speaker(random), draw_style(random))
+    spoken = 0
+    while spoken < count:
+        try:
+            clip = say(draw_sentence(random), draw_of_all(random), draw_style(random))
+        except SynthesisFailed as error:
+            _LOG.warning("left out: %s", error)
+            continue
+        spoken += 1
+        yield clip

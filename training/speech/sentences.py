@@ -3,7 +3,8 @@
 A quarter are commands as the command parser learns them: what one understands the other hears.
 
 A quarter of all are words strung together at random, so that the recogniser learns to hear words
-and not to guess them from what usually follows.
+and not to guess them from what usually follows. For the same reason some are two sentences in one
+breath: what is a whole sentence need not be the end.
 """
 
 import re
@@ -40,7 +41,8 @@ def read_tables(path: Path) -> dict[str, list[str]]:
 @cache
 def tables() -> Mapping[str, list[str]]:
     """Return all words and patterns by kind."""
-    return read_tables(_FOLDER / "words.txt") | read_tables(_FOLDER / "sentences.txt")
+    names = ("words.txt", "common_words.txt", "sentences.txt")
+    return {kind: told for name in names for kind, told in read_tables(_FOLDER / name).items()}
 
 
 @cache
@@ -102,6 +104,7 @@ _COMMAND_KINDS: Final = (
     "thing", "container", "colour", "size", "place", "count", "degrees", "direction", "verb",
     "person", "after", "polite", "fast", "look", "surface", "answer", "pose", "things", "doing",
 )  # fmt: skip
+_COMMON_KINDS: Final = ("common", "common", "common", "little", "verb", "noun", "thing", "surface")
 _TALK_KINDS: Final = ("verb", "noun", "noun", "adjective", "little", "doing", "done", "things")
 
 
@@ -123,14 +126,25 @@ def _string(kinds: tuple[str, ...]) -> Callable[[Random], str]:
 
 MOST_WORDS: Final = 20
 """What is longer than all that was learnt from, the recogniser does not follow to its end."""
+
+
+def _in_one_breath(random: Random) -> str:
+    """Return two short sentences with nothing between them."""
+    first, second = (_BREATHS[int(random.integers(len(_BREATHS)))](random) for _ in range(2))
+    return f"{first} {second}"
+
+
+_BREATHS: Final = (_command, draw_planner_command, _answer, _talk, _string(_COMMAND_KINDS))
 SHARES: Final[Mapping[Callable[[Random], str], float]] = {
-    _command: 0.26,
+    _command: 0.2,
     draw_planner_command: 0.25,
-    _question: 0.08,
-    _answer: 0.06,
-    _talk: 0.12,
-    _string(_COMMAND_KINDS): 0.13,
-    _string(_TALK_KINDS): 0.1,
+    _in_one_breath: 0.13,
+    _question: 0.06,
+    _answer: 0.05,
+    _talk: 0.08,
+    _string(_COMMAND_KINDS): 0.09,
+    _string(_TALK_KINDS): 0.06,
+    _string(_COMMON_KINDS): 0.08,
 }
 
 

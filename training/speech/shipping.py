@@ -10,7 +10,7 @@ from typing import Any, Final
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.speech import calibration, judging
-from training.speech.card import card, read_metrics
+from training.speech.card import METRICS, card, read_metrics
 from training.speech.sizes import Size
 from training.speech.trials import sentences
 from training.voices.clip_store import shards
@@ -21,7 +21,7 @@ from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE, Request, describe
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 
 SHIPPED: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "commands-whisper"
-CARD, METRICS, MODEL = "card.md", "metrics.json", "model"
+CARD, MODEL = "card.md", "model"
 _SPEECH: Final = load_profile("desktop").speech
 BEAM: Final = _SPEECH.beam
 LEAST_CONFIDENCE: Final = _SPEECH.least_confidence

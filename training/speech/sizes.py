@@ -25,7 +25,7 @@ SIZES: Final = {
     size.name: size
     for size in (
         Size(
-            name="full", width=128, heads=4, encoder_layers=4, decoder_layers=2, shards=30
+            name="full", width=256, heads=8, encoder_layers=4, decoder_layers=2, shards=40
         ),
         Size(
             name="smoke", width=32, heads=2, encoder_layers=1, decoder_layers=1, shards=1,

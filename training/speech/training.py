@@ -18,12 +18,13 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from training.speech.batches import IGNORED, Batch, Clips, Maker
+from training.speech.card import METRICS, read_metrics
 from training.speech.network import Recogniser
 from training.speech.sentences import draw_sentence
 from training.speech.sizes import Size
 from training.speech.spoiling import Spoiler
 from training.speech.tokens import TOKENIZER, Coder, make_tokenizer
-from training.speech.warm_start import NotReadable, weights_of
+from training.speech.warm_start import NotReadable, weights_of, widened
 
 STATE: Final = "state.pt"
 BEFORE_FALL: Final = "before_fall.pt"
@@ -36,13 +37,14 @@ AVERAGE_DECAY: Final = 0.99
 FALL_FROM: Final = 0.55
 """Share of the time after which the rate of learning falls."""
 SHORT_UNTIL: Final = 0.1
-"""Share of the time in which only the shorter clips are learnt from."""
+"""Share of the time in which only the shorter clips are learnt from, by a network that is new."""
 SMOOTHING: Final = 0.05
 STARTED_RATIO: Final = 0.5
 """Of the rates of learning, where a training begins with weights that were shipped."""
 _SAVE_EVERY_STEPS: Final = 200
 _TELL_EVERY_STEPS: Final = 50
 _TALKERS: Final = 400
+_WORDS: Final = "decoder.embed_tokens.weight"
 _LOG = logging.getLogger(__name__)
 
 
@@ -68,11 +70,11 @@ def train(out: Path, size: Size, budget_s: float, start_from: Path | None = None
     maker = Maker(coder, Spoiler(talk, random))
     run = _Run(out, size, coder.count, budget_s)
     if start_from is not None:
-        run.begin_from(start_from / "model.bin")
+        run.begin_from(start_from)
     stopping = _Stopping()
     while run.progress() < 1.0:
         clips.refresh()
-        early = run.progress() < SHORT_UNTIL
+        early = start_from is None and run.progress() < SHORT_UNTIL
         for group in clips.groups(size.batch_s, random, 0.5 if early else 1.0):
             run.step(maker.make(group, random))
             if stopping.told:
@@ -109,6 +111,8 @@ class _Run:
     def __init__(self, out: Path, size: Size, tokens: int, budget_s: float) -> None:
         self._out = out
         self._budget_s = budget_s
+        self._seed = size.seed
+        self._heard_before_s = 0.0
         self.model = Recogniser(size, tokens)
         self.average = copy.deepcopy(self.model)
         self._optimisers = _optimisers(self.model)
@@ -116,18 +120,24 @@ class _Run:
         self._resume()
         self._began_s = time.monotonic()
 
-    def begin_from(self, path: Path) -> None:
+    def begin_from(self, folder: Path) -> None:
         """Take the weights of a shipped recogniser, unless this training has begun already.
 
         Rates stay lower then: what is learnt is not to be shaken up. The head that names sounds was
-        not shipped, and learns anew.
+        not shipped, and learns anew. One of half the width is widened.
         """
+        self._heard_before_s = _heard_by(folder)
         if self._steps:
             return
+        path = folder / "model.bin"
         for optimiser in self._optimisers:
             for group in optimiser.param_groups:
                 group["highest"] *= STARTED_RATIO
-        values = {name: torch.from_numpy(rows) for name, rows in weights_of(path).items()}
+        stored = weights_of(path)
+        width = self.model.decoder.embed_tokens.embedding_dim
+        if 2 * stored[_WORDS].shape[1] == width:
+            stored = widened(stored, self._seed)
+        values = {name: torch.from_numpy(rows) for name, rows in stored.items()}
         missing, unknown = self.model.load_state_dict(values, strict=False)
         if unknown or any(not name.startswith("sounds.") for name in missing):
             raise NotReadable(f"{path}: missing {missing}, unknown {unknown}; is it of this size?")
@@ -212,9 +222,22 @@ class _Run:
     def finish(self) -> None:
         """Write the weights and what they cost."""
         _write(self.average.state_dict(), self._out / WEIGHTS)
-        told = {"steps": self._steps, "budget_s": self._budget_s, "heard_s": self._heard_s}
+        told = {
+            "steps": self._steps,
+            "budget_s": self._budget_s,
+            "heard_s": self._heard_s,
+            "heard_before_s": self._heard_before_s,
+            "seed": self._seed,
+        }
         (self._out / "training.json").write_text(json.dumps(told), encoding="utf-8")
         _LOG.info("done: %s", told)
+
+
+def _heard_by(folder: Path) -> float:
+    """Return how much sound a shipped recogniser has heard, with those that it went on from."""
+    path = folder / METRICS
+    training = read_metrics(path)["training"] if path.exists() else {}
+    return float(training.get("heard_s", 0.0) + training.get("heard_before_s", 0.0))
 
 
 def _losses(model: Recogniser, batch: Batch) -> tuple[Tensor, Tensor, float]:

@@ -58,6 +58,30 @@ def weights_of(path: Path) -> dict[str, Array]:
     return weights
 
 
+def widened(weights: dict[str, Array], seed: int) -> dict[str, Array]:
+    """Return the weights of a network twice as wide, with twice the heads, that tells the same.
+
+    Every value in it is there twice. How much of each sum comes from either of the two is drawn by
+    chance, so that learning can part them (Chen et al., Net2Net, 2016).
+    """
+    random = np.random.default_rng([seed, 8])
+    wide = {name: _wider(name, values, random) for name, values in weights.items()}
+    # The words' table gives the output too, in which each value would count twice.
+    for kind in ("weight", "bias"):
+        wide[f"decoder.layer_norm.{kind}"] /= 2.0
+    return wide
+
+
+def _wider(name: str, values: Array, random: np.random.Generator) -> Array:
+    if "embed_" in name:
+        return np.concatenate([values, values], axis=1)
+    doubled = np.concatenate([values, values], axis=0)
+    if values.ndim == 1 or name == "encoder.conv1.weight":
+        return doubled
+    share = random.uniform(0.25, 0.75, doubled.shape).astype(np.float32)
+    return np.concatenate([doubled * share, doubled * (1.0 - share)], axis=1)
+
+
 def _named(name: str, rows: Array) -> dict[str, Array]:
     """Return one stored array by Whisper's names; of what lies one upon another each part."""
     half, _, rest = name.partition("/")

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from training.voices import espeak, flite
+from training.voices import espeak, flite, hibari, pico, piper, rhvoice
 from training.voices.clip import Clip, Style
 
 ACCENTS: Final = (
@@ -42,6 +42,10 @@ class Speaker:
 _ENGINES: Final[Mapping[str, Callable[[str, str, Style], Clip]]] = {
     espeak.ENGINE: espeak.speak,
     flite.ENGINE: flite.speak,
+    pico.ENGINE: pico.speak,
+    hibari.ENGINE: hibari.speak,
+    piper.ENGINE: piper.speak,
+    rhvoice.ENGINE: rhvoice.speak,
 }
 
 
@@ -71,6 +75,24 @@ def draw_speaker(random: np.random.Generator, flite_share: float = FLITE_SHARE) 
 _ACCENT_SHARES: Final = tuple(
     0.4 if accent == "en-us" else 0.6 / (len(ACCENTS) - 1) for accent in ACCENTS
 )
+
+
+def draw_of_all(random: np.random.Generator) -> Speaker:
+    """Draw one of all engines but festival; those whose speech is natural more than their share."""
+    engine = str(random.choice(list(_ENGINE_SHARES), p=list(_ENGINE_SHARES.values())))
+    if engine in PACKAGED_VOICES:
+        return Speaker(engine=engine, voice=str(random.choice(PACKAGED_VOICES[engine])))
+    return draw_speaker(random, float(engine == flite.ENGINE))
+
+
+_ENGINE_SHARES: Final = {
+    espeak.ENGINE: 0.36, flite.ENGINE: 0.18, rhvoice.ENGINE: 0.2, pico.ENGINE: 0.1,
+    hibari.ENGINE: 0.09, piper.ENGINE: 0.07,
+}  # fmt: skip
+PACKAGED_VOICES: Final = {
+    rhvoice.ENGINE: rhvoice.VOICES, pico.ENGINE: pico.VOICES, hibari.ENGINE: hibari.VOICES,
+    piper.ENGINE: piper.VOICES,
+}  # fmt: skip
 
 
 def draw_held_out(random: np.random.Generator) -> Speaker:

@@ -1,8 +1,8 @@
 import json
 from pathlib import Path
 
-from training.speech.card import verdict
-from training.speech.shipping import METRICS, MODEL, ship
+from training.speech.card import METRICS, verdict, went_on
+from training.speech.shipping import MODEL, ship
 
 _NAMES = ("held_out_voices", "held_out_voices_10db", "unseen_engine", "unseen_engine_10db")
 
@@ -31,3 +31,8 @@ def test_a_card_says_in_its_first_words_what_falls_short() -> None:
     assert verdict(good).startswith("It reaches its aims")
     assert verdict(good | {"wer_unseen_engine": 0.11}).startswith("**It does not reach its aims")
     assert "not measured" in verdict(good | {"wer_unseen_engine": None})
+
+
+def test_a_card_tells_what_the_training_began_with() -> None:
+    assert "at random" in went_on(0.0)
+    assert "793 h" in went_on(793 * 3600.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from training.speech.warm_start import NotReadable, weights_of
+from training.speech.warm_start import NotReadable, weights_of, widened
 from vla_deploy import speech
 
 Array = NDArray[np.float32]
@@ -93,3 +93,20 @@ def test_a_file_that_is_cut_off_is_refused(tmp_path: Path, kept: int) -> None:
     cut.write_bytes((SHIPPED / "model.bin").read_bytes()[:kept])
     with pytest.raises(NotReadable, match=r"expected CTranslate2's version 6"):
         weights_of(cut)
+
+
+def test_a_network_made_twice_as_wide_tells_the_same(weights: dict[str, Array]) -> None:
+    frames = np.random.default_rng(6).standard_normal((80, FRAMES)).astype(np.float32)
+    narrow = encoded(weights, frames)
+    wide = widened(weights, 0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(globals(), "HEADS", 2 * HEADS)
+        told = encoded(wide, frames)
+    np.testing.assert_allclose(told, np.concatenate([narrow, narrow], axis=1), atol=1e-3)
+    names = "decoder.layer_norm.weight", "decoder.embed_tokens.weight"
+    (gain, words), (wide_gain, wide_words) = ([w[name] for name in names] for w in (weights, wide))
+    state = np.random.default_rng(7).standard_normal(len(gain)).astype(np.float32)
+    logits = wide_words @ (wide_gain * np.concatenate([state, state]))
+    np.testing.assert_allclose(logits, words @ (gain * state), atol=1e-3)
+    kernel = wide["encoder.layers.0.fc1.weight"]
+    assert np.abs(kernel[: len(kernel) // 2] - kernel[len(kernel) // 2 :]).max() > 1e-3

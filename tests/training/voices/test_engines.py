@@ -2,14 +2,15 @@
 
 import ctypes
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from training.voices import espeak, flite
+from training.voices import espeak, flite, rhvoice
 from training.voices.cast import HELD_OUT_VARIANTS, ROBOTIC_VARIANTS, VARIANTS, Speaker, say
 from training.voices.clip import Clip, Style
-from training.voices.errors import SynthesisFailed
+from training.voices.errors import EngineMissing, SynthesisFailed
 from training.voices.phones import SILENCE
 
 
@@ -66,3 +67,12 @@ def test_flite_names_the_voices_that_it_has() -> None:
 
 def test_nobody_is_both_trained_on_and_held_out() -> None:
     assert not {*VARIANTS, *ROBOTIC_VARIANTS} & set(HELD_OUT_VARIANTS)
+
+
+def test_without_rhvoice_it_is_said_where_to_get_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(rhvoice.ROOT, str(tmp_path))
+    rhvoice._speaker.cache_clear()
+    with pytest.raises(EngineMissing, match=f"libRHVoice.*name its folder in {rhvoice.ROOT}"):
+        rhvoice.speak("hello", rhvoice.VOICES[0], Style())
