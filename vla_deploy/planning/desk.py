@@ -28,7 +28,7 @@ from vla_deploy.planning.recovery import recover
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
-from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict
+from vla_deploy.planning.understanding import Outcome, Question, Reply, Turn, Verdict, described
 
 MOST_WAITING: Final = 8
 CANCELLED: Final = "cancelled on request"
@@ -217,6 +217,10 @@ class Desk:
         elif plan := corrected_by(waiting.plan, command.text):
             self._telling.answered(command, waiting.command)
             self._correct(waiting, plan)
+        elif full := described(waiting.question, command.text):
+            self._telling.answered(command, waiting.command)
+            self.dialogue.settle()
+            self._queue.appendleft(replace(waiting.command, text=full))
         elif command.is_answer:
             self._conclusions.refuse(command, f"that does not answer: {waiting.question.text}")
         else:
@@ -228,7 +232,7 @@ class Desk:
         if said.verdict is Verdict.NO:
             self._leave(Says.LEFT)
         elif said.verdict is Verdict.UNCLEAR:
-            self._ask_again(waiting)
+            self._ask_again(waiting, said.conversation.question or waiting.question)
         elif waiting.plan is not None:
             self.dialogue.settle(said)
             self._run_confirmed(waiting, waiting.plan)
@@ -262,12 +266,12 @@ class Desk:
             return
         self._conclusions.conclude(command, request, Answer(plan=checked, proposal=proposal))
 
-    def _ask_again(self, waiting: Waiting) -> None:
-        question = self.dialogue.ask_again()
-        if question is None:
+    def _ask_again(self, waiting: Waiting, question: Question) -> None:
+        asked = self.dialogue.ask_again(question)
+        if asked is None:
             self._leave(Says.STILL_UNCLEAR)
             return
-        self._telling.asked(waiting.command, question, waiting.plan)
+        self._telling.asked(waiting.command, asked, waiting.plan)
 
     def _run_confirmed(self, waiting: Waiting, plan: Plan) -> None:
         """Check a plan once more: the world may have changed while the person thought."""

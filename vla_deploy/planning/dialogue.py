@@ -70,12 +70,15 @@ class Dialogue:
         self.waiting = Waiting(command=command, answer=answer, question=question, plan=answer.plan)
         return self.waiting
 
-    def ask_again(self) -> Question | None:
-        """Wait once more, and return the question in other words; None when that was enough."""
+    def ask_again(self, question: Question) -> Question | None:
+        """Wait once more, and return the question in other words; None when that was enough.
+
+        `question` is the one that waits, or what an answer has left of it.
+        """
         waiting = self.waiting
         if waiting is None or waiting.times_asked >= MOST_ASKED:
             return None
-        asked = replace(waiting.question, asked_ns=self._clock.now_ns())
+        asked = replace(question, asked_ns=self._clock.now_ns())
         self.talk = self.talk.asks(asked)
         self.waiting = replace(waiting, question=asked, times_asked=waiting.times_asked + 1)
         return replace(asked, text=Says.NOT_CLEAR.format(question=asked.text))

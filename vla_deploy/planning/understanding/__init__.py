@@ -10,6 +10,7 @@ from vla_deploy.planning.understanding.conversation import (
     Role,
     Turn,
 )
+from vla_deploy.planning.understanding.described import described
 
 __all__ = [
     "Candidate",
@@ -21,5 +22,6 @@ __all__ = [
     "Role",
     "Turn",
     "Verdict",
+    "described",
     "reply",
 ]

@@ -21,7 +21,7 @@ from vla_deploy.planning.understanding.phrases import (
     ORDINALS,
     SIDES,
 )
-from vla_deploy.planning.understanding.questions import from_side
+from vla_deploy.planning.understanding.questions import MOST_CHOICES, either, from_side
 from vla_deploy.world.query import ORDERS
 
 
@@ -110,7 +110,7 @@ def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
     if verdict is Verdict.ANEW:
         return Reply(verdict=verdict, text=text, conversation=free)
     if verdict is Verdict.UNCLEAR:
-        again = replace(conversation, question=replace(question, asked_ns=now_ns))
+        again = replace(conversation, question=replace(narrowed(question, text), asked_ns=now_ns))
         return Reply(verdict=verdict, text=question.command_text, conversation=again)
     choices = dict(question.choices)
     if chosen is not None:
@@ -147,6 +147,25 @@ def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | Non
 
     Where it is said to be any of them, it is the first.
     """
+    remaining = _remaining(candidates, text)
+    if isinstance(remaining, Verdict):
+        return remaining, None
+    left, said, any_will_do = remaining
+    if len(left) == len(candidates):
+        return _picked(candidates, said)
+    if not left:
+        return Verdict.NO, None
+    if _telling(candidates, said):
+        return _picked(left, said)
+    is_clear = any_will_do or len(left) == 1
+    return (Verdict.CHOSEN, left[0]) if is_clear else (Verdict.UNCLEAR, None)
+
+
+def _remaining(candidates: Candidates, text: str) -> tuple[Candidates, str, bool] | Verdict:
+    """Return the candidates that are not ruled out, what is said besides, and if any will do.
+
+    Return what the whole is instead where something unknown is ruled out.
+    """
     left, rest, any_will_do = list(candidates), list[str](), False
     for piece in _PIECE.split(text):
         said = " ".join(_WORD.findall(piece))
@@ -156,19 +175,27 @@ def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | Non
             continue
         named = [_telling(candidates, one) for one in _OR.split(found["not"])]
         if not all(words and _known(candidates).issuperset(words) for words in named):
-            return (Verdict.ANEW if all(named) else Verdict.UNCLEAR), None
+            return Verdict.ANEW if all(named) else Verdict.UNCLEAR
         left = [one for one in left if not any(one.features.issuperset(it) for it in named)]
         rest.append(found["rest"] or "")
         any_will_do = any_will_do or bool(found["any"])
-    said = " ".join(part for part in rest if part)
-    if len(left) == len(candidates):
-        return _picked(candidates, said)
-    if not left:
-        return Verdict.NO, None
-    if _telling(candidates, said):
-        return _picked(tuple(left), said)
-    is_clear = any_will_do or len(left) == 1
-    return (Verdict.CHOSEN, left[0]) if is_clear else (Verdict.UNCLEAR, None)
+    return tuple(left), " ".join(part for part in rest if part), any_will_do
+
+
+def narrowed(question: Question, text: str) -> Question:
+    """Return the question without the candidates that an answer rules out, where several are left.
+
+    "not the blue one", to "the red one, the blue one or the white one?" -> "the red one or the
+    white one?".
+    """
+    remaining = _remaining(question.candidates, text.lower())
+    if isinstance(remaining, Verdict) or len(remaining[0]) < 2:
+        return question
+    left = remaining[0]
+    before, after = (
+        either([one.words for one in some[:MOST_CHOICES]]) for some in (question.candidates, left)
+    )
+    return replace(question, text=question.text.replace(before, after), candidates=left)
 
 
 def _picked(candidates: Candidates, said: str) -> tuple[Verdict, Candidate | None]:

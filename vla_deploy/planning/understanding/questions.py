@@ -39,7 +39,7 @@ def which_thing(things: Sequence[Thing], view: Viewpoint | None, expression: str
     ]
     kinds = {thing.kind for thing in asked}
     noun = next(iter(kinds)) if len(kinds) == 1 else "one"
-    return Ambiguous(f"Which {noun}, {_either(words)}?", candidates, expression)
+    return Ambiguous(f"Which {noun}, {either(words)}?", candidates, expression)
 
 
 def which_hand(held: Mapping[str, str], expression: str) -> Ambiguous:
@@ -53,7 +53,7 @@ def which_hand(held: Mapping[str, str], expression: str) -> Ambiguous:
         for hand, said in held.items()
     ]
     return Ambiguous(
-        f"Which one, {_either([one.words for one in candidates])}?", candidates, expression
+        f"Which one, {either([one.words for one in candidates])}?", candidates, expression
     )
 
 
@@ -61,7 +61,7 @@ def which_place(places: Sequence[str], expression: str) -> Ambiguous:
     """Return the question which of these places was meant."""
     candidates = _places(places)
     words = [one.words for one in candidates[:MOST_CHOICES]]
-    return Ambiguous(f"Which one, {_either(words)}?", candidates, expression)
+    return Ambiguous(f"Which one, {either(words)}?", candidates, expression)
 
 
 def where(places: Sequence[str], expression: str) -> Ambiguous:
@@ -89,10 +89,11 @@ def did_you_mean(match: Match, expression: str) -> Ambiguous:
         )
         for known, said in zip(match.known, words, strict=True)
     ]
-    return Ambiguous(f"Did you mean {_either(words)}?", candidates, expression)
+    return Ambiguous(f"Did you mean {either(words)}?", candidates, expression)
 
 
-def _either(words: Sequence[str]) -> str:
+def either(words: Sequence[str]) -> str:
+    """Return "the red one, the blue one or the white one"."""
     return " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
 
 

@@ -3,7 +3,14 @@ from dataclasses import replace
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.understanding import Candidate, Conversation, Question, Verdict, reply
+from vla_deploy.planning.understanding import (
+    Candidate,
+    Conversation,
+    Question,
+    Verdict,
+    described,
+    reply,
+)
 
 RED = Candidate(name="cup_1", words="the red one", features=frozenset({"red", "cup", "left"}))
 BLUE = Candidate(name="cup_2", words="the blue one", features=frozenset({"blue", "cup", "right"}))
@@ -144,3 +151,37 @@ def test_after_the_time_limit_even_a_fitting_answer_is_a_command_of_its_own() ->
     got = reply(Conversation(question=WHICH), "the red one", now_ns=late_ns)
     assert (got.verdict, got.text) == (Verdict.ANEW, "the red one")
     assert got.conversation.question is None
+
+
+def test_what_an_answer_rules_out_is_not_asked_for_again() -> None:
+    which = replace(
+        BALLS,
+        text="Which ball, the pink one, the grey one or the green one?",
+    )
+    got = reply(Conversation(question=which), "not the grey one", now_ns=NS_PER_S)
+    asked = got.conversation.question
+    assert got.verdict is Verdict.UNCLEAR
+    assert asked is not None
+    assert asked.text == "Which ball, the pink one or the green one?"
+    assert asked.candidates == (LEFT, LAST)
+    again = reply(got.conversation, "the left one", now_ns=2 * NS_PER_S)
+    assert again.chosen == LEFT
+
+
+@pytest.mark.parametrize(
+    ("said", "full"),
+    [
+        ("the one next to the book", "pick up the cup next to the book now"),
+        ("I mean the one that's behind the box, please", "pick up the cup behind the box now"),
+        ("the cup on the shelf", "pick up the cup on the shelf now"),
+        ("the ball on the shelf", None),
+        ("put it next to the book", None),
+        ("the one", None),
+    ],
+)
+def test_an_answer_by_another_thing_makes_the_command_whole(said: str, full: str | None) -> None:
+    which = replace(WHICH, command_text="pick up the cup now")
+    assert described(which, said) == full
+    assert described(replace(which, expression="mug"), said) is None
+    assert described(replace(which, command_text="put the cup by the other cup"), said) is None
+    assert described(SURE, said) is None
