@@ -10,6 +10,8 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.errors import DeviceMissing, LinkLost, WrongDevice
 
 SAMPLE_BYTES = 2
+ENDLESS_BYTES = 0x7FFF_0000
+"""What writes into a pipe cannot know the length, and claims at least so much."""
 
 
 def read_wav(path: Path) -> tuple[AudioFormat, Samples]:
@@ -17,7 +19,7 @@ def read_wav(path: Path) -> tuple[AudioFormat, Samples]:
 
     Raises:
         DeviceMissing: there is no such file.
-        WrongDevice: it is no WAV file of 16-bit samples.
+        WrongDevice: it is no WAV file of 16-bit samples, or it is cut off.
     """
     try:
         with wave.open(str(path), "rb") as file:
@@ -25,6 +27,7 @@ def read_wav(path: Path) -> tuple[AudioFormat, Samples]:
                 bits = 8 * file.getsampwidth()
                 raise WrongDevice(f"{path}: 16-bit samples expected, {bits}-bit got; convert it")
             format_ = AudioFormat(rate_hz=file.getframerate(), channels=file.getnchannels())
+            claimed_bytes = file.getnframes() * file.getnchannels() * SAMPLE_BYTES
             data = file.readframes(file.getnframes())
     except FileNotFoundError as error:
         raise DeviceMissing(f"{path}: no such file; correct the path") from error
@@ -32,7 +35,14 @@ def read_wav(path: Path) -> tuple[AudioFormat, Samples]:
         raise WrongDevice(
             f"{path}: no WAV file of 16-bit samples ({str(error) or 'cut off'}); convert it"
         ) from error
-    return format_, np.frombuffer(data, "<i2").astype(np.int16).reshape(-1, format_.channels)
+    if len(data) < claimed_bytes < ENDLESS_BYTES:
+        raise WrongDevice(
+            f"{path}: cut off: {claimed_bytes} bytes of sound expected, {len(data)} got; "
+            "record or copy it again"
+        )
+    whole = len(data) // (format_.channels * SAMPLE_BYTES) * format_.channels
+    samples = np.frombuffer(data, "<i2", whole).astype(np.int16)
+    return format_, samples.reshape(-1, format_.channels)
 
 
 class WavInput:
@@ -43,7 +53,7 @@ class WavInput:
 
         Raises:
             DeviceMissing: there is no such file.
-            WrongDevice: it is no WAV file of 16-bit samples.
+            WrongDevice: it is no WAV file of 16-bit samples, or it is cut off.
         """
         self.format, self._samples = read_wav(path)
         self.counters = AudioCounters()

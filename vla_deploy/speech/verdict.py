@@ -58,6 +58,8 @@ class Judgement:
 class _Refusal:
     why: Callable[[Case], str]
     ask_again: bool
+    by_sound: bool = True
+    """Whether an overdriven microphone may be the cause."""
 
 
 def judge(case: Case) -> Judgement:
@@ -67,6 +69,7 @@ def judge(case: Case) -> Judgement:
     for row in _REFUSALS:
         reason = row.why(case)
         if reason:
+            reason += _OVERDRIVEN if row.by_sound and _is_overdriven(case) else ""
             return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=row.ask_again)
     return Judgement(verdict=Verdict.ACCEPTED)
 
@@ -122,16 +125,22 @@ def _nobody(case: Case) -> str:
 def _unsure(case: Case) -> str:
     if case.confidence >= case.least_confidence:
         return ""
-    text = f"understood by {case.confidence:.0%}, at least {case.least_confidence:.0%} is needed"
-    if case.phrase.clipped_ratio > CLIPPED_RATIO:
-        text += "; the microphone is overdriven: turn its gain down, or speak from farther away"
-    return text
+    return f"understood by {case.confidence:.0%}, at least {case.least_confidence:.0%} is needed"
+
+
+_OVERDRIVEN: Final = (
+    "; the microphone is overdriven: turn its gain down, or speak from farther away"
+)
+
+
+def _is_overdriven(case: Case) -> bool:
+    return case.phrase.clipped_ratio > CLIPPED_RATIO
 
 
 _REFUSALS: Final = (
     _Refusal(_without_words, ask_again=False),
-    _Refusal(_courtesy, ask_again=False),
-    _Refusal(_own_voice, ask_again=False),
+    _Refusal(_courtesy, ask_again=False, by_sound=False),
+    _Refusal(_own_voice, ask_again=False, by_sound=False),
     _Refusal(_music, ask_again=False),
     _Refusal(_language, ask_again=True),
     _Refusal(_nobody, ask_again=False),

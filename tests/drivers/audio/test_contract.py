@@ -4,6 +4,7 @@ PortAudio runs on ALSA's null device, in a process of its own: the configuration
 """
 
 import os
+import struct
 import subprocess
 import sys
 import wave
@@ -212,3 +213,27 @@ def test_portaudio_on_alsas_null_device_keeps_the_contracts(tmp_path: Path) -> N
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert "7 passed" in ran.stdout
+
+
+def wav_of(path: Path, claimed_bytes: int, sound: bytes) -> Path:
+    head = struct.pack("<4sI4s4sIHHIIHH", b"RIFF", min(36 + claimed_bytes, 0xFFFF_FFFF), b"WAVE",
+                       b"fmt ", 16, 1, 1, 16_000, 32_000, 2, 16)  # fmt: skip
+    path.write_bytes(head + struct.pack("<4sI", b"data", claimed_bytes) + sound)
+    return path
+
+
+@pytest.mark.parametrize("left", [0, 1, 999])
+def test_a_recording_that_is_cut_off_is_not_taken_for_a_whole_one(
+    tmp_path: Path, left: int
+) -> None:
+    path = wav_of(tmp_path / "cut.wav", 1000, bytes(left))
+    with pytest.raises(WrongDevice, match=f"cut off: 1000 bytes of sound expected, {left} got"):
+        read_wav(path)
+
+
+@pytest.mark.parametrize("claimed_bytes", [0x7FFF_FFFE, 0xFFFF_FFFE])
+def test_what_was_written_into_a_pipe_is_taken_as_far_as_it_goes(
+    tmp_path: Path, claimed_bytes: int
+) -> None:
+    _, samples = read_wav(wav_of(tmp_path / "pipe.wav", claimed_bytes, b"\1\0\2\0\3"))
+    assert samples.tolist() == [[1], [2]]

@@ -55,6 +55,11 @@ def test_a_sure_reading_is_a_command() -> None:
         ({"reading": {"text": "Please. Thank you!"}}, "a courtesy", False),
         ({"confidence": 0.4}, "understood by 40%, at least 50% is needed", True),
         (
+            {"reading": {"text": "..."}, "phrase": {"clipped_ratio": 0.1}},
+            "a sound without words; the microphone is overdriven",
+            False,
+        ),
+        (
             {"confidence": 0.4, "phrase": {"clipped_ratio": 0.1}},
             "overdriven: turn its gain down",
             True,
