@@ -1,10 +1,11 @@
 """Measure the spoken stop: what is missed, what alarms by mistake, and how soon the button is hit.
 
 Phrases with a stop word are said by voices of every installed engine, in noise and in rooms, and
-other talk by the same voices, all into the spotter on board at its normal threshold. A delay is
-from the end of the word to the end of the block of sound in which it was told, and what the
-computer took for that block. `latch` does it with the whole way: a person in the twin's room says
-it while an arm moves, and physics tells when all stands still.
+other talk by the same voices, all into what listens on board: the spotter at its normal threshold,
+and the recogniser, whose words press the button too as soon as it has read them. A delay is from
+the end of the word to the end of the block of sound in which it was told, and what the computer
+took for that block. `latch` does it with the whole way: a person in the twin's room says it while
+an arm moves, and physics tells when all stands still.
 """
 
 import sys
@@ -26,15 +27,20 @@ from training.voices.mixing import at_level, at_snr
 from training.voices.noises import KINDS, noise
 from training.voices.rooms import draw_room, in_room
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.speech.sound import duration_ns
+from vla_deploy.speech.choosing import ears_of
+from vla_deploy.speech.hearing import Room
+from vla_deploy.speech.recording import StreamClock, open_hearing
+from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.stop_words.opening import open_spotter
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
+from vla_deploy.speech.verdict import Verdict
 from vla_deploy.state_dir import user_base
 
 SNRS_DB: Final[Mapping[str, float | None]] = {"clean": None, "20db": 20.0, "10db": 10.0, "5db": 5.0}
 BLOCK: Final = RATE_HZ // 50
 """The node steps so often."""
 TOO_LATE_S: Final = 1.0
+SPOTTER, WORDS = "spotter", "words"
 _LEVEL_DB: Final = -26.0
 _HISS: Final = 2e-4
 _BEFORE_S, _AFTER_S = 0.8, 1.2
@@ -42,37 +48,61 @@ _BEFORE_S, _AFTER_S = 0.8, 1.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alarm:
-    """Tell a word, when the button is hit in the stream, and what the last block took."""
+    """Tell a word and who heard it, when the button is hit, and what the last block took."""
 
     word: str
+    by: str
     at_s: float
     computed_s: float
 
 
 class Ear:
-    """Run the spotter on board over whole pieces of sound."""
+    """Run over whole pieces of sound what listens on board."""
 
     def __init__(self) -> None:
+        profile = load_profile("desktop")
         shelf = ModelShelf.of_base(user_base(), MonotonicClock())
         self.spotter: Spotter
-        self.spotter, thresholds = open_spotter(shelf, load_profile("desktop"))
+        self.spotter, thresholds = open_spotter(shelf, profile)
         self.threshold = thresholds["normal"]
-        self.heard_s = 0.0
-        self.busy_s = 0.0
+        self._clock = StreamClock()
+        ears = ears_of(shelf, profile, 0)
+        self.why_no_words = ears.why
+        self._hearing = open_hearing(ears.recogniser, ears.why, profile, self._clock)
+        self._count = 0
+        self.busy_s = {SPOTTER: 0.0, WORDS: 0.0}
+
+    @property
+    def heard_s(self) -> float:
+        """Return how much was heard."""
+        return self._count / RATE_HZ
 
     def alarms(self, sound: Wave) -> Iterator[Alarm]:
         """Yield what a piece of sound sets off, heard from silence on."""
         self.spotter.reset()
+        self._hearing.enter(Room())
         for at in range(0, len(sound), BLOCK):
-            block = sound[at : at + BLOCK]
-            end = at + len(block)
-            began_s, busy_s = time.perf_counter(), time.process_time()
-            spotted: Spotted | None = self.spotter.feed(block, duration_ns(end), self.threshold)
-            took_s = time.perf_counter() - began_s
-            self.busy_s += time.process_time() - busy_s
-            if spotted is not None:
-                yield Alarm(word=spotted.word, at_s=end / RATE_HZ, computed_s=took_s)
-        self.heard_s += len(sound) / RATE_HZ
+            samples = sound[at : at + BLOCK]
+            block = SoundBlock(stamp_ns=duration_ns(self._count), samples=samples, follows=at > 0)
+            self._count += len(samples)
+            self._clock.ns = block.end_ns
+            for by, listen in ((SPOTTER, self._spot), (WORDS, self._read)):
+                began_s, busy_s = time.perf_counter(), time.process_time()
+                word = listen(block)
+                took_s = time.perf_counter() - began_s
+                self.busy_s[by] += time.process_time() - busy_s
+                if word:
+                    at_s = (at + len(samples)) / RATE_HZ
+                    yield Alarm(word=word, by=by, at_s=at_s, computed_s=took_s)
+
+    def _spot(self, block: SoundBlock) -> str:
+        spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self.threshold)
+        return "" if spotted is None else spotted.word
+
+    def _read(self, block: SoundBlock) -> str:
+        self._hearing.feed(block, None)
+        told = list(self._hearing.heard())
+        return next((one.text for one in told if one.judgement.verdict is Verdict.STOP), "")
 
 
 def measure(
@@ -97,7 +127,9 @@ def measure(
         "stop_threshold": ear.threshold,
         **stops,
         **talk,
-        "stop_cpu_ratio": ear.busy_s / ear.heard_s,
+        "stop_no_words": ear.why_no_words,
+        "stop_cpu_ratio": ear.busy_s[SPOTTER] / ear.heard_s,
+        "stop_words_cpu_ratio": ear.busy_s[WORDS] / ear.heard_s,
         **latch(latches),
     }
 
@@ -109,16 +141,23 @@ def _stops(voices: Voices, ear: Ear, clips: int, random: np.random.Generator) ->
     for engine in voices.engines:
         for clip, (start_s, end_s) in phrases(voices, engine, clips, random):
             for name, snr_db in SNRS_DB.items():
-                delay_s = _delay_s(ear, _around(clip, snr_db, random), start_s, end_s)
+                by = _delays_s(ear, _around(clip, snr_db, random), start_s, end_s)
                 for group in (engine, "all"):
-                    missed[name][group].append(delay_s is None)
-                if delay_s is None:
-                    misses.append(f"{name}, {engine} {clip.voice}: {clip.text}")
+                    missed[name][group].append(not by)
+                for one in (SPOTTER, WORDS):
+                    missed[name][one].append(one not in by)
+                if by:
+                    delays_s.append(min(by.values()))
                 else:
-                    delays_s.append(delay_s)
+                    misses.append(f"{name}, {engine} {clip.voice}: {clip.text}")
     return {
         "stop_phrases": len(missed["clean"]["all"]),
         **{f"stop_missed_ratio_{name}": float(np.mean(missed[name]["all"])) for name in SNRS_DB},
+        **{
+            f"stop_missed_by_{one}_ratio_{name}": float(np.mean(missed[name][one]))
+            for one in (SPOTTER, WORDS)
+            for name in SNRS_DB
+        },
         "stop_missed_by_engine_10db": {
             engine: float(np.mean(missed["10db"][engine])) for engine in voices.engines
         },
@@ -128,13 +167,14 @@ def _stops(voices: Voices, ear: Ear, clips: int, random: np.random.Generator) ->
     }
 
 
-def _delay_s(ear: Ear, sound: Wave, start_s: float, end_s: float) -> float | None:
-    """Return how long after the word the button was hit; None where it was not, or far too late."""
+def _delays_s(ear: Ear, sound: Wave, start_s: float, end_s: float) -> dict[str, float]:
+    """Return how long after the word each listener hit the button, unless far too late."""
+    found: dict[str, float] = {}
     for alarm in ear.alarms(sound):
         late_s = alarm.at_s - (_BEFORE_S + end_s)
         if alarm.at_s > _BEFORE_S + start_s and late_s < TOO_LATE_S:
-            return max(0.0, late_s) + alarm.computed_s
-    return None
+            found.setdefault(alarm.by, max(0.0, late_s) + alarm.computed_s)
+    return found
 
 
 def _around(clip: Clip, snr_db: float | None, random: np.random.Generator) -> Wave:
@@ -158,7 +198,9 @@ def _talk(voices: Voices, ear: Ear, hours: float, random: np.random.Generator) -
             break
         snr_db = (None, None, 20.0, 10.0)[int(random.integers(4))]
         found = list(ear.alarms(_around(clip, snr_db, random)[: -RATE_HZ // 2]))
-        alarms += [f"{one.word}, {clip.engine} {clip.voice}: {clip.text}" for one in found]
+        alarms += [
+            f"{one.word} by {one.by}, {clip.engine} {clip.voice}: {clip.text}" for one in found
+        ]
         talked_s += clip.duration_s
     return {
         "stop_talk_hours": talked_s / 3600.0,

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 from platforms import SpeechSettings
 from vla_deploy.speech.companions import Playing
@@ -16,9 +16,11 @@ from vla_deploy.speech.readings import Answer, Readings
 from vla_deploy.speech.recogniser import Reading
 from vla_deploy.speech.sound import SoundBlock, level_db
 from vla_deploy.speech.surroundings import Music, NoiseFloor
-from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge
+from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge, stops
 from vla_deploy.speech.voice_activity import VoiceActivity
 from vla_deploy.speech.words import is_unfinished
+
+STOPPED: Final = "a stop was heard in it: the robot has stopped"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,6 +67,7 @@ class Hearing:
         self._phrases = Phrases(settings)
         self._own_words = OwnWords()
         self._barge_ns: int | None = None
+        self._stopped_by = 0
         self._told: list[Heard] = []
 
     def enter(self, room: Room) -> None:
@@ -101,10 +104,15 @@ class Hearing:
     def heard(self) -> Iterator[Heard]:
         """Yield what has been understood, or not, since the last call."""
         self._heed_draft()
+        self._heed_stop(self.readings.glanced(), is_all=False)
+        self._heed_stop(self.readings.drafted(), is_all=True)
         told, self._told = self._told, []
         yield from told
         for answer in self.readings.answers():
-            yield self._judged(answer)
+            if answer.phrase.number != self._stopped_by:
+                yield self._judged(answer)
+            else:
+                yield self._after_stop(answer)
 
     def document(self) -> dict[str, Any]:
         """Return what hearing knows of the room, as `speech_status` tells it."""
@@ -151,6 +159,8 @@ class Hearing:
         self.counts[happening.step.name.lower()] += 1
         if happening.step is Step.BEGAN:
             self._own_words.note_begun(is_person=not self.gate.is_shut)
+        elif happening.step is Step.SPEAKING:
+            self.readings.glance(phrase, self._hot_words())
         elif happening.step is Step.PAUSED:
             self.readings.draft(phrase, self._hot_words())
         elif happening.step is Step.ENDED:
@@ -163,9 +173,28 @@ class Hearing:
 
     def _heed_draft(self) -> None:
         """Wait longer for a speaker who pauses where the words so far cannot be all."""
-        reading = self.readings.drafted() if self._phrases.is_open else None
-        if reading is not None and is_unfinished(reading.text):
+        answer = self.readings.drafted() if self._phrases.is_open else None
+        if answer is not None and answer.reading and is_unfinished(answer.reading.text):
             self._phrases.wait_longer()
+
+    def _heed_stop(self, answer: Answer | None, *, is_all: bool) -> None:
+        """Stop at once by words read while the speaker goes on or pauses; once in a phrase."""
+        if answer is None or answer.reading is None or answer.phrase.number == self._stopped_by:
+            return
+        sure = self._confidence(answer.reading)
+        if not stops(answer.reading.text, sure, is_all=is_all):
+            return
+        self._stopped_by = answer.phrase.number
+        judgement = Judgement(verdict=Verdict.STOP)
+        self._told.append(
+            Heard(phrase=answer.phrase, answer=answer, confidence=sure, judgement=judgement)
+        )
+
+    def _after_stop(self, answer: Answer) -> Heard:
+        """Tell the whole of a phrase that has stopped the robot: it is no command."""
+        sure = 0.0 if answer.reading is None else self._confidence(answer.reading)
+        judgement = Judgement(verdict=Verdict.REJECTED, reason=STOPPED)
+        return Heard(phrase=answer.phrase, answer=answer, confidence=sure, judgement=judgement)
 
     def _refuse(self, phrase: Phrase, reason: str) -> None:
         judgement = Judgement(verdict=Verdict.REJECTED, reason=reason)

@@ -23,12 +23,15 @@ ABOVE_FLOOR_DB: Final = 3.0
 PAUSE_RATIO: Final = 0.6
 """After this share of the silence that ends a phrase, its words are read in advance."""
 CLIPPED: Final = 0.985
+GLANCE_FRAMES: Final = round(0.4 / FRAME_S)
+"""While somebody speaks, their words so far may be looked at so often."""
 
 
 class Step(Enum):
     """Name what may happen to a phrase."""
 
     BEGAN = "somebody begins to speak"
+    SPEAKING = "somebody has spoken for some while more"
     PAUSED = "long enough to read the words so far in advance"
     RESUMED = "the speaker goes on"
     ENDED = "the speaker has ended"
@@ -137,6 +140,8 @@ class Phrases:
             self._swallowing = True
         elif self._silent == self._pause_frames:
             yield Happening(Step.PAUSED, self._phrase())
+        elif self._silent == 0 and len(self._frames) % GLANCE_FRAMES == 0:
+            yield Happening(Step.SPEAKING, self._phrase())
 
     @property
     def _pause_frames(self) -> int:

@@ -1,5 +1,7 @@
 """Read phrases beside the steps: one in advance while a speaker pauses, the ended ones in order.
 
+While somebody speaks a fast recogniser has a glance at the words so far, for a stop among them.
+
 The rule of lateness: whoever waited longer than `LATE_NS` for an answer has gone on, and what comes
 then is not carried out; of more than `MOST_WAITING` phrases that wait, the newest is refused.
 """
@@ -16,11 +18,13 @@ from vla_deploy.speech.recogniser import Reading, Recogniser
 
 LATE_NS: Final = 5 * NS_PER_S
 MOST_WAITING: Final = 3
+FAST_NS: Final = NS_PER_S // 8
+"""A recogniser that takes longer has no time for glances: what has ended would wait for them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Hold what was read in a phrase that has ended; None, and why, where nothing could be."""
+    """Hold what was read in a phrase, or in one so far; None, and why, where nothing could be."""
 
     phrase: Phrase
     reading: Reading | None
@@ -44,6 +48,7 @@ class Readings:
         self._clock = clock
         self._draft: _Asked | None = None
         self._drafting: Future[Reading] | None = None
+        self._glance: _Asked | None = None
         self._ended: list[_Asked] = []
         self._refused: list[Answer] = []
         self._closed = False
@@ -73,12 +78,25 @@ class Readings:
             self._draft = self._ask(self.recogniser, phrase, hot_words)
             self._drafting = self._draft.future
 
-    def drafted(self) -> Reading | None:
+    def drafted(self) -> Answer | None:
         """Return what was read in advance, as soon as it is there."""
-        draft = self._draft
-        if draft is None or not draft.future.done() or draft.future.exception() is not None:
-            return None
-        return draft.future.result()
+        return _answered(self._draft)
+
+    def glance(self, phrase: Phrase, hot_words: str) -> None:
+        """Read what has been said so far, if the recogniser is fast and has nothing else to do."""
+        recogniser = self.recogniser
+        idle = self._drafting is None or self._drafting.done()
+        if recogniser is None or self._glance is not None or self._ended or not idle:
+            return
+        if recogniser.latency.percentile_ns(0.95) <= FAST_NS:
+            self._glance = self._ask(recogniser, phrase, hot_words)
+
+    def glanced(self) -> Answer | None:
+        """Return once what was read in a glance, as soon as it is there."""
+        answer = _answered(self._glance)
+        if self._glance is not None and self._glance.future.done():
+            self._glance = None
+        return answer
 
     def forget_draft(self) -> None:
         """Say that the speaker has gone on: what was read in advance is not all."""
@@ -129,3 +147,11 @@ class Readings:
 
     def _refuse(self, phrase: Phrase, trouble: str) -> None:
         self._refused.append(Answer(phrase=phrase, reading=None, trouble=trouble))
+
+
+def _answered(asked: _Asked | None) -> Answer | None:
+    if asked is None or not asked.future.done() or asked.future.cancelled():
+        return None
+    if asked.future.exception() is not None:
+        return None
+    return Answer(phrase=asked.phrase, reading=asked.future.result())

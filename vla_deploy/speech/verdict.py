@@ -11,7 +11,7 @@ from typing import Final
 
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.recogniser import Reading
-from vla_deploy.speech.words import is_courtesy, is_stop, words_of
+from vla_deploy.speech.words import holds_stop, is_courtesy, is_stop, words_of
 
 FASTEST_WORDS_S: Final = 7.0
 MOST_COMPRESSION: Final = 2.4
@@ -23,6 +23,8 @@ OWN_RATIO: Final = 0.7
 """The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
+STOP_WITHIN_CONFIDENCE: Final = 0.5
+"""The same, of a stop word among others: more words may be misread as one."""
 
 
 class Verdict(StrEnum):
@@ -64,7 +66,7 @@ class _Refusal:
 
 def judge(case: Case) -> Judgement:
     """Return what becomes of a phrase."""
-    if is_stop(case.reading.text) and case.confidence >= STOP_CONFIDENCE:
+    if stops(case.reading.text, case.confidence):
         return Judgement(verdict=Verdict.STOP)
     for row in _REFUSALS:
         reason = row.why(case)
@@ -72,6 +74,16 @@ def judge(case: Case) -> Judgement:
             reason += _OVERDRIVEN if row.by_sound and _is_overdriven(case) else ""
             return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=row.ask_again)
     return Judgement(verdict=Verdict.ACCEPTED)
+
+
+def stops(text: str, confidence: float, *, is_all: bool = True) -> bool:
+    """Tell whether words read by that confidence stop the robot; `is_all` unless more may follow.
+
+    As on the stream, the word itself does, whatever is meant by it.
+    """
+    if is_all and is_stop(text) and confidence >= STOP_CONFIDENCE:
+        return True
+    return confidence >= STOP_WITHIN_CONFIDENCE and holds_stop(text, is_all=is_all)
 
 
 def _without_words(case: Case) -> str:

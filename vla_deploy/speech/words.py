@@ -31,6 +31,12 @@ def is_stop(text: str) -> bool:
     )
 
 
+def holds_stop(text: str, *, is_all: bool = True) -> bool:
+    """Tell whether a call to stop is among the words; of words cut off the last may be another."""
+    words = words_of(text)
+    return any(word in STOPS for word in (words if is_all else words[:-1]))
+
+
 def is_courtesy(text: str) -> bool:
     """Tell whether a text has nothing in it to do or to answer."""
     return all(word in _COURTESIES for word in words_of(text))

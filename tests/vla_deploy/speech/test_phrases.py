@@ -43,7 +43,15 @@ class Stream:
 
 
 def steps(found: list[Happening]) -> list[str]:
-    return [one.step.name for one in found]
+    """Return what happened, but for how the words so far may be looked at."""
+    return [one.step.name for one in found if one.step is not Step.SPEAKING]
+
+
+def test_the_words_so_far_may_be_looked_at_while_somebody_speaks() -> None:
+    found = Stream().play(round(2.0 / FRAME_S) * "v" + 20 * ".")
+    glances = [one for one in found if one.step is Step.SPEAKING]
+    assert len(glances) == 5
+    assert [round(one.phrase.voiced_s, 1) for one in glances] == [0.4, 0.8, 1.2, 1.5, 1.9]
 
 
 def test_a_phrase_is_its_voice_with_what_came_before_and_a_pause_after() -> None:

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
+from drivers.latency import LatencyHistogram
 from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.readings import MOST_WAITING, Readings
+from vla_deploy.speech.readings import FAST_NS, MOST_WAITING, Readings
 from vla_deploy.speech.recogniser import Reading
 
 
@@ -43,6 +44,7 @@ class Reader:
         self.read_phrases: list[int] = []
         self.hot_words: list[str] = []
         self.fails = False
+        self.latency = LatencyHistogram()
         self.closed = 0
 
     def read(self, samples: Any, hot_words: str) -> Reading:
@@ -101,10 +103,11 @@ def test_what_was_read_in_advance_is_not_read_again(
     pool.work()
     draft = readings.drafted()
     assert draft is not None
-    assert draft.text == "90 samples"
+    assert draft.reading is not None
+    assert draft.reading.text == "90 samples"
     readings.finish(phrase(1, 0.9, samples=120), "red cup")
     (answer,) = readings.answers()
-    assert answer.reading == draft
+    assert answer.reading == draft.reading
     assert (reader.read_phrases, reader.hot_words) == ([90], ["red cup"])
 
 
@@ -122,6 +125,43 @@ def test_a_speaker_who_goes_on_is_read_again(
         "90 samples"
     ]
     assert not readings.is_busy
+
+
+def test_a_glance_is_told_once_and_leaves_what_is_read_in_advance_alone(
+    readings: Readings, pool: Waiting, reader: Reader
+) -> None:
+    readings.glance(phrase(1, 0.5, samples=50), "")
+    readings.glance(phrase(1, 0.6, samples=60), "")
+    readings.draft(phrase(1, 0.7, samples=70), "")
+    assert readings.glanced() is None
+    pool.work()
+    glance, draft = readings.glanced(), readings.drafted()
+    assert glance is not None and glance.reading is not None
+    assert draft is not None and draft.reading is not None
+    assert (glance.reading.text, draft.reading.text) == ("50 samples", "70 samples")
+    assert readings.glanced() is None
+    assert reader.read_phrases == [50, 70]
+
+
+def test_a_slow_recogniser_has_no_time_for_glances(
+    readings: Readings, pool: Waiting, reader: Reader
+) -> None:
+    reader.latency.record(2 * FAST_NS)
+    readings.glance(phrase(1, 0.5), "")
+    assert not pool.waiting
+
+
+def test_a_glance_that_fails_says_nothing(
+    readings: Readings, pool: Waiting, reader: Reader
+) -> None:
+    reader.fails = True
+    readings.glance(phrase(1, 0.5), "")
+    pool.work()
+    assert readings.glanced() is None
+    reader.fails = False
+    readings.glance(phrase(1, 0.6), "")
+    pool.work()
+    assert readings.glanced() is not None
 
 
 def test_only_one_phrase_is_read_in_advance_at_a_time(readings: Readings, pool: Waiting) -> None:

