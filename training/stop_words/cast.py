@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from training.voices import espeak, festival, flite, hibari, pico, piper
+from training.voices import espeak, festival, flite, hibari, pico, piper, rhvoice
 from training.voices.cast import (
     ACCENTS,
     HELD_OUT_ACCENT,
@@ -47,8 +47,8 @@ PARTS: Final = (
         speak=espeak.speak,
         tells_times=True,
         voices=tuple(f"{a}+{v}" for a in ACCENTS for v in (*VARIANTS, *ROBOTIC_VARIANTS)),
-        stops=6000,
-        others=8000,
+        stops=8000,
+        others=10000,
         held_voices=(
             *(f"{accent}+{variant}" for accent in ACCENTS for variant in HELD_OUT_VARIANTS),
             *(f"{HELD_OUT_ACCENT}+{variant}" for variant in VARIANTS),
@@ -60,21 +60,29 @@ PARTS: Final = (
         engine=flite.ENGINE,
         speak=flite.speak,
         tells_times=True,
-        voices=("kal", "kal16", "awb", "rms"),
-        stops=1600,
-        others=3000,
-        held_voices=("slt",),
-        held_stops=120,
-        held_others=300,
+        voices=tuple(flite.PITCH_HZ),
+        stops=4000,
+        others=5000,
     ),
     Part(
         engine=pico.ENGINE,
         speak=pico.speak,
         tells_times=False,
         voices=("en-US",),
-        stops=1000,
-        others=2500,
+        stops=1600,
+        others=3000,
         held_voices=("en-GB",),
+        held_stops=120,
+        held_others=300,
+    ),
+    Part(
+        engine=rhvoice.ENGINE,
+        speak=rhvoice.speak,
+        tells_times=False,
+        voices=rhvoice.VOICES,
+        stops=3000,
+        others=4000,
+        held_voices=(rhvoice.HELD_OUT,),
         held_stops=120,
         held_others=300,
     ),
@@ -83,16 +91,16 @@ PARTS: Final = (
         speak=hibari.speak,
         tells_times=False,
         voices=hibari.VOICES,
-        stops=700,
-        others=1200,
+        stops=1600,
+        others=2500,
     ),
     Part(
         engine=piper.ENGINE,
         speak=piper.speak,
         tells_times=False,
         voices=piper.VOICES,
-        stops=1200,
-        others=1500,
+        stops=1600,
+        others=2500,
     ),
     Part(
         engine=festival.ENGINE,
@@ -110,7 +118,7 @@ def draw_style(random: np.random.Generator) -> Style:
     """Draw how somebody speaks who may be in a hurry to stop a robot, or drawl."""
     return Style(
         rate_ratio=float(random.uniform(0.7, 1.4)),
-        pitch_ratio=float(random.uniform(0.75, 1.35)),
+        pitch_ratio=float(np.exp(random.uniform(-0.45, 0.45))),
         lively=float(random.uniform(0.15, 0.95)),
     )
 

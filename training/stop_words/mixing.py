@@ -99,7 +99,7 @@ class Mixer:
         heard = in_a_room(sound, random)
         power = float(np.mean(heard[heard != 0.0] ** 2)) + 1e-9
         if random.random() < 0.9:
-            snr_db = random.uniform(5.0, 35.0)
+            snr_db = random.uniform(2.0, 30.0)
             level = np.sqrt(power * 10.0 ** (-snr_db / 10.0))
             heard = heard + np.float32(level) * self._noise.take(self._count, random)
         loudness = 10.0 ** (random.uniform(-42.0, -8.0) / 20.0)
@@ -148,11 +148,11 @@ def _laid(said: Said, start: int, end: int, number: int, ratio: float) -> _Laid:
 
 
 def _at_another_pace(said: Said, random: np.random.Generator) -> tuple[Sound, float]:
-    """Return a clip at its own level, half of them with a longer or shorter throat."""
+    """Return a clip at its own level, most of them with a longer or shorter throat."""
     values = said.samples.astype(np.float32)
     ratio = 1.0
-    if random.random() < 0.5:
-        count = round(len(values) * random.uniform(0.84, 1.2))
+    if random.random() < 0.6:
+        count = round(len(values) * random.uniform(0.8, 1.22))
         ratio = count / len(values)
         places = np.linspace(0, len(values) - 1, count, dtype=np.float32)
         values = np.interp(places, np.arange(len(values)), values).astype(np.float32)

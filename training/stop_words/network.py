@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from training.voices.phones import PHONES
 from vla_deploy.speech.stop_words.features import BANDS, STRIDE
 
-CHANNELS: Final = 144
+CHANNELS: Final = 256
 FIRST_TAPS: Final = 5
 TAPS: Final = 5
 DILATIONS: Final = (1, 1, 2, 2, 4, 4, 4)
