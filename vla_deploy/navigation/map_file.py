@@ -33,7 +33,7 @@ FREE_SHADE: Final = 254
 REQUIRED_KEYS: Final = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
 RESOLUTION_RANGE_M: Final = (0.001, 5.0)
 MOST_CELLS: Final = 25_000_000
-"""250 m by 250 m at 0.05 m: reading so many takes 0.9 GB, which the smallest board just has."""
+"""250 m by 250 m at 0.05 m: reading so many takes 0.3 GB, which the smallest board has."""
 MOST_ORIGIN_M: Final = 100_000.0
 UNKNOWN: Final = -1
 _RAW_MOST: Final = 100
@@ -65,7 +65,17 @@ class MapFile:
 
     def probability(self) -> NDArray[np.float64]:
         """Return how probably each cell is occupied, NaN where that is unknown; row 0 is south."""
-        shades = np.flipud(self.shades).astype(np.float64)
+        return self._probability_of_shades()[np.flipud(self.shades)]
+
+    def occupancy(self) -> NDArray[np.int8]:
+        """Return each cell as nav_msgs/OccupancyGrid has it: 0..100, -1 unknown; row 0 is south."""
+        probability = self._probability_of_shades()
+        percent = np.rint(np.nan_to_num(probability, nan=0.0) * 100.0)
+        percent[np.isnan(probability)] = UNKNOWN
+        return percent.astype(np.int8)[np.flipud(self.shades)]
+
+    def _probability_of_shades(self) -> NDArray[np.float64]:
+        shades = np.arange(256, dtype=np.float64)
         if self.mode is MapMode.RAW:
             return np.where(shades > _RAW_MOST, np.nan, shades / _RAW_MOST)
         dark = shades / 255.0 if self.negate else (255.0 - shades) / 255.0
@@ -75,12 +85,6 @@ class MapFile:
             return certain
         span = self.occupied_thresh - self.free_thresh
         return np.where(np.isnan(certain), (dark - self.free_thresh) / span, certain)
-
-    def occupancy(self) -> NDArray[np.int8]:
-        """Return each cell as nav_msgs/OccupancyGrid has it: 0..100, -1 unknown; row 0 is south."""
-        probability = self.probability()
-        percent = np.rint(np.nan_to_num(probability, nan=0.0) * 100.0)
-        return np.where(np.isnan(probability), UNKNOWN, percent).astype(np.int8)
 
 
 def read_map_file(yaml_path: Path) -> MapFile:
@@ -190,7 +194,21 @@ def _read_shades(path: Path) -> Shades:
         raise MapInvalid(f"{expected}, found one that cannot be read")
     if image.size > MOST_CELLS:
         raise MapInvalid(f"{path}: expected at most {MOST_CELLS} cells, got {image.size}")
+    if _has_transparent_cells(path):
+        raise MapInvalid(
+            f"{expected}, found transparent cells, whose shade means nothing: draw what is unknown "
+            f"in the shade {UNKNOWN_SHADE}, and without transparency"
+        )
     return np.asarray(image, dtype=np.uint8)
+
+
+def _has_transparent_cells(path: Path) -> bool:
+    """Tell whether some cell shows what is behind the image; cv2 gives four channels then."""
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None or image.ndim < 3 or image.shape[2] < 4:
+        return False
+    opaque = np.iinfo(image.dtype).max
+    return bool((image[..., 3] < opaque).any())
 
 
 def _whole_entries(path: Path) -> dict[str, str | list[str]]:

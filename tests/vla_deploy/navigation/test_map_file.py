@@ -188,3 +188,18 @@ def test_a_yaml_that_is_no_text_is_told(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_bytes(b"\xff\xfe\x00image")
     with pytest.raises(MapInvalid, match="it is no text"):
         read_map_file(tmp_path / "map.yaml")
+
+
+def test_transparent_cells_are_refused_and_opaque_ones_read(tmp_path: Path) -> None:
+    path = tmp_path / "flat.yaml"
+    write_map_file(path, MapFile(shades=np.full((3, 4), 254, np.uint8), resolution_m=0.05,
+                                 origin_m=(0.0, 0.0)))  # fmt: skip
+    path.write_text(path.read_text().replace("flat.pgm", "flat.png"))
+    pixels = np.full((3, 4, 4), 254, np.uint8)
+    pixels[..., 3] = 255
+    cv2.imwrite(str(tmp_path / "flat.png"), pixels)
+    assert read_map_file(path).occupancy().tolist() == np.zeros((3, 4)).tolist()
+    pixels[1, 2] = 0
+    cv2.imwrite(str(tmp_path / "flat.png"), pixels)
+    with pytest.raises(MapInvalid, match=r"found transparent cells.*in the shade 205"):
+        read_map_file(path)
