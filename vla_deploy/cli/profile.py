@@ -87,7 +87,7 @@ def list_profiles(arguments: argparse.Namespace) -> int:
 def _row(name: str, fits: str, chosen: str | None) -> dict[str, Any]:
     source = read_source(name)
     notes = (
-        (name.endswith(_BASE), "to inherit from"),
+        (_is_base(name), "to inherit from"),
         (name == fits, "fits this computer"),
         (name == chosen, "chosen"),
     )
@@ -96,6 +96,10 @@ def _row(name: str, fits: str, chosen: str | None) -> dict[str, Any]:
         "inherits": source.parents,
         "note": ", ".join(note for holds, note in notes if holds),
     }
+
+
+def _is_base(name: str) -> bool:
+    return name in profile_names() and name.endswith(_BASE)
 
 
 def show_profile(arguments: argparse.Namespace) -> int:
@@ -159,6 +163,11 @@ def validate_profile(arguments: argparse.Namespace) -> int:
 def use_profile(arguments: argparse.Namespace) -> int:
     """Choose a profile; a running robot takes it over at once, or says why not."""
     name = _absolute(arguments.name)
+    if _is_base(name):
+        raise CommandFailed(
+            f"profile {name}: made to be inherited, for no computer; `vla-deploy profile list` "
+            f"tells which fits this one"
+        )
     _warn_of_small_slice(arguments, load_profile(name))
     if running(arguments.runtime_base or default_base()) is None:
         return _choose(arguments, name)

@@ -120,6 +120,14 @@ def test_a_dry_run_chooses_nothing(vla, base, mine):
     assert choice_of(base).load() is None
 
 
+@pytest.mark.parametrize("name", ["base", "jetson_base"])
+def test_what_is_made_to_be_inherited_is_not_chosen(vla, base, name):
+    code, _, err = vla("use", name)
+    assert code != 0
+    assert "made to be inherited, for no computer" in err
+    assert choice_of(base).load() is None
+
+
 def test_a_power_mode_that_this_computer_lacks_is_refused(vla, base, tmp_path):
     path = tmp_path / "fast.toml"
     path.write_text('inherits = "desktop"\npower_mode = "WARP"\n')
