@@ -40,7 +40,10 @@ _NO_THING: Final = re.compile(
     r"furthest|not)$"
 )
 # What is said of a thing to tell it from others is no name for it.
-_SAYS_MORE: Final = re.compile(r"'|\b(?:not|but|except|other than|that is|which)\b")
+_SAYS_MORE: Final = re.compile(
+    r"'|\b(?:not|but|except|other than|that is|which)\b"
+    r"|^(?:two|three|four|both|all|some|an? (?:couple|pair) of)\b"
+)
 _WAY: Final = re.compile(r"^(?:back|over|up|down) ")
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 

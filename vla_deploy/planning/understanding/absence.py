@@ -28,6 +28,14 @@ def not_there(read: Expression, things: Sequence[Thing]) -> NotThere:
     return NotThere(f'I see nothing that is "{read.said}"')
 
 
+def not_as_many(read: Expression, things: Sequence[Thing]) -> NotThere:
+    """Return why other things are there than were counted."""
+    there = f"{_number(len(things))} {_noun(read, len(things))}"
+    if len(things) < read.count:
+        return NotThere(f"I see only {there}")
+    return NotThere(f"I see {there}, and cannot tell which {_number(read.count)} you mean")
+
+
 def _noun(read: Expression, count: int) -> str:
     """Return what the things are called, in the singular for one or none."""
     kind = "thing" if read.query.kind == ANY_CLASS else read.query.kind

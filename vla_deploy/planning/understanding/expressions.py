@@ -104,9 +104,12 @@ _EVERYTHING: Final = re.compile(r"^(?:everything|anything)(?: else)?\b")
 _QUANTITY: Final[tuple[tuple[re.Pattern[str], Scope], ...]] = tuple(
     (re.compile(pattern), scope)
     for pattern, scope in (
-        (r"(?:all|both|every|each)(?: one)?(?: of)?(?: the| my| your| these| those)? (?P<own>.+)",
-         Scope.ALL),
-        (r"(?:the |my |these |those )?(?P<count>two|three|four|2|3|4) (?P<own>.+)", Scope.ALL),
+        (r"(?P<count>both)(?: of)?(?: the| my| your| these| those)? (?P<own>.+)", Scope.ALL),
+        (r"(?:all|every|each)(?: one)?(?: of)?(?: the| my| your| these| those)?"
+         r"(?: (?P<count>two|three|four|2|3|4))? (?P<own>.+)", Scope.ALL),
+        (r"(?:the|my|your|these|those) (?P<count>two|three|four|2|3|4) (?P<own>.+)", Scope.ALL),
+        (r"(?P<count>two|three|four|2|3|4|(?:an? )?(?:couple|pair)(?= of))"
+         r"(?: of(?: the| my| your| these| those)?)? (?P<own>.+)", Scope.ANY),
         (r"(?:(?:any|one|either) of(?: the| my| those| these)?|any|either|an?|some) (?P<own>.+)",
          Scope.ANY),
     )
@@ -227,7 +230,8 @@ def _quantity(said: str) -> tuple[str, Scope, int]:
     for pattern, scope in _QUANTITY:
         found = pattern.fullmatch(said)
         if found:
-            count = phrases.COUNTS.get(found.groupdict().get("count") or "", 0)
+            counted = (found.groupdict().get("count") or "").split()
+            count = phrases.COUNTS.get(counted[-1], 0) if counted else 0
             return found["own"], scope, count
     return said, Scope.ONE, 0
 

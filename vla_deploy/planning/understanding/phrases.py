@@ -102,5 +102,6 @@ SILENT: Final = frozenset(
     {"is", "are", "which", "standing", "lying", "sitting", "resting", "please", "lies", "stands"}
 )
 EVERYTHING: Final = frozenset({"everything", "all", "anything"})
-COUNTS: Final[Mapping[str, int]] = MappingProxyType({"two": 2, "three": 3, "four": 4, "2": 2,
-                                                     "3": 3, "4": 4})  # fmt: skip
+COUNTS: Final[Mapping[str, int]] = MappingProxyType(
+    {"two": 2, "three": 3, "four": 4, "2": 2, "3": 3, "4": 4, "both": 2, "couple": 2, "pair": 2}
+)

@@ -13,7 +13,7 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotThere, UnknownObject
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.absence import not_there
+from vla_deploy.planning.understanding.absence import not_as_many, not_there
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.decisions import Decision
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
@@ -126,7 +126,9 @@ class Resolver:
             raise not_there(read, among)
         if not found:
             return (self._unseen(read, use),)
-        if read.scope is Scope.ALL and read.count in (0, len(found)):
+        if read.scope is not Scope.ONE and read.count not in (0, len(found)):
+            return self._counted(read, found, use)
+        if read.scope is Scope.ALL or (read.scope is Scope.ANY and read.count):
             return tuple(self._seen(read, one, use, "one of all of them", found) for one in found)
         if len(found) == 1:
             of = f" of {len(among)}" if len(among) > 1 else ""
@@ -137,6 +139,17 @@ class Resolver:
         if chosen is None:
             raise which_thing(found, self.setting.view, read.said)
         return (self._seen(read, chosen, use, why, found, by_id=True),)
+
+    def _counted(self, read: Expression, found: list[Thing], use: Use) -> tuple[Referent, ...]:
+        """Return as many as were asked for where any will do: the nearest ones."""
+        held = [one for one in found if one.held_by]
+        if use is Use.PUT and len(held) == read.count:
+            return tuple(self._seen(read, one, use, "it is in my hand", found) for one in held)
+        if read.scope is Scope.ALL or len(found) < read.count:
+            raise not_as_many(read, found)
+        why = "any will do, these are the nearest"
+        nearest = found[: read.count]
+        return tuple(self._seen(read, one, use, why, found, by_id=True) for one in nearest)
 
     def _among(self, read: Expression, use: Use) -> list[Thing]:
         """Return what would fit if it were not compared, nor anything left out of it."""
@@ -308,7 +321,12 @@ def _needs_id(read: Expression) -> bool:
     pointed = read.side or read.extreme or read.is_other or read.support or query.order
     related = query.sizes or query.anchor is not None
     return bool(
-        pointed or related or read.is_relative or not query.is_named or read.scope is Scope.ALL
+        pointed
+        or related
+        or read.is_relative
+        or not query.is_named
+        or read.scope is Scope.ALL
+        or read.count
     )
 
 

@@ -161,3 +161,33 @@ def test_every_decision_is_logged_with_candidates_choice_and_reason(home: "Home"
     assert (second.role, second.candidates, second.certainty) == (Role.DESTINATION, (), 0.85)
     assert second.why == 'not seen yet, "botle" taken for bottle'
     assert resolver.certainty == 0.85
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("two cups", ["cup_1", "cup_2"]),
+        ("a couple of cups", ["cup_1", "cup_2"]),
+        ("three cups", ["cup_1", "cup_2", "cup_3"]),
+        ("all three cups", ["cup_1", "cup_2", "cup_3"]),
+    ],
+)
+def test_so_many_as_are_counted_are_meant(home: "Home", text: str, meant: list[str]) -> None:
+    far = replace(home.things["cup_2"], thing_id="cup_3", position_m=(9.0, 9.0, 0.5))
+    found = Resolver(home.ask("cup_1", "cup_2", far)).things(text, Use.TAKE)
+    assert sorted(one.name for one in found) == meant
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("both cups", "I see three cups, and cannot tell which two you mean"),
+        ("the two cups", "I see three cups, and cannot tell which two you mean"),
+        ("four cups", "I see only three cups"),
+        ("two balls", "I see only one ball"),
+    ],
+)
+def test_what_is_counted_otherwise_is_told(home: "Home", text: str, reason: str) -> None:
+    far = replace(home.things["cup_2"], thing_id="cup_3", position_m=(9.0, 9.0, 0.5))
+    with pytest.raises(NotThere, match=reason):
+        Resolver(home.ask("cup_1", "cup_2", far, "ball_1")).things(text, Use.TAKE)
