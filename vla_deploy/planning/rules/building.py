@@ -37,7 +37,7 @@ _PUT_RELATION: Final = re.compile(
 )
 _NO_THING: Final = re.compile(
     r"^(?:the |my |your )?(?:far |very )?(?:left|right|middle)$|\b(?:is|are|that|which|farthest|"
-    r"furthest|not)$"
+    r"furthest|not|lying|standing|sitting|resting)$"
 )
 # What is said of a thing to tell it from others is no name for it.
 _SAYS_MORE: Final = re.compile(
@@ -161,6 +161,37 @@ def leave_here(groups: Groups, request: Request) -> list[Step]:
     if not held and not read.pronoun:
         return [("speak", {"text": "I leave it where it is."})]
     return [("place", {"object": said, "destination": "here", **_arm(groups)})]
+
+
+def want(groups: Groups, request: Request) -> list[Step]:
+    """Bring "the cup on the table" where one is there, else put the cup on the table."""
+    whole = f"{groups['object']} {groups['relation']} {groups['destination']}"
+    if is_seen(whole, request):
+        return bring({**groups, "object": whole}, request)
+    return put(groups, request)
+
+
+def put_here(groups: Groups, _: Request) -> list[Step]:
+    """Put each thing on what the robot stands before."""
+    where = {"destination": "here", **_arm(groups)}
+    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+
+
+def keep(groups: Groups, request: Request) -> list[Step]:
+    """Go on holding what is held; take what is not."""
+    said = groups["object"]
+    setting = Setting(request)
+    read = read_expression(said, setting.furniture)
+    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
+    if held or read.pronoun:
+        return [("speak", {"text": "I keep it."})]
+    return pick(groups, request)
+
+
+def put_into_that(groups: Groups, _: Request) -> list[Step]:
+    """Put each thing into what was spoken of."""
+    where = {"destination": "there", "relation": "in", **_arm(groups)}
+    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
 
 
 def pick_from(groups: Groups, request: Request) -> list[Step]:

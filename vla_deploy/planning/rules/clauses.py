@@ -29,20 +29,33 @@ _POLITE_BEFORE: Final = re.compile(
     r"i'd (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
     r"i would (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
     r"what i (?:want|need) is for you to|possibly|so|well|quickly|maybe|perhaps|"
-    r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait)\b)|"
-    r"see if you can|go (?:and )?(?=(?:stand|park)\b)|try to|try and|start to|next|finally|also|"
+    r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait|see|"
+    r"check|charge|dock|stand|park|turn|open|close|drop|leave|give)\b)|"
+    r"come (?:and )?(?=(?:get|fetch|pick|take|help|look)\b)|"
+    r"(?:would|will) you be able to|are you able to|is it possible (?:for you )?to|"
+    r"(?:could|can|may|might) i (?:ask|trouble|get|bother) you to|do you mind|"
+    r"you(?:'d| had)? better|i'd like for you to|i would love (?:it )?(?:if you|for you to)|"
+    r"be (?:a|an) (?:love|star|angel|pal|good \w+) and|"
+    r"it would be (?:nice|great|good) if you(?: could)?|"
+    r"see if you can|try to|try and|start to|next|finally|also|alright|all right|"
+    r"right then|but(?= (?:go|also|do|take|put|pick|bring|keep|hang|hold|leave)\b)|"
     r"plus)\b[, ]*"
 )
 _POLITE_AFTER: Final = re.compile(
     r"[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
-    r"would you|could you|butler|robot|quickly|immediately|at once|instead|somewhere|anywhere|"
-    r"for us)$|[.!?, ]+$"
+    r"would you|could you|can you|butler|robot|quickly|immediately|at once|instead|somewhere|"
+    r"anywhere|for us|mate|love|dear|darling|pal|buddy|my friend|cheers|ta|right away|"
+    r"straight away|real quick|asap|okay|ok|if you would|if you don't mind|if possible|"
+    r"when(?:ever)? you (?:can|get (?:a|the) (?:chance|moment|minute|second)|"
+    r"have (?:a|the) (?:chance|moment|minute|second|time)|(?:are|get) (?:here|back|done|ready|"
+    r"finished|home)|'re (?:here|back|done|ready|finished|home))|"
+    r"when you're (?:here|back|done|ready|finished|home))$|[.!?, ]+$"
 )
 # What likens a clause to another one, and says nothing where it can stand alone.
 _ECHO: Final = re.compile(r"[, ]*\b(?:again|too|also|as well|likewise|once more|(?<!the )first)$")
 _SPLIT: Final = re.compile(
-    r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|and)\b|[,;]|[.!?]\s)"
-    r"\s*"
+    r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|and|"
+    r"but(?= (?:then|hang|hold|keep|leave|bring|take|put|pick|come)\b))\b|[,;]|[.!?]\s)\s*"
 )
 # What people say while they think, and words said twice.
 _FILLER: Final = re.compile(
@@ -57,6 +70,7 @@ _FORMS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
     for pattern, full in (
         ("gimme", "give me"), ("lemme have", "give me"), ("wanna", "want to"),
         ("gotta", "have to"), ("gonna", "going to"), ("outta", "out of"), ("'em", "them"),
+        ("ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
     )
 )  # fmt: skip
 _TWICE: Final = re.compile(r"\b(\w+)(?: \1\b)+")
@@ -65,7 +79,15 @@ _COURTESY: Final = re.compile(
     r"(?:hello|hi|hey|good (?:morning|day|afternoon|evening))(?: there| robot| butler)?|"
     r"excuse me|pardon(?: me)?|thanks(?: .*)?|thank you(?: .*)?|cheers|please|"
     r"(?:if|when|whenever) you(?: don't mind|'re ready| are ready| have (?:a|the) (?:\w+))|"
-    r"if it(?:'s| is) not too much trouble|if possible|you know what|listen"
+    r"if it(?:'s| is) not too much trouble|if possible|you know what|listen|"
+    r"(?:any|either)(?: (?:one|of (?:them|those)|cup|ball|book|bottle|can|bowl|phone|remote))?"
+    r"(?: (?:will|would) do| is fine| you (?:like|want))?|"
+    r"whichever(?: one)?(?: (?:you (?:like|want|prefer|find)|is (?:closest|nearest|fine)))?|"
+    r"(?:it )?(?:doesn't|does not) matter which(?: one)?|i don't (?:mind|care)(?: which(?: one)?)?|"
+    r"(?:and )?(?:then )?you(?:'re| are) (?:all )?done|(?:and )?(?:you )?can go(?: now)?|"
+    r"that(?:'s| is| will be| would be) (?:all|it|great|lovely|enough)|no (?:rush|hurry)|"
+    r"(?:no,? )?(?:that's |it's |that was )?(?:the )?wrong one|take your time|"
+    r"good (?:robot|boy|girl|job)|well done|great|perfect"
 )
 # At the beginning these ask for nothing either; later on they are a side, and something to do.
 _OPENING: Final = re.compile(r"right(?: then)?|look")
@@ -80,6 +102,14 @@ def is_stop(text: str) -> bool:
     """Tell whether a command means: stop what you are doing."""
     if len(text) > MOST_LETTERS:
         return False
+    sentences = [one for one in _SENTENCE.split(text) if words_of(one)]
+    return bool(sentences) and all(map(_is_stop, sentences))
+
+
+_SENTENCE: Final = re.compile(r"[.!?;]+")
+
+
+def _is_stop(text: str) -> bool:
     said = " ".join(words_of(polite_off(text).replace("'", "")))
     urged = _URGED.sub("", said)
     is_halt = urged in _STOPS and urged.startswith(_HALTS)
@@ -99,20 +129,54 @@ _STOPS: Final = frozenset(" ".join(words_of(spoken)) for spoken in STOP_WORDS) |
 
 def polite_off(text: str) -> str:
     """Return a command in lower case without what only asks nicely, or likens it to another."""
-    return _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER, _ECHO))
+    return _commanding(plain(text), _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER, _ECHO)))
 
 
 def courtesy_off(text: str) -> str:
     """Return a command in lower case without what only asks nicely; "again" and "too" stay."""
-    return _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER))
+    return _commanding(plain(text), _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER)))
+
+
+def _commanding(asked: str, own: str) -> str:
+    """Return "get the cup" for the rest of "would you mind getting the cup"."""
+    verb, space, rest = own.partition(" ")
+    is_asked = _ASKS_DOING.search(asked.removesuffix(own)) is not None
+    return f"{DOING[verb]}{space}{rest}" if is_asked and verb in DOING else own
+
+
+_ASKS_DOING: Final = re.compile(r"\b(?:mind|how about|what about)\b")
+DOING: Final = {
+    "bringing": "bring", "carrying": "carry", "checking": "check", "clearing": "clear",
+    "closing": "close", "coming": "come", "driving": "drive", "dropping": "drop",
+    "fetching": "fetch", "finding": "find", "getting": "get", "giving": "give", "going": "go",
+    "grabbing": "grab", "handing": "hand", "heading": "head", "holding": "hold",
+    "leaving": "leave", "lifting": "lift", "looking": "look", "moving": "move",
+    "opening": "open", "passing": "pass", "picking": "pick", "placing": "place",
+    "popping": "pop", "putting": "put", "returning": "return", "saying": "say",
+    "setting": "set", "showing": "show", "sticking": "stick", "taking": "take",
+    "telling": "tell", "tidying": "tidy", "turning": "turn", "waiting": "wait",
+}  # fmt: skip
+"""How verbs of commands are said behind "would you mind"."""
 
 
 def plain(text: str) -> str:
     """Return a text in lower case without hesitation, with words in full that were run together."""
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
+    text = _REASON.sub("", text)
     for pattern, full in _FORMS:
         text = pattern.sub(full, text)
     return in_figures(_TWICE.sub(r"\1", text))
+
+
+_VERBS: Final = "|".join(sorted({*DOING.values(), "stop", "clean", "search", "charge", "hang"}))
+_REASON: Final = re.compile(
+    r"^(?:i|we|you|there|they|he|she|somebody|someone|my \w+)"
+    r"(?:'[a-z]+| am| is| are| will| have| has| need| want| got| had)? "
+    r"(?!.*\b(?:if|when|until|unless)\b).+?,? so "
+    rf"(?=(?:please |just |can you |could you )?(?:{_VERBS})\b)"
+    r"(?!.*\b(?:it|them|there|those|that)\b)"
+)
+"""What is said before a command to say why; conditions are none."""
 
 
 def _without(text: str, patterns: tuple[re.Pattern[str], ...]) -> str:

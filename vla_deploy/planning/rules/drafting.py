@@ -21,7 +21,7 @@ from vla_deploy.planning.rules.clauses import (
     segments,
 )
 from vla_deploy.planning.rules.exchanging import continued, corrected
-from vla_deploy.planning.rules.fits import Fit, fit_of, is_whole, known_fit
+from vla_deploy.planning.rules.fits import HANDS, Fit, fit_of, is_whole, known_fit, names_hand
 from vla_deploy.planning.rules.intents import PRIORITIES, Intent
 from vla_deploy.planning.rules.ordering import in_order
 from vla_deploy.planning.rules.recalling import is_again, last_words, leans, recalled, same_with
@@ -32,6 +32,7 @@ from vla_deploy.planning.understanding.phrases import PRONOUNS
 
 # What of a clause the next one may exchange.
 _THINGS: Final = ("object", "place", "what")
+_TO_WHERE: Final = re.compile(r"\w (?:to|into|in|onto|on) (?:the|my|your) \w")
 _HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
 
 
@@ -91,6 +92,8 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     """Build the longest clause that the parts begin with; return how many parts it took."""
     for count in range(len(parts), 1, -1):
         clause = " and ".join(parts[:count])
+        if len(HANDS.findall(clause)) > 1:
+            continue
         fit = fit_of(clause, draft.request)
         if fit is not None and is_whole(fit, draft.request):
             _build(clause, fit, draft)
@@ -101,9 +104,23 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     refuse_unable(clause)
     clause, fit = _in_full(clause, draft)
     if fit is None:
+        clause, fit = _with_verb(clause, draft, others=len(parts) > 1)
+    if fit is None:
         raise NotUnderstood(parts[0])
     _build(clause, fit, draft)
     return 1
+
+
+def _with_verb(clause: str, draft: _Draft, *, others: bool) -> tuple[str, Fit | None]:
+    """Return "take the phone in your left hand" for what leaves the verb out, and its rule.
+
+    "The can in the box" is one thing by itself; beside other clauses it is something to do.
+    """
+    if names_hand(clause):
+        return f"take {clause}", known_fit(f"take {clause}", draft.request)
+    if (others or draft.steps) and _TO_WHERE.search(clause):
+        return f"put {clause}", known_fit(f"put {clause}", draft.request)
+    return clause, None
 
 
 def _in_full(clause: str, draft: _Draft) -> tuple[str, Fit | None]:

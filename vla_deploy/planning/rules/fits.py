@@ -16,11 +16,19 @@ _WITH_HAND: Final = re.compile(
     r"(?P<own>.+?),? "
     r"(?:(?:with|using|(?<! is )(?<!'s )(?<!thing )(?<!object )(?<! one )in) (?:the|your) "
     r"(?P<arm>left|right) (?:hand|arm|gripper)|"
-    r"(?:with|using) (?:the|your) (?P<arm2>left|right)(?: one)?)"
+    r"(?:with|using) (?:the|your) (?P<arm2>left|right)(?: one)?|"
+    r"in your (?P<arm3>left|right))"
 )
+# "In one hand": in either.
+_IN_A_HAND: Final = re.compile(
+    r"(?P<own>.+?),? (?:with|using|in) (?:(?:one|either|any|a)(?: of (?:your|the))? hands?|"
+    r"(?:the|your) other(?: hand| one)?)"
+)
+HANDS: Final = re.compile(r"\bin (?:your|the) (?:left|right)\b")
 _PACE: Final = re.compile(r",?\b(?:very |really |nice and )?(?:slowly|slow|carefully|gently)\b")
 _MANNERS: Final = (
     _WITH_HAND,
+    _IN_A_HAND,
     re.compile(r"(?P<own>.+?),? (?:at|with) (?P<speed>[\d.]+ ?(?:m/s|cm/s|km/h|mps|mph))"),
 )
 # What a rule finds in a clause: all of what is put somewhere, or some of what can be known.
@@ -66,6 +74,11 @@ def is_known(fit: Fit, request: Request) -> bool:
     return all(is_one(part, request) for text in named for part in parts_of(text))
 
 
+def names_hand(clause: str) -> bool:
+    """Tell whether a clause ends with which hand to take."""
+    return _WITH_HAND.fullmatch(clause) is not None
+
+
 def is_whole(fit: Fit, request: Request) -> bool:
     """Tell whether each of several things or places that a clause lists is one."""
     listed = [name for name in ("object", "place") if " and " in fit.groups.get(name, "")]
@@ -86,11 +99,9 @@ def _fits(clause: str) -> Iterator[Fit]:
 
 
 def _given(found: re.Match[str]) -> Groups:
-    """Return what a pattern has found; a second group for the same thing has a 2 at its end."""
+    """Return what a pattern has found; further groups for the same thing have a 2 or 3 behind."""
     return {
-        name.removesuffix("2"): value
-        for name, value in found.groupdict().items()
-        if value is not None
+        name.rstrip("23"): value for name, value in found.groupdict().items() if value is not None
     }
 
 

@@ -11,7 +11,7 @@ from typing import Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import words_of
-from vla_deploy.planning.rules.building import Groups, is_one, parts_of
+from vla_deploy.planning.rules.building import Groups, is_one, is_seen, parts_of
 from vla_deploy.planning.rules.fits import known_fit
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
@@ -21,14 +21,37 @@ _THING: Final = r"(?P<thing>(?:my|the|our) .+?)"
 _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
     re.compile(pattern)
     for pattern in (
-        r"i (?:just |still |simply )?(?:can't|cannot|can not|couldn't|could not) "
+        r"i (?:just |still |simply )?(?:can't|cannot|can not|couldn't|could not) (?:seem to )?"
         rf"(?:find|see|spot|remember where i (?:put|left)) {_THING}(?: anywhere)?",
         rf"i(?:'ve| have| seem to have| must have| think i(?:'ve)?)? (?:lost|mislaid|misplaced) "
         rf"{_THING}",
         rf"i(?:'ve| have| must have| think i(?:'ve)?)? (?:left|forgot|forgotten|put) {_THING} "
         r"(?:in|on|at|by) (?P<place>.+)",
-        rf"{_THING} (?:is|are|must be|should be) (?:still )?(?:in|on|at) (?P<place>.+)",
+        rf"{_THING}(?:'s| is| are| must be| should be) (?:still )?(?:in|on|at) (?P<place>.+)",
+        rf"(?:someone|somebody|we|he|she|they)(?:'ve| have|'s| has)? (?:left|put|dropped) {_THING} "
+        r"(?:in|on|at|by) (?P<place>.+)",
+        r"there(?:'s| is| should be| must be| might be| ought to be) "
+        r"(?P<thing>(?:an?|the|my|some) (?:(?! (?:in|on|at) ).)+?)(?: (?:somewhere|lying|standing)"
+        r"(?: around)?)?(?: in (?:this|the) (?:apartment|flat|house|home|place|room))?",
+        rf"{_THING} (?:shouldn't|should not|doesn't|does not|can't|cannot|mustn't|must not) "
+        r"(?:be|belong|stay|go|stand|lie|sit|live)\b.*",
     )
+)
+# What is said beside a command, and neither asks for anything nor lends it anything.
+_BESIDE: Final = re.compile(
+    r"(?:and |because |since |but |so )?(?:(?:i|we) (?:had|saw|used) (?:it|them)\b.*|"
+    r"(?:now )?(?:it|they|that)(?:'s| is|'re| are) (?:gone|missing|lost|in the way|dirty|empty|"
+    r"not needed)\b.*|"
+    r"(?:it|that|they) (?:can't|cannot|shouldn't|should not|doesn't|does not|don't) "
+    r"(?:be|stay|belong|live|go|stand|lie)\b.*|"
+    r"i think (?:it|they)(?:'s|'re| is| are)\b.*|you (?:really )?can't miss (?:it|them)|"
+    r"i(?:'m| am) (?:so |very |really |a bit )?"
+    r"(?:thirsty|tired|hungry|cold|late|in a hurry|busy)\b.*|"
+    r"i (?:need|want) to (?:read|drink|leave|call|go)\b.*)"
+)
+_IT_IS_AT: Final = re.compile(
+    r"(?:it|they)(?:'s|'re| is| are| should be| must be| might be| may be)(?: still| probably)? "
+    r"(?:lying |standing )?(?:in|on|at|by) (?P<place>.+)"
 )
 _POINTS: Final = re.compile(r"\b(?:it|them|they|those)\b")
 _NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P<place>.+)")
@@ -43,7 +66,22 @@ def begins_with_statement(text: str) -> bool:
 
 def statements_off(parts: Sequence[str], request: Request) -> list[str]:
     """Return the parts of a command that ask for something, with what the others lend them."""
-    return _told_off(_not_that_off(_not_there_off(list(parts), request), request), request)
+    told = _found_where_told(list(parts), request)
+    asking = [part for part in told if not _BESIDE.fullmatch(part)] or told
+    return _told_off(_not_that_off(_not_there_off(asking, request), request), request)
+
+
+def _found_where_told(parts: list[str], request: Request) -> list[str]:
+    """Go first to where a thing is said to be ("fetch it, it should be in the hall") if unseen."""
+    for at in range(1, len(parts)):
+        found = _IT_IS_AT.fullmatch(parts[at])
+        fit = known_fit(parts[at - 1], request) if found else None
+        if found is None or fit is None or "object" not in fit.groups:
+            continue
+        seen = is_seen(fit.groups["object"], request)
+        first = [] if seen or not is_one(found["place"], request) else [f"go to {found['place']}"]
+        return [*parts[: at - 1], *first, parts[at - 1], *parts[at + 1 :]]
+    return parts
 
 
 def _told_off(parts: list[str], request: Request) -> list[str]:

@@ -21,6 +21,10 @@ class Rule:
 
 _OBJECT: Final = r"(?P<object>.+?)"
 _PLACE: Final = r"(?P<place>.+)"
+_SAID_OF: Final = (
+    r"(?P<object>(?:the|my|our|this|that|these|those|both|all)(?: (?!you\b|i\b|we\b)[\w']+){1,8}?|"
+    r"it|they)"
+)
 _METRES: Final = (
     rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:m|meters?|metres?|cm|centimeters?|centimetres?|"
     r"feet|foot|steps?|paces?|inch|inches))"
@@ -56,8 +60,13 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      telling.tell_hands),
     (Intent.QUESTION, r"where are you|where am i|which room (?:are you|is this)(?: in)?",
      telling.tell_place),
+    (Intent.QUESTION, r"(?:do you (?:happen to |by any chance )?(?:know|remember) |any idea |"
+     r"(?:can|could) you (?:tell me|remember) |tell me |i wonder |i forgot )?where (?:i|we|you|"
+     r"somebody|someone|he|she|they)(?:'ve| have|'s| has|'d| had)? (?:left|put|leave|dropped|laid) "
+     rf"{_OBJECT}", telling.tell_or_find),
     (Intent.QUESTION, rf"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
-     rf"have you seen|do you know where) {_OBJECT}(?: is| are)?(?: anywhere| somewhere)?",
+     rf"have you seen|(?:do you (?:happen to |by any chance )?know|any idea|tell me|i wonder|"
+     rf"find out) where) {_OBJECT}(?: is| are| gone| has gone| got to)?(?: anywhere| somewhere)?",
      telling.tell_or_find),
     (Intent.QUESTION, rf"(?:do you see|is there|are there|see) (?:any |an? )?{_OBJECT}"
      r"(?: there| here| anywhere)?", telling.tell_whether),
@@ -71,16 +80,22 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      telling.tell_abilities),
     (Intent.ASSIST, r"(?:hold|take) (?:this|that) from me|hold this", building.hold),
     # --- bring
-    (Intent.MANIPULATION, rf"(?:bring|fetch|get|give|hand|pass) me {_OBJECT}", building.bring),
+    (Intent.MANIPULATION, rf"(?:bring|fetch|get|give|hand|pass) (?:me|us) {_OBJECT}",
+     building.bring),
+    (Intent.MANIPULATION, r"i(?:'d| would)? (?:want|need|like) "
+     r"(?P<object>(?:the|my|that|this|those|these|both|all) .+?) (?:to (?:be|go) |put |moved )?"
+     rf"(?:back )?{_INTO} (?P<destination>.+)", building.want),
     (Intent.MANIPULATION, rf"(?:bring|carry|take|fetch|get|hand|give|deliver|pass) {_OBJECT} "
      r"(?:over )?(?:here|(?:back )?to me)", building.bring),
     (Intent.MANIPULATION, rf"(?:get|fetch|grab|take|pick up|bring) {_OBJECT} for me|"
      r"i (?:need|want|would like|'d like) (?P<object2>(?:the|my|a|an|that|this) .+)",
      building.bring),
+    (Intent.MANIPULATION, r"i (?:could do with|could use|fancy|'d love|would love|'d like|"
+     r"feel like) (?P<object>(?:the|my|a|an|that|this|some) .+)", building.bring),
     (Intent.MANIPULATION, rf"fetch {_OBJECT}", building.bring),
     # --- go to
     (Intent.NAVIGATION, r"(?:go|come|drive) back(?: here| to (?:me|where you (?:were|are)))?|"
-     r"return", building.go_back),
+     r"return|(?:and )?back (?:here|to me)", building.go_back),
     (Intent.NAVIGATION, r"(?:go|drive|come|move|navigate|return|walk|head|travel|roll|proceed|get|"
      rf"run)(?: back| over| on|)?(?: over)? (?:to|towards?|into|for) {_PLACE}", building.go),
     (Intent.NAVIGATION, rf"(?:take|bring|get) yourself (?:back )?to {_PLACE}|"
@@ -88,7 +103,15 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     # --- wait
     (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay)(?: here| there)?(?: (?:for )?{_SECONDS})?",
      building.wait),
+    (Intent.NAVIGATION, r"(?:wait|stay|stand|stop)(?: there| for me)? (?:in|by|near|beside|"
+     rf"next to|outside) {_PLACE}", building.go),
+    # --- keep
+    (Intent.MANIPULATION, r"(?:keep|hang on to|hang onto|hold on to|hold onto|keep (?:a )?hold of|"
+     rf"keep holding(?: on to)?|don't (?:put down|drop|let go of)) {_OBJECT}"
+     r"(?: in your (?:left |right )?hands?)?", building.keep),
     # --- put
+    (Intent.MANIPULATION, rf"(?:put|drop|pop|stick|place|throw|set|lay) {_OBJECT} in(?:side)?",
+     building.put_into_that),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry) {_OBJECT} "
      r"(?:back )?(?:to )?where (?:it|they|that|you) (?:(?:was|were|came from|belongs?|had been)"
      r"(?: before)?|(?:found|got|took|had) (?:it|them)(?: from)?)", returning.put_back),
@@ -96,7 +119,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      building.put),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay) {_OBJECT} back(?: again)?|"
      r"(?:put|set|place|lay) back (?P<object2>.+)", returning.put_back),
-    (Intent.MANIPULATION, rf"(?:put|set|lay) {_OBJECT} down|(?:put|set|lay) down (?P<object2>.+?)",
+    (Intent.MANIPULATION, rf"(?:put|set|lay|place) {_OBJECT} (?:back )?down|"
+     r"(?:put|set|lay) down (?P<object2>.+?)",
      building.put_down),
     (Intent.MANIPULATION, r"(?:let go(?: of)?|drop|release|let loose)(?: of)?(?: (?P<object>it|"
      r"that|this|them))?", building.put_down),
@@ -106,16 +130,25 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      building.put),
     (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
      r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", building.put_away),
-    (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|take|stow|store|"
+    (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|stow|store|"
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
      rf"(?:down |away )?{_INTO} (?P<destination>.+)", building.put),
+    (Intent.MANIPULATION, rf"take {_OBJECT} (?P<relation>(?:back |over |up |down )?(?:to|into|onto|"
+     r"over to)|back (?:in|on)) (?P<destination>.+)", building.put),
     (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling) "
      rf"{_OBJECT} (?:down |away |back )?(?P<relation>into|inside|in|onto|on top of|on) "
      r"(?P<destination>.+)", building.put),
     (Intent.MANIPULATION, rf"(?:put|place|take|bring|carry|move) {_OBJECT} "
      r"(?P<destination>(?:over |back )?there)", building.put_there),
-    (Intent.MANIPULATION, rf"(?:leave|keep|put|set|drop) {_OBJECT} (?:right |over )?here",
-     building.leave_here),
+    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand) {_OBJECT} (?:down )?on "
+     r"(?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of (?:you|me|us)",
+     building.put_here),
+    (Intent.MANIPULATION, rf"(?:leave|keep|put|set|drop|lay|place) {_OBJECT} (?:down )?"
+     r"(?:(?:right |over )?here(?: on (?:the|this) (?:table|desk|shelf|surface))?|"
+     r"on this (?:table|desk|shelf|surface)(?: here)?)", building.leave_here),
+    (Intent.MANIPULATION, rf"{_SAID_OF} (?:goes|go|belongs?|lives?|(?:should|must|has to|have to|"
+     rf"needs to|need to|ought to|can|wants to) (?:go|be|live)) (?:back )?{_INTO} "
+     r"(?P<destination>.+)", building.put),
     # --- straight and turning
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come) (?P<little>{_LITTLE} )?{_WAY}"
      rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", moving.drive),
@@ -135,7 +168,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.NAVIGATION, rf"(?:turn|rotate|spin|face|swivel)(?P<little> {_LITTLE})?"
      rf"(?: to)?(?: the| your)? ?{_SIDE}(?: (?:by )?{_ANGLE})?(?P<little2> {_LITTLE})?",
      moving.turn),
-    (Intent.SEARCH, r"turn your head (?P<what>.+)", building.look),
+    (Intent.SEARCH, r"turn your head (?P<what>.+?)(?: for (?:a|one) (?:moment|second|bit|while))?",
+     building.look),
     (Intent.NAVIGATION, rf"(?:turn|rotate|spin|swivel)(?: by)? {_ANGLE}"
      rf"(?: (?:to )?(?:the )?{_SIDE})?", moving.turn),
     (Intent.NAVIGATION, r"(?:make|take|do) an? (?P<way>left|right)(?: turn)?|do a u-?turn",
@@ -166,12 +200,12 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.SEARCH, r"(?:look|glance) (?P<side>up|down|left|right) (?:at|to|towards?|on) "
      r"(?P<what>.+)", building.look),
     (Intent.SEARCH, r"(?:look|have a look|take a look|gaze|glance)(?: at| to| towards?)? "
-     r"(?P<what>.+)", building.look),
+     r"(?P<what>.+?)(?: for me)?", building.look),
     # --- clean
     (Intent.CLEANING, r"(?:clean|tidy|clear)(?: things)?(?: up)?|clear (?:things )?away",
      cleaning.tidy),
     (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", cleaning.tidy),
-    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|do a (?:round|tour))\b[^:]*: ?"
+    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|do a (?:round|tour))\b[^:]*: ?(?:first )?"
      r"(?P<place>.+)", cleaning.visit),
     (Intent.CLEANING, r"(?:patrol|inspect|sweep(?: through)?|cover(?: the floor (?:of|in))?|"
      r"drive (?:all )?over(?: the floor (?:of|in))?) (?P<place>.+?)(?: floor)?", cleaning.patrol),
@@ -180,9 +214,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      rf"scoop|collect) {_OBJECT} (?:back )?(?:up )?(?:out(?: of| from)|from inside) (?P<source>.+)",
      building.pick_from),
     (Intent.MANIPULATION, rf"bring {_OBJECT}(?: over)?", building.bring),
-    (Intent.MANIPULATION, rf"(?:pick|lift)(?: up)? {_OBJECT}(?: up)?", building.pick),
+    (Intent.MANIPULATION, rf"(?:pick|lift)(?: up)? {_OBJECT}(?: up| off)?", building.pick),
     (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove)"
-     rf"(?: hold of)? {_OBJECT}", building.pick),
+     rf"(?: (?:a )?hold of)? {_OBJECT}", building.pick),
     # --- the rest
     (Intent.ASSIST, r"(?:(?:say|announce|repeat after me)[:,]?|tell [a-z]+(?= that))(?: that)? "
      r"(?P<text>.+)", building.speak),

@@ -76,7 +76,8 @@ _SILENT: Final = frozenset(
         "it", "is", "its", "that", "this", "thing", "on", "in", "at", "to", "of", "with", "my",
         "your", "side", "and", "uh", "um", "er", "well", "just", "give", "me", "bring", "use",
         "from", "yes", "no", "rather", "other", "are", "which", "there", "over",
-        "that's", "it's", "said",
+        "that's", "it's", "said", "oh", "sorry", "ah", "hm", "hmm", "actually", "thanks", "thank",
+        "you", "cheers", "ta", "mate", "dear", "love", "one's", "i'd", "like", "would", "think",
     }
 )  # fmt: skip
 # Words of the questions themselves.

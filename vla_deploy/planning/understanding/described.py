@@ -9,7 +9,8 @@ _WORD: Final = re.compile(r"[a-z0-9_']+")
 _WHERE: Final = re.compile(
     r"(?:(?:no|yes|well|um|uh|i (?:mean|meant|want|said)|it(?:'s| is)|take) )*"
     r"(?:the|that) (?:one|(?P<noun>[a-z]+)) (?:(?:that|which)(?:'s| is) )?(?P<where>(?:right )?"
-    r"(?:next to|close to|beside|behind|in front of|near|nearest(?: to)?|closest to|by|between|"
+    r"(?:next to|close to|beside|behind|in front of|near|nearer to|closer to|nearest(?: to)?|"
+    r"closest to|by|between|"
     r"under|beneath|on top of|left of|right of|to the (?:left|right) of|opposite|inside|in|on)"
     r" .+?)(?: please)?"
 )

@@ -96,7 +96,8 @@ _FROM: Final = ((re.compile(r"\b(?:from|off(?: of)?) (?!me\b)"), "on "),
                 (re.compile(r"\bout of "), "in "))  # fmt: skip
 _IN_HAND: Final = re.compile(
     r"(?:what|whatever|the thing|the one|the object|everything)(?: that)?"
-    r"(?: you (?:are holding|hold|have|have got|carry|are carrying)"
+    r"(?: you (?:(?:are|re) (?:holding|carrying)|hold|have|have got|ve|ve got|got|carry)"
+    r"(?: in your(?: (?P<hand2>left|right))? hands?)?"
     r"|(?: is|s| you have)? in (?:your|the) (?:(?P<hand>left|right) )?hands?)"
 )
 _WHERE_IT_IS: Final = re.compile(r"^where (.+) (?:is|are|stands?|lies?)$")
@@ -142,7 +143,8 @@ def _read(text: str, named: tuple[tuple[str, str], ...]) -> Expression | None:
         return Expression(said=key, query=Query(), pronoun=pronoun)
     in_hand = _IN_HAND.fullmatch(said)
     if in_hand:
-        return Expression(said=key, query=Query(), pronoun=phrases.HELD, hand=in_hand["hand"] or "")
+        hand = in_hand["hand"] or in_hand["hand2"] or ""
+        return Expression(said=key, query=Query(), pronoun=phrases.HELD, hand=hand)
     said, to_me = _order_by_whom(" ".join(_TOKEN.findall(_plain(reworded(text, furniture)))))
     parts = parted(_WHERE_IT_IS.sub(r"\1", said))
     read = _description(parts, key, by_speaker or to_me, furniture)

@@ -1,11 +1,14 @@
 """Find the things of a scene that an expression fits, and that can play the part asked of them."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from enum import StrEnum
+from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
 from vla_deploy.planning.understanding.expressions import Expression
+from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.parting import Place
 from vla_deploy.planning.understanding.selection import (
     by_distance,
@@ -20,7 +23,10 @@ from vla_deploy.planning.understanding.selection import (
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, Viewpoint, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
+from vla_deploy.world.resting import IN
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
+
+BESIDE: Final = "next to"
 
 
 class Use(StrEnum):
@@ -52,6 +58,9 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     if query.relation in FROM_A_VIEW and (view is None or setting.request.scene is None):
         raise DependsOnView(read.said, OBJECT_CLASSES)
     found = find(replace(query, order=""), setting.scene, view)
+    found = found or _beside_at_a_distance(query, setting) or _in_room(query, setting)
+    if read.is_other and use is Use.PUT and not read.query.is_named:
+        found = [one for one in setting.scene.things if one.held_by] or found
     if read.place is None:
         found = [one for one in found if suits(one, use, query, setting)]
     else:  # what cannot be taken is counted all the same
@@ -65,6 +74,36 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
         meant = told_apart(other, _described_by(other, found, setting), setting)
         found = [one for one in found if one not in meant]
     return _best_kinds(found, read)
+
+
+def _beside_at_a_distance(query: Query, setting: Setting) -> list[Thing]:
+    """Return the nearest on the same furniture where nothing stands right next to a thing."""
+    anchors = find(query.anchor, setting.scene) if query.anchor and query.relation == BESIDE else []
+    if len(anchors) != 1 or anchors[0].rests is None:
+        return []
+    alone = find(replace(query, relation="", anchor=None, order=""), setting.scene)
+    on_it = [
+        one
+        for one in alone
+        if one is not anchors[0] and one.rests and one.rests.of == anchors[0].rests.of
+    ]
+    return by_distance(on_it, anchors[0].xy_m)[:1]
+
+
+def _in_room(query: Query, setting: Setting) -> list[Thing]:
+    """Return what stands on the furniture of a room, where "in the kitchen" names no furniture."""
+    world = setting.request.world
+    room = query.anchor.surface if query.anchor is not None and query.relation == IN else ""
+    table = surface_of(room, world) if room else ""
+    if table in ("", room):
+        return []
+    alone = find(replace(query, relation="", anchor=None, order=""), setting.scene)
+    there = {table, *(one.thing_id for one in setting.scene.things if _rests_on(one, {table}))}
+    return [one for one in alone if _rests_on(one, there)]
+
+
+def _rests_on(thing: Thing, names: Collection[str]) -> bool:
+    return thing.rests is not None and thing.rests.of in names
 
 
 def told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[Thing]:

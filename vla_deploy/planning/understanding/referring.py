@@ -11,7 +11,7 @@ from vla_deploy.planning.symbolic.conditions import PUT_INTO
 from vla_deploy.planning.symbolic.state import Held, Pose, State
 from vla_deploy.planning.symbolic.subjects import subject_of
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.conversation import Role
+from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.insertions import (
@@ -79,12 +79,28 @@ def pose_parameters(pose: Pose) -> dict[str, float]:
     return {"x_m": round(x_m, 3), "y_m": round(y_m, 3), "yaw_rad": yaw_rad}
 
 
-def _thing_unless_place(text: str, resolver: Resolver, use: Use) -> Referent | None:
+def _spoken_there(resolver: Resolver, use: Use, *, into: bool) -> Mention | None:
+    """Return what "there" was spoken of last: not what is being moved, nor what takes nothing."""
+    setting = resolver.setting
+    for one in setting.spoken_of():
+        if use is not Use.ONTO:
+            return one
+        is_moved = one in setting.mentions and one.role is Role.OBJECT
+        if one.role is Role.PLACE and not into:
+            return one
+        if not is_moved and (one.role is Role.DESTINATION or one.kind in PUT_INTO):
+            return one
+    return None
+
+
+def _thing_unless_place(
+    text: str, resolver: Resolver, use: Use, *, into: bool = False
+) -> Referent | None:
     """Return the thing that a text names, None where it names a place by its name or no thing."""
     if match_place(text, resolver.setting.request.world.places):
         return None
     if phrases.PRONOUNS.get(_spoken(text)) == phrases.THERE:
-        latest = next(iter(resolver.setting.spoken_of()), None)
+        latest = _spoken_there(resolver, use, into=into)
         if latest is None or latest.role is Role.PLACE:
             return None
         text = latest.thing_id or latest.means
@@ -188,7 +204,7 @@ def _destination(given: Parameters, resolver: Resolver, state: GetState) -> Para
     relation = given.get("relation")
     if text is None or phrases.PRONOUNS.get(_spoken(text)) == phrases.HERE:
         return _put_here(text or "down", resolver, state())
-    thing = _thing_unless_place(text, resolver, Use.ONTO)
+    thing = _thing_unless_place(text, resolver, Use.ONTO, into=relation == "in")
     if thing is not None:
         default = "in" if thing.kind in PUT_INTO else "on"
         return {"destination": thing.name, "relation": relation or default}

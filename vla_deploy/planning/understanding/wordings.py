@@ -20,6 +20,9 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"\b(is|are)n'?t\b", r"\1 not"),
     (r"\b(that|which|who|one)'s\b", r"\1 is"),
     (r"\b(is|are) neither (?=.+ nor )", r"\1 not "),
+    (r"^(?:what|whatever)(?:'s| is) (?:lying |standing |sitting )?"
+     r"(?=(?:on|in|inside|under|next to|behind|beside)\b(?! (?:your|the) (?:left |right )?hand))",
+     "the thing "),
     (r"^anything (?=but|except|other than|apart from)", "any object "),
     (rf"\bnon[- ]?{_COLOUR} (.+)", r"\2 that is not \g<colour>"),
     (rf"\b{_COLOUR}(?:[- ]colou?red| in colou?r)\b", r"\g<colour>"),

@@ -54,6 +54,8 @@ def test_an_utterance_of_any_form_has_a_clear_outcome(
     _, answer = desk.give(**utterance)
     allowed = CLEAR if utterance.get("text") == "go to the kitchen" else CLEAR[1:]
     assert answer.outcome in allowed, answer.text
+    if answer.outcome == "ask":
+        assert desk.say("never mind")[1].outcome == "refuse"
     assert_goes_on(desk)
 
 
