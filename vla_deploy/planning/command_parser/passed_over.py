@@ -64,6 +64,10 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"\b(?:in|after|every) (?:\w+ ){1,2}(?:minutes?|seconds?|hours?|days?)\b",
         rf"\bat (?:half past |quarter (?:past|to) )?{_HOUR}(?: o'clock)?$",
     ),
+    "it says what not to do as well": (
+        r"\b(?:but|and) (?:please )?(?:do not|don't|dont|never) "
+        r"(?!drop|spill|break|bump|forget|worry|hurry|rush|lose|wake|hit|crash|fall|run|be)\w+",
+    ),
     "I choose my speed myself": (r"\bper (?:second|minute|hour)\b",),
     "it tells or asks of something, instead of telling me to do it": (
         rf"{_BEGIN}(?:have|has|had) (?:you|i|we|he|she|they) (?!seen|noticed|found)",

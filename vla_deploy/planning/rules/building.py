@@ -10,8 +10,10 @@ from typing import Any, Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
 from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
 from vla_deploy.planning.understanding.places import is_like_place
 from vla_deploy.planning.understanding.quantities import quantity_of
@@ -95,16 +97,30 @@ def put(groups: Groups, request: Request) -> list[Step]:
     bare = match_place(destination, request.world.places)
     if said in _TOWARDS and bare is not None and bare not in request.world.furniture:
         return [*pick({**groups, "object": moved}, request), ("navigate_to", {"place": bare})]
-    relation = "in" if _WAY.sub("", said) in _INTO else "on"
-    where = {"destination": destination, "relation": relation, **_arm(groups)}
+    where: dict[str, Any] = {"destination": destination, **_arm(groups)}
+    if said not in _TOWARDS:
+        where["relation"] = "in" if _WAY.sub("", said) in _INTO else "on"
     return [("place", {"object": part, **where}) for part in parts_of(moved)]
 
 
 def put_there(groups: Groups, request: Request) -> list[Step]:
-    """Put each thing where was spoken of."""
-    del request
+    """Put each thing where was spoken of; what is there already is what shall be taken."""
+    if _is_there(groups["object"], request):
+        return pick(groups, request)
     where = {"destination": "there", **_arm(groups)}
     return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+
+
+def _is_there(text: str, request: Request) -> bool:
+    """Tell whether a thing stands at the place that was spoken of last."""
+    setting = Setting(request)
+    place = next((one.means for one in setting.spoken_of() if one.role is Role.PLACE), "")
+    try:
+        found = fitting(read_expression(text, setting.furniture), Use.TAKE, setting)
+    except UnknownObject:
+        return False
+    table = surface_of(place, request.world)
+    return bool(found) and all(one.rests is not None and one.rests.of == table for one in found)
 
 
 def split_put(text: str, request: Request) -> tuple[str, str, str]:

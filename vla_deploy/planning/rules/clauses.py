@@ -20,10 +20,11 @@ STOP_WORDS: Final = frozenset(
     }
 )  # fmt: skip
 _POLITE_BEFORE: Final = re.compile(
-    r"^(?:please|could you|can you|would you|will you|robot|butler|hey butler|hey robot|"
+    r"^(?:please|(?:would|do) you mind|could you|can you|would you|will you|mind|robot|butler|"
+    r"hey butler|hey robot|can(?= (?:go|come)\b)|"
     r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
     r"i would like you to|i'd like you to|i need you to|you should|you need to|you have to|you can|"
-    r"let's|lets|let us|go ahead and|first(?: of all)?|would you mind|do me a favou?r and|"
+    r"let's|lets|let us|go ahead and|first(?: of all)?|do me a favou?r and|"
     r"be so kind (?:and|as to)|be a dear and|how about you|how about|what about|"
     r"i was wondering if you (?:could|would)|i wonder if you (?:could|would)|"
     r"i'd (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
@@ -33,7 +34,7 @@ _POLITE_BEFORE: Final = re.compile(
     r"check|charge|dock|stand|park|turn|open|close|drop|leave|give)\b)|"
     r"come (?:and )?(?=(?:get|fetch|pick|take|help|look)\b)|"
     r"(?:would|will) you be able to|are you able to|is it possible (?:for you )?to|"
-    r"(?:could|can|may|might) i (?:ask|trouble|get|bother) you to|do you mind|"
+    r"(?:could|can|may|might) i (?:ask|trouble|get|bother) you to|"
     r"you(?:'d| had)? better|i'd like for you to|i would love (?:it )?(?:if you|for you to)|"
     r"be (?:a|an) (?:love|star|angel|pal|good \w+) and|"
     r"it would be (?:nice|great|good) if you(?: could)?|"
@@ -54,7 +55,8 @@ _POLITE_AFTER: Final = re.compile(
 # What likens a clause to another one, and says nothing where it can stand alone.
 _ECHO: Final = re.compile(r"[, ]*\b(?:again|too|also|as well|likewise|once more|(?<!the )first)$")
 _SPLIT: Final = re.compile(
-    r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|and|"
+    r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|"
+    r"(?<!\bgo )(?<!\btry )and|(?<=\bgo )and(?= (?:come|go|then|drive|return)\b)|"
     r"but(?= (?:then|hang|hold|keep|leave|bring|take|put|pick|come)\b))\b|[,;]|[.!?]\s)\s*"
 )
 # What people say while they think, and words said twice.

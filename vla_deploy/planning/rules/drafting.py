@@ -32,6 +32,12 @@ from vla_deploy.planning.understanding.phrases import PRONOUNS
 
 # What of a clause the next one may exchange.
 _THINGS: Final = ("object", "place", "what")
+_NEXT_VERB: Final = re.compile(
+    r"(?<!\bto )(?<!\bi )(?<!\bme )(?<!\byou )"
+    r"\b(?:get|fetch|grab|pick|take|put|bring|find|turn|go|drive|come|open|close|drop|place|look|wait|"
+    r"tell|say)\b(?= )"
+)
+_IN_THE_SIDE: Final = re.compile(r"\bin the (?:left|right)$")
 _TO_WHERE: Final = re.compile(r"\w (?:to|into|in|onto|on) (?:the|my|your) \w")
 _HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
 
@@ -102,6 +108,10 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     if repaired(clause) is not None:
         return _take_back(parts, draft)
     refuse_unable(clause)
+    two = _run_on(clause, draft.request)
+    if two is not None:
+        _take_clause(two[:1], draft)
+        return _take_clause((two[1], *parts[1:]), draft)
     clause, fit = _in_full(clause, draft)
     if fit is None:
         clause, fit = _with_verb(clause, draft, others=len(parts) > 1)
@@ -111,11 +121,23 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     return 1
 
 
+def _run_on(clause: str, request: Request) -> tuple[str, str] | None:
+    """Return the two clauses of "go to the kitchen get the can", said in one breath."""
+    if known_fit(clause, request) is not None:
+        return None
+    for found in _NEXT_VERB.finditer(clause):
+        two = clause[: found.start()].strip(), polite_off(clause[found.start() :])
+        if all(known_fit(one, request) is not None for one in two):
+            return two
+    return None
+
+
 def _with_verb(clause: str, draft: _Draft, *, others: bool) -> tuple[str, Fit | None]:
     """Return "take the phone in your left hand" for what leaves the verb out, and its rule.
 
     "The can in the box" is one thing by itself; beside other clauses it is something to do.
     """
+    clause = _IN_THE_SIDE.sub(r"\g<0> hand", clause) if names_hand(draft.clause) else clause
     if names_hand(clause):
         return f"take {clause}", known_fit(f"take {clause}", draft.request)
     if (others or draft.steps) and _TO_WHERE.search(clause):

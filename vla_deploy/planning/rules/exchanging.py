@@ -14,12 +14,16 @@ from vla_deploy.planning.rules.building import Groups, is_seen
 from vla_deploy.planning.rules.fits import Fit, fit_of, known_fit
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.phrases import PRONOUNS
+from vla_deploy.planning.understanding.quantities import number_of
 from vla_deploy.planning.understanding.setting import Setting
 
 # What of a clause can be exchanged by a part alone.
 _EXCHANGED: Final = frozenset({"object", "place", "destination", "quantity", "way", "what"})
 _MANNERS: Final = frozenset({"arm", "pace", "speed"})
 _ONE: Final = re.compile(r"(?<=\w )one(s?)\b")
+_HAND: Final = re.compile(r"(?:(?:in|with) )?(?:the |your )?(?P<side>left|right)(?: hand| one)?")
+_NAMED_HAND: Final = re.compile(r"\b(?:left|right)(?= hand\b)")
+_UNIT: Final = re.compile(r"\d+(?:\.\d+)? (?P<unit>[a-z]+)")
 _PREPOSITION: Final = re.compile(r"^(?:in|into|on|onto|at|to|from|with|for) ")
 _BEHIND: Final = re.compile(r" (?:in|into|on|onto|at|to|from|with|for) $")
 
@@ -51,6 +55,9 @@ def corrected(said: str, clause: str, request: Request) -> str:
     """
     if known_fit(said, request) is not None:
         return said
+    swapped = _with_other_hand(said, clause)
+    if swapped and known_fit(swapped, request) is not None:
+        return swapped
     known = [
         (whole, own)
         for whole, own in _exchanges(said, clause, request)
@@ -72,6 +79,21 @@ def of_kind(said: str, instead_of: str, request: Request) -> str:
     return _ONE.sub(rf"{kind}\1", said) if query.is_named else said
 
 
+def _with_other_hand(said: str, clause: str) -> str:
+    """Return "take it in your right hand" for "the right" after "take it in your left hand"."""
+    hand, named = _HAND.fullmatch(said), _NAMED_HAND.search(clause)
+    if hand is None or named is None:
+        return ""
+    return f"{clause[: named.start()]}{hand['side']}{clause[named.end() :]}"
+
+
+def _with_unit(words: str, instead_of: str) -> str:
+    """Return "60 degrees" for "60" where it stands for "30 degrees"."""
+    unit = _UNIT.fullmatch(instead_of)
+    number = number_of(words) if unit else None
+    return words if unit is None or number is None else f"{number:g} {unit['unit']}"
+
+
 def _exchanges(said: str, clause: str, request: Request) -> Iterator[tuple[str, str]]:
     """Yield each clause that an exchange can make, and the words in it; the last part first."""
     before = fit_of(clause, request)
@@ -81,7 +103,7 @@ def _exchanges(said: str, clause: str, request: Request) -> Iterator[tuple[str, 
         named.append(f"{groups['relation']} {groups['destination']}")
     for words in dict.fromkeys((said, _PREPOSITION.sub("", said))):
         for value in sorted(named, key=clause.rfind, reverse=True):
-            at, own = clause.rfind(value), of_kind(words, value, request)
+            at, own = clause.rfind(value), _with_unit(of_kind(words, value, request), value)
             # "In the bedroom" takes the place of "in the kitchen", not of "the kitchen".
             if not (_PREPOSITION.match(words) and _BEHIND.search(clause[:at])):
                 yield clause[:at] + own + clause[at + len(value) :], own

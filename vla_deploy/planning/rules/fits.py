@@ -25,6 +25,7 @@ _IN_A_HAND: Final = re.compile(
     r"(?:the|your) other(?: hand| one)?)"
 )
 HANDS: Final = re.compile(r"\bin (?:your|the) (?:left|right)\b")
+_FETCHES: Final = re.compile(r"(?:get|fetch|grab|take|pick|bring)\b")
 _PACE: Final = re.compile(r",?\b(?:very |really |nice and )?(?:slowly|slow|carefully|gently)\b")
 _MANNERS: Final = (
     _WITH_HAND,
@@ -47,10 +48,11 @@ class Fit:
 def fit_of(clause: str, request: Request) -> Fit | None:
     """Return the first rule that fits and names only what is known, else the first that fits.
 
-    What is "for me" may as well not be said.
+    What is "for me" may as well not be said, unless it is brought.
     """
     first: Fit | None = None
-    for said in dict.fromkeys((clause, clause.removesuffix(" for me"))):
+    ways = (clause, clause.removesuffix(" for me"))
+    for said in dict.fromkeys(ways if _FETCHES.match(clause) else ways[::-1]):
         for fit in _fits(said):
             if is_known(fit, request):
                 return fit

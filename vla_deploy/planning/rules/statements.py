@@ -53,6 +53,13 @@ _IT_IS_AT: Final = re.compile(
     r"(?:it|they)(?:'s|'re| is| are| should be| must be| might be| may be)(?: still| probably)? "
     r"(?:lying |standing )?(?:in|on|at|by) (?P<place>.+)"
 )
+_BELONGS: Final = re.compile(
+    r"(?:the|my|our|this|that|these|those|it|they)\b.* (?:belongs?|lives?|goes|go) (?:in|on|at|to) "
+)
+_PUT_THERE: Final = re.compile(
+    r"(?:so |please )*(?:put|pop|stick|place|set|take|drop|bring|move) (?:it|them|that one) "
+    r"(?:back )?(?:(?:in |on |over )?there|where (?:it|they) belongs?)"
+)
 _POINTS: Final = re.compile(r"\b(?:it|them|they|those)\b")
 _NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P<place>.+)")
 _NOT_THAT: Final = re.compile(r"(?:no )?not (?P<thing>(?:the|that|this|my) .+|that|this|it)")
@@ -66,7 +73,7 @@ def begins_with_statement(text: str) -> bool:
 
 def statements_off(parts: Sequence[str], request: Request) -> list[str]:
     """Return the parts of a command that ask for something, with what the others lend them."""
-    told = _found_where_told(list(parts), request)
+    told = _said_once(_found_where_told(list(parts), request))
     asking = [part for part in told if not _BESIDE.fullmatch(part)] or told
     return _told_off(_not_that_off(_not_there_off(asking, request), request), request)
 
@@ -82,6 +89,15 @@ def _found_where_told(parts: list[str], request: Request) -> list[str]:
         first = [] if seen or not is_one(found["place"], request) else [f"go to {found['place']}"]
         return [*parts[: at - 1], *first, parts[at - 1], *parts[at + 1 :]]
     return parts
+
+
+def _said_once(parts: list[str]) -> list[str]:
+    """Leave out "put it there" behind "the cup belongs on the table": that says it already."""
+    return [
+        part
+        for at, part in enumerate(parts)
+        if not (at and _PUT_THERE.fullmatch(part) and _BELONGS.match(parts[at - 1]))
+    ]
 
 
 def _told_off(parts: list[str], request: Request) -> list[str]:

@@ -138,7 +138,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling) "
      rf"{_OBJECT} (?:down |away |back )?(?P<relation>into|inside|in|onto|on top of|on) "
      r"(?P<destination>.+)", building.put),
-    (Intent.MANIPULATION, rf"(?:put|place|take|bring|carry|move) {_OBJECT} "
+    (Intent.MANIPULATION, r"(?:put|place|take|bring|carry|move|pop|stick|chuck|drop|set|lay) "
+     rf"{_OBJECT} "
      r"(?P<destination>(?:over |back )?there)", building.put_there),
     (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand) {_OBJECT} (?:down )?on "
      r"(?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of (?:you|me|us)",

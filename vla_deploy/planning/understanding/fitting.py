@@ -1,5 +1,6 @@
 """Find the things of a scene that an expression fits, and that can play the part asked of them."""
 
+import math
 from collections.abc import Collection
 from dataclasses import replace
 from enum import StrEnum
@@ -7,7 +8,7 @@ from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
-from vla_deploy.planning.understanding.expressions import Expression
+from vla_deploy.planning.understanding.expressions import Expression, Scope
 from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.parting import Place
 from vla_deploy.planning.understanding.selection import (
@@ -68,7 +69,7 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     if read.support:
         found = [one for one in found if one.rests and one.rests.of in read.support]
     if read.is_other:
-        before = setting.latest_id(read.query)
+        before = setting.latest_id(replace(query, is_named=query.kind != ANY_CLASS))
         found = [one for one in found if before is None or not one.is_called(before)]
     for other in read.besides:
         meant = told_apart(other, _described_by(other, found, setting), setting)
@@ -155,9 +156,10 @@ def _by_nearness(
 ) -> list[Thing]:
     """Return the nearest to another thing, or the farthest; none where that is not known."""
     others = told_apart(near, _described_by(near, list(setting.scene.things), setting), setting)
-    if len(others) != 1:
+    if not others or (len(others) > 1 and near.scope is not Scope.ALL):
         return found if others else []
-    row = by_distance([one for one in found if one not in others], others[0].xy_m)
+    row = [one for one in found if one not in others]
+    row.sort(key=lambda one: min(math.dist(one.xy_m, other.xy_m) for other in others))
     return row[:1] if ORDERS[read.order] > 0 else row[-1:]
 
 
