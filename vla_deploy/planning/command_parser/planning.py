@@ -16,7 +16,7 @@ from vla_deploy.planning.command_parser.spans import find_span
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.rules import building, cleaning, moving, telling
+from vla_deploy.planning.rules import building, cleaning, moving, placing, telling
 from vla_deploy.planning.understanding.insertions import is_surface
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
@@ -157,7 +157,7 @@ def _put(steps: Steps, step: Step) -> list[Skill]:
     way, _ = steps.source(step)
     things = steps.things(step)
     if "where" not in step:
-        down = building.put_away if steps.says("away") else _put_down
+        down = placing.put_away if steps.says("away") else _put_down
         return way + down({"object": things}, steps.request)
     where = {"destination": steps.spoken(step, "where")}
     where |= {} if relation == "to" else {"relation": relation}

@@ -10,16 +10,13 @@ from typing import Any, Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
 from vla_deploy.planning.references import match_place, words_of
-from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.insertions import surface_of
-from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
+from vla_deploy.planning.understanding.phrases import PRONOUNS
 from vla_deploy.planning.understanding.places import is_like_place
 from vla_deploy.planning.understanding.quantities import quantity_of
 from vla_deploy.planning.understanding.referring import pose_parameters
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 Groups = Mapping[str, str]
 Step = tuple[str, dict[str, Any]]
@@ -28,8 +25,6 @@ Builder = Callable[[Groups, Request], list[Step]]
 SLOW_RATIO: Final = 0.4
 # "Go back" alone is about the command before; in a longer one it is about where that began.
 MOST_WORDS_ALONE: Final = 4
-# What "put it away" means where nothing else is said.
-STORE: Final = "box"
 _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
@@ -37,7 +32,7 @@ _PUT_RELATION: Final = re.compile(
     r"(?:^| )(?:(?:back|over|up|down) )?"
     r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
 )
-_NO_THING: Final = re.compile(
+NO_THING: Final = re.compile(
     r"^(?:the |my |your )?(?:far |very )?(?:left|right|middle)$|\b(?:is|are|that|which|farthest|"
     r"furthest|not|lying|standing|sitting|resting)$"
 )
@@ -46,7 +41,6 @@ _SAYS_MORE: Final = re.compile(
     r"'|\b(?:not|but|except|other than|that is|which)\b"
     r"|^(?:two|three|four|both|all|some|an? (?:couple|pair) of)\b"
 )
-_WAY: Final = re.compile(r"^(?:back|over|up|down) ")
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 
 
@@ -79,48 +73,8 @@ def go_back(_: Groups, request: Request) -> list[Step]:
 
 def pick(groups: Groups, _: Request) -> list[Step]:
     """Take each thing."""
-    arm = _arm(groups)
+    arm = arm_in(groups)
     return [("pick_up", {"object": part, **arm}) for part in parts_of(groups["object"])]
-
-
-def put(groups: Groups, request: Request) -> list[Step]:
-    """Put each thing somewhere, fetching it first.
-
-    Raises:
-        UnknownObject: where to is no more than a side.
-    """
-    moved, said, destination = split_put(
-        f"{groups['object']} {groups['relation']} {groups['destination']}", request
-    )
-    if _NO_THING.search(destination):
-        raise UnknownObject(destination, OBJECT_CLASSES)
-    bare = match_place(destination, request.world.places)
-    if said in _TOWARDS and bare is not None and bare not in request.world.furniture:
-        return [*pick({**groups, "object": moved}, request), ("navigate_to", {"place": bare})]
-    where: dict[str, Any] = {"destination": destination, **_arm(groups)}
-    if said not in _TOWARDS:
-        where["relation"] = "in" if _WAY.sub("", said) in _INTO else "on"
-    return [("place", {"object": part, **where}) for part in parts_of(moved)]
-
-
-def put_there(groups: Groups, request: Request) -> list[Step]:
-    """Put each thing where was spoken of; what is there already is what shall be taken."""
-    if _is_there(groups["object"], request):
-        return pick(groups, request)
-    where = {"destination": "there", **_arm(groups)}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
-
-
-def _is_there(text: str, request: Request) -> bool:
-    """Tell whether a thing stands at the place that was spoken of last."""
-    setting = Setting(request)
-    place = next((one.means for one in setting.spoken_of() if one.role is Role.PLACE), "")
-    try:
-        found = fitting(read_expression(text, setting.furniture), Use.TAKE, setting)
-    except UnknownObject:
-        return False
-    table = surface_of(place, request.world)
-    return bool(found) and all(one.rests is not None and one.rests.of == table for one in found)
 
 
 def split_put(text: str, request: Request) -> tuple[str, str, str]:
@@ -157,7 +111,7 @@ def is_one(text: str, request: Request) -> bool:
 
     A side alone is neither, nor is what breaks off: "the cup that is".
     """
-    if _NO_THING.search(text):
+    if NO_THING.search(text):
         return False
     if is_like_place(_NEAR.sub("", text), request.world.places):
         return True
@@ -166,48 +120,6 @@ def is_one(text: str, request: Request) -> bool:
     except UnknownObject:
         return False
     return True
-
-
-def leave_here(groups: Groups, request: Request) -> list[Step]:
-    """Put down here what of things is held; what is not held stays where it is by itself."""
-    said = groups["object"]
-    setting = Setting(request)
-    read = read_expression(said, setting.furniture)
-    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
-    if not held and not read.pronoun:
-        return [("speak", {"text": "I leave it where it is."})]
-    return [("place", {"object": said, "destination": "here", **_arm(groups)})]
-
-
-def want(groups: Groups, request: Request) -> list[Step]:
-    """Bring "the cup on the table" where one is there, else put the cup on the table."""
-    whole = f"{groups['object']} {groups['relation']} {groups['destination']}"
-    if is_seen(whole, request):
-        return bring({**groups, "object": whole}, request)
-    return put(groups, request)
-
-
-def put_here(groups: Groups, _: Request) -> list[Step]:
-    """Put each thing on what the robot stands before."""
-    where = {"destination": "here", **_arm(groups)}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
-
-
-def keep(groups: Groups, request: Request) -> list[Step]:
-    """Go on holding what is held; take what is not."""
-    said = groups["object"]
-    setting = Setting(request)
-    read = read_expression(said, setting.furniture)
-    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
-    if held or read.pronoun:
-        return [("speak", {"text": "I keep it."})]
-    return pick(groups, request)
-
-
-def put_into_that(groups: Groups, _: Request) -> list[Step]:
-    """Put each thing into what was spoken of."""
-    where = {"destination": "there", "relation": "in", **_arm(groups)}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
 
 
 def pick_from(groups: Groups, request: Request) -> list[Step]:
@@ -221,28 +133,6 @@ def pick_from(groups: Groups, request: Request) -> list[Step]:
 
 def _out_of(text: str, source: str) -> str:
     return text if text in PRONOUNS else f"{text} out of {source}"
-
-
-def put_down(groups: Groups, request: Request) -> list[Step]:
-    """Put down what is held; with one thing in hand, or none, "it" tells nothing more."""
-    said = groups.get("object", "it")
-    if said in ("everything", "all", "both", "both of them"):
-        said = "everything you are holding"
-    held = [kind for kind in request.world.holding.values() if kind]
-    named = {"object": said} if len(held) > 1 or PRONOUNS.get(said) != IT else {}
-    return [("place", {**named, **_arm(groups)})]
-
-
-def empty_hand(groups: Groups, _: Request) -> list[Step]:
-    """Put down what a hand holds."""
-    arm = _arm(groups)
-    return [("place", {"object": f"what is in your {arm.get('arm', '')} hand", **arm})]
-
-
-def put_away(groups: Groups, _: Request) -> list[Step]:
-    """Put things into the box."""
-    where = {"destination": STORE, "relation": "in"}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
 
 
 def bring(groups: Groups, request: Request) -> list[Step]:
@@ -285,7 +175,7 @@ def look_around(groups: Groups, _: Request) -> list[Step]:
 def gripper(groups: Groups, _: Request) -> list[Step]:
     """Open or close a hand."""
     verb = "close" if groups["verb"] in ("close", "shut") else "open"
-    return [(f"{verb}_gripper", _arm(groups))]
+    return [(f"{verb}_gripper", arm_in(groups))]
 
 
 def pose(groups: Groups, request: Request) -> list[Step]:
@@ -293,12 +183,12 @@ def pose(groups: Groups, request: Request) -> list[Step]:
     words = groups["pose"].strip().replace(" ", "_")
     if words not in request.world.poses:
         raise NotUnderstood(" ".join(groups.values()))
-    return [("move_arm", {"pose": words, **_arm(groups)})]
+    return [("move_arm", {"pose": words, **arm_in(groups)})]
 
 
 def tuck(groups: Groups, _: Request) -> list[Step]:
     """Fold the arms in for driving."""
-    return [("move_arm", {"pose": "tuck", **_arm(groups)})]
+    return [("move_arm", {"pose": "tuck", **arm_in(groups)})]
 
 
 def hold(_: Groups, __: Request) -> list[Step]:
@@ -348,12 +238,11 @@ def speed_in(groups: Groups, request: Request) -> dict[str, Any]:
     return {"speed_m_s": SLOW_RATIO * most_m_s} if "pace" in groups and most_m_s else {}
 
 
-def _arm(groups: Groups) -> dict[str, Any]:
+def arm_in(groups: Groups) -> dict[str, Any]:
+    """Return which hand to take, where it is said."""
     return {"arm": groups["arm"]} if groups.get("arm") in ("left", "right") else {}
 
 
-_TOWARDS: Final = frozenset({"to", "over to", "back to", "at"})
-_INTO: Final = frozenset({"in", "into", "inside", "inside of"})
 _DIRECTIONS: Final = {
     "ahead": "ahead", "forward": "ahead", "forwards": "ahead", "straight": "ahead",
     "straight ahead": "ahead", "left": "left", "right": "right", "up": "up", "down": "down",

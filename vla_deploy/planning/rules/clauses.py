@@ -104,11 +104,13 @@ def is_stop(text: str) -> bool:
     """Tell whether a command means: stop what you are doing."""
     if len(text) > MOST_LETTERS:
         return False
-    sentences = [one for one in _SENTENCE.split(text) if words_of(one)]
+    said = [one for one in _SENTENCE.split(text) if words_of(one)]
+    sentences = [one for one in said if not _URGING.fullmatch(" ".join(words_of(one)))]
     return bool(sentences) and all(map(_is_stop, sentences))
 
 
 _SENTENCE: Final = re.compile(r"[.!?;]+")
+_URGING: Final = re.compile(r"(?:and|but|no|oh|hey|please|robot|butler|just|now| )+")
 
 
 def _is_stop(text: str) -> bool:

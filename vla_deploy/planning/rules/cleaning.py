@@ -10,7 +10,8 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
 from vla_deploy.planning.references import match_place, words_of
-from vla_deploy.planning.rules.building import STORE, Groups, Step, look_around, parts_of
+from vla_deploy.planning.rules.building import Groups, Step, look_around, parts_of
+from vla_deploy.planning.rules.placing import STORE
 from vla_deploy.world import Thing
 
 MOST_THINGS: Final = 6

@@ -23,7 +23,6 @@ _MANNERS: Final = frozenset({"arm", "pace", "speed"})
 _ONE: Final = re.compile(r"(?<=\w )one(s?)\b")
 _HAND: Final = re.compile(r"(?:(?:in|with) )?(?:the |your )?(?P<side>left|right)(?: hand| one)?")
 _NAMED_HAND: Final = re.compile(r"\b(?:left|right)(?= hand\b)")
-_UNIT: Final = re.compile(r"\d+(?:\.\d+)? (?P<unit>[a-z]+)")
 _PREPOSITION: Final = re.compile(r"^(?:in|into|on|onto|at|to|from|with|for) ")
 _BEHIND: Final = re.compile(r" (?:in|into|on|onto|at|to|from|with|for) $")
 
@@ -89,9 +88,9 @@ def _with_other_hand(said: str, clause: str) -> str:
 
 def _with_unit(words: str, instead_of: str) -> str:
     """Return "60 degrees" for "60" where it stands for "30 degrees"."""
-    unit = _UNIT.fullmatch(instead_of)
-    number = number_of(words) if unit else None
-    return words if unit is None or number is None else f"{number:g} {unit['unit']}"
+    before, _, unit = instead_of.rpartition(" ")
+    is_amount = bool(before) and number_of(before) is not None and number_of(words) is not None
+    return f"{words} {unit}" if is_amount else words
 
 
 def _exchanges(said: str, clause: str, request: Request) -> Iterator[tuple[str, str]]:

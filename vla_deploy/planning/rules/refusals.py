@@ -28,8 +28,8 @@ REFUSALS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
          r"(?:\bat\b|\bout\b|\boff\b|\baway\b|\bdown the\b|\bme\b|\bhim\b|\bher\b|\bsomeone\b|"
          r"\bperson\b|\bpeople\b|\bdog\b|\bcat\b|\bchild\b|\bbaby\b|\bwall\b|\bwindow\b).*",
          "I do not throw or hit; I can put it somewhere"),
-        (r"(?:put|place|set|lay|leave|drop|move) .+ (?:next to|beside|near|behind|in front of|"
-         r"under|underneath|between|(?:to the )?(?:left|right) of) "
+        (r"(?:put|place|set|lay|leave|drop|move) .+ (?:next to|beside|near|behind|"
+         r"in front of(?! (?:you|me|us)$)|under|underneath|between|(?:to the )?(?:left|right) of) "
          r"(?!.*\b(?:in|into|on|onto|inside|to)\b).+",
          "I put things in or on something, not beside or under it"),
         (r"(?:climb|go (?:up|down) the (?:stairs|steps)|jump|fly|swim)\b.*",

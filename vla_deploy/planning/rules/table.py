@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.planning.rules import building, cleaning, moving, returning, telling
+from vla_deploy.planning.rules import building, cleaning, moving, placing, returning, telling
 from vla_deploy.planning.rules.building import Builder
 from vla_deploy.planning.rules.intents import Intent
 from vla_deploy.planning.understanding.quantities import NUMBER
@@ -84,7 +84,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      building.bring),
     (Intent.MANIPULATION, r"i(?:'d| would)? (?:want|need|like) "
      r"(?P<object>(?:the|my|that|this|those|these|both|all) .+?) (?:to (?:be|go) |put |moved )?"
-     rf"(?:back )?{_INTO} (?P<destination>.+)", building.want),
+     rf"(?:back )?{_INTO} (?P<destination>.+)", placing.want),
     (Intent.MANIPULATION, rf"(?:bring|carry|take|fetch|get|hand|give|deliver|pass) {_OBJECT} "
      r"(?:over )?(?:here|(?:back )?to me)", building.bring),
     (Intent.MANIPULATION, rf"(?:get|fetch|grab|take|pick up|bring) {_OBJECT} for me|"
@@ -108,48 +108,48 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     # --- keep
     (Intent.MANIPULATION, r"(?:keep|hang on to|hang onto|hold on to|hold onto|keep (?:a )?hold of|"
      rf"keep holding(?: on to)?|don't (?:put down|drop|let go of)) {_OBJECT}"
-     r"(?: in your (?:left |right )?hands?)?", building.keep),
+     r"(?: in your (?:left |right )?hands?)?", placing.keep),
     # --- put
+    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand) {_OBJECT} (?:down )?on "
+     r"(?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of (?:you|me|us)",
+     placing.put_here),
     (Intent.MANIPULATION, rf"(?:put|drop|pop|stick|place|throw|set|lay) {_OBJECT} in(?:side)?",
-     building.put_into_that),
+     placing.put_into_that),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry) {_OBJECT} "
      r"(?:back )?(?:to )?where (?:it|they|that|you) (?:(?:was|were|came from|belongs?|had been)"
      r"(?: before)?|(?:found|got|took|had) (?:it|them)(?: from)?)", returning.put_back),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay) back {_OBJECT} {_INTO} (?P<destination>.+)",
-     building.put),
+     placing.put),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay) {_OBJECT} back(?: again)?|"
      r"(?:put|set|place|lay) back (?P<object2>.+)", returning.put_back),
     (Intent.MANIPULATION, rf"(?:put|set|lay|place) {_OBJECT} (?:back )?down|"
      r"(?:put|set|lay) down (?P<object2>.+?)",
-     building.put_down),
+     placing.put_down),
     (Intent.MANIPULATION, r"(?:let go(?: of)?|drop|release|let loose)(?: of)?(?: (?P<object>it|"
-     r"that|this|them))?", building.put_down),
-    (Intent.MANIPULATION, rf"(?:let go of|release|let loose of) {_OBJECT}", building.put_down),
-    (Intent.MANIPULATION, rf"(?:free|empty) {_HAND}", building.empty_hand),
+     r"that|this|them))?", placing.put_down),
+    (Intent.MANIPULATION, rf"(?:let go of|release|let loose of) {_OBJECT}", placing.put_down),
+    (Intent.MANIPULATION, rf"(?:free|empty) {_HAND}", placing.empty_hand),
     (Intent.MANIPULATION, rf"(?:tidy|clear|pack) {_OBJECT} (?:away|up) {_INTO} (?P<destination>.+)",
-     building.put),
+     placing.put),
     (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
-     r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", building.put_away),
+     r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", placing.put_away),
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|stow|store|"
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
-     rf"(?:down |away )?{_INTO} (?P<destination>.+)", building.put),
+     rf"(?:down |away )?{_INTO} (?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, rf"take {_OBJECT} (?P<relation>(?:back |over |up |down )?(?:to|into|onto|"
-     r"over to)|back (?:in|on)) (?P<destination>.+)", building.put),
+     r"over to)|back (?:in|on)) (?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling) "
      rf"{_OBJECT} (?:down |away |back )?(?P<relation>into|inside|in|onto|on top of|on) "
-     r"(?P<destination>.+)", building.put),
+     r"(?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, r"(?:put|place|take|bring|carry|move|pop|stick|chuck|drop|set|lay) "
      rf"{_OBJECT} "
-     r"(?P<destination>(?:over |back )?there)", building.put_there),
-    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand) {_OBJECT} (?:down )?on "
-     r"(?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of (?:you|me|us)",
-     building.put_here),
+     r"(?P<destination>(?:over |back )?there)", placing.put_there),
     (Intent.MANIPULATION, rf"(?:leave|keep|put|set|drop|lay|place) {_OBJECT} (?:down )?"
      r"(?:(?:right |over )?here(?: on (?:the|this) (?:table|desk|shelf|surface))?|"
-     r"on this (?:table|desk|shelf|surface)(?: here)?)", building.leave_here),
+     r"on this (?:table|desk|shelf|surface)(?: here)?)", placing.leave_here),
     (Intent.MANIPULATION, rf"{_SAID_OF} (?:goes|go|belongs?|lives?|(?:should|must|has to|have to|"
      rf"needs to|need to|ought to|can|wants to) (?:go|be|live)) (?:back )?{_INTO} "
-     r"(?P<destination>.+)", building.put),
+     r"(?P<destination>.+)", placing.put),
     # --- straight and turning
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come) (?P<little>{_LITTLE} )?{_WAY}"
      rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", moving.drive),

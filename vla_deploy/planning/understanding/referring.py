@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from typing import Any, Final
 
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
@@ -146,6 +147,8 @@ def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[S
         things = _to_put_down(things, state(), resolver)
     for thing in things:
         if thing is not None and _held(thing, state(), resolver) is None:
+            if _has_put(thing, destination, state(), resolver):
+                continue
             yield from _on_furniture(thing)
             yield "pick_up", {"object": thing.name, **_arm(given)}
         held = None if thing is None else _held(thing, state(), resolver)
@@ -153,6 +156,18 @@ def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[S
             {"arm": held.hand} if held is not None and held.hand and len(state().held) > 1 else {}
         )
         yield "place", {**put, **destination, **hand}
+
+
+def _has_put(thing: Referent, destination: Parameters, state: State, resolver: Resolver) -> bool:
+    """Tell whether the plan has put a thing there already: "take it to the box, drop it in"."""
+    scene = resolver.setting.request.scene
+    rest = state.rests.get(subject_of(thing.name, scene).key)
+    where = str(destination.get("destination", ""))
+    if rest is None or rest.of == where:
+        return rest is not None
+    with suppress(UnknownObject):  # a place by another name
+        return rest.of == subject_of(where, scene).key
+    return False
 
 
 def _to_put_down(

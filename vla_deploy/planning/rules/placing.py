@@ -1,0 +1,136 @@
+"""Build the steps of clauses that put things somewhere, or keep them in the hand."""
+
+import re
+from typing import Any, Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.rules.building import (
+    NO_THING,
+    Groups,
+    Step,
+    arm_in,
+    bring,
+    is_seen,
+    parts_of,
+    pick,
+    split_put,
+)
+from vla_deploy.planning.understanding.conversation import Role
+from vla_deploy.planning.understanding.expressions import read_expression
+from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.insertions import surface_of
+from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
+from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.world.vocabulary import OBJECT_CLASSES
+
+STORE: Final = "box"
+"""What "put it away" means where nothing else is said."""
+_WAY: Final = re.compile(r"^(?:back|over|up|down) ")
+_TOWARDS: Final = frozenset({"to", "over to", "back to", "at"})
+_INTO: Final = frozenset({"in", "into", "inside", "inside of"})
+
+
+def put(groups: Groups, request: Request) -> list[Step]:
+    """Put each thing somewhere, fetching it first.
+
+    Raises:
+        UnknownObject: where to is no more than a side.
+    """
+    moved, said, destination = split_put(
+        f"{groups['object']} {groups['relation']} {groups['destination']}", request
+    )
+    if NO_THING.search(destination):
+        raise UnknownObject(destination, OBJECT_CLASSES)
+    bare = match_place(destination, request.world.places)
+    if said in _TOWARDS and bare is not None and bare not in request.world.furniture:
+        return [*pick({**groups, "object": moved}, request), ("navigate_to", {"place": bare})]
+    where: dict[str, Any] = {"destination": destination, **arm_in(groups)}
+    if said not in _TOWARDS:
+        where["relation"] = "in" if _WAY.sub("", said) in _INTO else "on"
+    return [("place", {"object": part, **where}) for part in parts_of(moved)]
+
+
+def put_there(groups: Groups, request: Request) -> list[Step]:
+    """Put each thing where was spoken of; what is there already is what shall be taken."""
+    if _is_there(groups["object"], request):
+        return pick(groups, request)
+    where = {"destination": "there", **arm_in(groups)}
+    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+
+
+def _is_there(text: str, request: Request) -> bool:
+    """Tell whether a thing stands at the place that was spoken of last."""
+    setting = Setting(request)
+    place = next((one.means for one in setting.spoken_of() if one.role is Role.PLACE), "")
+    try:
+        found = fitting(read_expression(text, setting.furniture), Use.TAKE, setting)
+    except UnknownObject:
+        return False
+    table = surface_of(place, request.world)
+    return bool(found) and all(one.rests is not None and one.rests.of == table for one in found)
+
+
+def put_down(groups: Groups, request: Request) -> list[Step]:
+    """Put down what is held; with one thing in hand, or none, "it" tells nothing more."""
+    said = groups.get("object", "it")
+    if said in ("everything", "all", "both", "both of them"):
+        said = "everything you are holding"
+    held = [kind for kind in request.world.holding.values() if kind]
+    named = {"object": said} if len(held) > 1 or PRONOUNS.get(said) != IT else {}
+    return [("place", {**named, **arm_in(groups)})]
+
+
+def empty_hand(groups: Groups, _: Request) -> list[Step]:
+    """Put down what a hand holds."""
+    arm = arm_in(groups)
+    return [("place", {"object": f"what is in your {arm.get('arm', '')} hand", **arm})]
+
+
+def put_away(groups: Groups, _: Request) -> list[Step]:
+    """Put things into the box."""
+    where = {"destination": STORE, "relation": "in"}
+    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+
+
+def put_into_that(groups: Groups, _: Request) -> list[Step]:
+    """Put each thing into what was spoken of."""
+    where = {"destination": "there", "relation": "in", **arm_in(groups)}
+    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+
+
+def leave_here(groups: Groups, request: Request) -> list[Step]:
+    """Put down here what of things is held; what is not held stays where it is by itself."""
+    said = groups["object"]
+    setting = Setting(request)
+    read = read_expression(said, setting.furniture)
+    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
+    if not held and not read.pronoun:
+        return [("speak", {"text": "I leave it where it is."})]
+    return [("place", {"object": said, "destination": "here", **arm_in(groups)})]
+
+
+def want(groups: Groups, request: Request) -> list[Step]:
+    """Bring "the cup on the table" where one is there, else put the cup on the table."""
+    whole = f"{groups['object']} {groups['relation']} {groups['destination']}"
+    if is_seen(whole, request):
+        return bring({**groups, "object": whole}, request)
+    return put(groups, request)
+
+
+def put_here(groups: Groups, _: Request) -> list[Step]:
+    """Put each thing on what the robot stands before."""
+    where = {"destination": "here", **arm_in(groups)}
+    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+
+
+def keep(groups: Groups, request: Request) -> list[Step]:
+    """Go on holding what is held; take what is not."""
+    said = groups["object"]
+    setting = Setting(request)
+    read = read_expression(said, setting.furniture)
+    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
+    if held or read.pronoun:
+        return [("speak", {"text": "I keep it."})]
+    return pick(groups, request)
