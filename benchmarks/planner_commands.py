@@ -16,15 +16,25 @@ from pydantic import ValidationError
 
 from benchmarks.command import parser, show
 from benchmarks.planner_bounds import moves
-from benchmarks.planner_corpus import ASK, PLAN, REFUSE, command_kinds, commands
+from benchmarks.planner_corpus import (
+    ASK,
+    COMMAND_CORPORA,
+    COMMANDS,
+    PLAN,
+    REFUSE,
+    command_kinds,
+    commands,
+)
 from benchmarks.planner_desk import PROFILE, Answer, opened
 from benchmarks.planner_play import Judgement, Verdict, play_afresh
 from vla_deploy.planning.plan import Plan
 
 
-def measure(kinds: Sequence[str] = (), misses: bool = False) -> dict[str, Any]:
+def measure(
+    kinds: Sequence[str] = (), misses: bool = False, corpus: str = COMMANDS
+) -> dict[str, Any]:
     """Return the figures of all commands, or of some kinds; `misses` lists what went wrong."""
-    verdicts = [play_afresh(case) for case in commands(kinds)]
+    verdicts = [play_afresh(case) for case in commands(kinds, corpus)]
     models = opened(PROFILE)
     told = {"models": [rung.name for rung in models.rungs], "models_away": models.away}
     return told | report(verdicts) | ({"misses": _misses(verdicts)} if misses else {})
@@ -139,8 +149,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--kind", action="append", choices=command_kinds(), help="all by default"
     )
     arguments.add_argument("--misses", action="store_true", help="list what went wrong")
+    arguments.add_argument("--corpus", choices=COMMAND_CORPORA, default=COMMANDS)
     given = arguments.parse_args(argv)
-    show(measure(given.kind or (), given.misses), as_json=given.json)
+    show(measure(given.kind or (), given.misses, given.corpus), as_json=given.json)
     return 0
 
 

@@ -15,6 +15,10 @@ from benchmarks.planner_goals import Goal, parse_goal
 from benchmarks.planner_world import World
 
 CORPORA: Final = Path(__file__).parent / "corpora"
+COMMANDS: Final = "commands"
+COMMAND_CORPORA: Final = (COMMANDS, "everyday", "strangers")
+"""Three of commands: what the planner is measured by, what rules were written from, and what
+strangers said once, from which nothing may be learnt."""
 PLAN, ASK, REFUSE, STOP = "plan", "ask", "refuse", "stop"
 MUSTS: Final = (PLAN, ASK, REFUSE, STOP)
 _ID: Final = re.compile(r"[a-z]+_\d+")
@@ -73,17 +77,17 @@ def scenes() -> Mapping[str, Scene]:
     return MappingProxyType({name: _scene(told) for name, told in tomllib.loads(text).items()})
 
 
-def command_kinds() -> list[str]:
-    """Return the kinds of commands: a file each."""
-    return sorted(path.stem for path in (CORPORA / "commands").glob("*.jsonl"))
+def command_kinds(corpus: str = COMMANDS) -> list[str]:
+    """Return the kinds of commands of a corpus: a file each."""
+    return sorted(path.stem for path in (CORPORA / corpus).glob("*.jsonl"))
 
 
-def commands(kinds: Sequence[str] = ()) -> list[Case]:
+def commands(kinds: Sequence[str] = (), corpus: str = COMMANDS) -> list[Case]:
     """Return the commands of some kinds, of all by default."""
     return [
         case
-        for kind in kinds or command_kinds()
-        for case in _cases(CORPORA / "commands" / f"{kind}.jsonl", (PLAN,))
+        for kind in kinds or command_kinds(corpus)
+        for case in _cases(CORPORA / corpus / f"{kind}.jsonl", (PLAN,))
     ]
 
 

@@ -89,7 +89,7 @@ _COURTESY: Final = re.compile(
     r"(?:and )?(?:then )?you(?:'re| are) (?:all )?done|(?:and )?(?:you )?can go(?: now)?|"
     r"that(?:'s| is| will be| would be) (?:all|it|great|lovely|enough)|no (?:rush|hurry)|"
     r"(?:no,? )?(?:that's |it's |that was )?(?:the )?wrong one|take your time|"
-    r"good (?:robot|boy|girl|job)|well done|great|perfect"
+    r"good (?:robot|boy|girl|job)|well done|great|perfect|(?:my )?(?:dear|love|mate|darling)"
 )
 # At the beginning these ask for nothing either; later on they are a side, and something to do.
 _OPENING: Final = re.compile(r"right(?: then)?|look")

@@ -32,6 +32,11 @@ REFUSALS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
          r"in front of(?! (?:you|me|us)$)|under|underneath|between|(?:to the )?(?:left|right) of) "
          r"(?!.*\b(?:in|into|on|onto|inside|to)\b).+",
          "I put things in or on something, not beside or under it"),
+        (r"(?:carry|lift|move|push|pull|drag|shift|bring|take|pick up|raise|turn over) "
+         r"(?:up )?(?:the|that|this|my|our|your) (?:\w+ ){0,2}(?:table|sofa|couch|bed|chair|"
+         r"armchair|desk|shelf|cupboard|wardrobe|fridge|bookcase|furniture)"
+         r"(?: (?:up|over|away|out|closer|nearer|(?:in)?to|across|from|for|with|by)\b.*)?",
+         "furniture is too large and heavy for me"),
         (r"(?:climb|go (?:up|down) the (?:stairs|steps)|jump|fly|swim)\b.*",
          "I have wheels: I stay on the floor"),
     )

@@ -47,6 +47,7 @@ _BESIDE: Final = re.compile(
     r"i think (?:it|they)(?:'s|'re| is| are)\b.*|you (?:really )?can't miss (?:it|them)|"
     r"i(?:'m| am) (?:so |very |really |a bit )?"
     r"(?:thirsty|tired|hungry|cold|late|in a hurry|busy)\b.*|"
+    r"(?:now )?i (?:just |really )?(?:can't|cannot|don't) .*\bremember\b.*|"
     r"i (?:need|want) to (?:read|drink|leave|call|go)\b.*)"
 )
 _IT_IS_AT: Final = re.compile(
