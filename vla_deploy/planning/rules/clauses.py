@@ -5,6 +5,7 @@ from typing import Final
 
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.figures import in_figures
+from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 MOST_LETTERS: Final = 400
 # More clauses than that are no command that rules should answer.
@@ -22,6 +23,7 @@ STOP_WORDS: Final = frozenset(
 _POLITE_BEFORE: Final = re.compile(
     r"^(?:please|(?:would|do) you mind|could you|can you|would you|will you|mind|robot|butler|"
     r"hey butler|hey robot|can(?= (?:go|come)\b)|"
+    r"(?:then )?use (?:it|that|your (?:free|other) hand) to|"
     r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
     r"i would like you to|i'd like you to|i need you to|you should|you need to|you have to|you can|"
     r"let's|lets|let us|go ahead and|first(?: of all)?|do me a favou?r and|"
@@ -50,7 +52,8 @@ _POLITE_AFTER: Final = re.compile(
     r"when(?:ever)? you (?:can|get (?:a|the) (?:chance|moment|minute|second)|"
     r"have (?:a|the) (?:chance|moment|minute|second|time)|(?:are|get) (?:here|back|done|ready|"
     r"finished|home)|'re (?:here|back|done|ready|finished|home))|"
-    r"when you're (?:here|back|done|ready|finished|home))$|[.!?, ]+$"
+    r"when you're (?:here|back|done|ready|finished|home)|"
+    r"where (?:i|we) can (?:find|see|reach|get at) (?:it|them)(?: \w+)?)$|[.!?, ]+$"
 )
 # What likens a clause to another one, and says nothing where it can stand alone.
 _ECHO: Final = re.compile(r"[, ]*\b(?:again|too|also|as well|likewise|once more|(?<!the )first)$")
@@ -89,7 +92,10 @@ _COURTESY: Final = re.compile(
     r"(?:and )?(?:then )?you(?:'re| are) (?:all )?done|(?:and )?(?:you )?can go(?: now)?|"
     r"that(?:'s| is| will be| would be) (?:all|it|great|lovely|enough)|no (?:rush|hurry)|"
     r"(?:no,? )?(?:that's |it's |that was )?(?:the )?wrong one|take your time|"
-    r"good (?:robot|boy|girl|job)|well done|great|perfect|(?:my )?(?:dear|love|mate|darling)"
+    r"good (?:robot|boy|girl|job)|well done|great|perfect|do me a favou?r|"
+    r"(?:don't|do|haven't|have|isn't|is|aren't|are|can't|can|won't) (?:you|i|we|it|they)|"
+    r"not (?:a bit|any|one step|an inch|much)? ?(?:further|farther|more)|"
+    r"(?:my )?(?:dear|love|mate|darling)"
 )
 # At the beginning these ask for nothing either; later on they are a side, and something to do.
 _OPENING: Final = re.compile(r"right(?: then)?|look")
@@ -166,19 +172,23 @@ DOING: Final = {
 def plain(text: str) -> str:
     """Return a text in lower case without hesitation, with words in full that were run together."""
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
-    text = _REASON.sub("", text)
+    text = _REASON.sub("", _ASKED_BETWEEN.sub(", ", text))
     for pattern, full in _FORMS:
         text = pattern.sub(full, text)
     return in_figures(_TWICE.sub(r"\1", text))
 
 
 _VERBS: Final = "|".join(sorted({*DOING.values(), "stop", "clean", "search", "charge", "hang"}))
+# "Get my keys would you they are by the bed", said in one breath.
+_ASKED_BETWEEN: Final = re.compile(
+    r" (?:would you|could you|will you|please) (?=(?:they|it|i|he|she)\b)"
+)
 _REASON: Final = re.compile(
     r"^(?:i|we|you|there|they|he|she|somebody|someone|my \w+)"
     r"(?:'[a-z]+| am| is| are| will| have| has| need| want| got| had)? "
     r"(?!.*\b(?:if|when|until|unless)\b).+?,? so "
     rf"(?=(?:please |just |can you |could you )?(?:{_VERBS})\b)"
-    r"(?!.*\b(?:it|them|there|those|that)\b)"
+    rf"(?!(?:(?!\b(?:{'|'.join(OBJECT_CLASSES)})s?\b).)*\b(?:it|them|there|those|that)\b)"
 )
 """What is said before a command to say why; conditions are none."""
 

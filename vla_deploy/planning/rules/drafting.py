@@ -37,6 +37,7 @@ _NEXT_VERB: Final = re.compile(
     r"\b(?:get|fetch|grab|pick|take|put|bring|find|turn|go|drive|come|open|close|drop|place|look|wait|"
     r"tell|say)\b(?= )"
 )
+_INTO: Final = re.compile(r"\b(?:into|onto)\b")
 _IN_THE_SIDE: Final = re.compile(r"\bin the (?:left|right)$")
 _TO_WHERE: Final = re.compile(r"\w (?:to|into|in|onto|on) (?:the|my|your) \w")
 _HELP: Final = re.compile(r"(?:help|assist) me (?:to |with )?(?P<own>.+)")
@@ -140,7 +141,7 @@ def _with_verb(clause: str, draft: _Draft, *, others: bool) -> tuple[str, Fit | 
     clause = _IN_THE_SIDE.sub(r"\g<0> hand", clause) if names_hand(draft.clause) else clause
     if names_hand(clause):
         return f"take {clause}", known_fit(f"take {clause}", draft.request)
-    if (others or draft.steps) and _TO_WHERE.search(clause):
+    if (others or draft.steps or _INTO.search(clause)) and _TO_WHERE.search(clause):
         return f"put {clause}", known_fit(f"put {clause}", draft.request)
     return clause, None
 

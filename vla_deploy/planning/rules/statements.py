@@ -12,11 +12,14 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.building import Groups, is_one, is_seen, parts_of
+from vla_deploy.planning.rules.clauses import repaired
 from vla_deploy.planning.rules.fits import known_fit
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
 from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.world.vocabulary import OBJECT_CLASSES, SYNONYMS
 
+STOPS: Final = frozenset({"stop", "halt", "freeze"})
 _THING: Final = r"(?P<thing>(?:my|the|our) .+?)"
 _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
     re.compile(pattern)
@@ -52,7 +55,7 @@ _BESIDE: Final = re.compile(
 )
 _IT_IS_AT: Final = re.compile(
     r"(?:it|they)(?:'s|'re| is| are| should be| must be| might be| may be)(?: still| probably)? "
-    r"(?:lying |standing )?(?:in|on|at|by) (?P<place>.+)"
+    r"(?:lying |standing )?(?:in|on|at|by|beside|near|next to) (?P<place>.+)"
 )
 _BELONGS: Final = re.compile(
     r"(?:the|my|our|this|that|these|those|it|they)\b.* (?:belongs?|lives?|goes|go) (?:in|on|at|to) "
@@ -60,6 +63,18 @@ _BELONGS: Final = re.compile(
 _PUT_THERE: Final = re.compile(
     r"(?:so |please )*(?:put|pop|stick|place|set|take|drop|bring|move) (?:it|them|that one) "
     r"(?:back )?(?:(?:in |on |over )?there|where (?:it|they) belongs?)"
+)
+# Somebody's doings and states; not what one wants, forbids, or puts under a condition.
+_REMARK: Final = re.compile(
+    r"(?:and |but |because |since |as )?(?:i|we|he|she|they|you|it|there|that|nobody|somebody|"
+    r"someone|can't|cannot|couldn't|haven't|(?:my|your|our) \w+)"
+    r"(?:'(?:m|ve|ll|re|s|d))?\b(?!.*\b(?:must|should|shall|can you|"
+    r"need|needs|want|wants|wish|like|please|if|unless|until|when|whenever|after|before|later|"
+    r"tomorrow|tonight|don't|do not|not to|never|leave|instead|rather)\b).*"
+)
+_NAMED: Final = re.compile(
+    r"\b(?:the|my|our|your|a|an|that|this) (?:\w+ ){0,2}?"
+    rf"(?:{'|'.join(sorted({*OBJECT_CLASSES, *SYNONYMS}, key=len, reverse=True))})(?:e?s)?\b"
 )
 _POINTS: Final = re.compile(r"\b(?:it|them|they|those)\b")
 _NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P<place>.+)")
@@ -76,7 +91,30 @@ def statements_off(parts: Sequence[str], request: Request) -> list[str]:
     """Return the parts of a command that ask for something, with what the others lend them."""
     told = _said_once(_found_where_told(list(parts), request))
     asking = [part for part in told if not _BESIDE.fullmatch(part)] or told
-    return _told_off(_not_that_off(_not_there_off(asking, request), request), request)
+    asking = _told_off(_not_that_off(_not_there_off(asking, request), request), request)
+    return _remarks_off(asking, request)
+
+
+def _remarks_off(parts: list[str], request: Request) -> list[str]:
+    """Leave out what only tells of somebody or something, beside what asks for something.
+
+    The one thing that it names is what a pronoun of the rest means.
+    """
+    asking = [part for part in parts if not _is_remark(part) or known_fit(part, request)]
+    points = _POINTS.search(asking[0]) if asking else None
+    if points is None or _NAMED.search(asking[0][: points.start()]):
+        return asking or parts
+    told = " ".join(part for part in parts if part not in asking)
+    named = [found[0] for found in _NAMED.finditer(told)]
+    if len(named) > 1:
+        return parts
+    return [_POINTS.sub(named[0], asking[0], count=1), *asking[1:]] if named else asking
+
+
+def _is_remark(part: str) -> bool:
+    is_told = _REMARK.fullmatch(part) is not None and repaired(part) is None
+    is_told = is_told and not any(pattern.fullmatch(part) for pattern in _SAID)
+    return is_told and not STOPS.intersection(words_of(part))
 
 
 def _found_where_told(parts: list[str], request: Request) -> list[str]:

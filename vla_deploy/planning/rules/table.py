@@ -64,9 +64,10 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"(?:can|could) you (?:tell me|remember) |tell me |i wonder |i forgot )?where (?:i|we|you|"
      r"somebody|someone|he|she|they)(?:'ve| have|'s| has|'d| had)? (?:left|put|leave|dropped|laid) "
      rf"{_OBJECT}", telling.tell_or_find),
-    (Intent.QUESTION, rf"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
-     rf"have you seen|(?:do you (?:happen to |by any chance )?know|any idea|tell me|i wonder|"
-     rf"find out) where) {_OBJECT}(?: is| are| gone| has gone| got to)?(?: anywhere| somewhere)?",
+    (Intent.QUESTION, r"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
+     r"have you seen|you have(?:n't| not)(?: by any chance)? seen|(?:do you (?:happen to |by any "
+     rf"chance )?know|any idea|tell me|i wonder|find out) where) {_OBJECT}"
+     r"(?: is| are| gone| has gone| got to)?(?: anywhere| somewhere)?(?: have you)?",
      telling.tell_or_find),
     (Intent.QUESTION, rf"(?:do you see|is there|are there|see) (?:any |an? )?{_OBJECT}"
      r"(?: there| here| anywhere)?", telling.tell_whether),
@@ -82,6 +83,10 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     # --- bring
     (Intent.MANIPULATION, rf"(?:bring|fetch|get|give|hand|pass) (?:me|us) {_OBJECT}",
      building.bring),
+    (Intent.MANIPULATION, r"i(?:'d| would)? (?:want|need|like) (?P<object>(?:the|my|that|this|"
+     rf"those|these|both|all) .+) to (?:go|be|be put) (?:back )?{_INTO} (?P<destination>.+)",
+     placing.put),
+    (Intent.MANIPULATION, rf"box(?: up)? {_OBJECT}", placing.put_away),
     (Intent.MANIPULATION, r"i(?:'d| would)? (?:want|need|like) "
      r"(?P<object>(?:the|my|that|this|those|these|both|all) .+?) (?:to (?:be|go) |put |moved )?"
      rf"(?:back )?{_INTO} (?P<destination>.+)", placing.want),
@@ -98,6 +103,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"return|(?:and )?back (?:here|to me)", building.go_back),
     (Intent.NAVIGATION, r"(?:go|drive|come|move|navigate|return|walk|head|travel|roll|proceed|get|"
      rf"run)(?: back| over| on|)?(?: over)? (?:to|towards?|into|for) {_PLACE}", building.go),
+    (Intent.NAVIGATION, r"(?:off (?:you go|with you)|be off|off|(?:roll|trundle|nip|pop|scoot|hop|"
+     r"wander|zoom|run|dash|glide|cruise)(?: off| over| along| across)?)(?: back)? "
+     rf"(?:to|into|over to|through to) {_PLACE}", building.go),
     (Intent.NAVIGATION, rf"(?:take|bring|get) yourself (?:back )?to {_PLACE}|"
      r"to (?P<place2>the .+)", building.go),
     # --- wait

@@ -77,7 +77,9 @@ _SILENT: Final = frozenset(
         "your", "side", "and", "uh", "um", "er", "well", "just", "give", "me", "bring", "use",
         "from", "yes", "no", "rather", "other", "are", "which", "there", "over",
         "that's", "it's", "said", "oh", "sorry", "ah", "hm", "hmm", "actually", "thanks", "thank",
-        "you", "cheers", "ta", "mate", "dear", "love", "one's", "i'd", "like", "would", "think",
+        "you", "cheers", "ta", "mate", "dear", "love", "one's", "i'd", "like", "would",
+        "think", "was", "thinking",
+        "should", "have", "had",
     }
 )  # fmt: skip
 # Words of the questions themselves.

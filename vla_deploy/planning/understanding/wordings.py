@@ -37,6 +37,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (rf"\b(nearest|closest|nearer|closer|farthest) {_HERE}\b", r"\1"),
     (r"\bfarthest from (you|yourself|me|us|the robot)\b", r"farthest to \1"),
     # --- what points, and says nothing more
+    (r"^(.+?) (?:that is |lying |standing |sitting )?(?:right |just )?in front of (?:you|me|us)$",
+     r"\1"),
     (r"\b(?:over|right) there (?=(?:on|in|inside|under|next to|beside)\b)", ""),
     (r"^(.+) (?:over|right) there$", r"\1"),
     (r"\bback (?=(?:out of|from|off)\b)", ""),
