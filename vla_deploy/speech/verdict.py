@@ -24,7 +24,7 @@ OWN_RATIO: Final = 0.7
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 STOP_WITHIN_CONFIDENCE: Final = 0.5
-"""The same, of a stop word among others: more words may be misread as one."""
+"""The same, of a stop word anywhere among others: more words may be misread as one."""
 
 
 class Verdict(StrEnum):

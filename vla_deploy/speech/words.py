@@ -4,7 +4,12 @@ import re
 from typing import Final
 
 STOPS: Final = frozenset({"stop", "halt", "freeze"})
-_POLITE: Final = frozenset({"robot", "butler", "please", "now", "hey", "moving", "it", "that"})
+_POLITE: Final = frozenset(
+    {
+        "robot", "butler", "please", "now", "hey", "moving", "it", "that", "okay", "ok", "no", "oh",
+        "emergency", "right", "there", "at", "once", "immediately", "everything", "driving",
+    }
+)  # fmt: skip
 _COURTESIES: Final = frozenset(
     {"please", "thanks", "thank", "you", "um", "uh", "hm", "hmm", "ah", "oh", "er"}
 )

@@ -13,7 +13,7 @@ from vla_deploy import speech
 
 Array = NDArray[np.float32]
 SHIPPED = Path(speech.__path__[0]).parent / "models" / "commands-whisper"
-HEADS = 4
+HEADS = 8
 FRAMES = 64
 
 
@@ -79,11 +79,11 @@ def test_the_decoder_is_whole(weights: dict[str, Array]) -> None:
         at = f"decoder.layers.{layer}"
         for attention in ("self_attn", "encoder_attn"):
             for part in ("q_proj", "k_proj", "v_proj", "out_proj"):
-                assert shapes[f"{at}.{attention}.{part}.weight"] == (128, 128)
+                assert shapes[f"{at}.{attention}.{part}.weight"] == (256, 256)
             assert f"{at}.{attention}.k_proj.bias" not in shapes
-        assert shapes[f"{at}.fc1.weight"] == (512, 128)
-    assert shapes["decoder.embed_tokens.weight"] == (2150, 128)
-    assert shapes["decoder.embed_positions.weight"] == (448, 128)
+        assert shapes[f"{at}.fc1.weight"] == (1024, 256)
+    assert shapes["decoder.embed_tokens.weight"] == (2150, 256)
+    assert shapes["decoder.embed_positions.weight"] == (448, 256)
     assert np.abs(weights["decoder.embed_tokens.weight"]).max() < 2.0
 
 
