@@ -26,4 +26,6 @@ SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
     "thing": "object", "something": "object",
     "gray": "grey", "violet": "purple",
 })  # fmt: skip
+KIND_WORDS: Final = "|".join(sorted({*OBJECT_CLASSES, *SYNONYMS}, key=len, reverse=True))
+"""Part of a pattern that finds whatever a kind of thing is called; the longest words first."""
 FILLERS: Final = frozenset({"old", "new", "one", "storage"})

@@ -18,7 +18,7 @@ from vla_deploy.planning.rules.clauses import polite_off
 from vla_deploy.planning.understanding.expressions import Expression, read_expression
 from vla_deploy.planning.understanding.phrases import ORDINALS
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world.vocabulary import ANY_CLASS, ARTICLES, OBJECT_CLASSES, SYNONYMS
+from vla_deploy.world.vocabulary import ANY_CLASS, ARTICLES, KIND_WORDS, OBJECT_CLASSES, SYNONYMS
 
 _COMMA: Final = re.compile(r"\s*(?:[,;:]|\s[-\u2013\u2014]+\s|[.!?](?=\s))\s*")
 _ABOUT: Final = re.compile(r"^(?:as for|concerning|regarding|you see) (?=\w)")
@@ -47,7 +47,7 @@ _NEXT: Final = re.compile(r"\b(?:and|then)\b")
 _TOO: Final = re.compile(r"\b(?:too|also|as well)\b")
 _GENERIC: Final = re.compile(r"\b(?:thing|object|item|(?<=\bthe )one)\b")
 _KIND: Final = re.compile(
-    rf"\b(?:{'|'.join(sorted({*OBJECT_CLASSES, *SYNONYMS}, key=len, reverse=True))})e?s?\b"
+    rf"\b(?:{KIND_WORDS})e?s?\b"
     r"(?! (?:you|i|we)\b)"
 )
 _PLAIN: Final = re.compile(rf"\bthe (?P<kind>{_KIND.pattern})")

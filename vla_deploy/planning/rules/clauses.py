@@ -139,16 +139,18 @@ _STOPS: Final = frozenset(" ".join(words_of(spoken)) for spoken in STOP_WORDS) |
 
 def polite_off(text: str) -> str:
     """Return a command in lower case without what only asks nicely, or likens it to another."""
-    return _commanding(plain(text), _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER, _ECHO)))
+    return _commanded(text, (_POLITE_BEFORE, _POLITE_AFTER, _ECHO))
 
 
 def courtesy_off(text: str) -> str:
     """Return a command in lower case without what only asks nicely; "again" and "too" stay."""
-    return _commanding(plain(text), _without(plain(text), (_POLITE_BEFORE, _POLITE_AFTER)))
+    return _commanded(text, (_POLITE_BEFORE, _POLITE_AFTER))
 
 
-def _commanding(asked: str, own: str) -> str:
-    """Return "get the cup" for the rest of "would you mind getting the cup"."""
+def _commanded(text: str, patterns: tuple[re.Pattern[str], ...]) -> str:
+    """Return what is left without the patterns: "get the cup" of "do you mind getting the cup"."""
+    asked = plain(text)
+    own = _without(asked, patterns)
     verb, space, rest = own.partition(" ")
     is_asked = _ASKS_DOING.search(asked.removesuffix(own)) is not None
     return f"{DOING[verb]}{space}{rest}" if is_asked and verb in DOING else own

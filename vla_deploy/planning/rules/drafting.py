@@ -124,10 +124,11 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
 
 def _run_on(clause: str, request: Request) -> tuple[str, str] | None:
     """Return the two clauses of "go to the kitchen get the can", said in one breath."""
-    if known_fit(clause, request) is not None:
+    places = [found.start() for found in _NEXT_VERB.finditer(clause) if found.start()]
+    if not places or known_fit(clause, request) is not None:
         return None
-    for found in _NEXT_VERB.finditer(clause):
-        two = clause[: found.start()].strip(), polite_off(clause[found.start() :])
+    for at in places:
+        two = clause[:at].strip(), polite_off(clause[at:])
         if all(known_fit(one, request) is not None for one in two):
             return two
     return None

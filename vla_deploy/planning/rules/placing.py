@@ -49,15 +49,18 @@ def put(groups: Groups, request: Request) -> list[Step]:
     where: dict[str, Any] = {"destination": destination, **arm_in(groups)}
     if said not in _TOWARDS:
         where["relation"] = "in" if _WAY.sub("", said) in _INTO else "on"
-    return [("place", {"object": part, **where}) for part in parts_of(moved)]
+    return _put_each(moved, **where)
 
 
 def put_there(groups: Groups, request: Request) -> list[Step]:
     """Put each thing where was spoken of; what is there already is what shall be taken."""
     if _is_there(groups["object"], request):
         return pick(groups, request)
-    where = {"destination": "there", **arm_in(groups)}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+    return _put_each(groups["object"], destination="there", **arm_in(groups))
+
+
+def _put_each(things: str, **where: Any) -> list[Step]:
+    return [("place", {"object": part, **where}) for part in parts_of(things)]
 
 
 def _is_there(text: str, request: Request) -> bool:
@@ -90,25 +93,27 @@ def empty_hand(groups: Groups, _: Request) -> list[Step]:
 
 def put_away(groups: Groups, _: Request) -> list[Step]:
     """Put things into the box."""
-    where = {"destination": STORE, "relation": "in"}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+    return _put_each(groups["object"], destination=STORE, relation="in")
 
 
 def put_into_that(groups: Groups, _: Request) -> list[Step]:
     """Put each thing into what was spoken of."""
-    where = {"destination": "there", "relation": "in", **arm_in(groups)}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+    return _put_each(groups["object"], destination="there", relation="in", **arm_in(groups))
 
 
 def leave_here(groups: Groups, request: Request) -> list[Step]:
     """Put down here what of things is held; what is not held stays where it is by itself."""
     said = groups["object"]
-    setting = Setting(request)
-    read = read_expression(said, setting.furniture)
-    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
-    if not held and not read.pronoun:
+    if not _may_be_held(said, request):
         return [("speak", {"text": "I leave it where it is."})]
     return [("place", {"object": said, "destination": "here", **arm_in(groups)})]
+
+
+def _may_be_held(text: str, request: Request) -> bool:
+    """Tell whether a hand holds what is said, or may: "it" is whatever was spoken of."""
+    setting = Setting(request)
+    read = read_expression(text, setting.furniture)
+    return bool(read.pronoun) or any(one.held_by for one in fitting(read, Use.PUT, setting))
 
 
 def want(groups: Groups, request: Request) -> list[Step]:
@@ -121,16 +126,11 @@ def want(groups: Groups, request: Request) -> list[Step]:
 
 def put_here(groups: Groups, _: Request) -> list[Step]:
     """Put each thing on what the robot stands before."""
-    where = {"destination": "here", **arm_in(groups)}
-    return [("place", {"object": part, **where}) for part in parts_of(groups["object"])]
+    return _put_each(groups["object"], destination="here", **arm_in(groups))
 
 
 def keep(groups: Groups, request: Request) -> list[Step]:
     """Go on holding what is held; take what is not."""
-    said = groups["object"]
-    setting = Setting(request)
-    read = read_expression(said, setting.furniture)
-    held = [thing for thing in fitting(read, Use.PUT, setting) if thing.held_by]
-    if held or read.pronoun:
+    if _may_be_held(groups["object"], request):
         return [("speak", {"text": "I keep it."})]
     return pick(groups, request)

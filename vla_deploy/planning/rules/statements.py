@@ -17,9 +17,9 @@ from vla_deploy.planning.rules.fits import known_fit
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world.vocabulary import OBJECT_CLASSES, SYNONYMS
+from vla_deploy.world.vocabulary import KIND_WORDS
 
-STOPS: Final = frozenset({"stop", "halt", "freeze"})
+_STOPS: Final = frozenset({"stop", "halt", "freeze"})
 _THING: Final = r"(?P<thing>(?:my|the|our) .+?)"
 _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
     re.compile(pattern)
@@ -74,7 +74,7 @@ _REMARK: Final = re.compile(
 )
 _NAMED: Final = re.compile(
     r"\b(?:the|my|our|your|a|an|that|this) (?:\w+ ){0,2}?"
-    rf"(?:{'|'.join(sorted({*OBJECT_CLASSES, *SYNONYMS}, key=len, reverse=True))})(?:e?s)?\b"
+    rf"(?:{KIND_WORDS})(?:e?s)?\b"
 )
 _POINTS: Final = re.compile(r"\b(?:it|them|they|those)\b")
 _NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P<place>.+)")
@@ -114,7 +114,7 @@ def _remarks_off(parts: list[str], request: Request) -> list[str]:
 def _is_remark(part: str) -> bool:
     is_told = _REMARK.fullmatch(part) is not None and repaired(part) is None
     is_told = is_told and not any(pattern.fullmatch(part) for pattern in _SAID)
-    return is_told and not STOPS.intersection(words_of(part))
+    return is_told and not _STOPS.intersection(words_of(part))
 
 
 def _found_where_told(parts: list[str], request: Request) -> list[str]:

@@ -85,7 +85,7 @@ _SILENT: Final = frozenset(
 # Words of the questions themselves.
 _FILL: Final = frozenset({"the", "one", "on", "in", "a", "an"})
 Candidates = tuple[Candidate, ...]
-_WORD: Final = re.compile(r"[a-z0-9_']+")
+WORD: Final = re.compile(r"[a-z0-9_']+")
 _TO: Final = re.compile(
     r"^(?:(?:go |back |over )*(?:to|into|in|at|on|onto|by) )?(?:(?:the|my|your) )?"
 )
@@ -128,7 +128,7 @@ def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
 
 def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | None]:
     """Return what an utterance is to a question, and the candidate that it picks."""
-    said = " ".join(_WORD.findall(text.lower()))
+    said = " ".join(WORD.findall(text.lower()))
     if NO_WORDS.fullmatch(said):
         return Verdict.NO, None
     if not question.candidates:
@@ -171,7 +171,7 @@ def _remaining(candidates: Candidates, text: str) -> tuple[Candidates, str, bool
     """
     left, rest, any_will_do = list(candidates), list[str](), False
     for piece in _PIECE.split(text):
-        said = " ".join(_WORD.findall(piece))
+        said = " ".join(WORD.findall(piece))
         found = _NOT.fullmatch(said)
         if found is None:
             rest.append(said)

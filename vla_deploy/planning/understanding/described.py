@@ -3,9 +3,9 @@
 import re
 from typing import Final
 
+from vla_deploy.planning.understanding.answers import WORD
 from vla_deploy.planning.understanding.conversation import Question
 
-_WORD: Final = re.compile(r"[a-z0-9_']+")
 _WHERE: Final = re.compile(
     r"(?:(?:no|yes|well|um|uh|i (?:mean|meant|want|said)|it(?:'s| is)|take) )*"
     r"(?:the|that) (?:one|(?P<noun>[a-z]+)) (?:(?:that|which)(?:'s| is) )?(?P<where>(?:right )?"
@@ -21,7 +21,7 @@ def described(question: Question, text: str) -> str | None:
 
     "the one next to the book", to "pick up the cup" -> "pick up the cup next to the book".
     """
-    found = _WHERE.fullmatch(" ".join(_WORD.findall(text.lower())))
+    found = _WHERE.fullmatch(" ".join(WORD.findall(text.lower())))
     expression = question.expression
     command = question.command_text
     if found is None or not question.candidates or not expression:

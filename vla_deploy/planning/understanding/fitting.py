@@ -67,7 +67,7 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     else:  # what cannot be taken is counted all the same
         found = [one for one in found if not one.held_by]
     if read.support:
-        found = [one for one in found if one.rests and one.rests.of in read.support]
+        found = [one for one in found if _rests_on(one, read.support)]
     if read.is_other:
         before = setting.latest_id(replace(query, is_named=query.kind != ANY_CLASS))
         found = [one for one in found if before is None or not one.is_called(before)]
@@ -82,13 +82,8 @@ def _beside_at_a_distance(query: Query, setting: Setting) -> list[Thing]:
     anchors = find(query.anchor, setting.scene) if query.anchor and query.relation == BESIDE else []
     if len(anchors) != 1 or anchors[0].rests is None:
         return []
-    alone = find(replace(query, relation="", anchor=None, order=""), setting.scene)
-    on_it = [
-        one
-        for one in alone
-        if one is not anchors[0] and one.rests and one.rests.of == anchors[0].rests.of
-    ]
-    return by_distance(on_it, anchors[0].xy_m)[:1]
+    on_it = _standing_on({anchors[0].rests.of}, query, setting)
+    return by_distance([one for one in on_it if one is not anchors[0]], anchors[0].xy_m)[:1]
 
 
 def _in_room(query: Query, setting: Setting) -> list[Thing]:
@@ -98,9 +93,14 @@ def _in_room(query: Query, setting: Setting) -> list[Thing]:
     table = surface_of(room, world) if room else ""
     if table in ("", room):
         return []
-    alone = find(replace(query, relation="", anchor=None, order=""), setting.scene)
     there = {table, *(one.thing_id for one in setting.scene.things if _rests_on(one, {table}))}
-    return [one for one in alone if _rests_on(one, there)]
+    return _standing_on(there, query, setting)
+
+
+def _standing_on(names: Collection[str], query: Query, setting: Setting) -> list[Thing]:
+    """Return what a query means, but for its relation, among what rests on these."""
+    alone = find(replace(query, relation="", anchor=None, order=""), setting.scene)
+    return [one for one in alone if _rests_on(one, names)]
 
 
 def _rests_on(thing: Thing, names: Collection[str]) -> bool:
@@ -139,7 +139,7 @@ def _described_by(read: Expression, things: list[Thing], setting: Setting) -> li
     known = find(replace(read.query, order=""), setting.scene, setting.view)
     found = [one for one in things if one in known]
     if read.support:
-        found = [one for one in found if one.rests and one.rests.of in read.support]
+        found = [one for one in found if _rests_on(one, read.support)]
     return _best_kinds(found, read)
 
 
