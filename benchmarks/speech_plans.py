@@ -1,13 +1,15 @@
 """Measure whether a spoken command gives the plan that the typed one gives, and spoken talk none.
 
 Commands and other talk are those of the planner's corpora, which no training has read; they are
-spoken by voices that the recogniser never heard. What it is not sure of is asked again, and counts
-as not understood. Commands that the planner does not understand when they are typed are left out.
+spoken by voices that the recogniser never heard. What it is not sure of, and what makes no sense to
+the planner, is asked again, and counts as not understood; a plan that is read back because it is
+not sure that it was heard right counts, and its share is told. Commands that the planner does not
+understand when they are typed are left out.
 """
 
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, Final
@@ -18,13 +20,19 @@ from benchmarks.command import parser, show
 from benchmarks.planner_corpus import PLAN, Case, commands, home, other_talk, scenes
 from benchmarks.planner_desk import Answer, fresh_desk
 from benchmarks.speech_words import open_shipped
+from drivers.clock import NS_PER_S
 from training.speech.judging import NOISY_DB
-from training.speech.sentences import normal
 from training.speech.trials import NAMES, by_held_out_voices, by_unseen_engine, heard
 from training.voices.clip import Clip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.confidence import confidence
+from vla_deploy.speech.hearing import Heard
+from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.readings import Answer as Reading
 from vla_deploy.speech.recogniser import Recogniser
+from vla_deploy.speech.telling import utterance
+from vla_deploy.speech.verdict import Case as SpokenCase
+from vla_deploy.speech.verdict import Verdict, judge
 
 Random = np.random.Generator
 _SETS: Final[dict[str, tuple[Callable[[Sequence[str], Random], list[Clip]], float | None]]] = {
@@ -56,6 +64,7 @@ def measure(count: int = 100, talk: int = 200, seed: int = 0) -> dict[str, Any]:
     typed = list(_understood(count))
     texts = [_WRITTEN.sub("centimeters", one.text) for one in typed]
     figures: dict[str, Any] = {"commands": len(typed), "missing": []}
+    figures |= {"read_back_ratio": {}, "wrong_ratio": {}}
     recogniser, least = open_shipped("desktop")
     with closing(recogniser):
         for name, (speak, snr_db) in _SETS.items():
@@ -67,8 +76,12 @@ def measure(count: int = 100, talk: int = 200, seed: int = 0) -> dict[str, Any]:
                 figures[f"same_plan_{name}"] = None
                 continue
             pairs = zip(typed, clips, strict=True)
-            same = [_is_same(one, _read(recogniser, clip, least)) for one, clip in pairs]
-            figures[f"same_plan_{name}"] = float(np.mean(same))
+            answers = [
+                _heard_answer(one.case.scene, recogniser, clip, least) for one, clip in pairs
+            ]
+            figures[f"same_plan_{name}"] = _share(_is_same, typed, answers)
+            figures["read_back_ratio"][name] = _share(_is_read_back, typed, answers)
+            figures["wrong_ratio"][name] = _share(_runs_another, typed, answers)
         return figures | _talk(recogniser, least, other_talk()[:talk], seed)
 
 
@@ -81,30 +94,59 @@ def _understood(count: int) -> "list[Typed]":
 
 
 def _typed(case: Case, text: str) -> Typed:
-    return Typed(case=case, text=text, answer=_answer(case.scene, text))
+    return Typed(case=case, text=text, answer=_answer(case.scene, {"text": text}))
 
 
-def _answer(scene: str, text: str) -> Answer:
-    """Return what a planner to whom nobody has spoken yet makes of a text."""
+def _answer(scene: str, utterance: Mapping[str, Any]) -> Answer:
+    """Return what a planner to whom nobody has spoken yet makes of an utterance."""
     with fresh_desk() as desk:
         desk.tell(scenes()[scene].world(home()))
-        return desk.say(text)[1]
+        return desk.give(**utterance)[1]
 
 
-def _read(recogniser: Recogniser, clip: Clip, least: float) -> str:
-    """Return the words, or nothing where the robot would ask again."""
+def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) -> Answer | None:
+    """Return what comes of a spoken command; None where speech alone asks for it again."""
+    heard = _heard(recogniser, clip, least)
+    doubted = heard.judgement.verdict is Verdict.DOUBTED
+    if not doubted and heard.judgement.verdict is not Verdict.ACCEPTED:
+        return None
+    return _answer(scene, utterance(heard, doubted=doubted))
+
+
+def _heard(recogniser: Recogniser, clip: Clip, least: float) -> Heard:
     reading = recogniser.read(clip.samples, NAMES)
-    sure = confidence(reading, recogniser.declared.calibration) >= least
-    return reading.text if sure else ""
+    sure = confidence(reading, recogniser.declared.calibration)
+    phrase = Phrase(
+        number=1, began_ns=0, ended_ns=round(clip.duration_s * NS_PER_S),
+        voiced_s=clip.duration_s, clipped_ratio=0.0, voice=1.0, samples=clip.samples,
+    )  # fmt: skip
+    case = SpokenCase(
+        reading=reading, phrase=phrase, confidence=sure, least_confidence=least,
+        languages=recogniser.declared.languages,
+    )  # fmt: skip
+    answer = Reading(phrase=phrase, reading=reading)
+    return Heard(phrase=phrase, answer=answer, confidence=sure, judgement=judge(case))
 
 
-def _is_same(typed: Typed, text: str) -> bool:
-    if not text:
-        return False
-    if normal(text) == normal(typed.text):
-        return True
-    answer = _answer(typed.case.scene, text)
-    return answer.outcome == typed.answer.outcome and _steps(answer) == _steps(typed.answer)
+def _share(
+    holds: Callable[[Typed, Answer], bool], typed: Sequence[Typed], answers: Sequence[Answer | None]
+) -> float:
+    pairs = zip(typed, answers, strict=True)
+    return float(np.mean([answer is not None and holds(one, answer) for one, answer in pairs]))
+
+
+def _is_same(typed: Typed, answer: Answer) -> bool:
+    plans = answer.outcome == PLAN or answer.reads_back
+    return plans and _steps(answer) == _steps(typed.answer)
+
+
+def _is_read_back(typed: Typed, answer: Answer) -> bool:
+    return _is_same(typed, answer) and answer.reads_back and not typed.answer.reads_back
+
+
+def _runs_another(typed: Typed, answer: Answer) -> bool:
+    """Tell whether something else than was said would be done, and nobody is asked before."""
+    return answer.outcome == PLAN and not _is_same(typed, answer)
 
 
 def _steps(answer: Answer) -> list[tuple[str, Any]]:
@@ -116,13 +158,14 @@ def _talk(recogniser: Recogniser, least: float, texts: Sequence[str], seed: int)
     """Return which share of other talk, spoken, ends in no plan, and how many plans would run."""
     random = np.random.default_rng([seed, 6])
     clips = [heard(clip, random) for clip in by_held_out_voices(texts, random)]
-    read = [_read(recogniser, clip, least) for clip in clips]
-    outcomes = [_answer(_TALK_SCENE, text).outcome if text else "unsure" for text in read]
-    planned = [text for text, outcome in zip(read, outcomes, strict=True) if outcome == PLAN]
+    answers = [_heard_answer(_TALK_SCENE, recogniser, clip, least) for clip in clips]
+    pairs = list(zip(texts, answers, strict=True))
+    planned = [text for text, one in pairs if one is not None and one.outcome == PLAN]
     return {
         "talk": len(texts),
         "talk_rejected_ratio": 1.0 - len(planned) / max(1, len(texts)),
-        "talk_unsure_ratio": outcomes.count("unsure") / max(1, len(texts)),
+        "talk_unheeded_ratio": answers.count(None) / max(1, len(texts)),
+        "talk_read_back": [text for text, one in pairs if one is not None and one.reads_back],
         "talk_planned": planned,
     }
 

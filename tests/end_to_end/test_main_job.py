@@ -61,9 +61,11 @@ def test_what_hides_the_box_while_it_is_carried_ends_in_it_too(
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_at_least_eight_of_ten_seeds_succeed_and_failures_say_why(make_stack: MakeStack) -> None:
+def test_at_least_eighteen_of_twenty_seeds_succeed_and_failures_say_why(
+    make_stack: MakeStack,
+) -> None:
     results = []
-    for seed in range(10):
+    for seed in range(20):
         stack = make_stack(seed)
         stack.arm()
         outcome = stack.say(COMMAND)
@@ -73,7 +75,7 @@ def test_at_least_eight_of_ten_seeds_succeed_and_failures_say_why(make_stack: Ma
         )
         stack.close()
     print(json.dumps(results, indent=1))
-    assert sum(result["inside"] for result in results) >= 8
+    assert sum(result["inside"] for result in results) >= 18
     assert all(result["told"] or result["error"] for result in results)
     # A robot that reports success where physics disagrees is worse than one that reports failure.
     assert all(result["inside"] for result in results if result["told"])

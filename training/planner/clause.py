@@ -8,8 +8,8 @@ from random import Random
 from typing import Final, NamedTuple
 
 from training.planner.grammar import Sequence, Slot, expand, parse
-from training.planner.manners import SLIPS
 from training.planner.referring import SOURCES, Word
+from training.planner.slips import SLIPS
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS
 
 PHRASES: Final = Path(__file__).with_name("phrases")

@@ -5,20 +5,13 @@ from dataclasses import dataclass
 from random import Random
 from typing import Final
 
+from training.planner.asking import ASKING, GERUND_ASKING
 from training.planner.clause import Clause, Group, Said, load_groups, make_clause
 from training.planner.grammar import Sequence, expand
 from training.planner.hearing import misheard
-from training.planner.manners import (
-    ASKING,
-    CALLS,
-    CLAUSE_SLIPS,
-    ENDINGS,
-    FILLERS,
-    GERUND_ASKING,
-    JOINTS,
-    OPENINGS,
-    REASONS,
-)
+from training.planner.manners import CALLS, ENDINGS
+from training.planner.openings import OPENINGS, REASONS
+from training.planner.slips import CLAUSE_SLIPS, FILLERS, JOINTS
 from vla_deploy.planning.command_parser.grammar import answer_text
 
 # How often each kind of step is drawn, of those that may stand among others.

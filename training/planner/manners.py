@@ -1,135 +1,102 @@
-"""List what people wrap commands in: calls, politeness, reasons, joints, corrections, fillers."""
+"""List what people wrap commands in: calls and politeness at either end; all manners together."""
 
 from typing import Final
 
+from training.planner.asking import ASKING, GERUND_ASKING
 from training.planner.grammar import Sequence, parse
+from training.planner.openings import OPENINGS, REASONS
+from training.planner.slips import CLAUSE_SLIPS, JOINTS, SLIPS
 
 CALLS: Final = parse(
-    "(robot|hey robot|ok robot|okay robot|hi robot|hello robot|butler|hey butler|listen|hey"
-    "|alright|okay"
-    "|okay so|right|so|well|now|now then|dear robot|yo|attention|jarvis|excuse me|hello|buddy"
-    "|hey there"
-    "|my friend|okay listen|good morning|good morning robot|okay next|next|and|also|yes|oh|ah"
-    "|mister robot)"
-)
-ASKING: Final = parse(
-    "(please|kindly|just|go ahead and|now|next|first|quickly|carefully|slowly|gently|simply"
-    "|maybe|then"
-    "|(could|can|would|will) you [please|maybe|kindly|just|quickly|possibly|perhaps|now|go and"
-    "|try to]"
-    "|(please|kindly) (could|can|would|will) you"
-    "|(i want|i need|i'd like|i would like|i'd love|i would love|i expect|i'm asking|i ask|i order"
-    "|i command|i urge|i beg|i require|i wanted|we need|we want|we'd like) you [now|please|next] to"
-    "|you (should|must|need to|have to|can|could|may|might want to|ought to|had better|are to"
-    "|shall|will) [now]"
-    "|(it would be|it'd be|that would be) (great|nice|good|lovely|helpful|awesome|cool|perfect"
-    "|kind) if you (could|would|can)"
-    "|(would you be|are you) (able to|so kind as to|willing to|ready to|kind enough to|free to)"
-    "|(i was wondering|i wonder|do you think|is there any chance|any chance"
-    "|would you say) [if] you (could|can|would)"
-    "|(is it possible|would it be possible|could it be possible) (for you to|to have you|to)"
-    "|(let's|let us|let me see you|time to|it is time to|it's time to|your task is to"
-    "|your job is to"
-    "|your next task is to|the next thing is to|what i want is for you to"
-    "|all you have to do is|try to"
-    "|attempt to|be sure to|make sure to|make sure you|see to it that you|remember to"
-    "|don't forget to"
-    "|get going and|hurry up and|hurry and|come on and|come on|be a dear and|be a good robot and"
-    "|be so kind and|be so good as to|do me a favor and|do me a favour and|help me out and"
-    "|help me and"
-    "|why don't you|how about you|suppose you|could i (ask|get|have|bother|trouble) you to"
-    "|(can|may) i (ask|get|have|bother|trouble) you to|i'd be (glad|grateful|happy) if you could"
-    "|if you (can|could|would|don't mind|have time|are free|are not busy) [please]"
-    "|when you (can|have time|are ready|have a minute|get a chance) [please]|whenever you are ready"
-    "|i think you should|i believe you should|i suggest you|i'd suggest you|feel free to"
-    "|you are supposed to"
-    "|please help me to|what if you|will you please|the plan is to|the mission is to"
-    "|your order is to"
-    "|as a next step|as the next task|for me please|for my sake|at once|immediately))"
-)
-GERUND_ASKING: Final = parse(
-    "(would you mind|do you mind|how about|what about|i'd appreciate you|i would appreciate you|try"
-    "|start|start by|begin by|could you start|could you try|please start|consider|mind|thanks for"
-    "|thank you for|i'd be grateful for you|any chance of you|would you consider"
-    "|is there a chance of you)"
+    "(robot|hey robot|ok robot|okay robot|hi robot|hello robot|butler|hey "
+    "butler|listen|hey|alright|okay|okay so|right|so|well|now|now then|dear "
+    "robot|yo|attention|jarvis|excuse me|hello|buddy|hey there|my friend|okay listen|good "
+    "morning|good morning robot|okay next|next|and|also|yes|oh|ah|mister robot|(hey "
+    "jarvis|listen to me|ok then|mate)|(attention robot|chap|hello there|robot please)|(to "
+    "start with|okay then|hey mate|hi)|(lovely|attention please|excuse me robot|to begin "
+    "with)|(look here|okay butler|here you|oh yes)|(my dear|hello jarvis|so then|psst)|(very "
+    "well|sir|hello robot can you hear me|boss)|(ok butler|ah robot|hi there|robot are you "
+    "listening)|(thank you and now|right then|yoo hoo|good evening)|(chief|ma'am|oh by the "
+    "way|pal)|(for now|thank you|one more|hey you)|(now robot|ahem|now "
+    "listen|good)|(anyway|look|yes robot|fine)|(oi robot|oh and|oh robot|perfect)|(love|old "
+    "boy|er excuse me|good afternoon)|(alright robot|sorry robot|finally|thanks robot)|(so "
+    "now|machine|robot dear|well then)|(and then|sweetheart|great now|my little "
+    "helper)|(super|robo|okay good|hello butler)|(um robot|dear|oi|first off)|(hey "
+    "buddy|boy|right so|computer)|(little one|hey robo|lastly|yes please)|(good evening "
+    "robot|anyhow|you|robot can you hear me)|(sorry|you there|morning|darling)|(listen "
+    "robot|here robot|say|pardon me)|(listen up|by the way|great|mister)|(and now|wakey "
+    "wakey|alright then|first of all)|(tell you what|thanks))"
 )
 ENDINGS: Final = parse(
-    "(please|thanks|thank you|for me|now|right now|right away|if you can|if you could|if you would"
-    "|if you don't mind|if possible|if that is possible|would you|will you|could you|can you"
-    "|okay|quickly"
-    "|carefully|gently|slowly|immediately|asap|as soon as possible|at once|when you can"
-    "|when you are ready"
-    "|when you have time|robot|butler|buddy|my friend|real quick|again|one more time|once more"
-    "|already"
-    "|then|today|that would be great|that'd be great|that would be nice|that's all|for us"
-    "|for a change"
-    "|will you please|please and thank you|thank you very much|thanks a lot|and be careful"
-    "|and hurry"
-    "|and be quick|don't rush|no rush|take your time|quick|alright|if you are free"
-    "|you got that|got it"
-    "|if it isn't too much trouble|without bumping into anything|on your own|next|first"
-    "|as well|too|instead)"
-)
-REASONS: Final = parse(
-    "(because|since|as|so that|so) (i am thirsty|i need it|i'm in a hurry|it is late"
-    "|we are leaving soon"
-    "|the guests are coming|i want to drink|i can't do it myself|it is in the way"
-    "|dinner is almost ready"
-    "|my hands are full|i want to clean up|it gets dark|i can read|nobody trips"
-    "|the dog can't get it"
-    "|i forgot it there|i am busy|my back hurts|we can start|i have to go|it does not get lost)"
-)
-OPENINGS: Final = parse(
-    "(i'm thirsty|i am thirsty|i'm tired|the guests are here|it's getting late|i'm in a hurry"
-    "|dinner is ready"
-    "|my hands are full|this room is a mess|i need your help|i have a job for you"
-    "|here is a task|new task"
-    "|here is what i want|one more thing|change of plans|good job|well done|very good|nice"
-    "|that was good"
-    "|we have guests|i can't get up|my leg hurts|i've got an idea|you know what|guess what"
-    "|sorry to bother you"
-    "|i am going to read|someone is coming|i have a task for you|wake up|are you there"
-    "|can you hear me"
-    "|thanks for that|okay good|i am cooking|i forgot something|it is too dark for me"
-    "|tell you what) [so|and|now|please|]"
-)
-JOINTS: Final = parse(
-    "(and|and|and|and then|and then|then|then|after that|and after that|afterwards|next"
-    "|and next|and finally"
-    "|finally|once that is done|when that is done|when you are done|once you are there"
-    "|when you get there"
-    "|and also|also|followed by that|and afterwards|and when you are done|and once done|plus"
-    "|as well as|"
-    "|before you|and when you arrive|from there|secondly|last|lastly|subsequently|later"
-    "|thereafter|)"
-)
-SLIPS: Final = parse(
-    "(no|no wait|wait no|i mean|i meant|sorry|sorry i mean|actually|actually no|or rather"
-    "|rather|uh no|oh no"
-    "|make that|no make that|no sorry|correction|er no|no i mean|scratch that|um no|wait"
-    "|no not that)"
-)
-CLAUSE_SLIPS: Final = parse(
-    "(no wait|no|actually|actually no|never mind that|forget that|scratch that|no sorry"
-    "|wait no|on second thought"
-    "|no don't|oh wait|instead|or better|no better|cancel that|sorry i meant|i mean|no i meant"
-    "|better) [just|please|]"
-)
-FILLERS: Final = (
-    "uh",
-    "um",
-    "er",
-    "erm",
-    "hmm",
-    "well",
-    "like",
-    "you know",
-    "ah",
-    "eh",
-    "so",
-    "uhm",
-    "mm",
-    "okay",
+    "(please|thanks|thank you|for me|now|right now|right away|if you can|if you could|if you "
+    "would|if you don't mind|if possible|if that is possible|would you|will you|could you|can "
+    "you|okay|quickly|carefully|gently|slowly|immediately|asap|as soon as possible|at "
+    "once|when you can|when you are ready|when you have time|robot|butler|buddy|my "
+    "friend|real quick|again|one more time|once more|already|then|today|that would be "
+    "great|that'd be great|that would be nice|that's all|for us|for a change|will you "
+    "please|please and thank you|thank you very much|thanks a lot|and be careful|and "
+    "hurry|and be quick|don't rush|no rush|take your time|quick|alright|if you are free|you "
+    "got that|got it|if it isn't too much trouble|without bumping into anything|on your "
+    "own|next|first|as well|too|instead|(could you do that for me|this time|do you think you "
+    "could|hurry|take care|with caution)|(like i showed you|if you get the chance|that's a "
+    "good robot|please please|go on then|if you're able)|(one time|just this once|my dear|if "
+    "you have a minute|if you have time|as usual)|(and thank you|at your own pace|when you've "
+    "got a second|at your leisure|the usual way|this minute)|(that'd help|darling|if you've "
+    "got time|you hear|if you are not too busy|did you get that)|(i suppose|mind the "
+    "carpet|whenever you have time|it would help me|anyway|i'd like)|(i would be so "
+    "grateful|yeah|like last time|if you get a chance|nice and slow|thank you in advance)|(if "
+    "i may ask|is that alright|will you do that for me|straightaway|finally|when you have a "
+    "moment)|(is that possible|ever so gently|much obliged|for me now|you hear me|if you "
+    "like)|(man|that would be very kind|could you do that|get it|mind the kids|like a good "
+    "robot)|(do you think you can do that|make it quick|that'd be a help|as fast as you "
+    "can|if it's possible|but carefully)|(i'd be grateful|as your next task|right now "
+    "please|as quickly as possible|and quickly|thank you so much)|(huh|old chap|for my "
+    "sake|if you're able to|nice and carefully|and thanks)|(pls|many thanks|if you "
+    "please|there's no rush|hurry please|sharpish)|(are you listening|off you go|i beg "
+    "you|bro|there's a good robot|would you please)|(understand|be careful with that|there's "
+    "a good lad|thank you robot|for today|understood)|(when you get a chance|for goodness "
+    "sake|that would be wonderful|that'd be lovely|nothing more|i'd be very grateful)|(when "
+    "you've got time|if it's not too much trouble|mate|mind the dog|and don't drop "
+    "anything|or something)|(very quickly|would you do that for me|without knocking anything "
+    "over|can you do that|this once|nice and gently)|(slowly and carefully|love|if that's "
+    "alright|dear|would you dear|that's all i need)|(chop chop|next please|perhaps|as "
+    "always|if i may|if you'd be so kind)|(no need to rush|quick march|i'd say|can you manage "
+    "that|innit|and take care)|(for once|very slowly|at last|do you hear me|to start "
+    "with|maybe)|(don't worry|but be careful|please robot|i would appreciate it|for us "
+    "please|alright robot)|(there's a love|to start|whenever you're ready|okay please|that "
+    "would help|if that works for you)|(quick please|like a gentleman|do you understand|and "
+    "make it snappy|pretty please|that'd be grand)|(as i told you|i guess|is that something "
+    "you can do|like you did before|for heaven's sake|okay robot)|(for now|okay thanks|very "
+    "carefully|won't you|as the next step|and try not to drop anything)|(do you hear|to begin "
+    "with|just once|and mind the step|i'd appreciate it|there's no hurry)|(please sir|will "
+    "you do that|if that's okay|and mind the cat|can you please|come on now)|(be gentle|good "
+    "robot|quick sharp|for me if you can|or so|and don't break anything)|(that will be "
+    "all|nice and easy|all by yourself|for me please|and all that|slow and steady)|(do you "
+    "think you can manage that|nothing else|i say|as agreed|but slowly|i hope)|(thank you "
+    "kindly|would you be so kind|go on|my little helper|as i said|thanks love)|(i think|if "
+    "it's no bother|okay mate|for the moment|in your own time|as discussed)|(if you'd "
+    "like|though|that would be lovely|that is all|if that's not too much trouble|this "
+    "instant)|(before anything else|in one go|this very minute|for me dear|there's a "
+    "dear|take it easy)|(whenever it suits you|only that|if you wouldn't mind|please i beg "
+    "you|possibly|i said)|(quickly please|if you're not busy|you know|and everything|you "
+    "understand|straight away)|(for the love of god|come on|make it snappy|first thing|but "
+    "quickly|pal)|(that'd be nice|i tell you|and hurry up|after all|can't you|for me would "
+    "you)|(got me|did you hear me|now please|is that okay|by yourself|no hurry)|(that's "
+    "it|when you have a minute|and be gentle|when you get a minute|without breaking "
+    "anything|please dear)|(that would help me a lot|just for me|thanks so much|but take "
+    "care|but be gentle|don't hurry)|(thanks robot|hurry up|yourself|as we said|eh|that'd be "
+    "ace)|(please now|that's all i ask|come on then|please love|hey|just that)|(honey|be "
+    "careful|dude|like always|with care|cheers)|(old boy|very gently|it would be a great "
+    "help|couldn't you|as quick as you can|and such)|(no need to hurry|be quick about "
+    "it|thank you dear|my boy|and take your time|would you mind)|(first of all|could you "
+    "please|let's go|would you kindly|jarvis|sweetheart)|(quick as you can|on the double|as a "
+    "first step|can you do that for me|cheers mate|ta)|(whenever you can|when you've got a "
+    "minute|for me will you|as soon as you can|if you would be so kind|pronto)|(and make it "
+    "quick|please mate|good boy|hurry up please|could you do that please|thanks in "
+    "advance)|(watch out for the cat|same as always|if you have a moment|off you pop|and be "
+    "careful please|ok)|(that's all for now|but gently|if you're ready|without delay|that "
+    "would be super|alright mate)|(that's all i want|much appreciated|you got it|be "
+    "quick|yes|without dropping anything))"
 )
 ALL_MANNERS: Final[tuple[Sequence, ...]] = (
     CALLS, ASKING, GERUND_ASKING, ENDINGS, REASONS, OPENINGS, JOINTS, SLIPS, CLAUSE_SLIPS,

@@ -2,11 +2,13 @@
 
 import logging
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from training.speech.pausing import with_pauses
 from training.speech.sentences import draw_sentence
 from training.voices.cast import draw_of_all, draw_style, say
 from training.voices.clip import Clip
@@ -33,9 +35,10 @@ def _clips(number: int, seed: int, count: int) -> Iterator[Clip]:
     spoken = 0
     while spoken < count:
         try:
-            clip = say(draw_sentence(random), draw_of_all(random), draw_style(random))
+            text = draw_sentence(random)
+            said = say(with_pauses(text, random), draw_of_all(random), draw_style(random))
         except SynthesisFailed as error:
             _LOG.warning("left out: %s", error)
             continue
         spoken += 1
-        yield clip
+        yield replace(said, text=text)

@@ -4,7 +4,7 @@ A quarter are commands as the command parser learns them: what one understands t
 
 A quarter of all are words strung together at random, so that the recogniser learns to hear words
 and not to guess them from what usually follows. For the same reason some are two sentences in one
-breath: what is a whole sentence need not be the end.
+breath: what is a whole sentence need not be the end. Some are by speakers who hesitate.
 """
 
 import re
@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from training.speech.pausing import hesitating
 from training.speech.planner_commands import draw_planner_command
 
 Random = np.random.Generator
@@ -134,17 +135,30 @@ def _in_one_breath(random: Random) -> str:
     return f"{first} {second}"
 
 
+def _hesitation(random: Random) -> str:
+    """Return a command, or two short ones, of somebody who looks for words."""
+    drawer = (_command, draw_planner_command, _in_one_breath)[int(random.integers(3))]
+    return hesitating(drawer(random), random)
+
+
+def _urgent(random: Random) -> str:
+    """Return a few words with a stop among them, or one that sounds like it."""
+    return fill("<urgent>", random)
+
+
 _BREATHS: Final = (_command, draw_planner_command, _answer, _talk, _string(_COMMAND_KINDS))
 SHARES: Final[Mapping[Callable[[Random], str], float]] = {
-    _command: 0.2,
+    _command: 0.15,
     draw_planner_command: 0.25,
-    _in_one_breath: 0.13,
-    _question: 0.06,
-    _answer: 0.05,
-    _talk: 0.08,
-    _string(_COMMAND_KINDS): 0.09,
-    _string(_TALK_KINDS): 0.06,
-    _string(_COMMON_KINDS): 0.08,
+    _in_one_breath: 0.12,
+    _hesitation: 0.09,
+    _urgent: 0.05,
+    _question: 0.05,
+    _answer: 0.04,
+    _talk: 0.06,
+    _string(_COMMAND_KINDS): 0.08,
+    _string(_TALK_KINDS): 0.04,
+    _string(_COMMON_KINDS): 0.07,
 }
 
 

@@ -17,6 +17,7 @@ PATIENCE_S: Final = 5.0
 STATUS_AGE_S: Final = 2.0
 STOP: Final = "stop"
 REJECTED: Final = "rejected"
+DOUBTED: Final = "doubted"
 _SOURCE: Final = "voice"
 Event = dict[str, Any]
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from vla_deploy.cli.aloud import REJECTED, STATUS_AGE_S, Aloud, Hearing, why_deaf
+from vla_deploy.cli.aloud import DOUBTED, REJECTED, STATUS_AGE_S, Aloud, Hearing, why_deaf
 from vla_deploy.cli.session import Session
 
 MOST_TIMES_SAID: Final = 3
@@ -81,7 +81,7 @@ class SpokenCommand:
         while True:
             hearing = self._say(text, snr_db)
             yield {"event": "heard", "text": hearing.line()}
-            if hearing.told["verdict"] == REJECTED and self._may_say_again:
+            if hearing.told["verdict"] in (REJECTED, DOUBTED) and self._may_say_again:
                 continue
             is_refused = False
             for event in self._aloud.follow(hearing):

@@ -175,5 +175,7 @@ def _ears(status: dict[str, Any]) -> str:
         return "hears: nothing, speech is silent"
     if speech["state"] == "deaf":
         return f"hears: no words ({speech['why']}); type commands"
-    counts = ", ".join(f"{speech['heard'][name]} {name}" for name in ("accepted", "rejected"))
+    counts = ", ".join(
+        f"{speech['heard'][name]} {name}" for name in ("accepted", "doubted", "rejected")
+    )
     return f"hears: {speech['state']} by {speech['model']['name']}, {counts}"

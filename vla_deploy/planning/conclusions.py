@@ -101,7 +101,9 @@ class Conclusions:
             return
         self.accounts.refused += 1
         self._telling.refused(command, str(reason), answer)
-        if outcome is not Outcome.CANCELLED or isinstance(reason, Says):
+        if command.is_doubted:
+            self._ask_again(command)
+        elif outcome is not Outcome.CANCELLED or isinstance(reason, Says):
             self._telling.aloud(command, spoken_refusal(reason))
         turn = Turn(
             said=command.text,
@@ -111,6 +113,11 @@ class Conclusions:
             answer=str(reason),
         )
         self._dialogue.remember(turn)
+
+    def _ask_again(self, command: Command) -> None:
+        """Ask for words that may have been others once more, unless nobody spoke to the robot."""
+        if command.may_ask_again:
+            self._telling.aloud(command, Says.HEARD_BADLY)
 
 
 def _in_full(plan: Plan, answer: Answer) -> str:

@@ -25,6 +25,7 @@ from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.recovery import recover
+from vla_deploy.planning.rehearing import Rehearing
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
@@ -54,6 +55,7 @@ class Desk:
         self._clock = clock
         self._queue: deque[Command] = deque()
         self._under_way = UnderWay()
+        self._rehearing = Rehearing()
         self._conclusions = Conclusions(
             # Another profile brings another planner.
             lambda request, answer: self.planner.accepted(request, answer),
@@ -76,6 +78,9 @@ class Desk:
 
     def _take(self, command: Command) -> None:
         waiting = self.dialogue.waiting
+        if waiting is not None and command.is_doubted:
+            self._conclusions.refuse(command, f"heard too badly to answer: {waiting.question.text}")
+            return
         if waiting is not None and self._is_answer(command, waiting):
             return
         if command.is_answer:
@@ -164,11 +169,20 @@ class Desk:
     ) -> None:
         """Ask those who take time, where nobody else has a plan."""
         if answer.is_final or not self.planner.slow_rungs:
-            self._conclusions.conclude(command, request, answer)
+            self._conclude(command, request, answer)
             return
         self._telling.planning(command, self.planner.slow_rungs)
         slowly = partial(self.planner.plan_slowly, request, deadline, answer)
         self._beside.begin(command, request, deadline, slowly)
+
+    def _conclude(self, command: Command, request: Request, answer: Answer) -> None:
+        """Conclude a command, or try it next in other words that may have been said."""
+        other = self._rehearing.other(command, request, answer)
+        if other is not None:
+            self._queue.appendleft(other)
+            return
+        heard = self._rehearing.concluded(command, request, answer)
+        self._conclusions.conclude(heard.command, heard.request, heard.answer)
 
     def _begin_recovery(self, command: Command, request: Request) -> None:
         carried = self._under_way.carried(command.command_id)
@@ -184,9 +198,7 @@ class Desk:
         if done is not None:
             self._guarded(
                 done.command,
-                lambda: self._conclusions.conclude(
-                    done.command, done.request, done.future.result()
-                ),
+                lambda: self._conclude(done.command, done.request, done.future.result()),
             )
         tedious = self._beside.take_tedious()
         if tedious is not None:

@@ -1,6 +1,6 @@
 """Read what people and programs give the planner to do; nothing of it is trusted to be whole."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -18,8 +18,11 @@ class Command:
     """Hold one utterance: words, or a `plan` made elsewhere.
 
     `heard_confidence`, 0 to 1, is how sure the recogniser is of the words; None for typed text.
-    With `is_answer` the words are no command of their own; with `recovers` it is under way already,
-    and what is planned for it goes on after a failure.
+    `others` are what may have been said instead, the likeliest first, each with its probability
+    over that of the words; with `is_doubted` the words are not sure enough to act by, and with
+    `may_ask_again` nobody minds to be asked for them once more. With `is_answer` the words are no
+    command of their own; with `recovers` it is under way already, and what is planned for it goes
+    on after a failure.
     """
 
     command_id: str
@@ -28,6 +31,9 @@ class Command:
     text: str = ""
     plan: Any = None
     heard_confidence: float | None = None
+    others: tuple[tuple[str, float], ...] = ()
+    is_doubted: bool = False
+    may_ask_again: bool = False
     is_answer: bool = False
     recovers: bool = False
 
@@ -56,13 +62,18 @@ def read_command(event: Event) -> Command:
     """
     given = event.payload
     plan = given.get("plan")
+    told = given.get("heard")
+    heard: Mapping[str, Any] = told if isinstance(told, Mapping) else {}
     return Command(
         command_id=command_id_of(event),
         told_ns=event.stamp_ns,
         source=str(given.get("source", "")),
         text=_words(given) if plan is None else "",
         plan=plan,
-        heard_confidence=_confidence(given.get("heard")),
+        heard_confidence=_ratio(heard.get("confidence")),
+        others=tuple(_others(heard.get("others"))),
+        is_doubted=bool(heard.get("doubted")),
+        may_ask_again=bool(heard.get("ask_again")),
         is_answer=bool(given.get("answer")),
     )
 
@@ -81,8 +92,16 @@ def _words(given: Mapping[str, Any]) -> str:
     return text.strip()
 
 
-def _confidence(heard: Any) -> float | None:
-    value = heard.get("confidence") if isinstance(heard, Mapping) else None
+def _ratio(value: Any) -> float | None:
     if not isinstance(value, int | float) or isinstance(value, bool):
         return None
     return min(1.0, max(0.0, float(value)))
+
+
+def _others(told: Any) -> Iterator[tuple[str, float]]:
+    for one in told if isinstance(told, list) else []:
+        text, odds = (
+            (one.get("text"), _ratio(one.get("odds"))) if isinstance(one, Mapping) else ("", 0)
+        )
+        if isinstance(text, str) and text.strip() and odds and len(text) <= MOST_CHARACTERS:
+            yield text.strip(), odds

@@ -29,6 +29,7 @@ class Says(StrEnum):
     REPLACED = "I leave the other thing, then."
     NOTHING_ASKED = "Sorry, I am not waiting for an answer."
     STILL_UNCLEAR = "Sorry, I still do not know what you mean, so I leave it."
+    HEARD_BADLY = "Sorry, I did not understand that. Please say it again."
     NOT_UNDERSTOOD = "Sorry, I did not understand that."
     NOT_READY = "Sorry, I may not move now."
     REFUSED = "Sorry, I cannot do that: {reason}."

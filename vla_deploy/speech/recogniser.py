@@ -24,6 +24,8 @@ from vla_deploy.speech.sound import RATE_HZ, Sound
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
 _MOST_TOKENS: Final = 200
+_LEAST_ODDS: Final = 0.02
+"""Of what may have been said instead: what is less likely is none of it."""
 _COMPUTE: Final = {
     (CPU, "int8"): "int8",
     (CPU, "fp16"): "float32",
@@ -36,13 +38,22 @@ _DEVICES: Final = {CPU: "cpu", CUDA: "cuda"}
 _RUNTIME: Final = "vla_deploy.speech.whisper_runtime"
 
 
+@dataclass(frozen=True, slots=True)
+class Alternative:
+    """Hold what may have been said instead; `odds` is its probability over the reading's own."""
+
+    text: str
+    odds: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
     """Hold what a model read in a phrase, and what speaks for it.
 
     `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
     `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
-    as far as the model knows several.
+    as far as the model knows several. `others` is what may have been said instead, the likeliest
+    first.
     """
 
     text: str
@@ -52,6 +63,7 @@ class Reading:
     language: str
     duration_s: float
     took_s: float
+    others: tuple[Alternative, ...] = ()
 
 
 class Recogniser:
@@ -91,14 +103,16 @@ class Recogniser:
         took_ns = self._clock.now_ns() - started_ns
         self.latency.record(took_ns)
         weights = [max(1, len(one.tokens)) for one in segments]
+        text = " ".join(one.text.strip() for one in segments).strip()
         return Reading(
-            text=" ".join(one.text.strip() for one in segments).strip(),
+            text=text,
             log_probability=_mean([one.avg_logprob for one in segments], weights, 0.0),
             no_speech=_mean([one.no_speech_prob for one in segments], weights, 1.0),
             compression=max((one.compression_ratio for one in segments), default=0.0),
             language=info.language,
             duration_s=len(samples) / RATE_HZ,
             took_s=took_ns / NS_PER_S,
+            others=others_of(self._whisper.hypotheses),
         )
 
     def document(self) -> dict[str, Any]:
@@ -124,6 +138,7 @@ class Recogniser:
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper
+        whisper.hypotheses.clear()
         if self.declared.context == Context.TRIMMED:
             whisper.content_frames = len(samples) // whisper.feature_extractor.hop_length
         seconds = len(samples) / RATE_HZ
@@ -184,6 +199,19 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     recogniser.load_s = (clock.now_ns() - started_ns) / NS_PER_S
     recogniser.memory_mb = max(0.0, resident_mb() - before_mb)
     return recogniser
+
+
+def others_of(windows: list[list[tuple[str, float]]]) -> tuple[Alternative, ...]:
+    """Return what else was found in a phrase; of several windows of sound nobody can tell."""
+    if len(windows) != 1:
+        return ()
+    (best, best_log), *rest = windows[0]
+    odds: dict[str, float] = {}
+    for text, log_probability in rest:
+        if text and text != best:
+            odds.setdefault(text, math.exp(min(0.0, log_probability - best_log)))
+    ranked = sorted(odds.items(), key=lambda one: -one[1])
+    return tuple(Alternative(text, round(one, 4)) for text, one in ranked if one >= _LEAST_ODDS)
 
 
 def _provider(choice: ModelChoice, runtime: Any) -> str:

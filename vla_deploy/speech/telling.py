@@ -18,6 +18,8 @@ ASK_AGAIN: Final = "Sorry, I did not understand that. Please say it again."
 FIRST_PAUSE_NS: Final = 10 * NS_PER_S
 LONGEST_PAUSE_NS: Final = 160 * NS_PER_S
 _LONGEST_TEXT: Final = 1000
+_LONGEST_OTHER: Final = 200
+"""What is longer is no command that may have been misheard."""
 
 
 class AskingAgain:
@@ -66,7 +68,10 @@ class Telling:
             self._stop.press(f'heard "{heard.text}"')
         self.counts[verdict] += 1
         if verdict is Verdict.ACCEPTED:
+            self._asking.note_understood()
             self._command(heard)
+        elif verdict is Verdict.DOUBTED:
+            self._command(heard, doubted=True, ask_again=self._asking.may_ask(now_ns))
         elif heard.judgement.ask_again and self._asking.may_ask(now_ns):
             self._ask_again()
         self._heard.publish(self._document(heard, now_ns))
@@ -82,16 +87,8 @@ class Telling:
             "end_to_text_p95_s": latency.percentile_ns(0.95) / NS_PER_S,
         }
 
-    def _command(self, heard: Heard) -> None:
-        self._asking.note_understood()
-        self._utterances.publish(
-            {
-                "command_id": self._new_id(),
-                "text": heard.text[:_LONGEST_TEXT],
-                "source": SOURCE,
-                "heard": evidence(heard),
-            }
-        )
+    def _command(self, heard: Heard, **doubt: bool) -> None:
+        self._utterances.publish({"command_id": self._new_id(), **utterance(heard, **doubt)})
 
     def _ask_again(self) -> None:
         self.counts["asked_again"] += 1
@@ -114,15 +111,26 @@ class Telling:
         }
 
 
+def utterance(heard: Heard, **doubt: bool) -> dict[str, Any]:
+    """Return what the planner gets of a phrase; of a doubted one, if it may ask for it again."""
+    return {
+        "text": heard.text[:_LONGEST_TEXT],
+        "source": SOURCE,
+        "heard": evidence(heard) | doubt,
+    }
+
+
 def evidence(heard: Heard) -> dict[str, Any]:
     """Return what speaks for the words of a phrase."""
     reading = None if heard.answer is None else heard.answer.reading
     told: dict[str, Any] = {} if reading is None else asdict(reading)
     told.pop("text", None)
+    others = [one for one in told.pop("others", ()) if len(one["text"]) <= _LONGEST_OTHER]
     return {
         "confidence": round(heard.confidence, 4),
         "voice": round(heard.phrase.voice, 3),
         "clipped_ratio": round(heard.phrase.clipped_ratio, 4),
+        "others": others,
         **{
             key: round(value, 4) if isinstance(value, float) else value
             for key, value in told.items()

@@ -1,6 +1,7 @@
 """Decide what becomes of a phrase: a command for the planner, a stop, or nothing, with the reason.
 
-The first row of `_REFUSALS` that says something decides; it is told in `heard`.
+The first row of `_REFUSALS` that says something decides; it is told in `heard`. What is only not
+sure enough is doubted: the planner asks whether it is meant if it makes sense there.
 """
 
 from collections.abc import Callable
@@ -21,6 +22,8 @@ CLIPPED_RATIO: Final = 0.01
 OWN_RUN: Final = 4
 OWN_RATIO: Final = 0.7
 """The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
+DOUBT_RATIO: Final = 0.5
+"""What is understood by this share of what is needed may still make sense to the planner."""
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 STOP_WITHIN_CONFIDENCE: Final = 0.5
@@ -31,6 +34,7 @@ class Verdict(StrEnum):
     """Name what becomes of what was heard."""
 
     ACCEPTED = "accepted"
+    DOUBTED = "doubted"
     REJECTED = "rejected"
     STOP = "stop"
 
@@ -72,7 +76,9 @@ def judge(case: Case) -> Judgement:
         reason = row.why(case)
         if reason:
             reason += _OVERDRIVEN if row.by_sound and _is_overdriven(case) else ""
-            return Judgement(verdict=Verdict.REJECTED, reason=reason, ask_again=row.ask_again)
+            is_doubted = row.why is _unsure and _may_make_sense(case)
+            verdict = Verdict.DOUBTED if is_doubted else Verdict.REJECTED
+            return Judgement(verdict=verdict, reason=reason, ask_again=row.ask_again)
     return Judgement(verdict=Verdict.ACCEPTED)
 
 
@@ -138,6 +144,10 @@ def _unsure(case: Case) -> str:
     if case.confidence >= case.least_confidence:
         return ""
     return f"understood by {case.confidence:.0%}, at least {case.least_confidence:.0%} is needed"
+
+
+def _may_make_sense(case: Case) -> bool:
+    return case.confidence >= DOUBT_RATIO * case.least_confidence
 
 
 _OVERDRIVEN: Final = (

@@ -96,4 +96,4 @@ def test_other_talk_is_told_once_at_its_end(words: str) -> None:
 
 def test_what_is_hardly_understood_stops_nothing_while_the_speaker_goes_on() -> None:
     told = heard("take the stop to me now please", 2.4, log_probability=-0.9)
-    assert [one.judgement.verdict for _, one in told] == [Verdict.REJECTED]
+    assert [one.judgement.verdict for _, one in told] == [Verdict.DOUBTED]

@@ -14,7 +14,7 @@ from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, R
 from vla_deploy.inference.manifest import Context
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.recogniser import Recogniser, open_recogniser
+from vla_deploy.speech.recogniser import Recogniser, open_recogniser, others_of
 
 CHOICE = ModelChoice(
     tiers=("ours",),
@@ -94,6 +94,27 @@ class _Spied:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
+
+
+def test_what_may_have_been_said_instead_is_told_the_likeliest_first() -> None:
+    windows = [[("red cup", -1.0), ("red cup", -1.1), ("bad cup", -3.0), ("", -3.1),
+                ("red cap", -1.7), ("led cup", -9.0)]]  # fmt: skip
+    assert [(one.text, one.odds) for one in others_of(windows)] == [
+        ("red cap", pytest.approx(0.4966, abs=1e-4)),
+        ("bad cup", pytest.approx(0.1353, abs=1e-4)),
+    ]
+    assert others_of([*windows, *windows]) == others_of([]) == ()
+
+
+def test_a_wide_search_tells_other_readings_than_the_best(scripted_whisper: Any) -> None:
+    folder = scripted_whisper.model("ours", "pick up the red cup")
+    store = ModelStore(folder.parent, embedded=folder.parent / "none")
+    model = store.load(folder.name)
+    recogniser = open_recogniser(model, CHOICE, beam=5, clock=MonotonicClock())
+    reading = recogniser.read(SECOND)
+    recogniser.close()
+    assert reading.text == "pick up the red cup"
+    assert all(one.text != reading.text and 0 < one.odds <= 1 for one in reading.others)
 
 
 def test_a_model_of_many_languages_tells_which_one_was_spoken(scripted_whisper: Any) -> None:

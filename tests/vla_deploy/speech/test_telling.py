@@ -14,14 +14,20 @@ from vla_deploy.speech.hearing import Heard
 from vla_deploy.speech.hot_words import HotWords, joined, thing_names
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.readings import Answer
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.recogniser import Alternative, Reading
 from vla_deploy.speech.telling import Telling
 from vla_deploy.speech.verdict import Judgement, Verdict
 
 TOPICS = ("heard", "utterance", "say", "operator")
 
 
-def heard(text: str, verdict: Verdict, *, ask_again: bool = False) -> Heard:
+def heard(
+    text: str,
+    verdict: Verdict,
+    *,
+    ask_again: bool = False,
+    others: tuple[Alternative, ...] = (),
+) -> Heard:
     reading = Reading(
         text=text,
         log_probability=-0.25,
@@ -30,6 +36,7 @@ def heard(text: str, verdict: Verdict, *, ask_again: bool = False) -> Heard:
         language="en",
         duration_s=1.5,
         took_s=0.03,
+        others=others,
     )
     phrase = Phrase(
         number=1,
@@ -95,6 +102,20 @@ def test_a_refusal_is_never_a_command(telling: Telling, told: Any) -> None:
     telling.tell(heard("nice weather", Verdict.REJECTED))
     assert told("utterance") == told("operator") == told("say") == []
     assert told("heard")[0]["reason"] == "because"
+
+
+def test_doubted_words_go_to_the_planner_with_what_may_have_been_said_instead(
+    telling: Telling, told: Any
+) -> None:
+    others = (Alternative("put it in the box", 0.7), Alternative("word " * 60, 0.1))
+    telling.tell(heard("put it in the boss", Verdict.DOUBTED, others=others))
+    (utterance,) = told("utterance")
+    given = utterance["heard"]
+    assert given["others"] == [{"text": "put it in the box", "odds": 0.7}]
+    assert (given["doubted"], given["ask_again"]) == (True, True)
+    assert told("say") == [], "the planner asks, if it makes no sense of them"
+    telling.tell(heard("put it in the boss", Verdict.DOUBTED))
+    assert told("utterance")[0]["heard"]["ask_again"] is False, "nobody is asked again so soon"
 
 
 def test_the_robot_asks_again_ever_more_seldom_until_it_understands(

@@ -53,14 +53,14 @@ def test_a_sure_reading_is_a_command() -> None:
     [
         ({"reading": {"text": " ... "}}, "a sound without words", False),
         ({"reading": {"text": "Please. Thank you!"}}, "a courtesy", False),
-        ({"confidence": 0.4}, "understood by 40%, at least 50% is needed", True),
+        ({"confidence": 0.2}, "understood by 20%, at least 50% is needed", True),
         (
             {"reading": {"text": "..."}, "phrase": {"clipped_ratio": 0.1}},
             "a sound without words; the microphone is overdriven",
             False,
         ),
         (
-            {"confidence": 0.4, "phrase": {"clipped_ratio": 0.1}},
+            {"confidence": 0.2, "phrase": {"clipped_ratio": 0.1}},
             "overdriven: turn its gain down",
             True,
         ),
@@ -84,6 +84,21 @@ def test_what_speaks_against_it_is_told(
     assert judgement.verdict is Verdict.REJECTED
     assert reason in judgement.reason
     assert judgement.ask_again is ask_again
+
+
+@pytest.mark.parametrize(
+    ("confidence", "verdict"),
+    [(0.24, Verdict.REJECTED), (0.25, Verdict.DOUBTED), (0.49, Verdict.DOUBTED)],
+)
+def test_what_is_only_not_sure_enough_is_for_the_planner_to_make_sense_of(
+    confidence: float, verdict: Verdict
+) -> None:
+    assert judge(case(confidence=confidence)).verdict is verdict
+
+
+def test_what_else_speaks_against_it_is_no_doubt() -> None:
+    judgement = judge(case(confidence=0.4, reading={"no_speech": 0.93}))
+    assert judgement.verdict is Verdict.REJECTED
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from vla_deploy.telemetry.metrics.takes import count_of
 _RUNGS: Final = (keys("by_rung"), Each("rung"))
 _OUTCOMES: Final = ("planned", "asked", "declined", "refused", "invalid", "late")
 # Speech's own words for them come with its networks, which are not for whoever only counts.
-_VERDICTS: Final = ("accepted", "rejected", "stop")
+_VERDICTS: Final = ("accepted", "doubted", "rejected", "stop")
 _MODEL: Final = "sight.model"
 
 

@@ -9,7 +9,7 @@ import { may } from "../session.js";
 import { html, useEffect, useRef, useState } from "../ui.js";
 import { openMicrophone, whyNoMicrophone } from "./microphone.js";
 
-const VERDICTS = { accepted: "ok", rejected: "warn", stop: "bad" };
+const VERDICTS = { accepted: "ok", doubted: "warn", rejected: "warn", stop: "bad" };
 const KEYS = [" ", "Enter"];
 
 export function HoldToTalk() {

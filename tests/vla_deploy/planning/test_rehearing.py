@@ -1,0 +1,104 @@
+"""Words that make no sense are tried as what may have been said instead, and read back."""
+
+import pytest
+
+from vla_deploy.planning.errors import Declined
+from vla_deploy.planning.phrasing import Says
+
+GO = ("navigate_to", {"place": "kitchen"})
+SAYS_AGAIN = [Says.HEARD_BADLY.value]
+
+
+def spoken(text, *others, confidence=0.8, **heard):
+    told = [{"text": other, "odds": odds} for other, odds in others]
+    return {
+        "text": text,
+        "source": "voice",
+        "heard": {"confidence": confidence, "others": told, **heard},
+    }
+
+
+def events(told):
+    return [(one["event"], one.get("question", one.get("reason", ""))) for one in told]
+
+
+def test_the_reading_that_makes_sense_is_read_back_and_done_after_a_yes(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to the chicken", ("go to the kitten", 0.6), ("go to the kitchen", 0.5)))
+    ((event, question),) = events(desk.answers())
+    assert event == "asked"
+    assert question.startswith("Shall I go to the kitchen?")
+    assert desk.plans() == [], "nothing moves before the person agrees"
+    desk.give(command_id="c2", text="yes", source="voice")
+    desk.answers()
+    (plan,) = desk.plans()
+    assert plan["command_id"] == "c1"
+
+
+def test_words_that_make_sense_are_not_replaced(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to the bedroom", ("go to the kitchen", 0.9)))
+    desk.answers()
+    (plan,) = desk.plans()
+    assert plan["plan"]["actions"][0]["parameters"]["place"] == "bedroom"
+
+
+def test_where_nothing_makes_sense_the_first_reading_is_refused(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to the chicken", ("go to the kitten", 0.6)))
+    ((event, reason),) = events(desk.answers())
+    assert event == "rejected"
+    assert "chicken" in reason
+
+
+def test_a_model_is_asked_of_the_words_before_other_words_are_tried(open_desk, rung, propose):
+    model = rung("model", propose(GO))
+    desk = open_desk(model)
+    desk.give(**spoken("go where one cooks", ("go to the bedroom", 0.9)))
+    desk.answers()
+    (plan,) = desk.plans()
+    assert plan["plan"]["actions"][0]["parameters"]["place"] == "kitchen"
+
+
+def test_after_models_that_have_no_plan_the_other_words_are_tried(open_desk, rung, propose):
+    desk = open_desk(rung("model", Declined("no idea"), Declined("no idea")))
+    desk.give(**spoken("go to the chicken", ("go to the kitchen", 0.5)))
+    assert [event for event, _ in events(desk.answers())][-1] == "asked"
+
+
+def test_doubted_words_are_read_back_even_where_they_make_sense(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to the kitchen", confidence=0.3, doubted=True, ask_again=True))
+    ((event, _),) = events(desk.answers())
+    assert event == "asked"
+    assert desk.plans() == []
+
+
+@pytest.mark.parametrize(("ask_again", "said"), [(True, SAYS_AGAIN), (False, [])])
+def test_doubted_words_without_sense_are_asked_for_again_where_that_is_welcome(
+    open_desk, ask_again, said
+):
+    desk = open_desk()
+    desk.give(**spoken("so to the weather", confidence=0.3, doubted=True, ask_again=ask_again))
+    assert [event for event, _ in events(desk.answers())] == ["rejected"]
+    assert desk.said_aloud() == said
+
+
+def test_doubted_words_answer_no_question(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to the kitchen", confidence=0.3, doubted=True))
+    desk.answers()
+    desk.give(command_id="c2", **spoken("yes", confidence=0.3, doubted=True))
+    assert [event for event, _ in events(desk.answers())] == ["rejected"]
+    assert desk.plans() == []
+    desk.give(command_id="c3", **spoken("yes"))
+    desk.answers()
+    assert [plan["command_id"] for plan in desk.plans()] == ["c1"]
+
+
+def test_what_is_told_of_other_readings_is_not_trusted(open_desk):
+    desk = open_desk()
+    for others in ("kitchen", [1, {"text": 5, "odds": 1}, {"text": "x"}, {"odds": 1}], None):
+        heard = {"confidence": 0.9, "others": others}
+        desk.give(text="go to the chicken", source="voice", heard=heard)
+        assert [event for event, _ in events(desk.answers())] == ["rejected"]
