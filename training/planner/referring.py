@@ -9,25 +9,25 @@ from typing import Final
 
 from training.planner import pointing, words
 from training.planner.amounts import angle, duration, length, spelt
+from training.planner.describing import (
+    Word,
+    a_noun,
+    description,
+    maybe_colour,
+    maybe_place,
+    maybe_size,
+    said,
+    unmeant,
+)
+from training.planner.singling import counted, one_like, singled_out
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
-Word = tuple[str, bool]
 Source = Callable[[Random], list[Word]]
-
-
-def said(text: str) -> list[Word]:
-    """Return words that all belong to what is meant."""
-    return [(word, True) for word in text.split()]
-
-
-def unmeant(text: str) -> list[Word]:
-    """Return words that add nothing to what is meant."""
-    return [(word, False) for word in text.split()]
 
 
 def thing(random: Random) -> list[Word]:
     """Return a thing: "the big red cup on the table", "my keys", "a wug"."""
-    return [*unmeant(random.choice(pointing.ARTICLES)), *_description(random, depth=0)]
+    return [*unmeant(random.choice(pointing.ARTICLES)), *description(random, depth=0)]
 
 
 def what(random: Random) -> list[Word]:
@@ -37,15 +37,15 @@ def what(random: Random) -> list[Word]:
         said_of_it = random.choice(pointing.PRONOUNS).split()
         return [(word, word not in ("the", "of", "your")) for word in said_of_it]
     if chance < 0.18:
-        return _one(random)
+        return one_like(random)
     if chance < 0.23:
-        return _counted(random)
+        return counted(random)
     if chance < 0.29:
-        return random.choice(_SINGLED_OUT)(random)
+        return singled_out(random)
     if chance < 0.32:
-        return [*unmeant(random.choice(pointing.ARTICLES)), *_description(random, depth=1),
+        return [*unmeant(random.choice(pointing.ARTICLES)), *description(random, depth=1),
                 *said("and"), *unmeant(random.choice(pointing.ARTICLES)),
-                *_description(random, depth=1)]  # fmt: skip
+                *description(random, depth=1)]  # fmt: skip
     if chance < 0.33:
         return said(f"{random.choice(OBJECT_CLASSES)}_{random.randint(1, 12)}")
     return thing(random)
@@ -62,7 +62,7 @@ def moved(random: Random) -> list[Word]:
 def any_thing(random: Random) -> list[Word]:
     """Return a thing of which any will do."""
     article = random.choice(("a", "any", "some", "a", "another"))
-    return [*unmeant(article), *_maybe_colour(random), *said(_noun(random))]
+    return [*unmeant(article), *maybe_colour(random), *said(a_noun(random))]
 
 
 def place(random: Random) -> list[Word]:
@@ -124,12 +124,12 @@ def target(random: Random) -> list[Word]:
         )
         return [
             *unmeant(random.choice(pointing.ARTICLES)),
-            *_maybe_size(random),
-            *_maybe_colour(random),
+            *maybe_size(random),
+            *maybe_colour(random),
             *said(container),
-            *_maybe_place(random, 0.06),
+            *maybe_place(random, 0.06),
         ]
-    return _one(random) if chance < 0.80 else thing(random)
+    return one_like(random) if chance < 0.80 else thing(random)
 
 
 def person(random: Random) -> list[Word]:
@@ -149,169 +149,6 @@ def saying(random: Random) -> list[Word]:
         state = random.choice(("here", "gone", "ready", "red", "on the table", "lost"))
         return said(f"{subject} is {state}")
     return said(" ".join(words.invented(random) for _ in range(random.randint(1, 5))))
-
-
-def _dropping(text: str) -> list[Word]:
-    """Return words that are meant but for those that code puts back or that say nothing."""
-    return [(word, word not in pointing.DROPPED) for word in text.split()]
-
-
-def _one(random: Random) -> list[Word]:
-    """Return "the red one", "the one next to the book", "that one on the left"."""
-    article = unmeant(random.choice(("the", "the", "the", "that", "this")))
-    if random.random() < 0.3:
-        return [*article, *said("one"), *_maybe_place(random, 1.0)]
-    picks = (*words.COLOUR_WORDS, *words.SIZE_WORDS, *words.ORDER_WORDS, *pointing.COMPARED)
-    return [*article, *said(random.choice(picks)), *said("one"), *_maybe_place(random, 0.2)]
-
-
-def _counted(random: Random) -> list[Word]:
-    """Return "both red cups", "each book on the shelf", "a couple of bottles"."""
-    if random.random() < 0.25:
-        quantity, noun = random.choice(pointing.SINGLES), _noun(random)
-    else:
-        quantity, noun = random.choice(pointing.QUANTITIES), _plural(_noun(random))
-    counted = said(quantity) if quantity in _THESE_MANY else _dropping(quantity)
-    return [*counted, *_maybe_colour(random), *said(noun), *_maybe_place(random, 0.2)]
-
-
-def _compared(random: Random) -> list[Word]:
-    """Return "the smaller of the two balls", "the taller cup of the two"."""
-    compared, several = random.choice(pointing.COMPARED), random.choice(pointing.OF_SEVERAL)
-    noun = _noun(random)
-    if random.random() < 0.3:
-        return [*unmeant("the"), *said(f"{compared} {noun}"), *_dropping("of the two")]
-    one = said("one") if random.random() < 0.25 else []
-    return [*unmeant("the"), *said(compared), *one, *_dropping(several), *said(_plural(noun))]
-
-
-def _in_row(random: Random) -> list[Word]:
-    """Return "the second cup from the left", "the third one on the right", "bottle number two"."""
-    noun = "one" if random.random() < 0.25 else _noun(random)
-    if random.random() < 0.15:
-        return [*unmeant(random.choice(("", "the"))), *_maybe_colour(random),
-                *said(f"{_noun(random)} {random.choice(pointing.NUMBERED)}")]  # fmt: skip
-    colour = _maybe_colour(random) if noun != "one" and random.random() < 0.5 else []
-    return [*unmeant("the"), *said(random.choice(pointing.ORDINALS)), *colour, *said(noun),
-            *_dropping(random.choice(pointing.ROWS))]  # fmt: skip
-
-
-def _nearest(random: Random) -> list[Word]:
-    """Return "the cup closest to the box", "the bottle furthest from you"."""
-    own = "one" if random.random() < 0.25 else _noun(random)
-    relative = unmeant(random.choice(("", "", "that is", "that's", "which is", "that stands")))
-    if random.random() < 0.5:
-        return [*unmeant("the"), *said(own), *relative, *said(random.choice(pointing.DISTANCES))]
-    anchor = random.choice((*words.KNOWN_THINGS, *words.SURFACES, "door", "window", "wall"))
-    return [*unmeant("the"), *said(own), *relative, *said(random.choice(pointing.CLOSEST)),
-            *unmeant(random.choice(("the", "the", "my", "that"))), *said(anchor)]  # fmt: skip
-
-
-def _all_but(random: Random) -> list[Word]:
-    """Return "any cup but the blue one", "the cup that isn't red"."""
-    colour = random.choice(words.COLOUR_WORDS)
-    if random.random() < 0.5:
-        noun = "one" if random.random() < 0.25 else _noun(random)
-        return [*unmeant("the"), *said(noun), *_dropping_is(random.choice(pointing.BUT_COLOUR)),
-                *said(colour)]  # fmt: skip
-    several = random.random() < 0.5
-    noun = _plural(_noun(random)) if several else _noun(random)
-    head = "all the" if several else random.choice(("any", "a", "any other"))
-    out = random.choice((colour, colour, random.choice(pointing.COMPARED)))
-    return [*_dropping(head), *said(noun), *said(random.choice(pointing.BUT)), *unmeant("the"),
-            *said(f"{out} one")]  # fmt: skip
-
-
-def _dropping_is(text: str) -> list[Word]:
-    """Keep what denies: "(that is) not", "(that) isn't", "that's not"."""
-    return [(word, word in ("not", "isn't")) for word in text.split()]
-
-
-def _whatever(random: Random) -> list[Word]:
-    """Return "whatever is on the shelf", "everything in the box", "the thing on the table"."""
-    head = random.choice((*map(said, ("whatever is", "whatever's", "everything", "anything")),
-                          _dropping("everything that is"), _dropping("everything that's"),
-                          _dropping("the things"), _dropping("the thing that's"),
-                          _dropping("the stuff"), said("something")))  # fmt: skip
-    anchor = random.choice((*words.SURFACES, "box", "bowl", "basket", "drawer", "crate"))
-    relation = random.choice(("on", "in", "inside", "under", "next to", "behind", "on top of"))
-    return [*head, *said(relation), *unmeant(random.choice(("the", "the", "my"))), *said(anchor)]
-
-
-def _looking(random: Random) -> list[Word]:
-    """Return "the cup that is red", "the book with the blue cover", "the red coloured bowl"."""
-    noun = "one" if random.random() < 0.3 else _noun(random)
-    colour = random.choice(words.COLOUR_WORDS)
-    chance = random.random()
-    if chance < 0.4:
-        relative = random.choice(("that is", "that's", "which is"))
-        return [*unmeant("the"), *said(noun), *unmeant(relative), *said(colour)]
-    if chance < 0.8:
-        part = random.choice(pointing.PARTS)
-        return [*unmeant("the"), *said(f"{noun} with"), *unmeant(random.choice(("the", "a"))),
-                *said(f"{colour} {part}")]  # fmt: skip
-    coloured = random.choice(("coloured", "colored"))
-    return [*unmeant("the"), *said(f"{colour} {coloured} {noun}")]
-
-
-def _plural(noun: str) -> str:
-    if noun.endswith("s"):
-        return noun
-    if noun.endswith(("x", "sh", "ch")):
-        return f"{noun}es"
-    is_ies = noun.endswith("y") and noun[-2:-1] not in "aeiou"
-    return f"{noun[:-1]}ies" if is_ies else f"{noun}s"
-
-
-def _description(random: Random, depth: int) -> list[Word]:
-    described: list[Word] = []
-    if random.random() < 0.09:
-        described += said(random.choice(words.ORDER_WORDS))
-    described += _maybe_size(random)
-    if random.random() < 0.07:
-        described += said(random.choice(words.LOOK_WORDS))
-    described += [*_maybe_colour(random), *said(_noun(random))]
-    if depth == 0:
-        described += _maybe_place(random, 0.22)
-    return described
-
-
-def _maybe_size(random: Random) -> list[Word]:
-    return said(random.choice(words.SIZE_WORDS)) if random.random() < 0.18 else []
-
-
-def _maybe_colour(random: Random) -> list[Word]:
-    return said(random.choice(words.COLOUR_WORDS)) if random.random() < 0.40 else []
-
-
-def _maybe_place(random: Random, share: float) -> list[Word]:
-    chance = random.random()
-    if chance > share:
-        return unmeant(random.choice(pointing.TAILS)) if chance > 0.965 else []
-    if chance < 0.25 * share:
-        return _dropping(random.choice(pointing.SIDES))
-    relative = unmeant(random.choice(pointing.CLAUSES)) if random.random() < 0.35 else []
-    near = random.choice(pointing.NEAR).split()
-    leads = len(near) > 1 and near[0] in pointing.LEADING and near[1] != "of"
-    relation = [(word, word != "the" and not (leads and at == 0)) for at, word in enumerate(near)]
-    if random.random() < 0.5:
-        anchor = said(random.choice((*words.SURFACES, *words.PLACES)))
-    else:
-        anchor = _description(random, depth=1)
-    return [*relative, *relation, *unmeant(random.choice(pointing.ARTICLES)), *anchor]
-
-
-def _noun(random: Random) -> str:
-    chance = random.random()
-    if chance < 0.62:
-        return random.choice(words.KNOWN_THINGS)
-    return random.choice(words.OTHER_THINGS) if chance < 0.90 else words.invented(random)
-
-
-_THESE_MANY: Final = frozenset({"these two", "those two", "these three", "those three"})
-_SINGLED_OUT: Final = (
-    _compared, _in_row, _in_row, _nearest, _all_but, _whatever, _looking,
-)  # fmt: skip
 
 
 def _one_of(choices: tuple[str, ...]) -> Source:

@@ -182,7 +182,7 @@ class Hearing:
         if answer is None or answer.reading is None or answer.phrase.number == self._stopped_by:
             return
         sure = self._confidence(answer.reading)
-        if not stops(answer.reading.text, sure, is_all=is_all):
+        if not stops(answer.reading, sure, is_all=is_all):
             return
         self._stopped_by = answer.phrase.number
         judgement = Judgement(verdict=Verdict.STOP)

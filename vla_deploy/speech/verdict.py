@@ -26,6 +26,8 @@ DOUBT_RATIO: Final = 0.5
 """What is understood by this share of what is needed may still make sense to the planner."""
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
+STOP_ODDS: Final = 0.2
+"""A stop is taken where it was at least by so much as likely as the words that were read."""
 STOP_WITHIN_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one."""
 
@@ -70,7 +72,7 @@ class _Refusal:
 
 def judge(case: Case) -> Judgement:
     """Return what becomes of a phrase."""
-    if stops(case.reading.text, case.confidence):
+    if stops(case.reading, case.confidence):
         return Judgement(verdict=Verdict.STOP)
     for row in _REFUSALS:
         reason = row.why(case)
@@ -82,14 +84,17 @@ def judge(case: Case) -> Judgement:
     return Judgement(verdict=Verdict.ACCEPTED)
 
 
-def stops(text: str, confidence: float, *, is_all: bool = True) -> bool:
+def stops(reading: Reading, confidence: float, *, is_all: bool = True) -> bool:
     """Tell whether words read by that confidence stop the robot; `is_all` unless more may follow.
 
-    As on the stream, the word itself does, whatever is meant by it.
+    As on the stream, the word itself does, whatever is meant by it. A phrase that was hardly
+    likelier to be another one than a mere call to stop is one, too.
     """
-    if is_all and is_stop(text) and confidence >= STOP_CONFIDENCE:
+    if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
         return True
-    return confidence >= STOP_WITHIN_CONFIDENCE and holds_stop(text, is_all=is_all)
+    if is_all and any(is_stop(one.text) for one in reading.others if one.odds >= STOP_ODDS):
+        return True
+    return confidence >= STOP_WITHIN_CONFIDENCE and holds_stop(reading.text, is_all=is_all)
 
 
 def _without_words(case: Case) -> str:
