@@ -52,7 +52,7 @@ _TABLE: Final = tuple((re.compile(pattern), instead) for pattern, instead in _RO
 def reworded(text: str, furniture: Mapping[str, str]) -> str:
     """Return a description in plain words; `furniture` are the spoken names of what has a top."""
     text = text.lower().replace("\u2019", "'")
-    owned = _owner(tuple(furniture)).fullmatch(text.strip()) if "'" in text and furniture else None
+    owned = _owner(tuple(furniture)).fullmatch(text.strip()) if furniture else None
     if owned:
         text = f"{owned['own']} on the {owned['owner']}"
     for pattern, instead in _TABLE:
@@ -60,9 +60,18 @@ def reworded(text: str, furniture: Mapping[str, str]) -> str:
     return " ".join(text.split())
 
 
+_RELATIONS: Final = "on|in|at|of|near|by|next|under|behind|to|from|and|or|that|which|with|over"
+
+
 @lru_cache(maxsize=8)
 def _owner(names: tuple[str, ...]) -> re.Pattern[str]:
-    """Return what finds "the side table's cup"; any table goes by the last word of its name."""
+    """Return what finds "the side table's cup"; any table goes by the last word of its name.
+
+    A recogniser writes no apostrophe: "the side tables cup", but not "the side tables near you".
+    """
     spoken = {*names, *(name.split()[-1] for name in names)}
     owners = "|".join(re.escape(name) for name in sorted(spoken, key=len, reverse=True))
-    return re.compile(rf"(?:(?:the|my|your|that|this) )?(?P<owner>{owners})'s? (?P<own>.+)")
+    return re.compile(
+        rf"(?:(?:the|my|your|that|this) )?(?P<owner>{owners})"
+        rf"(?:'s?|s(?! (?:{_RELATIONS})\b)) (?P<own>.+)"
+    )
