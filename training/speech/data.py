@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from training.speech.pausing import with_pauses
+from training.speech.pausing import as_read, with_pauses
 from training.speech.sentences import draw_sentence
 from training.voices.cast import draw_of_all, draw_style, say
 from training.voices.clip import Clip
@@ -35,10 +35,10 @@ def _clips(number: int, seed: int, count: int) -> Iterator[Clip]:
     spoken = 0
     while spoken < count:
         try:
-            text = draw_sentence(random)
-            said = say(with_pauses(text, random), draw_of_all(random), draw_style(random))
+            text = with_pauses(draw_sentence(random), random)
+            said = say(text, draw_of_all(random), draw_style(random))
         except SynthesisFailed as error:
             _LOG.warning("left out: %s", error)
             continue
         spoken += 1
-        yield replace(said, text=text)
+        yield replace(said, text=as_read(text))

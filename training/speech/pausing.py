@@ -1,9 +1,11 @@
-"""Say where a speaker pauses: marks of punctuation for the voices, in none of the texts learnt.
+"""Say where a speaker pauses: marks of punctuation for the voices, commas for the recogniser.
 
 People pause before "and", around an "um", after a name, and where they think. A recogniser that
-has heard no pause within a sentence takes the first one for the end.
+has heard no pause within a sentence takes the first one for the end. It writes a comma where it
+hears one: "pick up the red cup, no, the blue one" is hard to understand without.
 """
 
+import re
 from typing import Final
 
 import numpy as np
@@ -37,6 +39,11 @@ def with_pauses(text: str, random: Random) -> str:
         pauses = at + 1 < len(words) and random.random() < _chance(words, at, around)
         said.append(word + str(random.choice(_MARKS, p=_MARK_SHARES)) if pauses else word)
     return " ".join(said)
+
+
+def as_read(text: str) -> str:
+    """Return a text with marks as the recogniser is to write it: each a comma."""
+    return re.sub(r"[.;]", ",", text)
 
 
 def hesitating(text: str, random: Random) -> str:

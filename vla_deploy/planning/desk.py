@@ -55,7 +55,7 @@ class Desk:
         self._clock = clock
         self._queue: deque[Command] = deque()
         self._under_way = UnderWay()
-        self._rehearing = Rehearing()
+        self._rehearing = Rehearing(clock)
         self._conclusions = Conclusions(
             # Another profile brings another planner.
             lambda request, answer: self.planner.accepted(request, answer),
@@ -168,7 +168,8 @@ class Desk:
         self, command: Command, request: Request, answer: Answer, deadline: Deadline
     ) -> None:
         """Ask those who take time, where nobody else has a plan."""
-        if answer.is_final or not self.planner.slow_rungs:
+        at_once = not self.planner.slow_rungs or self._rehearing.is_urgent(command)
+        if answer.is_final or at_once:
             self._conclude(command, request, answer)
             return
         self._telling.planning(command, self.planner.slow_rungs)

@@ -1,18 +1,26 @@
 """Try what may have been said instead, where the words as they were read make no sense.
 
 A recogniser that is unsure has several readings; the one with a plan in this room and this moment
-is the likeliest. It is read back before anything moves.
+is the likeliest. It is read back before anything moves. Each is tried without its commas, too: a
+pause may be a thought's end, or only a breath.
 """
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
+from drivers.clock import Clock
+from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
 
 READ_BACK: Final = 0.5
-"""How surely another reading is heard at most: less than what is carried out unasked."""
+"""How surely other words are heard at most: less than what is carried out unasked."""
+PATIENCE_S: Final = 1.0
+"""So long other readings are given to planners that take time, too."""
+_MARKS: Final = re.compile(r"[,;:.]+(?= |$)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,27 +33,30 @@ class Heard:
 
 
 class Rehearing:
-    """Remember of one command how it was read first."""
+    """Remember of one command how it was read first, and since when others are tried."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
         self._first: Heard | None = None
+        self._clock = clock
+        self._patience: Deadline | None = None
+
+    def is_urgent(self, command: Command) -> bool:
+        """Tell whether a reading may only be given to planners that answer at once."""
+        patience = self._patience
+        again = self._of(command) is not None
+        return again and patience is not None and patience.left_s <= 0.0
 
     def other(self, command: Command, request: Request, answer: Answer) -> Command | None:
         """Return the command in the next other words to try; None if it is to be concluded."""
-        is_first = self._of(command) is None
-        makes_sense = answer.is_final if is_first else answer.plan is not None
-        if makes_sense or not command.others:
+        first = self._of(command)
+        makes_sense = answer.is_final if first is None else answer.plan is not None
+        if makes_sense or not command.is_spoken:
             return None
-        if is_first:
-            self._first = Heard(command=command, request=request, answer=answer)
-        (text, odds), *rest = command.others
-        sure = 1.0 if command.heard_confidence is None else command.heard_confidence
-        return replace(
-            command,
-            text=text,
-            others=tuple(rest),
-            heard_confidence=min(READ_BACK, sure * odds),
-        )
+        if first is None:
+            first = self._first = Heard(command=command, request=request, answer=answer)
+            self._patience = Deadline.within(self._clock, PATIENCE_S)
+            command = replace(command, others=tuple(_readings(command)))
+        return _in_other_words(command, first.command)
 
     def concluded(self, command: Command, request: Request, answer: Answer) -> Heard:
         """Return what is to be concluded: of readings without a plan the first."""
@@ -58,3 +69,24 @@ class Rehearing:
         first = self._first
         same = first is not None and first.command.command_id == command.command_id
         return first if same else None
+
+
+def _readings(command: Command) -> Iterator[tuple[str, float]]:
+    """Yield all other readings of a command, and of each its words alone."""
+    tried = {command.text}
+    for text, odds in ((command.text, 1.0), *command.others):
+        for reading in (text, _MARKS.sub("", text)):
+            if reading not in tried:
+                tried.add(reading)
+                yield reading, odds
+
+
+def _in_other_words(command: Command, first: Command) -> Command | None:
+    """Return a command in the next of its other readings, as sure as that is."""
+    if not command.others:
+        return None
+    (text, odds), *rest = command.others
+    sure = first.heard_confidence
+    if _MARKS.sub("", text) != _MARKS.sub("", first.text):
+        sure = min(READ_BACK, odds * (1.0 if sure is None else sure))
+    return replace(command, text=text, others=tuple(rest), heard_confidence=sure)

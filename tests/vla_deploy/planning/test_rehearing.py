@@ -102,3 +102,26 @@ def test_what_is_told_of_other_readings_is_not_trusted(open_desk):
         heard = {"confidence": 0.9, "others": others}
         desk.give(text="go to the chicken", source="voice", heard=heard)
         assert [event for event, _ in events(desk.answers())] == ["rejected"]
+
+
+def test_a_breath_within_a_command_does_not_spoil_it(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to, the kitchen"))
+    assert "asked" not in [event for event, _ in events(desk.answers())]
+    (plan,) = desk.plans()
+    assert plan["plan"]["actions"][0]["parameters"]["place"] == "kitchen"
+
+
+def test_what_was_typed_is_taken_as_it_is(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the, kitten", source="cli")
+    assert [event for event, _ in events(desk.answers())] == ["rejected"]
+
+
+def test_a_planner_that_takes_long_is_not_asked_about_every_reading(open_desk, rung):
+    model = rung("model", *[Declined("no idea")] * 9, takes_s=0.7)
+    desk = open_desk(model)
+    others = [(f"go to the kitten {number}", 0.5) for number in range(8)]
+    desk.give(**spoken("go to the chicken", *others))
+    assert [event for event, _ in events(desk.answers())][-1] == "rejected"
+    assert len(model.asked) == 3, "of the words, and of others within a second"

@@ -5,6 +5,7 @@ from typing import Final
 
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.figures import in_figures
+from vla_deploy.planning.rules.run_together import with_commas
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 MOST_LETTERS: Final = 400
@@ -41,6 +42,7 @@ _POLITE_BEFORE: Final = re.compile(
     r"be (?:a|an) (?:love|star|angel|pal|good \w+) and|"
     r"it would be (?:nice|great|good) if you(?: could)?|"
     r"see if you can|try to|try and|start to|next|finally|also|alright|all right|"
+    r"if it(?:'s| is) not too much trouble|excuse me|pardon me|if you don't mind|"
     r"right then|but(?= (?:go|also|do|take|put|pick|bring|keep|hang|hold|leave)\b)|"
     r"plus)\b[, ]*"
 )
@@ -174,6 +176,7 @@ DOING: Final = {
 def plain(text: str) -> str:
     """Return a text in lower case without hesitation, with words in full that were run together."""
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
+    text = with_commas(text)
     text = _REASON.sub("", _ASKED_BETWEEN.sub(", ", text))
     for pattern, full in _FORMS:
         text = pattern.sub(full, text)

@@ -1,0 +1,51 @@
+"""Put in the commas that nobody hears: speech comes without them, and so do hasty typists.
+
+Only where the next words cannot belong to what stands before: "pick up the red cup, no wait, the
+blue one", "my keys are in the kitchen, could you bring them".
+"""
+
+import re
+from typing import Final
+
+_VERBS: Final = (
+    "bring|carry|check|clean|clear|close|come|drive|drop|fetch|find|get|give|go|grab|hand|head|hold|"
+    "leave|lift|look|move|open|pass|pick|place|pop|put|return|say|search|see|set|show|stick|"
+    "take|tell|tidy|turn|wait"
+)
+_PLACED: Final = "in|on|at|by|near|under|behind|beside|next|inside|somewhere"
+_BREAKS: Final = re.compile(
+    r"(?<=[a-z']) (?="
+    # He has changed his mind.
+    r"(?:no wait|wait no|oh no wait|or rather|no sorry|sorry no|sorry i mean|i meant?|actually no|"
+    r"no actually|scratch that|(?:no|sorry) make (?:it|that)|"
+    rf"no (?:{_VERBS})) "
+    # She has said how things are, and asks for something now.
+    rf"|(?:so )?(?:can|could|would|will) you (?:(?:please|possibly|kindly|just|go and) )*(?:{_VERBS})\b"
+    r"|(?:any idea|do you know) where|where (?:is it|are they|is he|is she)$"
+    rf"|please (?:{_VERBS}) "
+    # They tell where it is.
+    rf"|(?:it|they)(?:'s| is| should be| must be| might be|'re| are) (?:[a-z]+ )?(?:{_PLACED})\b"
+    r")"
+)
+# What stands before belongs to what follows.
+_JOINED: Final = frozenset(
+    {
+        "and", "if", "that", "so", "but", "then", "or", "because", "when", "where", "please",
+        "robot", "butler", "hey", "okay", "well", "now", "i", "you", "to", "say", "saying", "ask",
+    }
+)  # fmt: skip
+_QUOTES: Final = re.compile(r"^(?:please )?(?:say|tell|ask|announce|shout|whisper)\b")
+_FEWEST_WORDS: Final = 3
+
+
+def with_commas(text: str) -> str:
+    """Return a text in small letters with commas where a new thought surely begins."""
+    if _QUOTES.match(text):
+        return text
+    return _BREAKS.sub(lambda found: _comma(text[: found.start()]), text)
+
+
+def _comma(before: str) -> str:
+    words = before.replace(",", " , ").split()
+    goes_on = len(words) < _FEWEST_WORDS or words[-1] in _JOINED
+    return " " if goes_on else ", "
