@@ -39,7 +39,7 @@ FALL_FROM: Final = 0.55
 SHORT_UNTIL: Final = 0.1
 """Share of the time in which only the shorter clips are learnt from, by a network that is new."""
 SMOOTHING: Final = 0.05
-STARTED_RATIO: Final = 0.5
+STARTED_RATIO: Final = 0.25
 """Of the rates of learning, where a training begins with weights that were shipped."""
 _SAVE_EVERY_STEPS: Final = 200
 _TELL_EVERY_STEPS: Final = 50

@@ -15,13 +15,14 @@ COLOURS: Final = (
 CONTAINERS: Final = frozenset({"box", "bowl"})
 ARTICLES: Final = frozenset({"the", "a", "an", "my", "your", "that", "this", "some", "our"})
 SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
-    "mug": "cup", "glass": "cup", "beaker": "cup", "tumbler": "cup",
+    "mug": "cup", "glass": "cup", "beaker": "cup", "tumbler": "cup", "teacup": "cup",
     "sphere": "ball",
-    "novel": "book", "notebook": "book",
+    "novel": "book", "notebook": "book", "paperback": "book", "textbook": "book",
     "flask": "bottle",
-    "smartphone": "phone", "mobile": "phone", "telephone": "phone",
+    "smartphone": "phone", "mobile": "phone", "telephone": "phone", "cellphone": "phone",
+    "tin": "can",
     "key": "keys", "keyring": "keys",
-    "controller": "remote", "zapper": "remote",
+    "controller": "remote", "zapper": "remote", "clicker": "remote",
     "crate": "box", "bin": "box", "container": "box", "basket": "box",
     "thing": "object", "something": "object",
     "gray": "grey", "violet": "purple",

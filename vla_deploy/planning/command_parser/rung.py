@@ -36,6 +36,7 @@ from vla_deploy.planning.command_parser.wording import (
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.understanding.purposes import without_purpose
 
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
@@ -121,7 +122,7 @@ class CommandParser:
             Declined: the text is none that the model could know.
             InferenceError: there is no whole answer.
         """
-        words = plain_words(text)
+        words = plain_words(without_purpose(text.lower()))
         if not words or foreign_share(text) > MOST_FOREIGN:
             raise Declined("no words that I know")
         if len(words) > MOST_COMMAND_WORDS:

@@ -6,6 +6,7 @@ from typing import Final
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.figures import in_figures
 from vla_deploy.planning.rules.run_together import with_commas
+from vla_deploy.planning.understanding.purposes import without_purpose
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 MOST_LETTERS: Final = 400
@@ -66,7 +67,7 @@ _SPLIT: Final = re.compile(
 )
 # What people say while they think, and words said twice.
 _FILLER: Final = re.compile(
-    r",?\s*\b(?:um+|uh+|er+m?|hmm+|you know|like,|let me (?:think|see)(?=,)|"
+    r",?\s*\b(?:um+|uh+|er+m?|hmm+|ugh|och|aye|oops|you know|like,|let me (?:think|see)(?=,)|"
     r"(?:what's|what is|what was|what are) (?:it|that|they|its name)(?: called)?(?: again)?(?=,)|"
     r"how do you (?:say|call it)|what do you call it|whatsit|whatchamacallit)"
     r"(?=[\s,.!?]|$),?\s*"
@@ -77,6 +78,8 @@ _FORMS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
     for pattern, full in (
         ("gimme", "give me"), ("lemme have", "give me"), ("wanna", "want to"),
         ("gotta", "have to"), ("gonna", "going to"), ("outta", "out of"), ("'em", "them"),
+        ("whereabouts(?= (?:is|are)\\b)", "where"), ("thae", "those"),
+        ("help me look$", "look for it"),
         ("ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
     )
 )  # fmt: skip
@@ -173,14 +176,18 @@ DOING: Final = {
 """How verbs of commands are said behind "would you mind"."""
 
 
+# "And" joins what a thing is between; nothing new begins with it.
+_BETWEEN: Final = re.compile(r"\b(between (?:[\w']+ ){1,4}?)and (?=\w)")
+
+
 def plain(text: str) -> str:
     """Return a text in lower case without hesitation, with words in full that were run together."""
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
-    text = with_commas(text)
+    text = with_commas(without_purpose(text))
     text = _REASON.sub("", _ASKED_BETWEEN.sub(", ", text))
     for pattern, full in _FORMS:
         text = pattern.sub(full, text)
-    return in_figures(_TWICE.sub(r"\1", text))
+    return in_figures(_TWICE.sub(r"\1", _BETWEEN.sub(r"\1& ", text)))
 
 
 _VERBS: Final = "|".join(sorted({*DOING.values(), "stop", "clean", "search", "charge", "hang"}))

@@ -20,7 +20,8 @@ _BREAKS: Final = re.compile(
     r"no actually|scratch that|(?:no|sorry) make (?:it|that)|"
     rf"no (?:{_VERBS})) "
     # She has said how things are, and asks for something now.
-    rf"|(?:so )?(?:can|could|would|will) you (?:(?:please|possibly|kindly|just|go and) )*(?:{_VERBS})\b"
+    r"|(?:so )?(?:can|could|would|will) you (?:(?:please|possibly|kindly|just|go and) )*"
+    rf"(?:{_VERBS})\b"
     r"|(?:any idea|do you know) where|where (?:is it|are they|is he|is she)$"
     rf"|please (?:{_VERBS}) "
     # They tell where it is.

@@ -69,6 +69,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      rf"chance )?know|any idea|tell me|i wonder|find out) where) {_OBJECT}"
      r"(?: is| are| gone| has gone| got to)?(?: anywhere| somewhere)?(?: have you)?",
      telling.tell_or_find),
+    (Intent.QUESTION, r"(?:(?:do|did) you (?:happen to )?know |any idea |tell me )?"
+     rf"what(?:'s| has)? (?:become|became|happened|gone) (?:of|to|with) {_OBJECT}",
+     telling.tell_or_find),
     (Intent.QUESTION, rf"(?:do you see|is there|are there|see) (?:any |an? )?{_OBJECT}"
      r"(?: there| here| anywhere)?", telling.tell_whether),
     (Intent.QUESTION, rf"how many {_OBJECT}(?: are there| do you see| can you see| are here)?"
@@ -98,6 +101,12 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, r"i (?:could do with|could use|fancy|'d love|would love|'d like|"
      r"feel like) (?P<object>(?:the|my|a|an|that|this|some) .+)", building.bring),
     (Intent.MANIPULATION, rf"fetch {_OBJECT}", building.bring),
+    (Intent.MANIPULATION, r"(?:(?:can|could|may|might) (?:i|we) (?:please |just |maybe )?"
+     r"(?:have|get|borrow|trouble you for|bother you for|ask (?:you )?for)|"
+     r"let (?:me|us) (?:have|borrow)|(?:is there )?any chance of(?: getting)?|"
+     r"(?:is it|would it be) possible to (?:have|get)|have) "
+     r"(?P<object>(?:the|my|a|an|that|this|some|our) .+?)(?: (?:over )?here| to me)?",
+     building.bring),
     # --- go to
     (Intent.NAVIGATION, r"(?:go|come|drive) back(?: here| to (?:me|where you (?:were|are)))?|"
      r"return|(?:and )?back (?:here|to me)", building.go_back),
@@ -144,6 +153,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|stow|store|"
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
      rf"(?:down |away )?{_INTO} (?P<destination>.+)", placing.put),
+    (Intent.MANIPULATION, r"(?P<relation>in|into|on|onto) "
+     r"(?P<destination>(?:the|my|that|this) .+?) with (?P<object>(?:the|my|that|this|both|all) .+)", placing.put),
     (Intent.MANIPULATION, rf"take {_OBJECT} (?P<relation>(?:back |over |up |down )?(?:to|into|onto|"
      r"over to)|back (?:in|on)) (?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling) "

@@ -46,9 +46,9 @@ class Expression:
     `side` is left, right or middle, from the speaker's view where `by_speaker`. `support` names
     the furniture that a generic word such as "table" stands for. `place` is where in a row it is,
     `besides` what it is not, `near` what it is the nearest to, or the farthest from, as `order`
-    says. `among` is of how many things it is one. `kinds` are those that a word such as "round"
-    fits, the best first. `corrections` are words taken for others, `doubts` those that only sound
-    like a known one.
+    says, `between` which two things it is. `among` is of how many things it is one. `kinds` are
+    those that a word such as "round" fits, the best first. `corrections` are words taken for
+    others, `doubts` those that only sound like a known one.
     """
 
     said: str
@@ -66,6 +66,7 @@ class Expression:
     besides: "tuple[Expression, ...]" = ()
     near: "Expression | None" = None
     order: str = ""
+    between: "tuple[Expression, ...]" = ()
     among: int = 0
     kinds: tuple[frozenset[str], ...] = ()
     corrections: tuple[Match, ...] = ()
@@ -75,19 +76,20 @@ class Expression:
     @property
     def is_relative(self) -> bool:
         """Tell whether only the things around tell which one it is: a row, or what it is not."""
-        return bool(self.place or self.besides or self.near or self.kinds)
+        return bool(self.place or self.besides or self.near or self.between or self.kinds)
 
     @property
     def is_bare(self) -> bool:
         """Tell whether it is only a place in a list: "the second one"."""
         is_counted = self.place is not None and not self.place.side
-        tells = self.extreme or self.kinds or self.besides or self.near or self.support
+        tells = self.extreme or self.kinds or self.besides or self.near or self.between
+        tells = tells or self.support
         return is_counted and self.query == Query() and not (tells or self.query.is_named)
 
 
 MOST_LETTERS: Final = 200
 _ID: Final = re.compile(r"[a-z]+_\d+")
-_TOKEN: Final = re.compile(r"[a-z0-9_]+")
+_TOKEN: Final = re.compile(r"[a-z0-9_]+|&")
 _TO_WHOM: Final = re.compile(
     r"\b(nearest|closest|nearer|closer|farthest|furthest) to (you|yourself|robot|the robot|me)\b"
 )
@@ -183,6 +185,7 @@ def _compared(
 ) -> Expression | None:
     """Return it with the things that it is compared with; None where one of them is unknown."""
     others = [_read(one, named) or _read(f"the one {one}", named) for one in parts.besides]
+    others += [_read(one, named) for one in parts.between]
     others += [_read(parts.near, named)] if parts.near else []
     known = [one for one in others if one is not None and _can_compare(one)]
     if len(known) < len(others):
@@ -192,6 +195,7 @@ def _compared(
         read,
         besides=tuple(one for one in besides if not one.pronoun),
         near=known[-1] if parts.near else None,
+        between=tuple(known[len(besides) :][: len(parts.between)]),
         order=phrases.ORDER_WORDS.get(parts.order, parts.order),
         is_other=read.is_other or any(one.pronoun for one in besides),
         by_speaker=read.by_speaker or (parts.place is not None and parts.place.by_speaker),

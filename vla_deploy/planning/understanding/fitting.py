@@ -17,6 +17,7 @@ from vla_deploy.planning.understanding.selection import (
     in_a_row,
     most,
     nth,
+    off_line_m,
     on_side,
     ranked,
     together,
@@ -113,6 +114,8 @@ def told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[T
     looks = facing(view) if read.by_speaker and view is not None else view
     if read.among and len(found) not in (1, read.among):
         return found
+    if read.between:
+        found = _between(read.between, found, setting)
     if read.near is not None:
         return _by_nearness(read, read.near, found, setting)
     if read.place is not None:
@@ -161,6 +164,24 @@ def _by_nearness(
     row = [one for one in found if one not in others]
     row.sort(key=lambda one: min(math.dist(one.xy_m, other.xy_m) for other in others))
     return row[:1] if ORDERS[read.order] > 0 else row[-1:]
+
+
+def _between(ends: tuple[Expression, ...], found: list[Thing], setting: Setting) -> list[Thing]:
+    """Return what stands between two things, the nearest to their line first; none if unknown."""
+    known = list(setting.scene.things)
+    named = [told_apart(one, _described_by(one, known, setting), setting) for one in ends]
+    if not all(named):
+        return []
+    # "Between the books" names them together; of several cups, one pair has it between them.
+    pairs = [(one, other) for one in named[0] for other in named[1] if one is not other]
+    aside = [
+        (off_m, thing)
+        for thing in found
+        for pair in pairs
+        if thing not in pair and (off_m := off_line_m(thing, *pair)) is not None
+    ]
+    aside.sort(key=lambda row: row[0])
+    return list({thing.thing_id: thing for _, thing in aside}.values())
 
 
 def _in_place(

@@ -4,6 +4,7 @@
 "any cup but the blue one"           any cup, none that is "the blue one"
 "the smaller of the two balls"       the smaller ball, of two
 "the cup closest to the box"         a cup, the nearest to "the box"
+"the can between the cup and a book" a can, between "the cup" and "a book"
 """
 
 import re
@@ -36,7 +37,8 @@ class Place:
 class Parted:
     """Hold what is left of a description, and what it was parted from.
 
-    `is_one_of` tells that it is one of several ("of the two balls"), `among` of how many.
+    `is_one_of` tells that it is one of several ("of the two balls"), `among` of how many;
+    `between` names the two things that it is between.
     """
 
     own: str
@@ -46,6 +48,7 @@ class Parted:
     near: str = ""
     is_one_of: bool = False
     among: int = 0
+    between: tuple[str, ...] = ()
 
 
 _SIDE_BEHIND: Final = re.compile(
@@ -63,6 +66,11 @@ _NEAR: Final = re.compile(
     r"(?P<own>.+?) (?:(?:that|which) (?:is|are) |(?:is|are) |the )?"
     r"(?P<order>nearest|closest|nearer|closer|farthest)(?: to| from)? "
     r"(?P<near>(?:the|my|your|that|this) .+)"
+)
+_BETWEEN: Final = re.compile(
+    r"(?P<own>.+?) (?:(?:that|which) (?:is|are|stands|lies|sits) |(?:is|are) )?"
+    r"(?:(?:right|lying|standing|sitting|stood) )?(?:in )?"
+    r"between (?P<one>.+?) (?:and|&) (?P<other>.+)"
 )
 _NTH: Final = rf"(?:{'|'.join(ORDINALS)})"
 _COUNTING: Final = re.compile(
@@ -87,7 +95,8 @@ _ONE_OF: Final = re.compile(
 
 def parted(said: str) -> Parted:
     """Part a description, in lower case and without punctuation."""
-    own, besides = _besides(said)
+    amid = _BETWEEN.fullmatch(said)
+    own, besides = _besides(said if amid is None else amid["own"])
     own, is_one_of, among = _one_of(own)
     near = _NEAR.fullmatch(own)
     if near:
@@ -101,6 +110,7 @@ def parted(said: str) -> Parted:
         near=near["near"] if near else "",
         is_one_of=is_one_of,
         among=among,
+        between=() if amid is None else (amid["one"], amid["other"]),
     )
 
 

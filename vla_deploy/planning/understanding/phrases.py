@@ -92,8 +92,8 @@ COMPOUNDS: Final[Mapping[str, str]] = MappingProxyType(
 MODIFIERS: Final = frozenset(
     {
         "coffee", "tea", "water", "soda", "coke", "beer", "juice", "tennis", "toy", "rubber",
-        "plastic", "cardboard", "storage", "tv", "television", "car", "house", "door", "cell",
-        "mobile", "paper", "wooden", "metal", "ceramic", "drinking", "office", "favourite",
+        "plastic", "cardboard", "storage", "tv", "telly", "television", "car", "house", "door",
+        "cell", "mobile", "paper", "wooden", "metal", "ceramic", "drinking", "office", "favourite",
         "favorite", "nice", "lovely", "same",
     }
 )  # fmt: skip

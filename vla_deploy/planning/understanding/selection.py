@@ -12,6 +12,8 @@ from vla_deploy.world import Thing, Viewpoint
 LEAST_BEARING_RAD: Final = 0.03
 # Below this ratio two things look the same size.
 DIFFERENCE_RATIO: Final = 1.08
+# What is farther off the line between two things is not between them.
+MOST_OFF_RATIO: Final = 0.4
 Measure = Callable[[Thing], float]
 
 
@@ -35,6 +37,18 @@ MEASURES: Final[Mapping[str, Measure]] = MappingProxyType(
         "thin": lambda thing: 1.0 / max(min(thing.size_m), 1e-3),
     }
 )
+
+
+def off_line_m(thing: Thing, one: Thing, other: Thing) -> float | None:
+    """Return how far a thing is off the line between two others; None if it is not between them."""
+    (x, y), (x1, y1), (x2, y2) = thing.xy_m, one.xy_m, other.xy_m
+    length_m = math.dist(one.xy_m, other.xy_m)
+    if length_m == 0.0:
+        return None
+    along_ratio = ((x - x1) * (x2 - x1) + (y - y1) * (y2 - y1)) / length_m**2
+    off_m = abs((x - x1) * (y2 - y1) - (y - y1) * (x2 - x1)) / length_m
+    is_between = 0.0 < along_ratio < 1.0 and off_m <= MOST_OFF_RATIO * length_m
+    return off_m if is_between else None
 
 
 def bearing_rad(thing: Thing, view: Viewpoint) -> float:

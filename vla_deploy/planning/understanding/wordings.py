@@ -23,6 +23,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"^(?:what|whatever)(?:'s| is) (?:lying |standing |sitting )?"
      r"(?=(?:on|in|inside|under|next to|behind|beside)\b(?! (?:your|the) (?:left |right )?hand))",
      "the thing "),
+    (r"^(?:what|whatever)(?:'s| is) (?:lying |standing |sitting )?(?:in )?between\b",
+     "the thing between"),
     (r"^anything (?=but|except|other than|apart from)", "any object "),
     (rf"\bnon[- ]?{_COLOUR} (.+)", r"\2 that is not \g<colour>"),
     (rf"\b{_COLOUR}(?:[- ]colou?red| in colou?r)\b", r"\g<colour>"),

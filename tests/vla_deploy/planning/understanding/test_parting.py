@@ -64,3 +64,17 @@ def test_what_it_is_not_is_parted_from_the_thing(
 )  # fmt: skip
 def test_what_it_is_compared_with_is_parted_from_the_thing(said: str, expected: Parted) -> None:
     assert parted(said) == expected
+
+
+@pytest.mark.parametrize(
+    ("said", "own", "between"),
+    [
+        ("the can between the cup and the bowl", "the can", ("the cup", "the bowl")),
+        ("the one that is in between the cup & a red book", "the one", ("the cup", "a red book")),
+        ("the thing standing between my phone and it", "the thing", ("my phone", "it")),
+    ],
+)
+def test_what_a_thing_is_between_is_parted_from_it(
+    said: str, own: str, between: tuple[str, str]
+) -> None:
+    assert parted(said) == Parted(own=own, between=between)
