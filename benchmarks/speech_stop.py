@@ -33,6 +33,7 @@ from vla_deploy.speech.recording import StreamClock, open_hearing
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.stop_words.opening import open_spotter
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
+from vla_deploy.speech.stop_words.suspicions import Suspicions
 from vla_deploy.speech.verdict import Verdict
 from vla_deploy.state_dir import user_base
 
@@ -68,7 +69,10 @@ class Ear:
         self._clock = StreamClock()
         ears = ears_of(shelf, profile, 0)
         self.why_no_words = ears.why
-        self._hearing = open_hearing(ears.recogniser, ears.why, profile, self._clock)
+        self._suspicions = Suspicions()
+        self._hearing = open_hearing(
+            ears.recogniser, ears.why, profile, self._clock, suspicion=self._suspicions.highest
+        )
         self._count = 0
         self.busy_s = {SPOTTER: 0.0, WORDS: 0.0}
 
@@ -80,6 +84,7 @@ class Ear:
     def alarms(self, sound: Wave) -> Iterator[Alarm]:
         """Yield what a piece of sound sets off, heard from silence on."""
         self.spotter.reset()
+        self._suspicions.clear()
         self._hearing.enter(Room())
         for at in range(0, len(sound), BLOCK):
             samples = sound[at : at + BLOCK]
@@ -97,6 +102,7 @@ class Ear:
 
     def _spot(self, block: SoundBlock) -> str:
         spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self.threshold)
+        self._suspicions.note(block.end_ns, self.spotter.score, self.threshold)
         return "" if spotted is None else spotted.word
 
     def _read(self, block: SoundBlock) -> str:

@@ -44,6 +44,10 @@ class StreamListener(Protocol):
         """Return why a phrase of that time is no command; empty where it may be one."""
         ...
 
+    def suspicion(self, began_ns: int, ended_ns: int) -> float:
+        """Return how near to being heard what it listens for came then; 1 is heard."""
+        ...
+
     def heed(self, settings: SpeechSettings) -> None:
         """Go by the settings of another profile from now on."""
         ...

@@ -20,6 +20,9 @@ from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge, stops
 from vla_deploy.speech.voice_activity import VoiceActivity
 from vla_deploy.speech.words import is_unfinished
 
+Suspicion = Callable[[int, int], float]
+"""How near the spotter of stop words came to hearing one from a time to another, in ns; 1 is
+heard."""
 STOPPED: Final = "a stop was heard in it: the robot has stopped"
 
 
@@ -48,6 +51,11 @@ class Room:
     gate: EchoGate = field(default_factory=EchoGate)
 
 
+def unsuspected(_began_ns: int, _ended_ns: int) -> float:
+    """Suspect nothing, where no spotter listens."""
+    return 0.0
+
+
 class Hearing:
     """Hold what hearing remembers between two blocks."""
 
@@ -57,12 +65,15 @@ class Hearing:
         readings: Readings,
         settings: SpeechSettings,
         hot_words: Callable[[], str],
+        suspicion: Suspicion = unsuspected,
     ) -> None:
         self.readings = readings
         self.enter(Room())
         self.counts: Counter[str] = Counter()
         self._activity = voice_activity
         self._hot_words = hot_words
+        self._suspicion = suspicion
+        self._newest: tuple[Answer, bool] | None = None
         self._framing = Framing()
         self._phrases = Phrases(settings)
         self._own_words = OwnWords()
@@ -106,9 +117,13 @@ class Hearing:
         self._heed_draft()
         self._heed_stop(self.readings.glanced(), is_all=False)
         self._heed_stop(self.readings.drafted(), is_all=True)
+        if self._newest is not None:
+            # The spotter may come to suspect a word only after it was read.
+            self._heed_stop(self._newest[0], is_all=self._newest[1])
         told, self._told = self._told, []
         yield from told
         for answer in self.readings.answers():
+            self._newest = None
             if answer.phrase.number != self._stopped_by:
                 yield self._judged(answer)
             else:
@@ -158,6 +173,7 @@ class Hearing:
         phrase = happening.phrase
         self.counts[happening.step.name.lower()] += 1
         if happening.step is Step.BEGAN:
+            self._newest = None
             self._own_words.note_begun(is_person=not self.gate.is_shut)
         elif happening.step is Step.SPEAKING:
             self.readings.glance(phrase, self._hot_words())
@@ -181,14 +197,18 @@ class Hearing:
         """Stop at once by words read while the speaker goes on or pauses; once in a phrase."""
         if answer is None or answer.reading is None or answer.phrase.number == self._stopped_by:
             return
+        self._newest = answer, is_all
         sure = self._confidence(answer.reading)
-        if not stops(answer.reading, sure, is_all=is_all):
+        if not stops(answer.reading, sure, self._suspected(answer.phrase), is_all=is_all):
             return
         self._stopped_by = answer.phrase.number
         judgement = Judgement(verdict=Verdict.STOP)
         self._told.append(
             Heard(phrase=answer.phrase, answer=answer, confidence=sure, judgement=judgement)
         )
+
+    def _suspected(self, phrase: Phrase) -> float:
+        return self._suspicion(phrase.began_ns, phrase.ended_ns)
 
     def _after_stop(self, answer: Answer) -> Heard:
         """Tell the whole of a phrase that has stopped the robot: it is no command."""
@@ -217,6 +237,7 @@ class Hearing:
             least_confidence=self.settings.least_confidence,
             languages=recogniser.declared.languages,
             music=self.music.plays,
+            suspicion=self._suspected(answer.phrase),
         )
         judgement = judge(case)
         if answer.trouble and judgement.verdict is not Verdict.STOP:

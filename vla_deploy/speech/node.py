@@ -158,7 +158,9 @@ class SpeechNode:
             return
         hot_words = HotWords(self._robot.places, self._space.cell_reader("scene"))
         readings = Readings(self._executor, self._clock)
-        self._hearing = Hearing(activity, readings, self._profile.speech, hot_words.text)
+        self._hearing = Hearing(
+            activity, readings, self._profile.speech, hot_words.text, self._suspicion
+        )
         self._hearing.enter(self._rooms[False])
         self._loading = self._executor.submit(ears_of, self._shelf, self._profile, 0)
 
@@ -222,6 +224,11 @@ class SpeechNode:
             return
         if barged_ns is not None and self._voice is not None:
             self._voice.barge_in(barged_ns)
+
+    def _suspicion(self, began_ns: int, ended_ns: int) -> float:
+        """Return how near a listener to what is heard now came to hearing its word then."""
+        listeners = self._page_listeners if self._in_page else self._room_listeners
+        return max((one.suspicion(began_ns, ended_ns) for one in listeners), default=0.0)
 
     def _after_listeners(self, heard: Heard) -> Heard:
         """Keep a phrase from being a command that a listener has taken for something else."""

@@ -8,7 +8,7 @@ import numpy as np
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
 from vla_deploy.aside import AtOnce
-from vla_deploy.speech.hearing import Heard, Hearing
+from vla_deploy.speech.hearing import Heard, Hearing, Suspicion, unsuspected
 from vla_deploy.speech.readings import Readings
 from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
@@ -40,6 +40,7 @@ def open_hearing(
     profile: Profile,
     clock: Clock,
     hot_words: str = "",
+    suspicion: Suspicion = unsuspected,
 ) -> Hearing:
     """Return hearing that reads each phrase at once, as no process' steps wait for it.
 
@@ -50,7 +51,7 @@ def open_hearing(
     readings = Readings(AtOnce(), clock)
     readings.take(recogniser, why)
     activity = open_voice_activity(clock)
-    return Hearing(activity, readings, profile.speech, lambda: hot_words)
+    return Hearing(activity, readings, profile.speech, lambda: hot_words, suspicion)
 
 
 def hear_recording(hearing: Hearing, clock: StreamClock, sound: Sound) -> Iterator[Heard]:

@@ -28,6 +28,8 @@ STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 STOP_ODDS: Final = 0.2
 """A stop is taken where it was at least by so much as likely as the words that were read."""
+SUSPICION: Final = 0.55
+"""From this share of its threshold on, what the spotter heard counts beside what was read."""
 STOP_WITHIN_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one."""
 
@@ -43,7 +45,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Hold all that a phrase is judged by."""
+    """Hold all that a phrase is judged by; `suspicion` is how near a spotted stop word came."""
 
     reading: Reading
     phrase: Phrase
@@ -51,6 +53,7 @@ class Case:
     least_confidence: float
     languages: tuple[str, ...]
     music: bool = False
+    suspicion: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +75,7 @@ class _Refusal:
 
 def judge(case: Case) -> Judgement:
     """Return what becomes of a phrase."""
-    if stops(case.reading, case.confidence):
+    if stops(case.reading, case.confidence, case.suspicion):
         return Judgement(verdict=Verdict.STOP)
     for row in _REFUSALS:
         reason = row.why(case)
@@ -84,12 +87,19 @@ def judge(case: Case) -> Judgement:
     return Judgement(verdict=Verdict.ACCEPTED)
 
 
-def stops(reading: Reading, confidence: float, *, is_all: bool = True) -> bool:
+def stops(
+    reading: Reading, confidence: float, suspicion: float = 0.0, *, is_all: bool = True
+) -> bool:
     """Tell whether words read by that confidence stop the robot; `is_all` unless more may follow.
 
     As on the stream, the word itself does, whatever is meant by it. A phrase that was hardly
-    likelier to be another one than a mere call to stop is one, too.
+    likelier to be another one than a mere call to stop is one, too; where the spotter suspects a
+    stop word itself, so is any that may hold one.
     """
+    if suspicion >= SUSPICION:
+        likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
+        if any(map(holds_stop, (reading.text, *likely))):
+            return True
     if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
         return True
     if is_all and any(is_stop(one.text) for one in reading.others if one.odds >= STOP_ODDS):

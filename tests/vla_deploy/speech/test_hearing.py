@@ -9,9 +9,9 @@ from drivers.latency import LatencyHistogram
 from platforms import load_profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.manifest import Context, Whisper
-from vla_deploy.speech.hearing import STOPPED, Heard, Hearing
+from vla_deploy.speech.hearing import STOPPED, Heard, Hearing, Suspicion, unsuspected
 from vla_deploy.speech.readings import Readings
-from vla_deploy.speech.recogniser import Reading, Recogniser
+from vla_deploy.speech.recogniser import Alternative, Reading, Recogniser
 from vla_deploy.speech.recording import StreamClock
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.verdict import Verdict
@@ -33,11 +33,14 @@ class Ear:
 class Reader:
     """Read more of a text the longer the sound is, in place of a network."""
 
-    def __init__(self, words: str, log_probability: float) -> None:
+    def __init__(
+        self, words: str, log_probability: float, others: tuple[Alternative, ...] = ()
+    ) -> None:
         self.declared = Whisper(languages=("en",), context=Context.TRIMMED, hot_words=False)
         self.latency = LatencyHistogram()
         self._words = words.split()
         self._log_probability = log_probability
+        self._others = others
 
     def read(self, samples: Any, _hot_words: str) -> Reading:
         voiced_s = float((np.abs(samples) >= LOUD).sum()) / 16_000
@@ -49,16 +52,24 @@ class Reader:
             language="en",
             duration_s=1.0,
             took_s=0.0,
+            others=self._others,
         )
 
 
-def heard(words: str, voiced_s: float, log_probability: float = -0.1) -> list[tuple[float, Heard]]:
+def heard(
+    words: str,
+    voiced_s: float,
+    log_probability: float = -0.1,
+    others: tuple[Alternative, ...] = (),
+    suspicion: Suspicion = unsuspected,
+) -> list[tuple[float, Heard]]:
     """Return what is told of words that are spoken for so long, and when, from their beginning."""
     clock = StreamClock()
     readings = Readings(AtOnce(), clock)
-    readings.take(cast("Recogniser", Reader(words, log_probability)), "")
+    readings.take(cast("Recogniser", Reader(words, log_probability, others)), "")
     activity = cast("VoiceActivity", Ear())
-    hearing = Hearing(activity, readings, load_profile("desktop").speech, lambda: "")
+    settings = load_profile("desktop").speech
+    hearing = Hearing(activity, readings, settings, lambda: "", suspicion)
     told: list[tuple[float, Heard]] = []
     tone = np.where(np.arange(FRAME) % 16 < 8, 1.0, -1.0).astype(np.float32)
     quiet, loud = 0.001 * tone, LOUD * tone
@@ -97,3 +108,39 @@ def test_other_talk_is_told_once_at_its_end(words: str) -> None:
 def test_what_is_hardly_understood_stops_nothing_while_the_speaker_goes_on() -> None:
     told = heard("take the stop to me now please", 2.4, log_probability=-0.9)
     assert [one.judgement.verdict for _, one in told] == [Verdict.DOUBTED]
+
+
+HALT = (Alternative("halt", 0.4),)
+
+
+def test_a_phrase_that_was_hardly_likelier_another_one_than_a_stop_is_one() -> None:
+    assert heard("hope", 0.3, others=HALT)[0][1].judgement.verdict is Verdict.STOP
+    unlikely = (Alternative("halt", 0.1),)
+    assert heard("hope", 0.3, others=unlikely)[0][1].judgement.verdict is not Verdict.STOP
+
+
+def test_what_the_spotter_suspects_and_the_recogniser_may_have_read_is_a_stop() -> None:
+    within = (Alternative("please halt before the chair", 0.3),)
+    plain = heard("please hold before the chair", 1.2, others=within)
+    assert [one.judgement.verdict for _, one in plain] == [Verdict.ACCEPTED]
+    told = heard(
+        "please hold before the chair", 1.2, others=within, suspicion=lambda began, ended: 0.6
+    )
+    assert told[0][1].judgement.verdict is Verdict.STOP
+
+
+def test_a_suspicion_alone_stops_nothing() -> None:
+    told = heard("please hold the chair", 1.2, suspicion=lambda began, ended: 0.9)
+    assert [one.judgement.verdict for _, one in told] == [Verdict.ACCEPTED]
+
+
+def test_a_suspicion_that_comes_after_the_reading_still_counts() -> None:
+    asked: list[int] = []
+
+    def later(_began_ns: int, _ended_ns: int) -> float:
+        asked.append(1)
+        return 0.6 if len(asked) > 2 else 0.0
+
+    told = heard("hey hold it there", 1.2, others=(Alternative("hey halt", 0.3),), suspicion=later)
+    assert told[0][1].judgement.verdict is Verdict.STOP
+    assert told[0][0] < 1.2, "while the speaker goes on"

@@ -48,6 +48,10 @@ class Listener:
     def refuses(self, began_ns: int, ended_ns: int) -> str:
         return self.refusal
 
+    def suspicion(self, began_ns: int, ended_ns: int) -> float:
+        del began_ns, ended_ns
+        return 0.0
+
     def heed(self, settings: SpeechSettings) -> None:
         self.settings = settings
 

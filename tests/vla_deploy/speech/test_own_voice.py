@@ -41,6 +41,10 @@ class Raw:
         del began_ns, ended_ns
         return ""
 
+    def suspicion(self, began_ns: int, ended_ns: int) -> float:
+        del began_ns, ended_ns
+        return 0.0
+
     def heed(self, settings: SpeechSettings) -> None:
         """Go by no setting."""
 

@@ -154,7 +154,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
      rf"(?:down |away )?{_INTO} (?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, r"(?P<relation>in|into|on|onto) "
-     r"(?P<destination>(?:the|my|that|this) .+?) with (?P<object>(?:the|my|that|this|both|all) .+)", placing.put),
+     r"(?P<destination>(?:the|my|that|this) .+?) "
+     r"with (?P<object>(?:the|my|that|this|both|all) .+)", placing.put),
     (Intent.MANIPULATION, rf"take {_OBJECT} (?P<relation>(?:back |over |up |down )?(?:to|into|onto|"
      r"over to)|back (?:in|on)) (?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling) "

@@ -17,6 +17,7 @@ from vla_deploy.speech.sound import SoundBlock
 from vla_deploy.speech.stop_words.errors import StopWordsError
 from vla_deploy.speech.stop_words.own_voice import OwnVoice
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
+from vla_deploy.speech.stop_words.suspicions import Suspicions
 
 OFF: Final = "off"
 OFF_WHY: Final = "switched off by the profile: speech.stop_words"
@@ -72,6 +73,7 @@ class StopWords:
         self._clock = clock
         self._playing = playing
         self._own = OwnVoice()
+        self._suspicions = Suspicions()
         self._spotter: Spotter | None = None
         self._thresholds: Mapping[str, float] = {}
         self._pressed: deque[Spotted] = deque(maxlen=KEPT)
@@ -108,6 +110,7 @@ class StopWords:
             return
         if not block.follows:
             self._spotter.reset()
+            self._suspicions.clear()
         own = self._own.sounds(block.end_ns)
         threshold = self._thresholds["own_voice" if own else self._sensitivity]
         runs = self._spotter.runs
@@ -119,6 +122,8 @@ class StopWords:
             return
         if self._spotter.runs > runs:
             self._broken = ""
+        if not own:
+            self._suspicions.note(block.end_ns, self._spotter.score, threshold)
         if spotted is not None:
             self._take(spotted)
 
@@ -128,6 +133,10 @@ class StopWords:
             if began_ns <= spotted.stamp_ns <= ended_ns + OVERLAP_NS:
                 return f"{spotted.word!r} was heard in it: the robot has stopped"
         return ""
+
+    def suspicion(self, began_ns: int, ended_ns: int) -> float:
+        """Return how near its threshold a stop word came in what was said from then to then."""
+        return 0.0 if self.state is not State.LIVE else self._suspicions.highest(began_ns, ended_ns)
 
     def document(self) -> Mapping[str, Any]:
         """Return what `speech_status` tells under "stop_words"."""

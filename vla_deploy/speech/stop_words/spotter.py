@@ -32,7 +32,7 @@ class Spotted:
 
 
 class Spotter:
-    """Follow one stream of sound at 16 kHz."""
+    """Follow one stream of sound at 16 kHz; `score` is that of the likeliest word by now."""
 
     def __init__(self, scorer: Scorer, manifest: Manifest) -> None:
         """Take the model and what its manifest says of it.
@@ -48,6 +48,7 @@ class Spotter:
         self._moments = int(manifest.outputs[0].shape[2])
         self._step = self._moments * features.STRIDE
         self.runs = 0
+        self.score = 0.0
         self._refractory_ns = round(self._words.refractory_s * NS_PER_S)
         self.reset()
 
@@ -63,6 +64,7 @@ class Spotter:
         self._fresh = np.zeros((0, features.BANDS), np.float32)
         self._scores = np.zeros((0, len(self._words.words)), np.float32)
         self._quiet_until_ns = 0
+        self.score = 0.0
 
     def feed(self, sound: Sound, end_ns: int, threshold: float) -> Spotted | None:
         """Take the next piece of sound, whose last sample was at `end_ns`; tell what was said.
@@ -88,6 +90,7 @@ class Spotter:
         self._scores = np.concatenate([self._scores, scores])[-kept:]
         best = _smoothed(self._scores, self._words.smoothing_frames)
         number = int(best.argmax())
+        self.score = float(best[number])
         if best[number] < threshold or stamp_ns < self._quiet_until_ns:
             return None
         self._quiet_until_ns = stamp_ns + self._refractory_ns

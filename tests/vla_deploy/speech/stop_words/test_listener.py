@@ -100,6 +100,25 @@ def speaking(text: str, say_id: str = "a") -> Playing:
     return Playing(say_id=say_id, text=text, level_db=-20.0)
 
 
+def test_how_near_a_word_came_is_known_for_the_time_when_it_was_said(ear: Ear) -> None:
+    listener = ear.listen("low")
+    ear.hear(0.5, 0.0)
+    began_ns = ear.clock.ns
+    ear.word()
+    nearest = listener.suspicion(began_ns, ear.clock.ns)
+    assert nearest > 0.5
+    assert listener.suspicion(0, began_ns - NS_PER_S) < 0.2
+    listener.heed(settings("off"))
+    assert listener.suspicion(began_ns, ear.clock.ns) == 0.0
+
+
+def test_what_sounds_while_the_robot_speaks_is_not_suspected(ear: Ear) -> None:
+    listener = ear.listen("low")
+    ear.playing = Playing(say_id="s", text="here is the cup", level_db=-20.0)
+    ear.word()
+    assert listener.suspicion(0, ear.clock.ns) == 0.0
+
+
 def test_it_stays_live_while_the_robot_speaks(ear: Ear) -> None:
     ear.listen()
     ear.playing = speaking("I am on my way to the kitchen")
