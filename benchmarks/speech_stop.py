@@ -13,13 +13,14 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Final
 
 import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.speech_stop_latch import latch
-from benchmarks.speech_stop_talk import Voices, other_talk, phrases
+from benchmarks.speech_stop_talk import Voices, other_talk, phrases, words_alike
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.voices.clip import RATE_HZ, Clip, Wave
@@ -123,10 +124,11 @@ def measure(
     random = np.random.default_rng(seed)
     voices, ear = Voices(), Ear()
     stops = _stops(voices, ear, clips, random)
-    talk = _talk(voices, ear, hours, random)
+    talk = _talk(voices, ear, hours, random) | _alike(voices, ear, 3 * clips, random)
     if not misses:
         stops.pop("stop_misses")
         talk.pop("stop_false_alarms")
+        talk.pop("stop_alike_alarms")
     return {
         "stop_engines": sorted(voices.engines),
         "stop_engines_missing": voices.missing,
@@ -202,17 +204,30 @@ def _talk(voices: Voices, ear: Ear, hours: float, random: np.random.Generator) -
     for clip in other_talk(voices, random):
         if talked_s >= 3600.0 * hours:
             break
-        snr_db = (None, None, 20.0, 10.0)[int(random.integers(4))]
-        found = list(ear.alarms(_around(clip, snr_db, random)[: -RATE_HZ // 2]))
-        alarms += [
-            f"{one.word} by {one.by}, {clip.engine} {clip.voice}: {clip.text}" for one in found
-        ]
+        alarms += _alarms(ear, clip, random)
         talked_s += clip.duration_s
     return {
         "stop_talk_hours": talked_s / 3600.0,
         "stop_false_alarms_per_hour": len(alarms) / max(talked_s / 3600.0, 1e-9),
         "stop_false_alarms": alarms,
     }
+
+
+def _alike(voices: Voices, ear: Ear, count: int, random: np.random.Generator) -> dict[str, Any]:
+    """Let people say what was made to sound like a stop word, in the same noise."""
+    clips = islice(words_alike(voices, random), count)
+    alarms = [_alarms(ear, clip, random) for clip in clips]
+    return {
+        "stop_alike_sentences": count,
+        "stop_alike_alarmed_ratio": float(np.mean([bool(found) for found in alarms])),
+        "stop_alike_alarms": [one for found in alarms for one in found],
+    }
+
+
+def _alarms(ear: Ear, clip: Clip, random: np.random.Generator) -> list[str]:
+    snr_db = (None, None, 20.0, 10.0)[int(random.integers(4))]
+    found = ear.alarms(_around(clip, snr_db, random)[: -RATE_HZ // 2])
+    return [f"{one.word} by {one.by}, {clip.engine} {clip.voice}: {clip.text}" for one in found]
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -5,7 +5,7 @@ clips are by voices that it has not, where there are such.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -122,12 +122,18 @@ def phrases(
 
 
 def other_talk(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
-    """Yield talk without a stop word, without end, a tenth of it in words that sound like one."""
-    lines = [*_off_domain(), *_documented()]
+    """Yield talk of other things without a stop word, without end."""
+    return _endless([*_off_domain(), *_documented()], voices, random)
+
+
+def words_alike(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
+    """Yield sentences made of words that sound like a stop word, without end."""
+    return _endless(_NEAR, voices, random)
+
+
+def _endless(texts: Sequence[str], voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
     engines = voices.engines
     while True:
-        near = random.random() < 0.1
-        texts = _NEAR if near else lines
         text = texts[int(random.integers(len(texts)))]
         # Festival takes most of a second for a clip.
         weights = np.array([0.2 if name == "festival" else 1.0 for name in engines])

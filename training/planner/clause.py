@@ -7,8 +7,9 @@ from pathlib import Path
 from random import Random
 from typing import Final, NamedTuple
 
+from training.planner.describing import Word
 from training.planner.grammar import Sequence, Slot, expand, parse
-from training.planner.referring import SOURCES, Word
+from training.planner.referring import SOURCES
 from training.planner.slips import SLIPS
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS
 

@@ -138,12 +138,12 @@ def _run_on(clause: str, request: Request) -> tuple[str, str] | None:
 def _with_verb(clause: str, draft: _Draft, *, others: bool) -> tuple[str, Fit | None]:
     """Return "take the phone in your left hand" for what leaves the verb out, and its rule.
 
-    A place alone is where to go. "The can in the box" is one thing by itself; beside other clauses
-    it is something to do.
+    "The can in the box" is one thing by itself, and "kitchen" one word; beside other clauses they
+    are something to do.
     """
     clause = _IN_THE_SIDE.sub(r"\g<0> hand", clause) if names_hand(draft.clause) else clause
-    if match_place(clause.removeprefix("to "), draft.request.world.places):
-        return f"go to {clause.removeprefix('to ')}", known_fit(f"go to {clause}", draft.request)
+    if others and match_place(clause, draft.request.world.places):
+        return f"go to {clause}", known_fit(f"go to {clause}", draft.request)
     if names_hand(clause):
         return f"take {clause}", known_fit(f"take {clause}", draft.request)
     if (others or draft.steps or _INTO.search(clause)) and _TO_WHERE.search(clause):

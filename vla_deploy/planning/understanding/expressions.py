@@ -82,8 +82,8 @@ class Expression:
     def is_bare(self) -> bool:
         """Tell whether it is only a place in a list: "the second one"."""
         is_counted = self.place is not None and not self.place.side
-        tells = self.extreme or self.kinds or self.besides or self.near or self.between
-        tells = tells or self.support
+        compared = self.besides or self.near or self.between
+        tells = self.extreme or self.kinds or compared or self.support
         return is_counted and self.query == Query() and not (tells or self.query.is_named)
 
 
