@@ -4,6 +4,8 @@ Every case of `benchmarks/corpora/commands` is played with the robot's own plann
 topics. `goal_reached_ratio` counts the cases that end in a plan; a conversation counts when each of
 its turns is right. `asked_ratio` and `refused_ratio` count what must be asked back or refused.
 Plans that are read back first count once the person has agreed: `confirmed_ratio` tells how many.
+Nobody listens to what they agree to: `moved_wrongly_ratio` counts wrong plans that were read back,
+too, `moved_wrongly_unasked_ratio` only those that ran at once.
 """
 
 import sys
@@ -57,6 +59,9 @@ def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
         "asked_ratio": _share(list(_turns(verdicts, ASK)), lambda turn: not turn.wrong),
         "refused_ratio": _share(refusable, lambda one: not one.wrong),
         "moved_wrongly_ratio": _share(verdicts, _moved_wrongly),
+        "moved_wrongly_unasked_ratio": _share(
+            verdicts, lambda one: _moved_wrongly(one) and not one.judged[-1].confirmed
+        ),
         "confirmed_ratio": _share(judged, lambda turn: turn.confirmed),
         "schema_valid_ratio": _share(plans, is_schema_valid),
         "bounds_broken": sum(bool(turn.broken) for turn in judged),

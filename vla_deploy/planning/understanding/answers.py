@@ -22,6 +22,7 @@ from vla_deploy.planning.understanding.phrases import (
     SIDES,
 )
 from vla_deploy.planning.understanding.questions import MOST_CHOICES, either, from_side
+from vla_deploy.planning.understanding.wordings import reworded
 from vla_deploy.world.query import ORDERS
 
 
@@ -78,8 +79,8 @@ _SILENT: Final = frozenset(
         "from", "yes", "no", "rather", "other", "are", "which", "there", "over",
         "that's", "it's", "said", "oh", "sorry", "ah", "hm", "hmm", "actually", "thanks", "thank",
         "you", "cheers", "ta", "mate", "dear", "love", "one's", "i'd", "like", "would",
-        "think", "was", "thinking",
-        "should", "have", "had",
+        "think", "was", "thinking", "meaning", "talking", "about", "then", "guess", "suppose",
+        "should", "have", "had", "aye", "erm", "probably", "maybe", "course", "obviously",
     }
 )  # fmt: skip
 # Words of the questions themselves.
@@ -94,6 +95,13 @@ _NOT: Final = re.compile(
     r"(?:no )?(?P<any>(?:any|either|anything|whichever)(?: one| of them)? )?(?:the one )?"
     r"(?:but not|but|not|except|other than|apart from|(?:that |which )?is(?:n'?t| not)|"
     r"i (?:don'?t|do not) (?:want|mean)) (?P<not>.+?)(?: but (?P<rest>.+))?"
+)
+# What people say when they are asked, before they answer.
+_SURPRISE: Final = re.compile(
+    r"(?:oh |ah |well |hm )*"
+    r"(?:there(?:'s| is| are| were)|you(?:'ve| have)(?: got)?|i see|are there) "
+    r"(?:two|three|four|several|both|more(?: than one)?)(?: of (?:them|those|these))?(?: there)?|"
+    r"(?:oh|ah|well|hm|good (?:question|point)|fair (?:enough|point)|my mistake|right|sorry)+"
 )
 _OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
 # Words of an answer even where they tell no candidate from the others.
@@ -128,7 +136,8 @@ def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
 
 def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | None]:
     """Return what an utterance is to a question, and the candidate that it picks."""
-    said = " ".join(WORD.findall(text.lower()))
+    text = reworded(text, {})
+    said = " ".join(WORD.findall(text))
     if NO_WORDS.fullmatch(said):
         return Verdict.NO, None
     if not question.candidates:
@@ -140,7 +149,7 @@ def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | No
     agrees = YES_WORDS.fullmatch(said) is not None
     if agrees and len(question.candidates) == 1:
         return Verdict.CHOSEN, question.candidates[0]
-    verdict, chosen = _judged(question.candidates, text.lower())
+    verdict, chosen = _judged(question.candidates, text)
     # "right" is the one on the right where there is one; of several a yes picks none.
     return (Verdict.UNCLEAR if agrees and verdict is Verdict.ANEW else verdict), chosen
 
@@ -172,6 +181,8 @@ def _remaining(candidates: Candidates, text: str) -> tuple[Candidates, str, bool
     left, rest, any_will_do = list(candidates), list[str](), False
     for piece in _PIECE.split(text):
         said = " ".join(WORD.findall(piece))
+        if _SURPRISE.fullmatch(said) and said not in SIDES:
+            continue
         found = _NOT.fullmatch(said)
         if found is None:
             rest.append(said)

@@ -12,7 +12,7 @@ _WHERE: Final = re.compile(
     r"(?:next to|close to|beside|behind|in front of|near|nearer to|closer to|nearest(?: to)?|"
     r"closest to|by|between|"
     r"under|beneath|on top of|left of|right of|to the (?:left|right) of|opposite|inside|in|on)"
-    r" .+?)(?: please)?"
+    r" .+?)(?:,? (?:please|then|thanks|thank you|i think|i guess))*"
 )
 
 
