@@ -50,7 +50,11 @@ _POLITE_BEFORE: Final = re.compile(
 _POLITE_AFTER: Final = re.compile(
     r"[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
     r"would you|could you|can you|butler|robot|quickly|immediately|at once|instead|somewhere|"
-    r"anywhere|for us|mate|love|dear|darling|pal|buddy|my friend|cheers|ta|right away|"
+    r"anywhere|for us|and nothing else|"
+    r"for (?:my|our|the) (?:daughter|son|wife|husband|mum|mom|mother|dad|father|"
+    r"grandma|granny|gran|grandpa|grandad|sister|brother|kids?|children|baby|guests?|friends?|"
+    r"visitors?|neighbours?|boss|nurse|doctor|partner|girlfriend|boyfriend)|"
+    r"mate|love|dear|darling|pal|buddy|my friend|cheers|ta|right away|"
     r"straight away|real quick|asap|okay|ok|if you would|if you don't mind|if possible|"
     r"when(?:ever)? you (?:can|get (?:a|the) (?:chance|moment|minute|second)|"
     r"have (?:a|the) (?:chance|moment|minute|second|time)|(?:are|get) (?:here|back|done|ready|"

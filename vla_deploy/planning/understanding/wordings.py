@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Final
 
+from vla_deploy.planning.understanding.embellishments import plain_description
 from vla_deploy.world.vocabulary import COLOURS
 
 _COLOUR: Final = rf"(?P<colour>{'|'.join((*COLOURS, 'gray', 'violet'))})"
@@ -48,6 +49,9 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"^((?:that|this|those|these) .+?) (?:over |right )?(?:there|here)$", r"\1"),
     (r"^(.+ (?:on|in|inside|under|next to|beside) .+?) (?:over |right )?(?:there|here)$", r"\1"),
 )  # fmt: skip
+_BY: Final = re.compile(
+    r"(?P<own>.+?)(?: that is)?(?: over| just| right| down)? by (?P<other>(?:the|my|your|that) .+)"
+)
 _TABLE: Final = tuple((re.compile(pattern), instead) for pattern, instead in _ROWS)
 
 
@@ -59,7 +63,16 @@ def reworded(text: str, furniture: Mapping[str, str]) -> str:
         text = f"{owned['own']} on the {owned['owner']}"
     for pattern, instead in _TABLE:
         text = pattern.sub(instead, text)
-    return " ".join(text.split())
+    return _near(" ".join(plain_description(" ".join(text.split())).split()), furniture)
+
+
+def _near(text: str, furniture: Mapping[str, str]) -> str:
+    """Return "the box on the side table" for "the box over by the side table"; next to a thing."""
+    found = _BY.fullmatch(text)
+    if found is None:
+        return text
+    named = found["other"].split(maxsplit=1)[-1]
+    return f"{found['own']} {'on' if named in furniture else 'next to'} {found['other']}"
 
 
 _RELATIONS: Final = "on|in|at|of|near|by|next|under|behind|to|from|and|or|that|which|with|over"
