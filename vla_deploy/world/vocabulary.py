@@ -24,7 +24,7 @@ SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
     "key": "keys", "keyring": "keys",
     "controller": "remote", "zapper": "remote", "clicker": "remote",
     "crate": "box", "bin": "box", "container": "box", "basket": "box",
-    "thing": "object", "something": "object",
+    "thing": "object", "item": "object", "something": "object",
     "gray": "grey", "violet": "purple",
 })  # fmt: skip
 KIND_WORDS: Final = "|".join(sorted({*OBJECT_CLASSES, *SYNONYMS}, key=len, reverse=True))

@@ -23,7 +23,7 @@ STOP_WORDS: Final = frozenset(
     }
 )  # fmt: skip
 _POLITE_BEFORE: Final = re.compile(
-    r"^(?:please|(?:would|do) you mind|could you|can you|would you|will you|mind|robot|butler|"
+    r"^(?:please|yo|(?:would|do) you mind|could you|can you|would you|will you|mind|robot|butler|"
     r"hey butler|hey robot|can(?= (?:go|come)\b)|"
     r"(?:then )?use (?:it|that|your (?:free|other) hand) to|"
     r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
@@ -54,7 +54,8 @@ _POLITE_AFTER: Final = re.compile(
     r"for (?:my|our|the) (?:daughter|son|wife|husband|mum|mom|mother|dad|father|"
     r"grandma|granny|gran|grandpa|grandad|sister|brother|kids?|children|baby|guests?|friends?|"
     r"visitors?|neighbours?|boss|nurse|doctor|partner|girlfriend|boyfriend)|"
-    r"mate|love|dear|darling|pal|buddy|my friend|cheers|ta|right away|"
+    r"mate|love|dear|darling|pal|buddy|bud|son|lol|sweetie|honey|sir|"
+    r"carefully|gently|my friend|cheers|ta|right away|"
     r"straight away|real quick|asap|okay|ok|if you would|if you don't mind|if possible|"
     r"when(?:ever)? you (?:can|get (?:a|the) (?:chance|moment|minute|second)|"
     r"have (?:a|the) (?:chance|moment|minute|second|time)|(?:are|get) (?:here|back|done|ready|"

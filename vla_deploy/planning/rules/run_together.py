@@ -35,6 +35,10 @@ _JOINED: Final = frozenset(
         "robot", "butler", "hey", "okay", "well", "now", "i", "you", "to", "say", "saying", "ask",
     }
 )  # fmt: skip
+_COUNT_FIRST: Final = re.compile(
+    r"^(?:please )?count(?:ing)? from (?:the|your|my) (?P<side>left|right)(?: side)?,? "
+    r"(?:and |then |and then )?(?P<rest>.+?\b(?:first|second|third|fourth|fifth|last) \w+)"
+)
 _QUOTES: Final = re.compile(r"^(?:please )?(?:say|tell|ask|announce|shout|whisper)\b")
 _FEWEST_WORDS: Final = 3
 
@@ -43,6 +47,7 @@ def with_commas(text: str) -> str:
     """Return a text in small letters with commas where a new thought surely begins."""
     if _QUOTES.match(text):
         return text
+    text = _COUNT_FIRST.sub(r"\g<rest> from the \g<side>", text)
     return _BREAKS.sub(lambda found: _comma(text[: found.start()]), text)
 
 

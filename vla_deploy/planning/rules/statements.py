@@ -30,6 +30,8 @@ _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
         rf"{_THING}",
         rf"i(?:'ve| have| must have| think i(?:'ve)?)? (?:left|forgot|forgotten|put) {_THING} "
         r"(?:in|on|at|by) (?P<place>.+)",
+        r"(?:(?:do|can) you )?see (?P<thing>(?:my|the|our|that|those|these) .+?)"
+        r"(?: (?:over )?there)?",
         rf"{_THING}(?:'s| is| are| must be| should be) (?:still )?(?:in|on|at) (?P<place>.+)",
         rf"(?:someone|somebody|we|he|she|they)(?:'ve| have|'s| has)? (?:left|put|dropped) {_THING} "
         r"(?:in|on|at|by) (?P<place>.+)",

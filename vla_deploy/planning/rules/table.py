@@ -66,8 +66,10 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      rf"{_OBJECT}", telling.tell_or_find),
     (Intent.QUESTION, r"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
      r"have you seen|you have(?:n't| not)(?: by any chance)? seen|(?:do you (?:happen to |by any "
-     rf"chance )?know|any idea|tell me|i wonder|find out) where) {_OBJECT}"
-     r"(?: is| are| gone| has gone| got to)?(?: anywhere| somewhere)?(?: have you)?",
+     r"chance )?know|(?:have you (?:got )?|do you have )?(?:any|an?|the (?:faintest|slightest)) "
+     rf"(?:idea|notion|clue)|tell me|i wonder|find out) where|what have you done with) {_OBJECT}"
+     r"(?: is| are| gone| has gone|(?: has| have)? got to)?(?: anywhere| somewhere)?"
+     r"(?: have you)?",
      telling.tell_or_find),
     (Intent.QUESTION, r"(?:(?:do|did) you (?:happen to )?know |any idea |tell me )?"
      rf"what(?:'s| has)? (?:become|became|happened|gone) (?:of|to|with) {_OBJECT}",
@@ -83,6 +85,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"what (?:can|could) you do(?: for me)?|who are you|what are you|how can you help(?: me)?",
      telling.tell_abilities),
     (Intent.ASSIST, r"(?:hold|take) (?:this|that) from me|hold this", building.hold),
+    (Intent.SEARCH, r"have a (?:\w+ )?(?:look|scout|search|hunt|rummage|nosey|gander|check)"
+     rf"(?: a?round| about)? for {_OBJECT}|(?:hunt|track|chase) down (?P<object2>.+?)|"
+     r"(?:hunt|track|chase) (?P<object3>.+?) down", building.find),
     # --- bring
     (Intent.MANIPULATION, rf"(?:bring|fetch|get|give|hand|pass) (?:me|us) {_OBJECT}",
      building.bring),
@@ -152,7 +157,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", placing.put_away),
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|stow|store|"
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
-     rf"(?:down |away )?{_INTO} (?P<destination>.+)", placing.put),
+     rf"(?:down |away |off )?{_INTO} (?P<destination>.+)", placing.put),
+    (Intent.MANIPULATION, rf"(?:take|bring|carry) {_OBJECT} (?:along|with you)(?: with you)?",
+     building.pick),
     (Intent.MANIPULATION, r"(?P<relation>in|into|on|onto) "
      r"(?P<destination>(?:the|my|that|this) .+?) "
      r"with (?P<object>(?:the|my|that|this|both|all) .+)", placing.put),

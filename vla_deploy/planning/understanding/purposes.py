@@ -27,7 +27,7 @@ _BEHIND: Final = tuple(
         r"for (?:safe ?keeping|the time being|good measure|a change|a start)",
         r"(?:chop chop|hurry(?: up)?|be quick(?: about it)?|quick(?:ly)?|snappy|asap|sharpish|"
         r"go on|"
-        r"there's a (?:dear|love|good \w+)|if you (?:can )?manage(?: it| that)?|"
+        r"there's a (?:dear|love|pal|good \w+)|if you (?:can )?manage(?: it| that)?|"
         r"if you'd be so kind|if it's no (?:trouble|bother))",
         r"(?:with|in|using) (?:your|the) (?:free|empty|spare) (?:hand|gripper|arm)",
     )

@@ -26,6 +26,10 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
      "the thing "),
     (r"^(?:what|whatever)(?:'s| is) (?:lying |standing |sitting )?(?:in )?between\b",
      "the thing between"),
+    (rf"^(?:what|whatever)(?:'s| is) {_COLOUR}\b", r"the \g<colour> thing"),
+    (r"^(?:whichever|whatever|any) (\w+) (?:that )?you (?:can )?(?:find|see|like|come across)"
+     r"(?: lying| standing)?(?: (?:about|around|in) (?=the ))?", r"any \1 in "),
+    (r" in $", ""),
     (r"^anything (?=but|except|other than|apart from)", "any object "),
     (rf"\bnon[- ]?{_COLOUR} (.+)", r"\2 that is not \g<colour>"),
     (rf"\b{_COLOUR}(?:[- ]colou?red| in colou?r)\b", r"\g<colour>"),
@@ -40,7 +44,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (rf"\b(nearest|closest|nearer|closer|farthest) {_HERE}\b", r"\1"),
     (r"\bfarthest from (you|yourself|me|us|the robot)\b", r"farthest to \1"),
     # --- what points, and says nothing more
-    (r"^(.+?) (?:that is |lying |standing |sitting )?(?:right |just )?in front of (?:you|me|us)$",
+    (r"^(.+?) (?:from |that is |lying |standing |sitting )?(?:right |just )?"
+     r"in front of (?:you|me|us)$",
      r"\1"),
     (r"\b(?:over|right) there (?=(?:on|in|inside|under|next to|beside)\b)", ""),
     (r"^(.+) (?:over|right) there$", r"\1"),
