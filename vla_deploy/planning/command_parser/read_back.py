@@ -24,6 +24,7 @@ _PATTERNS: Final[Mapping[str, tuple[str, ...]]] = {
     "wait": ("wait", "by"),
     "stop": ("stand still",),
     "ask": ("answer you",),
+    "tidy": ("tidy up", "where"),
 }
 _FIELDS: Final = frozenset({"where", "what", "how", "way", "by", "arm", "name", "text"})
 
