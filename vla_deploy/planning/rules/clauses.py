@@ -85,6 +85,10 @@ _FORMS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
         ("gotta", "have to"), ("gonna", "going to"), ("outta", "out of"), ("'em", "them"),
         ("whereabouts(?= (?:is|are)\\b)", "where"), ("thae", "those"),
         ("help me look$", "look for it"),
+        ("(?:turn|spin)(?: right| all the way| yourself)? (?:a?round|about),?"
+         "(?: and| to| so(?: that)?)?"
+         "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)", "turn around"), ("face the other (?:way|side|direction)", "turn around"),
+        ("(?:and )?once you(?:'ve| have) got (?:it|them)", "and then"),
         ("ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
     )
 )  # fmt: skip
@@ -105,7 +109,7 @@ _COURTESY: Final = re.compile(
     r"good (?:robot|boy|girl|job)|well done|great|perfect|do me a favou?r|"
     r"(?:don't|do|haven't|have|isn't|is|aren't|are|can't|can|won't) (?:you|i|we|it|they)|"
     r"not (?:a bit|any|one step|an inch|much)? ?(?:further|farther|more)|"
-    r"(?:my )?(?:dear|love|mate|darling)"
+    r"(?:my )?(?:dear|love|mate|darling)|where(?:ver)? (?:it|they) (?:is|are|may be|might be)"
 )
 # At the beginning these ask for nothing either; later on they are a side, and something to do.
 _OPENING: Final = re.compile(r"right(?: then)?|look")

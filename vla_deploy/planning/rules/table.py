@@ -34,7 +34,7 @@ _SECONDS: Final = (
     rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment))"
 )
 _WAY: Final = r"(?P<way>forwards?|ahead|straight(?: ahead| on)?|backwards?|back(?: up)?|in reverse)"
-_LITTLE: Final = r"(?:a (?:little|bit|tad)|slightly)"
+_LITTLE: Final = r"(?:a (?:little|(?:wee |tiny |little )?(?:bit|tad)|touch|smidge|hair)|slightly)"
 _SIDE: Final = r"(?P<way>left|right|a?round|clockwise|counter-?clockwise|anti-?clockwise)"
 _SHARE: Final = (
     r"(?:an? |one )?(?P<share>half|(?:three[ -])?quarters?|full|whole|complete)(?: an?| of an?)?"
@@ -120,6 +120,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.NAVIGATION, r"(?:off (?:you go|with you)|be off|off|(?:roll|trundle|nip|pop|scoot|hop|"
      r"wander|zoom|run|dash|glide|cruise)(?: off| over| along| across)?)(?: back)? "
      rf"(?:to|into|over to|through to) {_PLACE}", building.go),
+    (Intent.NAVIGATION, rf"(?:home(?: you go)?|on|through|up|down|across) to {_PLACE}",
+     building.go),
     (Intent.NAVIGATION, rf"(?:take|bring|get) yourself (?:back )?to {_PLACE}|"
      r"to (?P<place2>the .+)", building.go),
     # --- wait
@@ -132,7 +134,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      rf"keep holding(?: on to)?|don't (?:put down|drop|let go of)) {_OBJECT}"
      r"(?: in your (?:left |right )?hands?)?", placing.keep),
     # --- put
-    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand) {_OBJECT} (?:down )?on "
+    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand|leave) {_OBJECT} "
+     r"(?:down )?on "
      r"(?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of (?:you|me|us)",
      placing.put_here),
     (Intent.MANIPULATION, rf"(?:put|drop|pop|stick|place|throw|set|lay) {_OBJECT} in(?:side)?",
@@ -154,7 +157,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:tidy|clear|pack) {_OBJECT} (?:away|up) {_INTO} (?P<destination>.+)",
      placing.put),
     (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
-     r"(?:put away|stow(?: away)?|store|pack away) (?P<object2>.+?)", placing.put_away),
+     r"(?:put away|stow(?: away)?|store|pack away) "
+     r"(?P<object2>(?:(?! (?:in|into|inside|on|onto) ).)+)", placing.put_away),
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|stow|store|"
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
      rf"(?:down |away |off )?{_INTO} (?P<destination>.+)", placing.put),
@@ -181,6 +185,8 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come) (?P<little>{_LITTLE} )?{_WAY}"
      rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", moving.drive),
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step)(?: by)? {_METRES} {_WAY}", moving.drive),
+    (Intent.NAVIGATION, rf"(?:roll|drive|carry|keep going) (?P<way>on)(?: for| by)? {_METRES}",
+     moving.drive),
     (Intent.NAVIGATION, rf"(?P<way>back up|reverse)(?: (?:by )?{_METRES})?"
      rf"(?P<little> {_LITTLE})?", moving.drive),
     (Intent.NAVIGATION, r"(?:turn|spin|rotate) (?:a?round once|once a?round|"
@@ -198,6 +204,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      moving.turn),
     (Intent.SEARCH, r"turn your head (?P<what>.+?)(?: for (?:a|one) (?:moment|second|bit|while))?",
      building.look),
+    (Intent.NAVIGATION, rf"{_ANGLE} (?:to (?:the|your) )?(?P<way>left|right)", moving.turn),
     (Intent.NAVIGATION, rf"(?:turn|rotate|spin|swivel)(?: by)? {_ANGLE}"
      rf"(?: (?:to )?(?:the )?{_SIDE})?", moving.turn),
     (Intent.NAVIGATION, r"(?:make|take|do) an? (?P<way>left|right)(?: turn)?|do a u-?turn",

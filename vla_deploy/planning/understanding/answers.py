@@ -80,7 +80,7 @@ _SILENT: Final = frozenset(
         "that's", "it's", "said", "oh", "sorry", "ah", "hm", "hmm", "actually", "thanks", "thank",
         "you", "cheers", "ta", "mate", "dear", "love", "one's", "i'd", "like", "would",
         "think", "was", "thinking", "meaning", "talking", "about", "then", "guess", "suppose",
-        "should", "have", "had", "aye", "erm", "probably", "maybe", "course", "obviously",
+        "should", "have", "had", "aye", "erm", "probably", "maybe", "course", "duh", "obviously",
     }
 )  # fmt: skip
 # Words of the questions themselves.

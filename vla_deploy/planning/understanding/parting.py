@@ -55,7 +55,10 @@ _SIDE_BEHIND: Final = re.compile(
     r"(?P<own>.*?) ?(?:that is )?(?:on|to|at) (?P<whose>the|your|my|its) (?P<side>left|right)"
     r"(?: hand)?(?: side)?"
 )
-_MIDDLE_BEHIND: Final = re.compile(r"(?P<own>.+?) (?:in|at) the (?P<side>middle|centre|center)")
+_MIDDLE_BEHIND: Final = re.compile(
+    r"(?P<own>.+?) (?:(?:that|which) (?:is|sits|stands|lies) )?"
+    r"(?:in|at) the (?P<side>middle|centre|center)"
+)
 _DETERMINER: Final = r"(?:(?:the|my|your|that|this|our) )?"
 _BESIDES: Final = re.compile(
     r"(?P<own>.+?) (?:(?:that|which|who) (?:is|are) not|(?:is|are) not|but not|not|but|except for|"

@@ -35,9 +35,11 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (rf"\b{_COLOUR}(?:[- ]colou?red| in colou?r)\b", r"\g<colour>"),
     (rf"\bof (?:a )?{_COLOUR} colou?r\b", r"\g<colour>"),
     (rf"(.+?) (?:with|in) (?:a|an|the|its) {_COLOUR} {_HULL}\b", r"\g<colour> \1"),
+    (r"^(?:those|these) ((?:[a-z]+ )?keys)\b", r"the \1"),
+    (r"^(?:those|these) (?!two\b|three\b|four\b|\d)(?=(?:[a-z]+ ){0,2}[a-z]+s\b)", "all the "),
     # --- how far
     (r"\b(?:far|very|extreme) (?=(?:left|right)\b)", ""),
-    (r"\b(?:farthest|furthest|most) (?:to|on) the (?=(?:left|right)\b)", "on the "),
+    (r"\b(?:farthest|furthest|most) (?:to|on) (?:the|your|my) (?=(?:left|right)\b)", "on the "),
     (r"\bmost distant\b", "farthest"),
     (r"\bfa(?:rthest|rther)\b|\bfurthe(?:st|r)\b", "farthest"),
     (r"\bfarthest (?:away|off)\b", "farthest"),
