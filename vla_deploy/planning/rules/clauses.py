@@ -87,9 +87,10 @@ _FORMS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
         ("help me look$", "look for it"),
         ("(?:turn|spin)(?: right| all the way| yourself)? (?:a?round|about),?"
          "(?: and| to| so(?: that)?)?"
-         "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)", "turn around"), ("face the other (?:way|side|direction)", "turn around"),
+         "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)", "turn around"),
+        ("face the other (?:way|side|direction)", "turn around"),
         ("(?:and )?once you(?:'ve| have) got (?:it|them)", "and then"),
-        ("ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
+        (r"ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
     )
 )  # fmt: skip
 _TWICE: Final = re.compile(r"\b(\w+)(?: \1\b)+")

@@ -22,7 +22,6 @@ _BEHIND: Final = tuple(
         rf"before {_PERSON} {_HARM}\b[^,;.!?]*",
         rf"so (?:that )?{_PERSON} (?:don't|doesn't|do not|does not|won't|will not|can|can't|cannot|"
         r"could|needn't|may) (?!you\b)[^,;.!?]+",
-        r"(?<!\bgo )while (?:i|we) [^,;.!?]+",
         r"as an? (?:test|favou?r|treat|surprise|experiment)\b[^,;.!?]*",
         r"for (?:safe ?keeping|the time being|good measure|a change|a start)",
         r"(?:chop chop|hurry(?: up)?|be quick(?: about it)?|quick(?:ly)?|snappy|asap|sharpish|"
@@ -34,11 +33,19 @@ _BEHIND: Final = tuple(
 )
 
 
+# Only what stands still does that while somebody does something: all else would be done too soon.
+_WAITING: Final = re.compile(
+    r"(?P<own>\W*(?:(?:please|robot|just|now|can you|could you|would you) )*"
+    r"(?:wait|hold|stay|stand|keep|pause|freeze)\b[^,;.!?]*?),? while (?:i|we) [^,;.!?]+[ .!?,]*"
+)
+
+
 def without_purpose(text: str) -> str:
     """Return a command in lower case without what it is for; one that is nothing else stays."""
     while True:
         before = text
         for pattern in _BEHIND:
             text = pattern.sub("", text) or text
+        text = _WAITING.sub(r"\g<own>", text)
         if text == before:
             return text
