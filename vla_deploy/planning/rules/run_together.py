@@ -33,6 +33,7 @@ _JOINED: Final = frozenset(
     {
         "and", "if", "that", "so", "but", "then", "or", "because", "when", "where", "please",
         "robot", "butler", "hey", "okay", "well", "now", "i", "you", "to", "say", "saying", "ask",
+        "sorry", "no", "oh", "wait",
     }
 )  # fmt: skip
 _COUNT_FIRST: Final = re.compile(
