@@ -4,6 +4,7 @@ import re
 from typing import Final
 
 from vla_deploy.planning.references import words_of
+from vla_deploy.planning.rules.breaths import without_breaths
 from vla_deploy.planning.rules.figures import in_figures
 from vla_deploy.planning.rules.run_together import with_commas
 from vla_deploy.planning.understanding.purposes import without_purpose
@@ -193,7 +194,7 @@ _BETWEEN: Final = re.compile(r"\b(between (?:[\w']+ ){1,4}?)and (?=\w)")
 def plain(text: str) -> str:
     """Return a text in lower case without hesitation, with words in full that were run together."""
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
-    text = with_commas(without_purpose(text))
+    text = with_commas(without_purpose(without_breaths(text)))
     text = _REASON.sub("", _ASKED_BETWEEN.sub(", ", text))
     for pattern, full in _FORMS:
         text = pattern.sub(full, text)

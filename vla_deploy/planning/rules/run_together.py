@@ -16,7 +16,8 @@ _PLACED: Final = "in|on|at|by|near|under|behind|beside|next|inside|somewhere"
 _BREAKS: Final = re.compile(
     r"(?<=[a-z']) (?="
     # He has changed his mind.
-    r"(?:no wait|wait no|oh no wait|or rather|no sorry|sorry no|sorry i meant?|i meant?|actually no|"
+    r"(?:no wait|wait no|oh no wait|or rather|no sorry|sorry no|sorry i meant?|i meant?|"
+    r"actually no|"
     r"no actually|scratch that|(?:no|sorry) make (?:it|that)|"
     rf"no (?:{_VERBS})) "
     # She has said how things are, and asks for something now.
