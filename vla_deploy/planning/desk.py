@@ -99,6 +99,7 @@ class Desk:
         asked = None if waiting is None else waiting.command
         dropped = (asked, self._beside.call_in(), *self._queue)
         self._queue.clear()
+        self._rehearing.forget()
         for command in dropped:
             if command is not None:
                 self._conclusions.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
@@ -161,7 +162,8 @@ class Desk:
                 command, request, self.planner.check_given(command.plan, request)
             )
             return
-        deadline = Deadline.within(self._clock, self.planner.within_s, Event())
+        within_s = self._rehearing.within_s(command, self.planner.within_s)
+        deadline = Deadline.within(self._clock, within_s, Event())
         self._go_slowly(command, request, self.planner.plan_at_once(request, deadline), deadline)
 
     def _go_slowly(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Final
 
 from vla_deploy.ipc import Event
@@ -10,7 +11,10 @@ from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.rules import is_stop
 
 VOICE: Final = "voice"
+READ_BACK: Final = 0.5
+"""How surely doubted or other words are heard at most: less than what is carried out unasked."""
 _ID_CHARACTERS: Final = 128
+_MOST_OTHERS: Final = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,8 +74,8 @@ def read_command(event: Event) -> Command:
         source=str(given.get("source", "")),
         text=_words(given) if plan is None else "",
         plan=plan,
-        heard_confidence=_ratio(heard.get("confidence")),
-        others=tuple(_others(heard.get("others"))),
+        heard_confidence=_confidence(heard),
+        others=tuple(islice(_others(heard.get("others")), _MOST_OTHERS)),
         is_doubted=bool(heard.get("doubted")),
         may_ask_again=bool(heard.get("ask_again")),
         is_answer=bool(given.get("answer")),
@@ -90,6 +94,14 @@ def _words(given: Mapping[str, Any]) -> str:
             "say less at a time"
         )
     return text.strip()
+
+
+def _confidence(heard: Mapping[str, Any]) -> float | None:
+    """Return how sure the words are; of doubted ones so little that they are read back."""
+    told = _ratio(heard.get("confidence"))
+    if not heard.get("doubted"):
+        return told
+    return READ_BACK if told is None else min(told, READ_BACK)
 
 
 def _ratio(value: Any) -> float | None:

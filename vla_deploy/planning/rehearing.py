@@ -13,11 +13,9 @@ from typing import Final
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.ladder import Answer
 
-READ_BACK: Final = 0.5
-"""How surely other words are heard at most: less than what is carried out unasked."""
 PATIENCE_S: Final = 1.0
 """So long other readings are given to planners that take time, too."""
 _MARKS: Final = re.compile(r"[,;:.]+(?= |$)")
@@ -46,11 +44,22 @@ class Rehearing:
         again = self._of(command) is not None
         return again and patience is not None and patience.left_s <= 0.0
 
+    def within_s(self, command: Command, usual_s: float) -> float:
+        """Return how long planning a reading may take; all others share what patience is left."""
+        patience = self._patience
+        if self._of(command) is None or patience is None:
+            return usual_s
+        return min(usual_s, max(patience.left_s, 0.0)) or usual_s
+
+    def forget(self) -> None:
+        """Forget the command: it is given up."""
+        self._first = None
+
     def other(self, command: Command, request: Request, answer: Answer) -> Command | None:
         """Return the command in the next other words to try; None if it is to be concluded."""
         first = self._of(command)
         makes_sense = answer.is_final if first is None else answer.plan is not None
-        if makes_sense or not command.is_spoken:
+        if makes_sense or not command.is_spoken or command.recovers:
             return None
         if first is None:
             first = self._first = Heard(command=command, request=request, answer=answer)
@@ -73,12 +82,17 @@ class Rehearing:
 
 def _readings(command: Command) -> Iterator[tuple[str, float]]:
     """Yield all other readings of a command, and of each its words alone."""
-    tried = {command.text}
+    tried = {_spoken(command.text)}
     for text, odds in ((command.text, 1.0), *command.others):
         for reading in (text, _MARKS.sub("", text)):
-            if reading not in tried:
-                tried.add(reading)
+            if _spoken(reading) not in tried:
+                tried.add(_spoken(reading))
                 yield reading, odds
+
+
+def _spoken(text: str) -> str:
+    """Return what two texts have in common that nobody can hear the difference of."""
+    return text.lower().strip(" ,;:.!?")
 
 
 def _in_other_words(command: Command, first: Command) -> Command | None:
@@ -87,6 +101,6 @@ def _in_other_words(command: Command, first: Command) -> Command | None:
         return None
     (text, odds), *rest = command.others
     sure = first.heard_confidence
-    if _MARKS.sub("", text) != _MARKS.sub("", first.text):
+    if text != _MARKS.sub("", first.text):
         sure = min(READ_BACK, odds * (1.0 if sure is None else sure))
     return replace(command, text=text, others=tuple(rest), heard_confidence=sure)

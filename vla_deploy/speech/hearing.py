@@ -123,7 +123,8 @@ class Hearing:
         told, self._told = self._told, []
         yield from told
         for answer in self.readings.answers():
-            self._newest = None
+            if self._newest is not None and self._newest[0].phrase.number <= answer.phrase.number:
+                self._newest = None
             if answer.phrase.number != self._stopped_by:
                 yield self._judged(answer)
             else:
@@ -148,6 +149,7 @@ class Hearing:
             self._activity.reset()
             self._phrases.reset()
             self.readings.forget_draft()
+            self._newest = None
         voice, level = self._activity.probability(frame.samples), level_db(frame.samples)
         self.gate.follow(playing)
         self._own_words.follow(frame, playing)

@@ -136,7 +136,3 @@ def evidence(heard: Heard) -> dict[str, Any]:
             for key, value in told.items()
         },
     }
-
-
-def _rounded(value: object) -> object:
-    return round(value, 4) if isinstance(value, float) else value

@@ -102,8 +102,11 @@ def stops(
             return True
     if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
         return True
-    if is_all and any(is_stop(one.text) for one in reading.others if one.odds >= STOP_ODDS):
-        return True
+    spoke = words_of(reading.text) and reading.no_speech <= NO_SPEECH
+    if is_all and spoke:
+        likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
+        if any(map(is_stop, likely)):
+            return True
     return confidence >= STOP_WITHIN_CONFIDENCE and holds_stop(reading.text, is_all=is_all)
 
 

@@ -125,3 +125,25 @@ def test_a_planner_that_takes_long_is_not_asked_about_every_reading(open_desk, r
     desk.give(**spoken("go to the chicken", *others))
     assert [event for event, _ in events(desk.answers())][-1] == "rejected"
     assert len(model.asked) == 3, "of the words, and of others within a second"
+
+
+def test_doubted_words_are_read_back_however_sure_the_profile_wants_them(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to the kitchen", confidence=0.72, doubted=True))
+    assert [event for event, _ in events(desk.answers())] == ["asked"]
+
+
+def test_a_full_stop_is_no_other_reading(open_desk, rung):
+    model = rung("model", *[Declined("no idea")] * 9)
+    desk = open_desk(model)
+    desk.give(**spoken("Go to the chicken.", ("Go to the kitchen.", 0.6)))
+    assert [event for event, _ in events(desk.answers())][-1] == "asked"
+    assert len(model.asked) == 1
+
+
+def test_of_many_other_readings_only_the_likeliest_are_tried(open_desk, rung):
+    model = rung("model", *[Declined("no idea")] * 99)
+    desk = open_desk(model)
+    desk.give(**spoken("go to the chicken", *[(f"go to kitten {n}", 0.5) for n in range(60)]))
+    desk.answers()
+    assert len(model.asked) <= 9

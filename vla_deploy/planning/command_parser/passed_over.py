@@ -46,6 +46,9 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "it says what not to do": (
         r"\b(?:avoid|avoiding|refrain|refuse|refusing|beware|dare|hands off|off limits)\b",
+        rf"{_BEGIN}(?:do not|don't|dont|never)\b"
+        r"(?! (?:forget|hesitate|worry|rush|hurry|drop|spill|break)\b)",
+        rf"{_BEGIN}no \w+ing\b",
         r"\bwithout (?:\w+ing )?(?:through |into |near )?(?:(?:the|a|an|my|your|our)\b|~)",
         r"\b(?:stop|quit|cease) \w+ing\b|\bbut (?:stop|wait|halt)\b",
         r"\bleave (?:\w+ )*~(?: ~)* (?:where|alone|as)\b",

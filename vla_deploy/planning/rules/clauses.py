@@ -55,7 +55,7 @@ _POLITE_AFTER: Final = re.compile(
     r"for (?:my|our|the) (?:daughter|son|wife|husband|mum|mom|mother|dad|father|"
     r"grandma|granny|gran|grandpa|grandad|sister|brother|kids?|children|baby|guests?|friends?|"
     r"visitors?|neighbours?|boss|nurse|doctor|partner|girlfriend|boyfriend)|"
-    r"mate|love|dear|darling|pal|buddy|bud|son|lol|sweetie|honey|sir|"
+    r"mate|love|dear|darling|pal|buddy|bud|lol|sweetie|"
     r"carefully|gently|my friend|cheers|ta|right away|"
     r"straight away|real quick|asap|okay|ok|if you would|if you don't mind|if possible|"
     r"when(?:ever)? you (?:can|get (?:a|the) (?:chance|moment|minute|second)|"
@@ -90,7 +90,9 @@ _FORMS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
          "(?: and| to| so(?: that)?)?"
          "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)", "turn around"),
         ("face the other (?:way|side|direction)", "turn around"),
-        ("(?:and )?once you(?:'ve| have) got (?:it|them)", "and then"),
+        (r"((?:take|get|fetch|pick|grab|find)\b[^,;.!?]*?),? (?:and )?"
+         r"once you(?:'ve| have) got (?:it|them)",
+         r"\1 and then"),
         (r"ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
     )
 )  # fmt: skip
@@ -188,7 +190,9 @@ DOING: Final = {
 
 
 # "And" joins what a thing is between; nothing new begins with it.
-_BETWEEN: Final = re.compile(r"\b(between (?:[\w']+ ){1,4}?)and (?=\w)")
+_BETWEEN: Final = re.compile(
+    r"\b(between (?:[\w']+ ){1,4}?)and (?=(?:the|a|an|my|your|that|this|those|these)\b)"
+)
 
 
 def plain(text: str) -> str:

@@ -34,7 +34,8 @@ _JOINED: Final = frozenset(
     {
         "and", "if", "that", "so", "but", "then", "or", "because", "when", "where", "please",
         "robot", "butler", "hey", "okay", "well", "now", "i", "you", "to", "say", "saying", "ask",
-        "sorry", "no", "oh", "wait",
+        "sorry", "no", "oh", "wait", "unless", "until", "till", "once", "while", "as", "after",
+        "before", "whether", "whenever",
     }
 )  # fmt: skip
 _COUNT_FIRST: Final = re.compile(

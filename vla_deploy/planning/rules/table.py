@@ -134,8 +134,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      rf"keep holding(?: on to)?|don't (?:put down|drop|let go of)) {_OBJECT}"
      r"(?: in your (?:left |right )?hands?)?", placing.keep),
     # --- put
-    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand|leave) {_OBJECT} "
-     r"(?:down )?on "
+    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand) {_OBJECT} (?:down )?on "
      r"(?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of (?:you|me|us)",
      placing.put_here),
     (Intent.MANIPULATION, rf"(?:put|drop|pop|stick|place|throw|set|lay) {_OBJECT} in(?:side)?",

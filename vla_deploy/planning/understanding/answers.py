@@ -22,7 +22,7 @@ from vla_deploy.planning.understanding.phrases import (
     SIDES,
 )
 from vla_deploy.planning.understanding.questions import MOST_CHOICES, either, from_side
-from vla_deploy.planning.understanding.wordings import reworded
+from vla_deploy.planning.understanding.wordings import in_plain_words
 from vla_deploy.world.query import ORDERS
 
 
@@ -101,7 +101,8 @@ _SURPRISE: Final = re.compile(
     r"(?:oh |ah |well |hm )*"
     r"(?:there(?:'s| is| are| were)|you(?:'ve| have)(?: got)?|i see|are there) "
     r"(?:two|three|four|several|both|more(?: than one)?)(?: of (?:them|those|these))?(?: there)?|"
-    r"(?:oh|ah|well|hm|good (?:question|point)|fair (?:enough|point)|my mistake|right|sorry)+"
+    r"(?:(?:oh|ah|well|hm|good (?:question|point)|fair (?:enough|point)|my mistake|right|sorry)"
+    r"\b ?)+"
 )
 _OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
 # Words of an answer even where they tell no candidate from the others.
@@ -136,8 +137,7 @@ def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
 
 def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | None]:
     """Return what an utterance is to a question, and the candidate that it picks."""
-    text = reworded(text, {})
-    said = " ".join(WORD.findall(text))
+    said = " ".join(WORD.findall(text.lower()))
     if NO_WORDS.fullmatch(said):
         return Verdict.NO, None
     if not question.candidates:
@@ -149,7 +149,7 @@ def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | No
     agrees = YES_WORDS.fullmatch(said) is not None
     if agrees and len(question.candidates) == 1:
         return Verdict.CHOSEN, question.candidates[0]
-    verdict, chosen = _judged(question.candidates, text)
+    verdict, chosen = _judged(question.candidates, in_plain_words(text.lower()))
     # "right" is the one on the right where there is one; of several a yes picks none.
     return (Verdict.UNCLEAR if agrees and verdict is Verdict.ANEW else verdict), chosen
 

@@ -8,11 +8,11 @@ import re
 from typing import Final
 
 _SOMEBODY: Final = (
-    r"(?:i|we|you|she|he|they|someone|somebody|nobody|everybody|everyone|"
+    r"(?:i|we|you|she|he|they|someone|somebody|everybody|everyone|"
     r"(?:my|our|your|the|his|her) (?!one\b|thing\b|other\b)[a-z]+)"
 )
 _HAS: Final = (
-    r"(?:'(?:ve|d|m|re|s|ll)| have| has| had| am| is| are| was| were| always| usually| never|"
+    r"(?:'(?:ve|d|m|re|s|ll)| have| has| had| am| is| are| was| were| always| usually|"
     r" just| already| last| keep| keeps| once| really| so)*"
 )
 _LAID: Final = (
@@ -26,6 +26,11 @@ _DID: Final = (
     r"was|were|is|are|call|calls|lost)"
 )
 _AT: Final = r"(?=(?:on|in|inside|under|by|next to|near|beside|behind|at|on top of)\b)"
+# Of the rest of what somebody did: neither where the thing is, nor that it is not so.
+_MORE: Final = (
+    r"(?!(?:on|in|inside|under|by|near|beside|behind|at|next|not|no|never|now|moved|left|right|one)\b)"
+    r"(?![a-z]+n't\b)[a-z']+"
+)
 _STANDING: Final = (
     r"(?:(?:that|which) (?:is|are) )?(?:just |still |currently )?"
     r"(?:lying|sitting|standing|charging|hiding|waiting|resting|kept|placed|left|sat|stood|located)"
@@ -42,7 +47,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"^something to read$", "a book"),
     (r"^something to play with$", "a ball"),
     (rf"(?<=\w) (?:that |which |who )?{_SOMEBODY}{_HAS} {_LAID} {_AT}", " "),
-    (rf"(?<=\w) (?:that |which |who )?{_SOMEBODY}{_HAS} {_DID}(?: [a-z']+){{0,3}}$", ""),
+    (rf"(?<=\w) (?:that |which |who )?{_SOMEBODY}{_HAS} {_DID} {_AT}", " "),
+    (rf"(?<=\w) (?:that |which |who )?{_SOMEBODY}{_HAS} {_DID}(?: {_MORE}){{0,3}}$", ""),
     (r" of (?:mine|ours|yours|hers|his|theirs)\b", ""),
     (r" from (?:earlier|before|yesterday|this morning|last night|just now)$", ""),
     (r" with (?:the|a|its) (?:handle|lid|label|stripes?|picture|logo|cap|straw|lettering)"

@@ -1,7 +1,8 @@
-"""Leave out what a command is for, or why it is urgent, said behind it: the robot goes at once.
+"""Leave out what a command is for, or why it is urgent, said behind it.
 
 "take the red book before the toddler does", "fetch it here so i don't have to get up", "wait twenty
-seconds while i get past", "take the keys, chop chop"
+seconds while i get past", "take the keys, chop chop". A condition behind it, or a further command,
+is none of that: then all stays, for whoever refuses conditions to see.
 """
 
 import re
@@ -16,27 +17,30 @@ _HARM: Final = (
     r"does|do|sits?|steps?|treads?|trips?|falls?|rolls?|breaks?|spills?|drops?|knocks?|kicks?|"
     r"grabs?|takes?|gets? (?:it|them|there|to it|hold)|finds?|eats?|wakes?|notices?)"
 )
+_REST: Final = (
+    r"(?:(?!\b(?:if|when|whenever|until|till|unless|after|before|once|only|but|not yet|later|"
+    r"as soon|as long|provided|and|then|or|no|never)\b)[^,;.!?])*"
+)
 _BEHIND: Final = tuple(
     re.compile(rf",? {pattern}[ .!?,]*$")
     for pattern in (
-        rf"before {_PERSON} {_HARM}\b[^,;.!?]*",
+        rf"before {_PERSON} {_HARM}\b{_REST}",
         rf"so (?:that )?{_PERSON} (?:don't|doesn't|do not|does not|won't|will not|can|can't|cannot|"
-        r"could|needn't|may) (?!you\b)[^,;.!?]+",
-        r"as an? (?:test|favou?r|treat|surprise|experiment)\b[^,;.!?]*",
+        rf"could|needn't|may) (?!you\b){_REST}",
+        rf"as an? (?:test|favou?r|treat|surprise|experiment)\b{_REST}",
         r"for (?:safe ?keeping|the time being|good measure|a change|a start)",
         r"(?:chop chop|hurry(?: up)?|be quick(?: about it)?|quick(?:ly)?|snappy|asap|sharpish|"
         r"go on|"
         r"there's a (?:dear|love|pal|good \w+)|if you (?:can )?manage(?: it| that)?|"
         r"if you'd be so kind|if it's no (?:trouble|bother))",
-        r"(?:with|in|using) (?:your|the) (?:free|empty|spare) (?:hand|gripper|arm)",
+        r"(?:with|using) (?:your|the) (?:free|empty|spare) (?:hand|gripper|arm)",
     )
 )
-
-
 # Only what stands still does that while somebody does something: all else would be done too soon.
 _WAITING: Final = re.compile(
     r"(?P<own>\W*(?:(?:please|robot|just|now|can you|could you|would you) )*"
-    r"(?:wait|hold|stay|stand|keep|pause|freeze)\b[^,;.!?]*?),? while (?:i|we) [^,;.!?]+[ .!?,]*"
+    r"(?:wait|hold|stay|stand|pause)\b(?:(?!\b(?:and|then|but|or)\b)[^,;.!?])*?),? "
+    rf"while (?:i|we) {_REST}[ .!?,]*"
 )
 
 
@@ -46,6 +50,7 @@ def without_purpose(text: str) -> str:
         before = text
         for pattern in _BEHIND:
             text = pattern.sub("", text) or text
-        text = _WAITING.sub(r"\g<own>", text)
+        waiting = _WAITING.fullmatch(text)
+        text = text if waiting is None else waiting["own"]
         if text == before:
             return text

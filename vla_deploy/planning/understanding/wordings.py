@@ -68,9 +68,14 @@ def reworded(text: str, furniture: Mapping[str, str]) -> str:
     owned = _owner(tuple(furniture)).fullmatch(text.strip()) if furniture else None
     if owned:
         text = f"{owned['own']} on the {owned['owner']}"
+    return _near(" ".join(plain_description(in_plain_words(text)).split()), furniture)
+
+
+def in_plain_words(text: str) -> str:
+    """Return a description, in lower case, in other words that mean the same."""
     for pattern, instead in _TABLE:
         text = pattern.sub(instead, text)
-    return _near(" ".join(plain_description(" ".join(text.split())).split()), furniture)
+    return " ".join(text.split())
 
 
 def _near(text: str, furniture: Mapping[str, str]) -> str:

@@ -122,7 +122,7 @@ class StopWords:
             return
         if self._spotter.runs > runs:
             self._broken = ""
-        if not own:
+        if not own and self._spotter.runs > runs:
             self._suspicions.note(block.end_ns, self._spotter.score, threshold)
         if spotted is not None:
             self._take(spotted)

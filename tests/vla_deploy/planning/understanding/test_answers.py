@@ -39,6 +39,7 @@ SURE = Question(text="Shall I?", asked_ns=0, command_text="throw the cup away")
         ("the second", Verdict.CHOSEN, BLUE),
         ("the last one", Verdict.CHOSEN, BLUE),
         ("number two", Verdict.CHOSEN, BLUE),
+        ("the red one I mean the blue one", Verdict.UNCLEAR, None),
         ("cup_2", Verdict.CHOSEN, BLUE),
         ("either one", Verdict.CHOSEN, RED),
         ("never mind", Verdict.NO, None),
@@ -188,3 +189,17 @@ def test_an_answer_by_another_thing_makes_the_command_whole(said: str, full: str
     assert described(replace(which, expression="mug"), said) is None
     assert described(replace(which, command_text="put the cup by the other cup"), said) is None
     assert described(SURE, said) is None
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "yes I mean no",
+        "okay I mean don't do it",
+        "yes someone is in the way",
+        "yes we are not ready",
+    ],
+)
+def test_a_yes_that_is_taken_back_is_none(said: str) -> None:
+    talk = Conversation(question=SURE)
+    assert reply(talk, said, now_ns=1).verdict is not Verdict.YES

@@ -27,6 +27,13 @@ def test_what_a_command_is_for_is_left_out(said: str, command: str) -> None:
         "bring me the cup before dinner",
         "take the ball with your left hand",
         "chop chop",
+        "go to the kitchen so i can cook when dinner is ready",
+        "bring me the ball so that i can throw it unless it is wet",
+        "go to the bedroom so i don't see you until i call",
+        "wait and go forward while i sleep",
+        "put the cup in the box so it won't roll off then go to the kitchen",
+        "take the red cup before it falls and put it in the box",
+        "put the cup in your free hand",
     ],
 )
 def test_what_changes_a_command_stays(said: str) -> None:
