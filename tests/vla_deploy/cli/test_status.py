@@ -59,9 +59,9 @@ def test_whether_spoken_words_are_understood_is_told_and_why_not() -> None:
     assert ears(None) == "hears: nothing, speech is silent"
     deaf = {"state": "deaf", "why": "robot butler has no [microphone]"}
     assert ears(deaf) == "hears: no words (robot butler has no [microphone]); type commands"
-    heard = {"accepted": 3, "rejected": 1}
+    heard = {"accepted": 3, "doubted": 1, "rejected": 1}
     well = {"state": "listening", "why": "", "model": {"name": "whisper-small.en"}, "heard": heard}
-    assert ears(well) == "hears: listening by whisper-small.en, 3 accepted, 1 rejected"
+    assert ears(well) == "hears: listening by whisper-small.en, 3 accepted, 1 doubted, 1 rejected"
 
 
 def test_who_plans_what_is_asked_and_who_is_away_is_told() -> None:
