@@ -2,22 +2,28 @@
 
 A recogniser that is unsure has several readings; the one with a plan in this room and this moment
 is the likeliest. It is read back before anything moves. Each is tried without its commas, too: a
-pause may be a thought's end, or only a breath.
+pause may be a thought's end, or only a breath; and with words apart that were run into one. A plan
+about things that nobody has seen gives way to one about things that are there.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.glued import parted
 from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.rules.building import is_seen
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to planners that take time, too."""
+WELL_HEARD: Final = 0.75
+LEAST_INSTEAD: Final = 0.15
+"""Words heard less surely give way to others that make more sense, if those are so likely."""
 _MARKS: Final = re.compile(r"[,;:.]+(?= |$)")
 
 
@@ -57,20 +63,26 @@ class Rehearing:
 
     def other(self, command: Command, request: Request, answer: Answer) -> Command | None:
         """Return the command in the next other words to try; None if it is to be concluded."""
+        if not command.is_spoken or command.recovers:
+            return None
         first = self._of(command)
         makes_sense = answer.is_final if first is None else answer.plan is not None
-        if makes_sense or not command.is_spoken or command.recovers:
+        seeks_unseen = _is_unsure(command) and _seeks_unseen(answer, request)
+        if makes_sense and not seeks_unseen:
             return None
         if first is None:
             first = self._first = Heard(command=command, request=request, answer=answer)
             self._patience = Deadline.within(self._clock, PATIENCE_S)
-            command = replace(command, others=tuple(_readings(command)))
-        return _in_other_words(command, first.command)
+            places = request.world.places
+            least = LEAST_INSTEAD if makes_sense else 0.0
+            others = [one for one in _readings(command, places) if one[1] >= least]
+            command = replace(command, others=tuple(others))
+        return _in_other_words(command, first.command, request.world.places)
 
     def concluded(self, command: Command, request: Request, answer: Answer) -> Heard:
         """Return what is to be concluded: of readings without a plan the first."""
         first, self._first = self._of(command), None
-        if first is None or answer.plan is not None:
+        if first is None or (answer.plan is not None and not _seeks_unseen(answer, request)):
             return Heard(command=command, request=request, answer=answer)
         return first
 
@@ -80,11 +92,26 @@ class Rehearing:
         return first if same else None
 
 
-def _readings(command: Command) -> Iterator[tuple[str, float]]:
-    """Yield all other readings of a command, and of each its words alone."""
+def _seeks_unseen(answer: Answer, request: Request) -> bool:
+    """Tell whether a plan looks for a kind of thing that has not been seen, in a known scene."""
+    scene = request.scene
+    if answer.plan is None or scene is None or not scene.things:
+        return False
+    sought = [one.parameters["object"] for one in answer.plan.actions if one.skill == "find_object"]
+    return not all(is_seen(str(text), request) for text in sought)
+
+
+def _is_unsure(command: Command) -> bool:
+    sure = command.heard_confidence
+    return sure is not None and sure < WELL_HEARD
+
+
+def _readings(command: Command, places: Mapping[str, str]) -> Iterator[tuple[str, float]]:
+    """Yield all other readings of a command, and of each its words alone, and apart."""
     tried = {_spoken(command.text)}
     for text, odds in ((command.text, 1.0), *command.others):
-        for reading in (text, _MARKS.sub("", text)):
+        bare = _MARKS.sub("", text)
+        for reading in (text, bare, parted(bare, places)):
             if _spoken(reading) not in tried:
                 tried.add(_spoken(reading))
                 yield reading, odds
@@ -95,12 +122,12 @@ def _spoken(text: str) -> str:
     return text.lower().strip(" ,;:.!?")
 
 
-def _in_other_words(command: Command, first: Command) -> Command | None:
+def _in_other_words(command: Command, first: Command, places: Mapping[str, str]) -> Command | None:
     """Return a command in the next of its other readings, as sure as that is."""
     if not command.others:
         return None
     (text, odds), *rest = command.others
     sure = first.heard_confidence
-    if text != _MARKS.sub("", first.text):
+    if text not in (bare := _MARKS.sub("", first.text), parted(bare, places)):
         sure = min(READ_BACK, odds * (1.0 if sure is None else sure))
     return replace(command, text=text, others=tuple(rest), heard_confidence=sure)

@@ -147,3 +147,29 @@ def test_of_many_other_readings_only_the_likeliest_are_tried(open_desk, rung):
     desk.give(**spoken("go to the chicken", *[(f"go to kitten {n}", 0.5) for n in range(60)]))
     desk.answers()
     assert len(model.asked) <= 9
+
+
+def test_words_that_were_run_into_one_are_parted(open_desk):
+    desk = open_desk()
+    desk.give(**spoken("go to thekitchen"))
+    assert "asked" not in [event for event, _ in events(desk.answers())]
+    (plan,) = desk.plans()
+    assert plan["plan"]["actions"][0]["parameters"]["place"] == "kitchen"
+
+
+@pytest.mark.parametrize(("confidence", "odds", "sought"), [
+    (0.65, 0.4, "red cup"), (0.65, 0.1, "red can"), (0.9, 0.4, "red can"),
+])  # fmt: skip
+def test_a_thing_that_is_there_is_likelier_meant_than_one_that_nobody_saw(
+    open_desk, confidence, odds, sought
+):
+    desk = open_desk()
+    desk.sees("red cup")
+    desk.give(**spoken("find the red can", ("find the red cup", odds), confidence=confidence))
+    told = desk.answers()
+    desk.give(command_id="c2", text="yes", source="voice")
+    desk.answers()
+    (plan,) = desk.plans()
+    assert plan["plan"]["actions"][0]["parameters"]["object"] == sought
+    asked = "asked" in [event for event, _ in events(told)]
+    assert asked is (sought == "red cup")

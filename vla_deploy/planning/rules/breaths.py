@@ -25,8 +25,20 @@ _ROWS: Final = (
     rf"\b(?P<own>{_TELLS}),+ ?(?=(?:{KIND_WORDS}|thing|one)s?\b)",
     r"\b(?P<own>kitchen|coffee|side|bedside|bed),+ ?(?=table\b)",
     r"\b(?P<own>left|right),+ ?(?=(?:hand|arm|gripper)\b)",
+    r"\b(?P<own>(?:after|once|when) you),+ ?(?=[a-z])",
     r"\b(?P<own>no|wait|sorry),+ ?(?=(?:no|wait|sorry)\b)",
 )
+_ROWS_BEFORE: Final = (
+    r",+ ?(?=(?:in|into|inside|on|onto|from|out of|off|with|next to|through) "
+    r"(?:the|my|your|a|that)\b)",
+    r",+ ?(?=(?:that|which) (?:is|are|was)\b)",
+    r"(?<=[a-z]),(?=[a-z])",
+)
+_TO: Final = re.compile(
+    r"(?P<own>\b(?:bring|take|carry|move|put|get|fetch|return|deliver) (?:the|my|that|it|a|your)\b"
+    r"(?:(?!\b(?:to|in|on|into|onto|and|then)\b)[a-z' ])*),+ ?(?=to (?:the|my|me|your)\b)"
+)
+_BEFORE: Final = tuple(re.compile(pattern) for pattern in _ROWS_BEFORE)
 _BREATHS: Final = tuple(re.compile(pattern) for pattern in _ROWS)
 
 
@@ -34,4 +46,6 @@ def without_breaths(text: str) -> str:
     """Return a text in small letters without commas where no thought can end."""
     for pattern in _BREATHS:
         text = pattern.sub(r"\g<own> ", text)
-    return text
+    for pattern in _BEFORE:
+        text = pattern.sub(" ", text)
+    return _TO.sub(r"\g<own> ", text)

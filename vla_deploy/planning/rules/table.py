@@ -241,6 +241,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", cleaning.tidy),
     (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|do a (?:round|tour))\b[^:]*: ?(?:first )?"
      r"(?P<place>.+)", cleaning.visit),
+    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour) (?:the |my |our )?"
+     r"(?:flat|house|apartment|home|rooms?|place) (?:and )?(?:first )?(?P<place>.+)",
+     cleaning.visit),
     (Intent.CLEANING, r"(?:patrol|inspect|sweep(?: through)?|cover(?: the floor (?:of|in))?|"
      r"drive (?:all )?over(?: the floor (?:of|in))?) (?P<place>.+?)(?: floor)?", cleaning.patrol),
     # --- pick
