@@ -39,7 +39,7 @@ SIZES: Final[Mapping[str, Settings]] = {
         judged=20,
     ),
     "trial": Settings(name="trial", budget_s=180.0),
-    "full": Settings(name="full", budget_s=5700.0),
+    "full": Settings(name="full", budget_s=3600.0),
     # Of the same shape: it can go on from where the other one ended.
     "long": Settings(name="long", budget_s=14_400.0),
 }
