@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 help:
 	@echo "make demo      install what is needed, then pick up the red cup on the twin"
 	@echo "make test      install what is needed, then format, lint, types, import rules and all tests"
-	@echo "make campaign  the long tests: ten seeds of pick and place, every fault, a million streams into every parser"
+	@echo "make campaign  the long tests: twenty scenes of pick and place, every fault, a million streams into every parser"
 	@echo "make mutation  change vla_deploy/safety in every small way: each change must fail a test; minutes, nightly"
 	@echo "make lock      pin every dependency afresh"
 
