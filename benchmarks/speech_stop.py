@@ -1,7 +1,7 @@
 """Measure the spoken stop: what is missed, what alarms by mistake, and how soon the button is hit.
 
 Phrases with a stop word are said by voices of every installed engine, in noise and in rooms, and
-other talk by the same voices, all into what listens on board: the spotter at its normal threshold,
+other talk by the same voices, all into what listens on board: the spotter as the profile wants it,
 and the recogniser, whose words press the button too as soon as it has read them. A delay is from
 the end of the word to the end of the block of sound in which it was told, and what the computer
 took for that block. `latch` does it with the whole way: a person in the twin's room says it while
@@ -66,7 +66,7 @@ class Ear:
         shelf = ModelShelf.of_base(user_base(), MonotonicClock())
         self.spotter: Spotter
         self.spotter, thresholds = open_spotter(shelf, profile)
-        self.threshold = thresholds["normal"]
+        self.threshold = thresholds[profile.speech.stop_words]
         self._clock = StreamClock()
         ears = ears_of(shelf, profile, 0)
         self.why_no_words = ears.why

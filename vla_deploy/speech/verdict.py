@@ -24,14 +24,22 @@ OWN_RATIO: Final = 0.7
 """The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
 DOUBT_RATIO: Final = 0.5
 """What is understood by this share of what is needed may still make sense to the planner."""
+
+
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
+STOP_WITHIN_CONFIDENCE: Final = 0.85
+STOP_SUSPECTED_CONFIDENCE: Final = 0.5
+"""The same, of a stop word anywhere among others: more words may be misread as one. The second is
+enough where the spotter suspects one."""
 STOP_ODDS: Final = 0.2
-"""A stop is taken where it was at least by so much as likely as the words that were read."""
-SUSPICION: Final = 0.55
-"""From this share of its threshold on, what the spotter heard counts beside what was read."""
-STOP_WITHIN_CONFIDENCE: Final = 0.5
-"""The same, of a stop word anywhere among others: more words may be misread as one."""
+"""What was at least by so much as likely as the words that were read counts beside them."""
+SLIGHT_SUSPICION: Final = 0.3
+SUSPICION: Final = 0.4
+STRONG_SUSPICION: Final = 0.7
+"""From these shares of its threshold on, what the spotter heard counts beside words that were read
+within others, beside a stop that may have been read instead, and beside any word that may be one.
+"""
 
 
 class Verdict(StrEnum):
@@ -92,22 +100,19 @@ def stops(
 ) -> bool:
     """Tell whether words read by that confidence stop the robot; `is_all` unless more may follow.
 
-    As on the stream, the word itself does, whatever is meant by it. A phrase that was hardly
-    likelier to be another one than a mere call to stop is one, too; where the spotter suspects a
-    stop word itself, so is any that may hold one.
+    As on the stream, the word itself does, whatever is meant by it. The less sure the words are,
+    the more the spotter must suspect one; then what may have been said instead counts, too.
     """
-    if suspicion >= SUSPICION:
-        likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
-        if any(map(holds_stop, (reading.text, *likely))):
-            return True
+    likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
+    if suspicion >= STRONG_SUSPICION and any(map(holds_stop, (reading.text, *likely))):
+        return True
+    if is_all and suspicion >= SUSPICION and any(map(is_stop, likely)):
+        return True
     if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
         return True
-    spoke = words_of(reading.text) and reading.no_speech <= NO_SPEECH
-    if is_all and spoke:
-        likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
-        if any(map(is_stop, likely)):
-            return True
-    return confidence >= STOP_WITHIN_CONFIDENCE and holds_stop(reading.text, is_all=is_all)
+    suspected = suspicion >= SLIGHT_SUSPICION
+    least = STOP_SUSPECTED_CONFIDENCE if suspected else STOP_WITHIN_CONFIDENCE
+    return confidence >= least and holds_stop(reading.text, is_all=is_all)
 
 
 def _without_words(case: Case) -> str:

@@ -110,27 +110,30 @@ def test_what_is_hardly_understood_stops_nothing_while_the_speaker_goes_on() -> 
     assert [one.judgement.verdict for _, one in told] == [Verdict.DOUBTED]
 
 
-HALT = (Alternative("halt", 0.4),)
+def suspecting(ratio: float) -> Suspicion:
+    return lambda began_ns, ended_ns: ratio
 
 
-def test_a_phrase_that_was_hardly_likelier_another_one_than_a_stop_is_one() -> None:
-    assert heard("hope", 0.3, others=HALT)[0][1].judgement.verdict is Verdict.STOP
-    unlikely = (Alternative("halt", 0.1),)
-    assert heard("hope", 0.3, others=unlikely)[0][1].judgement.verdict is not Verdict.STOP
+@pytest.mark.parametrize(("ratio", "odds", "stops"), [
+    (0.5, 0.4, True), (0.3, 0.4, False), (0.5, 0.1, False),
+])  # fmt: skip
+def test_a_phrase_that_was_hardly_likelier_another_one_than_a_stop_is_one(
+    ratio: float, odds: float, stops: bool
+) -> None:
+    told = heard("hope", 0.3, others=(Alternative("halt", odds),), suspicion=suspecting(ratio))
+    assert (told[0][1].judgement.verdict is Verdict.STOP) is stops
 
 
 def test_what_the_spotter_suspects_and_the_recogniser_may_have_read_is_a_stop() -> None:
     within = (Alternative("please halt before the chair", 0.3),)
     plain = heard("please hold before the chair", 1.2, others=within)
     assert [one.judgement.verdict for _, one in plain] == [Verdict.ACCEPTED]
-    told = heard(
-        "please hold before the chair", 1.2, others=within, suspicion=lambda began, ended: 0.6
-    )
+    told = heard("please hold before the chair", 1.2, others=within, suspicion=suspecting(0.75))
     assert told[0][1].judgement.verdict is Verdict.STOP
 
 
 def test_a_suspicion_alone_stops_nothing() -> None:
-    told = heard("please hold the chair", 1.2, suspicion=lambda began, ended: 0.9)
+    told = heard("please hold the chair", 1.2, suspicion=suspecting(0.9))
     assert [one.judgement.verdict for _, one in told] == [Verdict.ACCEPTED]
 
 
@@ -139,7 +142,7 @@ def test_a_suspicion_that_comes_after_the_reading_still_counts() -> None:
 
     def later(_began_ns: int, _ended_ns: int) -> float:
         asked.append(1)
-        return 0.6 if len(asked) > 2 else 0.0
+        return 0.8 if len(asked) > 2 else 0.0
 
     told = heard("hey hold it there", 1.2, others=(Alternative("hey halt", 0.3),), suspicion=later)
     assert told[0][1].judgement.verdict is Verdict.STOP
