@@ -28,7 +28,7 @@ from training.voices.errors import EngineMissing
 from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.hearing import Heard
 from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.readings import Answer as Reading
+from vla_deploy.speech.readings import Answer as Read
 from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.telling import utterance
 from vla_deploy.speech.verdict import Case as SpokenCase
@@ -97,11 +97,11 @@ def _typed(case: Case, text: str) -> Typed:
     return Typed(case=case, text=text, answer=_answer(case.scene, {"text": text}))
 
 
-def _answer(scene: str, utterance: Mapping[str, Any]) -> Answer:
+def _answer(scene: str, given: Mapping[str, Any]) -> Answer:
     """Return what a planner to whom nobody has spoken yet makes of an utterance."""
     with fresh_desk() as desk:
         desk.tell(scenes()[scene].world(home()))
-        return desk.give(**utterance)[1]
+        return desk.give(**given)[1]
 
 
 def _heard_answer(scene: str, recogniser: Recogniser, clip: Clip, least: float) -> Answer | None:
@@ -124,7 +124,7 @@ def _heard(recogniser: Recogniser, clip: Clip, least: float) -> Heard:
         reading=reading, phrase=phrase, confidence=sure, least_confidence=least,
         languages=recogniser.declared.languages,
     )  # fmt: skip
-    answer = Reading(phrase=phrase, reading=reading)
+    answer = Read(phrase=phrase, reading=reading)
     return Heard(phrase=phrase, answer=answer, confidence=sure, judgement=judge(case))
 
 

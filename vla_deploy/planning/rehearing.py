@@ -42,20 +42,16 @@ class Rehearing:
     def __init__(self, clock: Clock) -> None:
         self._first: Heard | None = None
         self._clock = clock
-        self._patience: Deadline | None = None
+        self._patience = Deadline.within(clock, 0.0)
 
     def is_urgent(self, command: Command) -> bool:
         """Tell whether a reading may only be given to planners that answer at once."""
-        patience = self._patience
-        again = self._of(command) is not None
-        return again and patience is not None and patience.left_s <= 0.0
+        return self._of(command) is not None and self._patience.left_s <= 0.0
 
     def within_s(self, command: Command, usual_s: float) -> float:
         """Return how long planning a reading may take; all others share what patience is left."""
-        patience = self._patience
-        if self._of(command) is None or patience is None:
-            return usual_s
-        return min(usual_s, max(patience.left_s, 0.0)) or usual_s
+        left_s = self._patience.left_s
+        return min(usual_s, left_s) if self._of(command) and left_s > 0.0 else usual_s
 
     def forget(self) -> None:
         """Forget the command: it is given up."""
@@ -73,10 +69,9 @@ class Rehearing:
         if first is None:
             first = self._first = Heard(command=command, request=request, answer=answer)
             self._patience = Deadline.within(self._clock, PATIENCE_S)
-            places = request.world.places
             least = LEAST_INSTEAD if makes_sense else 0.0
-            others = [one for one in _readings(command, places) if one[1] >= least]
-            command = replace(command, others=tuple(others))
+            readings = _readings(command, request.world.places)
+            command = replace(command, others=tuple(one for one in readings if one[1] >= least))
         return _in_other_words(command, first.command, request.world.places)
 
     def concluded(self, command: Command, request: Request, answer: Answer) -> Heard:
@@ -110,11 +105,16 @@ def _readings(command: Command, places: Mapping[str, str]) -> Iterator[tuple[str
     """Yield all other readings of a command, and of each its words alone, and apart."""
     tried = {_spoken(command.text)}
     for text, odds in ((command.text, 1.0), *command.others):
-        bare = _MARKS.sub("", text)
-        for reading in (text, bare, parted(bare, places)):
+        for reading in (text, *_same_sound(text, places)):
             if _spoken(reading) not in tried:
                 tried.add(_spoken(reading))
                 yield reading, odds
+
+
+def _same_sound(text: str, places: Mapping[str, str]) -> tuple[str, str]:
+    """Return the words of a text alone, and with those apart that were run into one."""
+    bare = _MARKS.sub("", text)
+    return bare, parted(bare, places)
 
 
 def _spoken(text: str) -> str:
@@ -128,6 +128,6 @@ def _in_other_words(command: Command, first: Command, places: Mapping[str, str])
         return None
     (text, odds), *rest = command.others
     sure = first.heard_confidence
-    if text not in (bare := _MARKS.sub("", first.text), parted(bare, places)):
+    if text not in _same_sound(first.text, places):
         sure = min(READ_BACK, odds * (1.0 if sure is None else sure))
     return replace(command, text=text, others=tuple(rest), heard_confidence=sure)

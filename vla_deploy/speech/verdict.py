@@ -24,8 +24,6 @@ OWN_RATIO: Final = 0.7
 """The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
 DOUBT_RATIO: Final = 0.5
 """What is understood by this share of what is needed may still make sense to the planner."""
-
-
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 STOP_WITHIN_CONFIDENCE: Final = 0.85
@@ -79,6 +77,8 @@ class _Refusal:
     ask_again: bool
     by_sound: bool = True
     """Whether an overdriven microphone may be the cause."""
+    may_be_doubt: bool = False
+    """Whether what is nearly good enough is for the planner to make sense of."""
 
 
 def judge(case: Case) -> Judgement:
@@ -89,7 +89,7 @@ def judge(case: Case) -> Judgement:
         reason = row.why(case)
         if reason:
             reason += _OVERDRIVEN if row.by_sound and _is_overdriven(case) else ""
-            is_doubted = row.why is _unsure and _may_make_sense(case)
+            is_doubted = row.may_be_doubt and _may_make_sense(case)
             verdict = Verdict.DOUBTED if is_doubted else Verdict.REJECTED
             return Judgement(verdict=verdict, reason=reason, ask_again=row.ask_again)
     return Judgement(verdict=Verdict.ACCEPTED)
@@ -191,5 +191,5 @@ _REFUSALS: Final = (
     _Refusal(_nobody, ask_again=False),
     _Refusal(_repeats, ask_again=False),
     _Refusal(_too_fast, ask_again=False),
-    _Refusal(_unsure, ask_again=True),
+    _Refusal(_unsure, ask_again=True, may_be_doubt=True),
 )

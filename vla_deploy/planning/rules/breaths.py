@@ -19,6 +19,7 @@ _VERBS: Final = (
     "pass me|tell me|tell"
 )
 _TELLS: Final = "|".join((*COLOURS, *EXTREMES, *ORDINALS, "big", "small", "tall", "other", "grey"))
+# A comma goes with what follows it, or stands behind `own`, which nothing ends with.
 _ROWS: Final = (
     rf"\b(?P<own>{_UNFINISHED}),+ ?(?=[a-z])",
     rf"(?:^|(?<= ))(?P<own>{_VERBS}),+ ?(?=(?:the|a|an|my|your|that|this|me|it|all|both)\b)",
@@ -27,18 +28,14 @@ _ROWS: Final = (
     r"\b(?P<own>left|right),+ ?(?=(?:hand|arm|gripper)\b)",
     r"\b(?P<own>(?:after|once|when) you),+ ?(?=[a-z])",
     r"\b(?P<own>no|wait|sorry),+ ?(?=(?:no|wait|sorry)\b)",
-)
-_ROWS_BEFORE: Final = (
-    r",+ ?(?=(?:in|into|inside|on|onto|from|out of|off|with|next to|through) "
+    r"(?P<own>),+ ?(?=(?:in|into|inside|on|onto|from|out of|off|with|next to|through) "
     r"(?:the|my|your|a|that)\b)",
-    r",+ ?(?=(?:that|which) (?:is|are|was)\b)",
-    r"(?<=[a-z]),(?=[a-z])",
+    r"(?P<own>),+ ?(?=(?:that|which) (?:is|are|was)\b)",
+    r"(?<=[a-z])(?P<own>),(?=[a-z])",
+    r"(?P<own>\b(?:bring|take|carry|move|put|get|fetch|return|deliver) "
+    r"(?:the|my|that|it|a|your)\b(?:(?!\b(?:to|in|on|into|onto|and|then)\b)[a-z' ])*),+ ?"
+    r"(?=to (?:the|my|me|your)\b)",
 )
-_TO: Final = re.compile(
-    r"(?P<own>\b(?:bring|take|carry|move|put|get|fetch|return|deliver) (?:the|my|that|it|a|your)\b"
-    r"(?:(?!\b(?:to|in|on|into|onto|and|then)\b)[a-z' ])*),+ ?(?=to (?:the|my|me|your)\b)"
-)
-_BEFORE: Final = tuple(re.compile(pattern) for pattern in _ROWS_BEFORE)
 _BREATHS: Final = tuple(re.compile(pattern) for pattern in _ROWS)
 
 
@@ -46,6 +43,4 @@ def without_breaths(text: str) -> str:
     """Return a text in small letters without commas where no thought can end."""
     for pattern in _BREATHS:
         text = pattern.sub(r"\g<own> ", text)
-    for pattern in _BEFORE:
-        text = pattern.sub(" ", text)
-    return _TO.sub(r"\g<own> ", text)
+    return text

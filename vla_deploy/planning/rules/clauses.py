@@ -1,12 +1,14 @@
 """Take a sentence apart: politeness off, a stop recognised, one clause for each thing to do."""
 
 import re
+from functools import lru_cache
 from typing import Final
 
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.breaths import without_breaths
 from vla_deploy.planning.rules.figures import in_figures
 from vla_deploy.planning.rules.run_together import with_commas
+from vla_deploy.planning.rules.verbs import DOING, any_verb
 from vla_deploy.planning.understanding.purposes import without_purpose
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
@@ -175,26 +177,14 @@ def _commanded(text: str, patterns: tuple[re.Pattern[str], ...]) -> str:
 
 
 _ASKS_DOING: Final = re.compile(r"\b(?:mind|how about|what about)\b")
-DOING: Final = {
-    "bringing": "bring", "carrying": "carry", "checking": "check", "clearing": "clear",
-    "closing": "close", "coming": "come", "driving": "drive", "dropping": "drop",
-    "fetching": "fetch", "finding": "find", "getting": "get", "giving": "give", "going": "go",
-    "grabbing": "grab", "handing": "hand", "heading": "head", "holding": "hold",
-    "leaving": "leave", "lifting": "lift", "looking": "look", "moving": "move",
-    "opening": "open", "passing": "pass", "picking": "pick", "placing": "place",
-    "popping": "pop", "putting": "put", "returning": "return", "saying": "say",
-    "setting": "set", "showing": "show", "sticking": "stick", "taking": "take",
-    "telling": "tell", "tidying": "tidy", "turning": "turn", "waiting": "wait",
-}  # fmt: skip
-"""How verbs of commands are said behind "would you mind"."""
-
-
 # "And" joins what a thing is between; nothing new begins with it.
 _BETWEEN: Final = re.compile(
     r"\b(between (?:[\w']+ ){1,4}?)and (?=(?:the|a|an|my|your|that|this|those|these)\b)"
 )
 
 
+# Rules try many readings of a command: the same clauses come again and again.
+@lru_cache(maxsize=256)
 def plain(text: str) -> str:
     """Return a text in lower case without hesitation, with words in full that were run together."""
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
@@ -205,7 +195,7 @@ def plain(text: str) -> str:
     return in_figures(_TWICE.sub(r"\1", _BETWEEN.sub(r"\1& ", text)))
 
 
-_VERBS: Final = "|".join(sorted({*DOING.values(), "stop", "clean", "search", "charge", "hang"}))
+_VERBS: Final = any_verb("stop", "clean", "search", "charge", "hang")
 # "Get my keys would you they are by the bed", said in one breath.
 _ASKED_BETWEEN: Final = re.compile(
     r" (?:would you|could you|will you|please) (?=(?:they|it|i|he|she)\b)"

@@ -7,11 +7,9 @@ blue one", "my keys are in the kitchen, could you bring them".
 import re
 from typing import Final
 
-_VERBS: Final = (
-    "bring|carry|check|clean|clear|close|come|drive|drop|fetch|find|get|give|go|grab|hand|head|hold|"
-    "leave|lift|look|move|open|pass|pick|place|pop|put|return|say|search|see|set|show|stick|"
-    "take|tell|tidy|turn|wait"
-)
+from vla_deploy.planning.rules.verbs import any_verb
+
+_VERBS: Final = any_verb("clean", "search", "see")
 _PLACED: Final = "in|on|at|by|near|under|behind|beside|next|inside|somewhere"
 _BREAKS: Final = re.compile(
     r"(?<=[a-z']) (?="
