@@ -94,6 +94,8 @@ _SAID_OF: Final = (
     ("go", "it says where not to be", rf"{_NOT_WHERE} (?:the |my |our |your )?~"),
     ("put", "it says where not to be", r"\baway from\b"),
     ("move", "I drive straight ahead, not to or from something", r"\btowards? (?!me\b|us\b)"),
+    # What is heard of "no way".
+    ("wait", "it tells of something, instead of telling me to do it", rf"{_BEGIN}know\b"),
 )
 # Sides that a sentence names, and steps have: "turn right and left" is two of them.
 _SIDE: Final = re.compile(
@@ -118,21 +120,20 @@ _RULES: Final = (
 
 
 def refuse_passed_over(steps: Sequence[Step], command: Sequence[str]) -> None:
-    """Refuse an answer that moves something and passes over what changes its meaning.
+    """Refuse an answer that passes over what changes its meaning, mostly if it moves something.
 
     Raises:
         CannotBeDone: it does; says over what.
     """
-    moving = {step["do"] for step in steps} - _HARMLESS
-    if not moving:
-        return
-    rest = _rest(steps, command)
+    named = {step["do"] for step in steps}
+    moving, rest = named - _HARMLESS, _rest(steps, command)
     for rule in _RULES:
-        found = rule.said.search(rest) if not rule.step or rule.step in moving else None
+        concerned = rule.step in named if rule.step else bool(moving)
+        found = rule.said.search(rest) if concerned else None
         if found:
             said = _shown(found, rest, command)
             raise CannotBeDone(f'I would pass over "{said}": {rule.why}; say just what to do now')
-    if moving <= _SIDEWAYS and len(_SIDE.findall(rest)) > len(steps):
+    if moving and moving <= _SIDEWAYS and len(_SIDE.findall(rest)) > len(steps):
         raise CannotBeDone("more sides were named than I understood; say one after the other")
 
 

@@ -12,12 +12,14 @@ PUT: Step = {"do": "put", "what": "cup", "how": "in", "where": "box"}
 BRING: Step = {"do": "bring", "what": "cup"}
 FORWARD: Step = {"do": "move", "way": "forward"}
 LEFT: Step = {"do": "turn", "way": "left"}
+WAIT: Step = {"do": "wait"}
 
 
 @pytest.mark.parametrize(
     ("said", "step"),
     [
         ("pick up the ball rather than the cup", PICK),
+        ("know wait", WAIT),
         ("go anywhere but the kitchen", GO),
         ("everything except the cup goes in the box", PUT),
         ("put the cup somewhere other than the box", PUT),
