@@ -138,7 +138,8 @@ def _put(world: World, given: Parameters) -> None:
     held = world.held_in(hand) if hand else None
     if hand is None or held is None:
         raise ActionFails("no such hand holds anything")
-    relation, (of, at_m) = str(given["relation"]), _destination(world, given, held)
+    of, at_m = _destination(world, given, held)
+    relation = "in" if given["relation"] == "in" else "on"
     world.things[held.thing_id] = replace(held, held_by="", rests=(relation, of), xy_m=at_m)
     world.open_hands[hand] = True
 
@@ -159,6 +160,10 @@ def _destination(world: World, given: Parameters, held: Thing) -> tuple[str, Poi
         return near[0], FURNITURE[near[0]].middle_m
     other = world.known(text)
     _must_be_near(world, other)
+    if relation == "next to":
+        if other.held_by or other.rests[0] != "on" or other.thing_id == held.thing_id:
+            raise ActionFails(f"nothing can be put next to the {other.kind}")
+        return other.rests[1], world.place_of(other)
     fits = CONTAINERS if relation == "in" else SUPPORTS
     if other.thing_id == held.thing_id or other.kind not in fits:
         raise ActionFails(f"nothing can be put {relation} a {other.kind}")

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from vla_deploy.analysis.outlook import CannotBe, Outlook
 from vla_deploy.manipulation.grasps import grasps_from_above
-from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.planning.catalogue import GRASPABLE_CLASSES, NEXT_TO
 from vla_deploy.planning.references import match_place
 from vla_deploy.world import Query, Thing, UnknownWord, access_to, parse_query
 from vla_deploy.world.access import Access, Bar, Obstacle
@@ -194,6 +194,8 @@ def _put(hand: str, target: Thing, relation: str, outlook: Outlook) -> None:
             outlook.alternatives += _containers(outlook)
             raise CannotBe(f"a {target.kind} is no container", belief)
         _fit(held, target, belief)
+    elif relation == NEXT_TO:
+        outlook.need(f"see a free spot next to the {target}")
     else:
         for other in world.things:
             if other.rests is not None and (other.rests.relation, other.rests.of) == (

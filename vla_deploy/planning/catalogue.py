@@ -9,7 +9,8 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 ARMS = ("left", "right")
 GRASPABLE_CLASSES = tuple(name for name in OBJECT_CLASSES if name != "box")
-RELATIONS = ("in", "on")
+NEXT_TO = "next to"
+RELATIONS = ("in", "on", NEXT_TO)
 NAVIGATION_TIMEOUT_S = 300.0
 MANIPULATION_TIMEOUT_S = 120.0
 DEFAULT_TIMEOUT_S = 60.0
@@ -134,7 +135,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             retryable=True,
         ),
         "place": SkillSpec(
-            summary="put what is held in or on something within reach",
+            summary="put what is held in, on or next to something within reach",
             parameters={
                 "destination": Parameter(type=Type.DESTINATION),
                 "relation": Parameter(type=Type.CHOICE, choices=RELATIONS),

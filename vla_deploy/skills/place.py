@@ -1,7 +1,7 @@
-"""Put what a hand holds into a container, on an object, or on a free spot of a surface."""
+"""Put what a hand holds into a container, on or beside an object, or on a surface's free spot."""
 
 import math
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
+from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
@@ -27,7 +28,7 @@ from vla_deploy.skills.frames import to_base
 from vla_deploy.skills.gaze import remembered, turn_head, watch
 from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
-from vla_deploy.skills.surfaces import free_spots
+from vla_deploy.skills.surfaces import Spot, free_spots, spots_beside
 from vla_deploy.skills.swing import heights_above
 
 ABOVE_M = 0.10
@@ -59,7 +60,7 @@ class Release:
 
 
 def place(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
-    """Put what is held `in` or `on` a destination within reach.
+    """Put what is held `in`, `on` or `next to` a destination within reach.
 
     Raises:
         NotPossible: nothing is held any more, or was lost on the way, or the spot is out of reach.
@@ -116,6 +117,8 @@ def _release(
     except UnknownObject:
         return (yield from _on_surface(context, hand, held))
     relation = str(parameters["relation"])
+    if relation == NEXT_TO:
+        return (yield from solve_near(context, query, lambda: _beside(context, query, hand, held)))
     return (
         yield from solve_near(
             context, query, lambda: _over_object(context, query, relation, hand, held)
@@ -135,6 +138,16 @@ def _on_surface(context: SkillContext, hand: str, held: Held) -> Generator[None,
     spots = free_spots(context, hand)
     if not spots:
         raise TryAgain("I see no free spot within reach to put it down")
+    return _first_reached(context, hand, spots, held)
+
+
+def _first_reached(context: SkillContext, hand: str, spots: Iterable[Spot], held: Held) -> Release:
+    """Return how to let go at the first of some spots that the hand reaches.
+
+    Raises:
+        OutOfReach: it reaches none.
+    """
+    reason = OutOfReach(f"there is no spot for the {hand} hand")
     for x_m, y_m, z_m in spots:
         point_m = (x_m, y_m, z_m + held.below_grip_m + ABOVE_SURFACE_M)
         try:
@@ -142,6 +155,22 @@ def _on_surface(context: SkillContext, hand: str, held: Held) -> Generator[None,
         except OutOfReach as error:
             reason = error
     raise reason
+
+
+def _beside(context: SkillContext, query: ObjectQuery, hand: str, held: Held) -> Release:
+    """Choose the first free spot around a thing that the hand reaches.
+
+    Raises:
+        OutOfReach: it reaches none of them.
+        TryAgain: the thing is not in sight, or nothing around it is free.
+    """
+    seen = remembered(context, query)
+    if seen is None:
+        raise TryAgain(f"I lost sight of the {query}")
+    spots = spots_beside(context, hand, seen)
+    if not spots:
+        raise TryAgain(f"I see no free spot next to the {query}")
+    return _first_reached(context, hand, spots, held)
 
 
 def _over_object(

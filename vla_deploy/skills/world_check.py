@@ -10,6 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
+from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Action
@@ -19,11 +20,13 @@ from vla_deploy.planning.symbolic.conditions import MET, Answer, Setting
 from vla_deploy.planning.symbolic.state import Pose, State
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.errors import TryAgain
+from vla_deploy.world.footprint import gap_m
 from vla_deploy.world.touch import is_denied
 
 # A drive ends within centimetres of its goal; farther away the robot is somewhere else.
 ARRIVED_M: Final = 0.6
-# A thing that was put into or onto another one lies within its outline, and may have rolled a bit.
+# A thing that was put into or onto another one lies within its outline, or beside it where that was
+# wanted, and may have rolled a bit.
 PUT_WITHIN_M: Final = 0.35
 
 
@@ -107,6 +110,11 @@ def is_put(now: State, setting: Setting, before: State, done_ns: int) -> Answer:
         return None
     if put.rests is not None and put.rests.of == container.thing_id:
         return MET
+    if setting.parameters.get("relation") == NEXT_TO:
+        free_m = gap_m(put, container)
+        return (
+            f"the {put} lies {free_m:.2f} m from the {container}" if free_m > PUT_WITHIN_M else MET
+        )
     off_m = math.dist(put.xy_m, container.xy_m)
     return f"the {put} lies {off_m:.2f} m from the {container}" if off_m > PUT_WITHIN_M else None
 

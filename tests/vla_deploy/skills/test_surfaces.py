@@ -5,7 +5,9 @@ import pytest
 
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.frames import to_map
-from vla_deploy.skills.surfaces import APART_M, EDGE_M, free_spots
+from vla_deploy.skills.surfaces import APART_M, EDGE_M, free_spots, spots_beside
+from vla_deploy.world.document import read_thing
+from vla_deploy.world.relations import is_next_to
 
 if TYPE_CHECKING:
     from conftest import StandingLink
@@ -62,3 +64,45 @@ def test_the_floor_and_high_shelves_are_no_place_to_put_things(
         {"height_m": height_m, "polygon_m": TABLE_M} for height_m in (0.0, 0.15, 0.9)
     ]
     assert free_spots(context, "left") == []
+
+
+@pytest.mark.parametrize(("kind", "size_m"), [("cup", 0.08), ("box", 0.23)])
+def test_what_is_put_beside_a_thing_stands_next_to_it(
+    context: SkillContext, standing: "StandingLink", kind: str, size_m: float
+) -> None:
+    standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
+    standing.objects = [thing(kind, size_m)]
+    anchor = read_thing(standing.objects[0])
+
+    spots = spots_beside(context, "left", standing.objects[0])
+
+    assert len(spots) >= 8
+    for x_m, y_m, height_m in spots:
+        spot = [*to_map(standing.pose, x_m, y_m), height_m + 0.05]
+        put = read_thing({**thing("can", 0.06), "id": "can_1", "position_m": spot})
+        assert is_next_to(put, anchor)
+
+
+def test_beside_means_on_the_same_surface_and_apart_from_others(
+    context: SkillContext, standing: "StandingLink"
+) -> None:
+    standing.objects = [thing("cup", 0.08)]
+    standing.surfaces = [{"height_m": 0.60, "polygon_m": TABLE_M}]
+    assert spots_beside(context, "left", standing.objects[0]) == []
+    standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
+    other = {**thing("can", 0.08), "position_m": [1.44, 2.28, 0.5]}
+    standing.objects.append(other)
+    for x_m, y_m, _ in spots_beside(context, "left", standing.objects[0]):
+        spot = to_map(standing.pose, x_m, y_m)
+        assert math.dist(spot, (1.44, 2.28)) > 0.04 + APART_M
+
+
+def test_a_hand_begins_beside_a_thing_where_it_reaches_best(
+    context: SkillContext, standing: "StandingLink"
+) -> None:
+    standing.surfaces = [{"height_m": 0.45, "polygon_m": TABLE_M}]
+    standing.objects = [thing("cup", 0.08)]
+    left, right = (
+        spots_beside(context, hand, standing.objects[0])[0] for hand in ("left", "right")
+    )
+    assert left[1] > right[1]

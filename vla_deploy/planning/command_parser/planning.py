@@ -31,7 +31,7 @@ _POSES: Final[Mapping[str, str]] = {
     "pull": "tuck", "carry": "tuck", "driving": "tuck", "travel": "tuck", "safe": "tuck",
     "carrying": "tuck", "resting": "rest", "relax": "rest", "lower": "rest", "sleep": "rest",
 }  # fmt: skip
-_CAN_PUT: Final = frozenset({"in", "on", "to"})
+_CAN_PUT: Final = frozenset({"in", "on", "to", "next to", "near"})
 # These are answered from what is seen, held, or remembered when they are planned.
 _OF_THE_MOMENT: Final = frozenset({"where", "ask", "tidy"})
 Handler = Callable[["Steps", Step], list[Skill]]
@@ -153,7 +153,7 @@ def _pick(steps: Steps, step: Step) -> list[Skill]:
 def _put(steps: Steps, step: Step) -> list[Skill]:
     relation = step.get("how", "to")
     if relation not in _CAN_PUT:
-        raise CannotBeDone(f"I can put things in or on something, not {relation} it")
+        raise CannotBeDone(f"I can put things in, on or next to something, not {relation} it")
     way, _ = steps.source(step)
     things = steps.things(step)
     if "where" not in step:

@@ -28,9 +28,16 @@ MOST_WORDS_ALONE: Final = 4
 _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
+PUT_GROUPS: Final = ("object", "relation", "destination")
+BESIDE: Final = r"next to|beside|alongside|close to|near"
 _PUT_RELATION: Final = re.compile(
     r"(?:^| )(?:(?:back|over|up|down) )?"
     r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
+)
+_PUT_BESIDE: Final = re.compile(rf"{_PUT_RELATION.pattern}|(?:^| )(?:{BESIDE}) ")
+# "On the table next to the book": there the book is.
+_BESIDE_THERE: Final = re.compile(
+    rf"(?P<moved>.+?) (?P<there>(?:on|onto|in) .+?) (?P<how>{BESIDE}) (?P<other>.+)"
 )
 NO_THING: Final = re.compile(
     r"^(?:the |my |your )?(?:far |very )?(?:left|right|middle)$|\b(?:is|are|that|which|farthest|"
@@ -77,16 +84,21 @@ def pick(groups: Groups, _: Request) -> list[Step]:
     return [("pick_up", {"object": part, **arm}) for part in parts_of(groups["object"])]
 
 
-def split_put(text: str, request: Request) -> tuple[str, str, str]:
+def split_put(groups: Groups, request: Request) -> tuple[str, str, str]:
     """Return what is put, how, and where to: "the cup on the table | into | the box".
 
     Of several ways to read it the last is meant of which both sides are known.
     """
+    text = " ".join(groups[name] for name in PUT_GROUPS)
+    beside = groups["relation"] in BESIDE.split("|")
     ways = [
         (text[: found.start()].strip(), found[0].strip(), text[found.end() :].strip())
-        for found in _PUT_RELATION.finditer(text)
+        for found in (_PUT_BESIDE if beside else _PUT_RELATION).finditer(text)
         if text[: found.start()].strip() and text[found.end() :].strip()
     ]
+    if beside and (told := _BESIDE_THERE.fullmatch(text)):
+        there = f"{told['other']} {told['there']}"
+        ways.append((told["moved"], told["how"], re.sub(r" (?:on|in)to ", " on ", there)))
     known = [
         way
         for way in ways

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.rules.building import Groups, is_one, parts_of, split_put
+from vla_deploy.planning.rules.building import PUT_GROUPS, Groups, is_one, parts_of, split_put
 from vla_deploy.planning.rules.intents import Intent
 from vla_deploy.planning.rules.table import RULES, Rule
 
@@ -33,7 +33,6 @@ _MANNERS: Final = (
     re.compile(r"(?P<own>.+?),? (?:at|with) (?P<speed>[\d.]+ ?(?:m/s|cm/s|km/h|mps|mph))"),
 )
 # What a rule finds in a clause: all of what is put somewhere, or some of what can be known.
-_PUT: Final = ("object", "relation", "destination")
 _NAMED: Final = ("object", "place", "destination")
 
 
@@ -68,9 +67,8 @@ def known_fit(clause: str, request: Request) -> Fit | None:
 
 def is_known(fit: Fit, request: Request) -> bool:
     """Tell whether what a clause names is known, so that it is no accident that it fits."""
-    put = [fit.groups[name] for name in _PUT if name in fit.groups]
-    if len(put) == len(_PUT):
-        moved, _, destination = split_put(" ".join(put), request)
+    if all(name in fit.groups for name in PUT_GROUPS):
+        moved, _, destination = split_put(fit.groups, request)
         return all(is_one(one, request) for one in (*parts_of(moved), destination))
     named = (fit.groups[name] for name in _NAMED if name in fit.groups)
     return all(is_one(part, request) for text in named for part in parts_of(text))

@@ -4,9 +4,11 @@ import re
 from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.building import (
+    BESIDE,
     NO_THING,
     Groups,
     Step,
@@ -38,9 +40,7 @@ def put(groups: Groups, request: Request) -> list[Step]:
     Raises:
         UnknownObject: where to is no more than a side.
     """
-    moved, said, destination = split_put(
-        f"{groups['object']} {groups['relation']} {groups['destination']}", request
-    )
+    moved, said, destination = split_put(groups, request)
     if NO_THING.search(destination):
         raise UnknownObject(destination, OBJECT_CLASSES)
     bare = match_place(destination, request.world.places)
@@ -48,8 +48,14 @@ def put(groups: Groups, request: Request) -> list[Step]:
         return [*pick({**groups, "object": moved}, request), ("navigate_to", {"place": bare})]
     where: dict[str, Any] = {"destination": destination, **arm_in(groups)}
     if said not in _TOWARDS:
-        where["relation"] = "in" if _WAY.sub("", said) in _INTO else "on"
+        where["relation"] = _relation(_WAY.sub("", said))
     return _put_each(moved, **where)
+
+
+def _relation(said: str) -> str:
+    if said in BESIDE.split("|"):
+        return NEXT_TO
+    return "in" if said in _INTO else "on"
 
 
 def put_there(groups: Groups, request: Request) -> list[Step]:

@@ -28,10 +28,10 @@ REFUSALS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
          r"(?:\bat\b|\bout\b|\boff\b|\baway\b|\bdown the\b|\bme\b|\bhim\b|\bher\b|\bsomeone\b|"
          r"\bperson\b|\bpeople\b|\bdog\b|\bcat\b|\bchild\b|\bbaby\b|\bwall\b|\bwindow\b).*",
          "I do not throw or hit; I can put it somewhere"),
-        (r"(?:put|place|set|lay|leave|drop|move) .+ (?:next to|beside|near|behind|"
+        (r"(?:put|place|set|lay|leave|drop|move) .+ (?:behind|"
          r"in front of(?! (?:you|me|us)$)|under|underneath|between|(?:to the )?(?:left|right) of) "
          r"(?!.*\b(?:in|into|on|onto|inside|to)\b).+",
-         "I put things in or on something, not beside or under it"),
+         "I put things in, on or next to something, not under, behind or before it"),
         (r"(?:carry|lift|move|push|pull|drag|shift|bring|take|pick up|raise|turn over) "
          r"(?:up )?(?:the|that|this|my|our|your) (?:\w+ ){0,2}(?:table|sofa|couch|bed|chair|"
          r"armchair|desk|shelf|cupboard|wardrobe|fridge|bookcase|furniture)"

@@ -161,6 +161,10 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|stow|store|"
      rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
      rf"(?:down |away |off )?{_INTO} (?P<destination>.+)", placing.put),
+    # What is taken or brought so is what stands there already.
+    (Intent.MANIPULATION, rf"(?:put|place|drop|set|lay|move|stick|pop|deposit) {_OBJECT} "
+     rf"(?:down |over |back |in )?(?:right |just )?(?P<relation>{building.BESIDE}) "
+     r"(?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, rf"(?:take|bring|carry) {_OBJECT} (?:along|with you)(?: with you)?",
      building.pick),
     (Intent.MANIPULATION, r"(?P<relation>in|into|on|onto) "

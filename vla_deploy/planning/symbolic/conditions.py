@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import grasps_from_above
+from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.references import match_place
@@ -19,6 +20,8 @@ from vla_deploy.planning.symbolic.subjects import Subject, subject_of
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
 from vla_deploy.world.reach import GRIP_HEIGHTS_M
+from vla_deploy.world.resting import IN
+from vla_deploy.world.thing import FLOOR
 
 # Farther than that from where it stands, the robot is surely not before a thing.
 SURELY_AWAY_M: Final = 1.6
@@ -165,10 +168,11 @@ def is_light_enough(state: State, setting: Setting) -> Answer:
 
 
 def takes_things(state: State, setting: Setting) -> Answer:
-    """Can something be put in or on the destination?"""
-    del state
+    """Can something be put in, on or next to the destination?"""
     place, subject = setting.place("destination"), setting.subject("destination")
     relation = setting.parameters.get("relation")
+    if relation == NEXT_TO:
+        return _has_room_beside(state, subject)
     if place is not None:
         if relation == "in":
             return f"nothing is put in the {place}, only on it"
@@ -177,6 +181,17 @@ def takes_things(state: State, setting: Setting) -> Answer:
     if relation == "in" and subject is not None and subject.kind not in PUT_INTO:
         return f"a {subject.kind} is no container; things go into: {', '.join(sorted(PUT_INTO))}"
     return MET
+
+
+def _has_room_beside(state: State, subject: Subject | None) -> Answer:
+    if subject is None:
+        return "things are put next to things, and on furniture"
+    rest = state.rests.get(subject.key) or (subject.thing.rests if subject.thing else None)
+    if rest is None:
+        return None
+    if rest.relation == IN:
+        return f"the {subject.words} is in the {rest.of}: put it in there as well"
+    return "nothing is put down on the floor" if rest.of == FLOOR else MET
 
 
 def opens_empty(state: State, setting: Setting) -> Answer:

@@ -4,8 +4,10 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.symbolic.conditions import SMALL_MOVE_M, Setting
 from vla_deploy.planning.symbolic.state import Held, State
+from vla_deploy.world.resting import ON
 from vla_deploy.world.thing import Rest
 
 Effect = Callable[[State, Setting], State]
@@ -74,11 +76,20 @@ def takes(state: State, setting: Setting) -> State:
 def puts(state: State, setting: Setting) -> State:
     """Hold the thing no longer, and let it rest where it was put."""
     held = state.holding(str(setting.parameters.get("arm", "")))[:1]
-    subject = setting.subject("destination")
-    of = subject.key if subject is not None else setting.place("destination") or ""
-    relation = str(setting.parameters.get("relation", "on"))
-    put = {one.key: Rest(relation, of) for one in held}
+    rest = _rest_at_destination(state, setting)
+    put = {one.key: rest for one in held}
     return replace(state.without(held), rests={**state.rests, **put})
+
+
+def _rest_at_destination(state: State, setting: Setting) -> Rest:
+    """Return what it rests in or on then; beside a thing, on what that rests on."""
+    subject, relation = setting.subject("destination"), str(setting.parameters.get("relation", ON))
+    if subject is None:
+        return Rest(relation, setting.place("destination") or "")
+    if relation != NEXT_TO:
+        return Rest(relation, subject.key)
+    below = state.rests.get(subject.key) or (subject.thing.rests if subject.thing else None)
+    return Rest(ON, below.of if below is not None else "")
 
 
 def lets_go(state: State, setting: Setting) -> State:

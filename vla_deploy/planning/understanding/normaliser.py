@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-from vla_deploy.planning.catalogue import ARMS, SKILLS, Type
+from vla_deploy.planning.catalogue import ARMS, NEXT_TO, SKILLS, Type
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.understanding.quantities import UNITS, quantity_of
 
@@ -19,6 +19,7 @@ DIRECTIONS: Final[Mapping[str, str]] = {
 RELATIONS: Final[Mapping[str, str]] = {
     "into": "in", "inside": "in", "inside of": "in", "within": "in", "onto": "on",
     "on top of": "on", "upon": "on", "over": "on", "at": "on", "to": "on",
+    "next_to": NEXT_TO, "beside": NEXT_TO, "near": NEXT_TO, "close to": NEXT_TO, "by": NEXT_TO,
 }  # fmt: skip
 # With these, whichever hand is best takes.
 _ANY_ARM: Final = frozenset({"", "any", "either", "auto", "default", "none", "null"})

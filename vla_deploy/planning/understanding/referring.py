@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
+from vla_deploy.planning.catalogue import NEXT_TO
+from vla_deploy.planning.errors import NotAble, PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.symbolic.conditions import PUT_INTO
@@ -23,6 +24,7 @@ from vla_deploy.planning.understanding.insertions import (
 )
 from vla_deploy.planning.understanding.places import is_like_place, resolve_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
+from vla_deploy.world.resting import IN
 
 Parameters = Mapping[str, Any]
 GetState = Callable[[], State]
@@ -221,14 +223,25 @@ def _destination(given: Parameters, resolver: Resolver, state: GetState) -> Para
         return _put_here(text or "down", resolver, state())
     thing = _thing_unless_place(text, resolver, Use.ONTO, into=relation == "in")
     if thing is not None:
+        if relation == NEXT_TO and (container := _container_of(thing, resolver)):
+            resolver.note(text, Role.DESTINATION, container, "that is what it is in")
+            return {"destination": container, "relation": IN}
         default = "in" if thing.kind in PUT_INTO else "on"
         return {"destination": thing.name, "relation": relation or default}
+    if relation == NEXT_TO:
+        raise NotAble(f"I put things next to things and on furniture, not next to {text}")
     world = resolver.setting.request.world
     place = resolve_place(text, resolver)
     surface = surface_of(place, world)
     if surface != place:
         resolver.note(place, Role.DESTINATION, surface, "the furniture there")
     return {"destination": surface, "relation": "on"}
+
+
+def _container_of(thing: Referent, resolver: Resolver) -> str:
+    """Return what a thing in the scene lies in, "" for none."""
+    known = subject_of(thing.name, resolver.setting.request.scene).thing
+    return known.rests.of if known and known.rests and known.rests.relation == IN else ""
 
 
 def _put_here(text: str, resolver: Resolver, state: State) -> Parameters:

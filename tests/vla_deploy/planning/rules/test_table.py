@@ -108,6 +108,9 @@ COMMANDS = {
             "pick_up red cup left; pick_up ball right; place side_table on left; "
             "place side_table on",
         "stack the book on the box": "place box on",
+        "put the ball next to the book": "place book next to",
+        "set the red cup down right beside the green ball": "place green ball next to",
+        "take the ball next to the red cup": "pick_up ball_1",
         "put back the ball on the side table": "place side_table on",
         "when you have a moment, put the ball in the box": BOX,
         "put the red cup and the ball in the box, no wait, on the side table":
@@ -202,7 +205,8 @@ def test_a_command_does_what_it_says(does: Does, text: str, expected: str) -> No
         ("wipe the table", NotAble),
         ("follow me", NotAble),
         ("open the fridge", NotAble),
-        ("place the book next to the box", NotAble),
+        ("place the book behind the box", NotAble),
+        ("put the red cup next to the coffee table", NotAble),
         ("throw the ball at the dog", NotAble),
         ("chuck the book at the cat", NotAble),
         ("bung the ball out of the window", NotAble),

@@ -75,6 +75,31 @@ def test_the_main_plan_keeps_every_rule(butler: World) -> None:
     assert state.at == "box_1"
 
 
+def test_what_is_put_beside_a_thing_rests_where_that_rests(butler: World) -> None:
+    book = thing("book_1")
+    scene = seen(thing("cup_1"), book)
+    beside = {"destination": "book_1", "relation": "next to"}
+    to_book = (("find_object", {"object": "book_1"}), ("navigate_to", {"object": "book_1"}))
+    assert faults(butler, *FETCH, *to_book, ("place", beside), scene=scene) == []
+    state = end_state(chain(*FETCH, *to_book, ("place", beside)), butler, scene, HERE)
+    assert state.rests == {"cup_1": Rest("on", "coffee_table")}
+
+
+@pytest.mark.parametrize(
+    ("rests", "why"),
+    [
+        (Rest("in", "box_1"), "the book_1 is in the box_1: put it in there as well"),
+        (Rest("on", "floor"), "nothing is put down on the floor"),
+    ],
+)
+def test_not_everything_has_room_beside_it(butler: World, rests: Rest, why: str) -> None:
+    scene = seen(thing("cup_1"), thing("book_1", rests=rests))
+    beside = {"destination": "book_1", "relation": "next to"}
+    to_book = (("find_object", {"object": "book_1"}), ("navigate_to", {"object": "book_1"}))
+    (fault,) = faults(butler, *FETCH, *to_book, ("place", beside), scene=scene)
+    assert why in fault
+
+
 @pytest.mark.parametrize(
     ("steps", "broken"),
     [
