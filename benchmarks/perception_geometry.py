@@ -17,8 +17,9 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from training.detector.table_scenes import TableScene, Truth, draw_scenes
-from vla_deploy.perception.cloud import make_cloud
+from vla_deploy.perception.cloud import Cloud, make_cloud
 from vla_deploy.perception.detection import Detection, detect
+from vla_deploy.perception.geometry_grid import geometry_grid
 from vla_deploy.perception.supports import find_supports
 
 MATCH_M: Final = 0.08
@@ -59,9 +60,16 @@ def measure(scenes: int = 96, seed: int = 0) -> dict[str, Any]:
 
 def look(scene: TableScene) -> list[Pair]:
     """Return each thing of a scene with what perception says is there."""
-    cloud = make_cloud(scene.rgb, scene.depth_m, scene.camera, scene.base_from_camera)
+    cloud = cloud_of(scene)
     found = detect(cloud, find_supports(cloud))
     return [Pair(truth, _nearest(truth, found)) for truth in scene.truths]
+
+
+def cloud_of(scene: TableScene) -> Cloud:
+    """Return the points of a scene on the grid on which the robot measures."""
+    grid = geometry_grid(scene.camera)
+    rgb, depth_m = grid.colours(scene.rgb), grid.depth(scene.depth_m)
+    return make_cloud(rgb, depth_m, grid.camera, scene.base_from_camera)
 
 
 def _nearest(truth: Truth, found: Iterable[Detection]) -> Detection | None:

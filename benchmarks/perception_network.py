@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from benchmarks.perception_geometry import MATCH_M
+from benchmarks.perception_geometry import MATCH_M, cloud_of
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from sim_twin.renderer import open_gl_context
@@ -25,9 +25,9 @@ from training.detector.table_scenes import TableScene, draw_scenes
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.perception.classes import OTHER
-from vla_deploy.perception.cloud import make_cloud
 from vla_deploy.perception.detection import Detection, detect
 from vla_deploy.perception.detectors.detector import ROLE, Detector, open_detector
+from vla_deploy.perception.geometry_grid import geometry_grid
 from vla_deploy.perception.model_tools.benching import bench
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.supports import find_supports
@@ -132,10 +132,10 @@ def _names(detector: Detector, scenes: int, seed: int) -> dict[str, Any]:
 
 
 def _detections(scene: TableScene, detector: Detector | None) -> list[Detection]:
-    cloud = make_cloud(scene.rgb, scene.depth_m, scene.camera, scene.base_from_camera)
-    view = None
+    cloud, view = cloud_of(scene), None
     if detector is not None:
-        view = NetworkView.of(detector.detect(scene.rgb), detector.detection)
+        seen = NetworkView.of(detector.detect(scene.rgb), detector.detection)
+        view = geometry_grid(scene.camera).view(seen)
     return detect(cloud, find_supports(cloud), view)
 
 

@@ -1,6 +1,7 @@
 """The main job in lock-step, judged by the physics."""
 
 import json
+import math
 from collections.abc import Callable
 
 import pytest
@@ -57,6 +58,21 @@ def test_what_hides_the_box_while_it_is_carried_ends_in_it_too(
     outcome = stack.say(f"pick up the {thing} and put it in the box")
     assert outcome["error"] is None
     assert stack.lockstep.inside(thing, "box")["inside"]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cup_that_is_put_next_to_the_book_stands_there(make_stack: MakeStack, seed: int) -> None:
+    stack = make_stack(seed)
+    stack.arm()
+    outcome = stack.say("put the red cup next to the book")
+    assert outcome["error"] is None
+    data = stack.lockstep.twin.engine.data
+    cup, book = data.body("red_cup"), data.body("book")
+    assert math.dist(cup.xpos[:2], book.xpos[:2]) < 0.3
+    assert cup.xpos[2] - book.xpos[2] < 0.06  # on the table, not on the book
+    assert cup.xmat.reshape(3, 3)[2, 2] > 0.95  # upright
 
 
 @pytest.mark.slow

@@ -122,7 +122,7 @@ def test_the_camera_streams_at_the_rate_asked_for_in_simulated_time(lockstep: Lo
         frames.append(camera.poll())
     seen = [frame for frame in frames if frame is not None]
     assert len(seen) == 5
-    assert seen[0].rgb.shape == (240, 320, 3)
+    assert seen[0].rgb.shape == (384, 512, 3)
     assert 0.3 < float(np.median(seen[0].depth_m())) < 8.0
 
 

@@ -31,7 +31,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shard:
-    """Hold images (N x 240 x 320 x 3, RGB) and the rows of their labels."""
+    """Hold images (N x 384 x 512 x 3, RGB) and the rows of their labels."""
 
     images: NDArray[np.uint8]
     labels: NDArray[np.float32]

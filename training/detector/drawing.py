@@ -10,7 +10,7 @@ from sim_twin.renderer import GLContext, fixed_camera
 from training.detector.pose import CAMERA
 from training.detector.scene_model import Stage
 
-WIDTH_PX, HEIGHT_PX = 320, 240
+WIDTH_PX, HEIGHT_PX = 512, 384
 VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
 MAX_GEOMS = 2500
 Image = NDArray[np.uint8]

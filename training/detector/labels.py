@@ -22,9 +22,9 @@ class Least:
     in_image: float
 
 
-SMALL_LEAST = Least(pixels=100, long_px=16.0, short_px=6.0, in_image=0.5)
-LARGE_LEAST = Least(pixels=300, long_px=32.0, short_px=10.0, in_image=0.25)
-NEAR_LONG_PX = 80.0
+SMALL_LEAST = Least(pixels=256, long_px=25.6, short_px=9.6, in_image=0.5)
+LARGE_LEAST = Least(pixels=768, long_px=51.2, short_px=16.0, in_image=0.25)
+NEAR_LONG_PX = 128.0
 """People and chairs with so large a box count whatever part of them is beyond the image: they are
 near, just when they matter.
 """

@@ -9,7 +9,7 @@ THING_PRIOR = -4.0
 SIZE_LOG_RANGE = (-2.0, 4.6)
 """Bounds of ln(side of a box / stride)."""
 FIRST_SIZE_LOG = 1.3
-QUARTER, EIGHTH, SIXTEENTH, JOINED = 32, 112, 256, 128
+QUARTER, EIGHTH, SIXTEENTH, WIDE, JOINED = 32, 112, 256, 160, 128
 """Channels at each size."""
 
 
@@ -26,7 +26,7 @@ def _activated(convolution: nn.Conv2d) -> nn.Sequential:
 class CentreNet(nn.Module):
     """Tell for each cell of 8 x 8 pixels how likely a thing's middle is there, and its box.
 
-    `image` is N x 3 x H x W, RGB from 0 to 1, H and W multiples of 16. The outputs are `heat`,
+    `image` is N x 3 x H x W, RGB from 0 to 1, H and W multiples of 32. The outputs are `heat`,
     N x classes x H/8 x W/8 from 0 to 1, and `edges`, N x 4 x H/8 x W/8: distances in pixels from
     the cell's centre to the left, top, right and bottom edge.
     """
@@ -40,19 +40,27 @@ class CentreNet(nn.Module):
         self.eighth = nn.Sequential(
             _block(QUARTER, EIGHTH, 2), _block(EIGHTH, EIGHTH), _block(EIGHTH, EIGHTH)
         )
-        # Spread kernels see a whole person without a level at 1/32, which does not divide 240 rows.
         self.sixteenth = nn.Sequential(
             _block(EIGHTH, SIXTEENTH, 2),
             _block(SIXTEENTH, SIXTEENTH, spread=2),
             _block(SIXTEENTH, SIXTEENTH, spread=3),
             _block(SIXTEENTH, SIXTEENTH),
         )
+        # Sees the whole image at once: a person nearby is as high as that.
+        self.wide = nn.Sequential(
+            _block(SIXTEENTH, WIDE, 2), _block(WIDE, WIDE, spread=2), _block(WIDE, WIDE)
+        )
         self.from_eighth = nn.Conv2d(EIGHTH, JOINED, 1)
         self.to_eighth = nn.Conv2d(SIXTEENTH, JOINED, 1)
+        self.from_wide = nn.Conv2d(WIDE, JOINED, 1)
         self.grow = nn.Upsample(scale_factor=2, mode="nearest")
         self.join = nn.Sequential(_block(JOINED, JOINED), _block(JOINED, JOINED))
         self.last = nn.Conv2d(JOINED, 1 + classes + 4, 1)
         with torch.no_grad():
+            # What sees far adds nothing at first.
+            self.from_wide.weight.zero_()
+            assert self.from_wide.bias is not None
+            self.from_wide.bias.zero_()
             assert self.last.bias is not None
             first = [THING_PRIOR] + [0.0] * classes + [0.0, 0.0, FIRST_SIZE_LOG, FIRST_SIZE_LOG]
             self.last.bias.copy_(torch.tensor(first))
@@ -60,8 +68,9 @@ class CentreNet(nn.Module):
     def raw(self, image: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return logits of whether something is there and of its name, and edges in pixels."""
         eighth = self.eighth(self.quarter(self.stem(image)))
-        wide = self.to_eighth(self.sixteenth(eighth))
-        joined = self.join(self.from_eighth(eighth) + self.grow(wide))
+        sixteenth = self.sixteenth(eighth)
+        far = self.to_eighth(sixteenth) + self.grow(self.from_wide(self.wide(sixteenth)))
+        joined = self.join(self.from_eighth(eighth) + self.grow(far))
         with torch.autocast(joined.device.type, enabled=False):
             last = self.last(joined.float())
         return last[:, :1], last[:, 1:-4], _edges(last[:, -4:])

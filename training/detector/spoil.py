@@ -39,7 +39,7 @@ def _exposed(image: Image) -> Image:
 def _blurred(values: NDArray[np.float32], random: Random) -> NDArray[np.float32]:
     if random.random() < 0.5:
         return np.asarray(cv2.GaussianBlur(values, (0, 0), between(random, 0.4, 1.2)), np.float32)
-    length = int(random.integers(2, 6))
+    length = int(random.integers(3, 9))
     kernel = np.zeros((length, length), np.float32)
     cv2.line(
         kernel, (0, int(random.integers(length))), (length - 1, int(random.integers(length))), 1.0

@@ -62,17 +62,15 @@ def _typical(shards: int) -> NDArray[np.int_]:
 
 def _learn(run: "_Run", shard: Shard, random: np.random.Generator, epoch: int) -> list[list[float]]:
     """Learn from each image once; return the losses of all steps."""
-    settings = run.settings
-    piece_px = settings.piece_px if epoch < settings.epochs else None
-    order = random.permutation(len(shard.images))
-    steps = len(order) // settings.batch
-    return [
-        run.step(
-            *make_batch(shard, order[k * settings.batch :][: settings.batch], random, piece_px),
-            learning_rate=_rate(settings, epoch + k / steps),
-        )
-        for k in range(steps)
-    ]
+    settings, told = run.settings, []
+    left = random.permutation(len(shard.images))
+    while len(left) >= settings.batch:
+        done = 1 - len(left) / len(shard.images)
+        whole = epoch >= settings.epochs or random.random() < settings.whole_share
+        picks, left = np.split(left, [settings.whole_batch if whole else settings.batch])
+        batch = make_batch(shard, picks, random, None if whole else settings.piece_px)
+        told.append(run.step(*batch, learning_rate=_rate(settings, epoch + done)))
+    return told
 
 
 def _rate(settings: Settings, epochs: float) -> float:

@@ -15,6 +15,7 @@ from vla_deploy.perception.cloud import aim_sigma_rad
 from vla_deploy.perception.eyes import Eyes
 from vla_deploy.perception.frame_check import Use
 from vla_deploy.perception.frame_watch import FrameWatch
+from vla_deploy.perception.geometry_grid import geometry_grid
 from vla_deploy.perception.near_obstacles import NearObstacles
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.pinhole_view import as_pinhole, in_image
@@ -32,11 +33,13 @@ MAX_CAMERA_TURN_RAD_S: Final = 0.35
 class Moment:
     """Hold an image and how the robot stood when it was taken.
 
+    `seen` is the image on the geometry's grid, with its depth in metres and its mask of the robot;
     `track` is where it was by dead reckoning, `view` turns the camera into that frame, 3 x 3: a
     robot that finds out where it really is has not moved.
     """
 
     frame: RgbdFrame
+    seen: RgbdFrame
     depth_m: NDArray[np.float32]
     base_from_camera: Array
     base: Pose2D
@@ -74,14 +77,14 @@ class Looking:
         if positions is None:
             return False
         moment = self._moment(frame, positions)
-        verdict = self._watch.judge(frame, moment.depth_m, moment.view, moment.track)
+        verdict = self._watch.judge(frame, frame.depth_m(), moment.view, moment.track)
         if verdict.use < Use.OBSTACLES:
             return False
         hands = self._body.hands(positions, frame.stamp_ns)
         grips = [np.array(hand.grip) for hand in hands if hand.hold.kind]
         self.obstacles.look(
             moment.depth_m,
-            frame.intrinsics,
+            moment.seen.intrinsics,
             moment.base_from_camera,
             moment.body,
             moment.base,
@@ -103,7 +106,8 @@ class Looking:
         if self._waiting is None or answer is None:
             return False
         moment, self._waiting = self._waiting, None
-        self._look(moment, in_image(answer.view, moment.frame.intrinsics))
+        camera = moment.frame.intrinsics
+        self._look(moment, geometry_grid(camera).view(in_image(answer.view, camera)))
         return True
 
     def carry(self, positions: Array, now_ns: int) -> None:
@@ -128,9 +132,9 @@ class Looking:
 
     def _look(self, moment: Moment, network: NetworkView | None) -> None:
         self.scene.look(
-            moment.frame.rgb,
+            moment.seen.rgb,
             moment.depth_m,
-            moment.frame.intrinsics,
+            moment.seen.intrinsics,
             moment.base_from_camera,
             moment.base,
             moment.body,
@@ -142,13 +146,15 @@ class Looking:
     def _moment(self, frame: RgbdFrame, positions: Array) -> Moment:
         track = self._whereabouts.track_at(frame.stamp_ns)
         view = self._body.view_rotation(frame.stamp_ns, track)
+        seen = geometry_grid(frame.intrinsics).frame(frame)
         return Moment(
             frame=frame,
-            depth_m=frame.depth_m(),
+            seen=seen,
+            depth_m=seen.depth_m(),
             base_from_camera=self._body.camera_pose(positions),
             base=self._whereabouts.pose_at(frame.stamp_ns),
             track=track,
-            body=self._body.mask(positions, frame.intrinsics),
+            body=self._body.mask(positions, seen.intrinsics),
             view=view,
             turn_rad_s=self._camera_turn(view, frame.stamp_ns),
         )

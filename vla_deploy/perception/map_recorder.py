@@ -13,6 +13,7 @@ from vla_deploy.navigation.mapping import Mapper
 from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.navigation.pose import ORIGIN, Pose2D
 from vla_deploy.perception.body_state import BodyState
+from vla_deploy.perception.geometry_grid import geometry_grid
 from vla_deploy.perception.lens import ray_table
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.model import RobotModel, full_positions
@@ -76,12 +77,12 @@ class MapRecorder:
         positions = self._body.at(frame.stamp_ns)
         if positions is None:
             return
-        camera = self._intrinsics(frame.width, frame.height)
+        grid = geometry_grid(self._intrinsics(frame.width, frame.height))
         standing, floor = depth_band(
-            depths_m(frame),
-            ray_table(camera),
+            grid.depth(depths_m(frame)),
+            ray_table(grid.camera),
             self._body.camera_pose(positions),
-            self._body.mask(positions, camera),
+            self._body.mask(positions, grid.camera),
         )
         self.mapper.add_depth(standing, floor, frame.stamp_ns)
 

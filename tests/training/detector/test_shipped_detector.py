@@ -47,5 +47,5 @@ def test_an_image_without_contents_shows_nothing(name: str, level: int) -> None:
 def test_the_files_are_small() -> None:
     sizes = {key: (SHIPPED / name).stat().st_size for key, name in FILES.items()}
 
-    assert sizes["fp32"] <= 11 * 2**20  # 2.6 million weights
+    assert sizes["fp32"] <= 14 * 2**20  # 3.5 million weights
     assert max(sizes["int8_u8s8"], sizes["int8_s8s8"]) <= sizes["fp32"] / 2

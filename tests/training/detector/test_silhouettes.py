@@ -2,6 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from training.detector.drawing import HEIGHT_PX
 from training.detector.silhouettes import extent
 
 WORLD = """
@@ -14,7 +15,7 @@ WORLD = """
   </worldbody>
 </mujoco>
 """
-FOCAL_PX = 120 / np.tan(np.radians(30))
+FOCAL_PX = HEIGHT_PX / 2 / np.tan(np.radians(30))
 
 
 def seen(kind: str, size: str, tilt: float = 0.0) -> np.ndarray:

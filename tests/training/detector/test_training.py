@@ -18,9 +18,10 @@ SETTINGS = Settings(
     shards=(("train", 3),),
     epochs=3,
     settling_epochs=1,
-    piece_px=(80, 96),
+    piece_px=(64, 96),
     epoch_shards=2,
     batch=4,
+    whole_batch=4,
 )
 IMAGES = 8
 
@@ -30,7 +31,7 @@ def out(tmp_path: Path) -> Path:
     """Return a folder with shards of grey images that each show one bright cup."""
     random = np.random.default_rng(5)
     for number in range(3):
-        images = random.integers(60, 90, (IMAGES, 240, 320, 3), np.uint8)
+        images = random.integers(60, 90, (IMAGES, 224, 320, 3), np.uint8)
         rows = []
         for k, image in enumerate(images):
             x, y = (int(value) for value in random.integers(40, 180, 2))

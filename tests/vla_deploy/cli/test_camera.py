@@ -32,7 +32,17 @@ HEAD = [(pan, tilt) for pan in (-0.22, 0.0, 0.22) for tilt in (0.44, 0.6, 0.76)]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    return Path(shutil.copytree(ROBOTS_DIR / "butler", tmp_path / "butler"))
+    """Return the butler with the camera of LENS, which has few pixels: soon computed."""
+    folder = Path(shutil.copytree(ROBOTS_DIR / "butler", tmp_path / "butler"))
+    file = folder / "robot.toml"
+    own = load_robot("butler").camera
+    text = file.read_text()
+    for key, size in (("width", LENS.width), ("height", LENS.height)):
+        before = f"{key} = {getattr(own, key)}\n"
+        assert before in text
+        text = text.replace(before, f"{key} = {size}\n")
+    file.write_text(text)
+    return folder
 
 
 @pytest.fixture(scope="module")

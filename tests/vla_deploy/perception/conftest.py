@@ -30,6 +30,7 @@ from sim_twin.worlds.placement import draw_poses, load_world
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.navigation.pose import Pose2D
 from vla_deploy.node import NodeContext
+from vla_deploy.perception.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.node import PerceptionNode
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.model import RobotModel
@@ -38,7 +39,6 @@ Rgb = NDArray[np.uint8]
 Depth = NDArray[np.float32]
 
 STEP_NS = 10_000_000
-CAMERA_FRAME_BYTES = HEADER_BYTES + 320 * 240 * BYTES_PER_PIXEL + CRC.size
 NODE_PERIOD_NS = 20_000_000
 VIEW = Pose2D(2.2, 2.05, -math.pi / 2)
 HIDDEN_GROUP = 5
@@ -61,6 +61,10 @@ class StillFlat:
     @property
     def intrinsics(self) -> Intrinsics:
         return self.robot.camera.pinhole
+
+    @property
+    def grid(self) -> GeometryGrid:
+        return geometry_grid(self.intrinsics)
 
     def positions(self, **joints: float) -> NDArray[np.float64]:
         """Return the joint array of the tucked pose with some joints changed."""
@@ -100,10 +104,11 @@ class StillFlat:
     def noisy_view(
         self, random: np.random.Generator
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Render with the depth noise of a stereo camera, in whole millimetres."""
+        """Render on the geometry's grid, with a stereo camera's noise, in whole millimetres."""
         rgb, depth = self.camera.render()
         noisy = depth + 0.0012 * depth**2 * random.standard_normal(depth.shape)
-        return rgb, (np.rint(noisy * 1000.0) / 1000.0).astype(np.float32)
+        rounded = (np.rint(noisy * 1000.0) / 1000.0).astype(np.float32)
+        return self.grid.colours(rgb), self.grid.depth(rounded)
 
     def view_without_robot(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Render what the camera would see were the robot transparent."""
@@ -143,8 +148,10 @@ class Rig:
             "imu": ImuDevice(self._feel, seed=1),
             "camera": CameraDevice(self._render, flat.intrinsics, latency_s=0.03, seed=1),
         }
+        pixels = flat.intrinsics.width * flat.intrinsics.height
+        frame_bytes = HEADER_BYTES + pixels * BYTES_PER_PIXEL + CRC.size
         self.camera_wire = LineTamper(
-            self.devices["camera"], self.now_ns, CAMERA_FRAME_BYTES, tells_time=False
+            self.devices["camera"], self.now_ns, frame_bytes, tells_time=False
         )
         wires = {**self.devices, "camera": self.camera_wire}
         self.lines = {name: MemoryLine(device, self) for name, device in wires.items()}

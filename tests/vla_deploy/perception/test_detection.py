@@ -25,8 +25,8 @@ def see(flat: "StillFlat", seed: int = 0) -> list[tuple[Detection, np.ndarray]]:
     """Return what the robot detects, each with its position in the map."""
     rgb, depth = flat.noisy_view(np.random.default_rng(seed))
     pose = flat.kinematics.camera_pose(flat.joints)
-    body = BodyMask(flat.robot).mask(flat.joints, flat.intrinsics)
-    cloud = make_cloud(rgb, depth, flat.intrinsics, pose, body)
+    body = BodyMask(flat.robot).mask(flat.joints, flat.grid.camera)
+    cloud = make_cloud(rgb, depth, flat.grid.camera, pose, body)
     found = []
     for detection in detect(cloud, find_supports(cloud)):
         x, y, z = detection.position_m

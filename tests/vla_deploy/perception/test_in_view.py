@@ -30,9 +30,9 @@ TABLE_CORNERS = ((3.95, 0.25), (4.45, 0.25), (4.45, 0.65), (3.95, 0.65))
 def look(flat: "StillFlat") -> Image:
     rgb, depth = flat.noisy_view(np.random.default_rng(0))
     pose = flat.kinematics.camera_pose(flat.joints)
-    body = BodyMask(flat.robot).mask(flat.joints, flat.intrinsics)
-    cloud = make_cloud(rgb, depth, flat.intrinsics, pose, body)
-    return Image(cloud=cloud, camera=flat.intrinsics, base_from_camera=pose)
+    body = BodyMask(flat.robot).mask(flat.joints, flat.grid.camera)
+    cloud = make_cloud(rgb, depth, flat.grid.camera, pose, body)
+    return Image(cloud=cloud, camera=flat.grid.camera, base_from_camera=pose)
 
 
 def look_with_the_table_hidden(flat: "StillFlat", beyond_m: float) -> Cloud:

@@ -68,8 +68,8 @@ def test_every_topic_is_published(make_rig: MakeRig) -> None:
     assert rig.cell("imu")["acceleration_m_s2"][2] == pytest.approx(9.81, abs=0.3)
     frame = rig.space.frame_reader("rgbd").latest()
     assert frame is not None
-    assert (frame.width, frame.height) == (320, 240)
-    assert len(frame.payload) == 320 * 240 * 5
+    assert (frame.width, frame.height) == (512, 384)
+    assert len(frame.payload) == 512 * 384 * 5
     rgb, _ = rig.flat.camera.render()
     assert frame.payload[: rgb.size] == rgb.tobytes()
 
@@ -204,6 +204,7 @@ def reach(flat: "StillFlat", target: np.ndarray) -> dict[str, float]:
 
 def test_a_cup_in_the_hand_goes_where_the_hand_goes(make_rig: MakeRig) -> None:
     rig = make_rig()
+    rig.flat.put("book", (6.3, 4.0, 0.5475))  # it would lie where the cup is put
     rig.flat.put("red_cup", (2.1, 1.62, 0.4975))
     rig.run_for(1.0)
     cup = rig.known()["cup_1"]["position_m"]

@@ -25,7 +25,7 @@ from vla_deploy.robots.model import RobotModel, full_positions
 CAMERA = load_robot("butler").camera
 LENS = LensCalibration(
     intrinsics=Intrinsics(
-        width=320, height=240, fx=221.4, fy=220.9, cx=158.2, cy=121.3,
+        width=512, height=384, fx=354.2, fy=353.4, cx=253.1, cy=194.1,
         distortion=(-0.28, 0.09, 0.0004, -0.0007, -0.01),
     ),
     distortion_model="plumb_bob",
@@ -46,14 +46,14 @@ MOUNTING = Mounting(
 )
 # As `camera_calibration` of ROS writes it.
 OF_ROS = """\
-image_width: 320
-image_height: 240
+image_width: 512
+image_height: 384
 camera_name: narrow_stereo
 camera_matrix:
   rows: 3
   cols: 3
-  data: [ 218.5 ,   0.     , 160.2 ,
-          0.     , 219.  , 119.4 ,
+  data: [ 349.6 ,   0.     , 256.3 ,
+          0.     , 350.  , 191.0 ,
           0.     ,   0.     ,   1.     ]
 distortion_model: plumb_bob
 distortion_coefficients:
@@ -67,7 +67,7 @@ rectification_matrix:
 projection_matrix:
   rows: 3
   cols: 4
-  data: [210., 0., 160., 0., 0., 211., 119., 0., 0., 0., 1., 0.]
+  data: [336., 0., 256., 0., 0., 337., 191., 0., 0., 0., 1., 0.]
 """
 
 
@@ -98,7 +98,7 @@ def test_a_file_of_ros_is_taken_as_it_is(folder: Path) -> None:
     (folder / LENS_FILE).write_text(OF_ROS)
     lens = load_robot(folder).camera.lens
     assert lens is not None
-    assert lens.intrinsics.fx == 218.5
+    assert lens.intrinsics.fx == 349.6
     assert lens.intrinsics.distortion == (-0.2, 0.05, 0.0001, 0.0, 0.0)
     assert (lens.reprojection_error_px, lens.made_at) == (None, "")
 
@@ -111,11 +111,11 @@ def test_a_file_without_distortion_is_a_pinhole(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("image_width: 320", "image_width: 640", "image_width: got 640, expected 320"),
-        ("218.5", "21.85", "camera_matrix.data fx: got 21.85"),
-        ("218.5", ".nan", "camera_matrix.data: got"),
-        ("160.2", "4.0", "camera_matrix.data cx: got 4"),
-        ("219. ", "330.", "camera_matrix.data fy: got 330"),
+        ("image_width: 512", "image_width: 640", "image_width: got 640, expected 512"),
+        ("349.6", "34.96", "camera_matrix.data fx: got 34.96"),
+        ("349.6", ".nan", "camera_matrix.data: got"),
+        ("256.3", "4.0", "camera_matrix.data cx: got 4"),
+        ("350. ", "528.", "camera_matrix.data fy: got 528"),
         ("plumb_bob", "equidistant", "fisheye lenses, are not supported"),
         ("plumb_bob", "rational_polynomial", "8 finite numbers for rational_polynomial"),
         ("-0.2, 0.05", "-0.2, .inf", "distortion_coefficients.data: got"),
@@ -124,7 +124,7 @@ def test_a_file_without_distortion_is_a_pinhole(folder: Path) -> None:
         ("[1., 0., 0., 0., 1., 0., 0., 0., 1.]", "[0., 1., 0., -1., 0., 0., 0., 0., 1.]", "pair"),
         ("image_width", "camera_model: D435\nimage_width", "camera_model: got 'D435'"),
         ("camera_matrix:", "camera_matrix: 7\nother:", "camera_matrix.data: got 7"),
-        ("image_width: 320", "image_width: [", "a YAML document"),
+        ("image_width: 512", "image_width: [", "a YAML document"),
     ],
 )
 def test_what_cannot_be_this_camera_is_refused_with_the_reason(
@@ -139,7 +139,7 @@ def test_what_cannot_be_this_camera_is_refused_with_the_reason(
 
 def test_all_faults_of_a_lens_are_told_at_once(folder: Path) -> None:
     (folder / LENS_FILE).write_text(
-        OF_ROS.replace("320", "640").replace("240", "480").replace("218.5", "2.0")
+        OF_ROS.replace("512", "640").replace("384", "480").replace("349.6", "2.0")
     )
     message = faults_of(folder)
     for key in ("image_width", "image_height", "data fx"):
@@ -171,7 +171,7 @@ def test_the_camera_sits_where_its_mounting_says(folder: Path) -> None:
         ("0.004", "0.4", "translation_m: got 0.400 m"),
         ("0.004", "nan", "translation_m: got"),
         ("0.9998", "0.5998", "expected a rotation"),
-        ("focal_px = 2", "focal_px = 3", "run `vla-deploy camera hand-eye` again"),
+        ("focal_px = 3", "focal_px = 4", "run `vla-deploy camera hand-eye` again"),
         ("residual_m", "residue_m", "residue_m"),
         ("[", "[[", "a TOML document"),
     ],
