@@ -20,6 +20,7 @@ from vla_deploy.robots.model import RobotModel, full_positions
 from vla_deploy.robots.tree_reader import read_tree
 
 ROBOT = load_robot("butler")
+WIDE, HIGH = ROBOT.camera.width, ROBOT.camera.height
 X_M, Y_M, YAW_RAD = 1.2, -0.7, 0.9
 
 
@@ -72,7 +73,7 @@ class Rig:
         ]
         self.space.cell_writer("scene").put_document({"stamp_ns": self.clock.ns, "objects": cups})
 
-    def take(self, width: int = 320, height: int = 240, shade: int = 128) -> None:
+    def take(self, width: int = WIDE, height: int = HIGH, shade: int = 128) -> None:
         pixels = np.full(width * height * 5, shade, np.uint8)
         self.frames.put(pixels.tobytes(), width=width, height=height, stamp_ns=self.clock.ns)
 
@@ -100,7 +101,7 @@ def test_a_thing_on_the_optical_axis_is_boxed_in_the_middle_of_the_picture(rig: 
     rig.take()
     (message,) = rig.look()
     header, image = opened(message)
-    assert (header["width"], header["height"], image.shape) == (320, 240, (240, 320, 3))
+    assert (header["width"], header["height"], image.shape) == (WIDE, HIGH, (HIGH, WIDE, 3))
     (cup,) = header["detections"]
     assert (cup["id"], cup["class"], cup["colour"], cup["confidence"]) == (
         "cup_0",
@@ -109,7 +110,9 @@ def test_a_thing_on_the_optical_axis_is_boxed_in_the_middle_of_the_picture(rig: 
         0.9,
     )
     left, top, right, bottom = cup["box"]
-    assert ((left + right) / 2, (top + bottom) / 2) == pytest.approx((159.5, 119.5), abs=1.5)
+    assert ((left + right) / 2, (top + bottom) / 2) == pytest.approx(
+        ((WIDE - 1) / 2, (HIGH - 1) / 2), abs=1.5
+    )
     wide_px = 0.1 * ROBOT.camera.focal_px
     assert wide_px <= right - left <= 1.8 * wide_px
 
@@ -160,7 +163,7 @@ def test_without_scene_or_pose_a_picture_comes_without_boxes(
     space: SharedSpace, clock: ManualClock
 ) -> None:
     feed = CameraFeed(space, Detections(space, ROBOT, read_tree(ROBOT.mjcf_path)))
-    pixels = bytes(320 * 240 * 5)
-    space.frame_writer("rgbd").put(pixels, width=320, height=240, stamp_ns=clock.ns)
+    pixels = bytes(WIDE * HIGH * 5)
+    space.frame_writer("rgbd").put(pixels, width=WIDE, height=HIGH, stamp_ns=clock.ns)
     (message,) = feed.look(Moment(run_ns=0, wall_ns=0))
     assert opened(message)[0]["detections"] == []
