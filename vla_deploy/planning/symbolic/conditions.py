@@ -21,7 +21,7 @@ from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
 from vla_deploy.world.reach import GRIP_HEIGHTS_M
 from vla_deploy.world.resting import IN
-from vla_deploy.world.thing import FLOOR
+from vla_deploy.world.thing import FLOOR, Rest
 
 # Farther than that from where it stands, the robot is surely not before a thing.
 SURELY_AWAY_M: Final = 1.6
@@ -183,10 +183,15 @@ def takes_things(state: State, setting: Setting) -> Answer:
     return MET
 
 
+def rest_of_subject(state: State, subject: Subject) -> Rest | None:
+    """Return what a thing rests in or on: where the plan has put it, else where it was seen."""
+    return state.rests.get(subject.key) or (subject.thing.rests if subject.thing else None)
+
+
 def _has_room_beside(state: State, subject: Subject | None) -> Answer:
     if subject is None:
         return "things are put next to things, and on furniture"
-    rest = state.rests.get(subject.key) or (subject.thing.rests if subject.thing else None)
+    rest = rest_of_subject(state, subject)
     if rest is None:
         return None
     if rest.relation == IN:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from vla_deploy.planning.catalogue import NEXT_TO
-from vla_deploy.planning.symbolic.conditions import SMALL_MOVE_M, Setting
+from vla_deploy.planning.symbolic.conditions import SMALL_MOVE_M, Setting, rest_of_subject
 from vla_deploy.planning.symbolic.state import Held, State
 from vla_deploy.world.resting import ON
 from vla_deploy.world.thing import Rest
@@ -88,7 +88,7 @@ def _rest_at_destination(state: State, setting: Setting) -> Rest:
         return Rest(relation, setting.place("destination") or "")
     if relation != NEXT_TO:
         return Rest(relation, subject.key)
-    below = state.rests.get(subject.key) or (subject.thing.rests if subject.thing else None)
+    below = rest_of_subject(state, subject)
     return Rest(ON, below.of if below is not None else "")
 
 
