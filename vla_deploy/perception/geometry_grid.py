@@ -21,26 +21,18 @@ from vla_deploy.perception.network_view import NetworkView
 GRID_PIXELS: Final = 320 * 240
 EDGE_RATIO: Final = 0.015
 """Steps in depth between neighbours, over the depth, that are an edge or a hole and no surface."""
-NEARER_SHARE: Final = 0.5
 SIZES_KEPT: Final = 8
 DepthT = TypeVar("DepthT", np.uint16, np.float32)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Between:
-    """Hold for each of a row's wanted places the pixels before and behind it, and how far along."""
+    """Hold for each of a row's wanted places the pixels around it, and how far along it lies."""
 
     before: NDArray[np.intp]
     behind: NDArray[np.intp]
+    nearest: NDArray[np.intp]
     share: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, pixels: int, wanted: int) -> "_Between":
-        # Pixel k covers the image from k - 0.5 to k + 0.5.
-        places = (np.arange(wanted) + 0.5) * pixels / wanted - 0.5
-        before = np.floor(places).astype(np.intp).clip(0, pixels - 1)
-        behind = np.minimum(before + 1, pixels - 1)
-        return cls(before=before, behind=behind, share=(places - before).astype(np.float32))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,11 +82,7 @@ class GeometryGrid:
         upper = around[0] + across * (around[1] - around[0])
         lower = around[2] + across * (around[3] - around[2])
         mean = upper + down * (lower - upper)
-        nearest = np.where(
-            down < NEARER_SHARE,
-            np.where(across < NEARER_SHARE, around[0], around[1]),
-            np.where(across < NEARER_SHARE, around[2], around[3]),
-        )
+        nearest = depth[np.ix_(rows.nearest, columns.nearest)]
         low, high = np.minimum.reduce(around), np.maximum.reduce(around)
         found = np.where(high - low <= EDGE_RATIO * low, mean, nearest)
         return (np.rint(found) if depth.dtype == np.uint16 else found).astype(depth.dtype)
@@ -131,4 +119,12 @@ def geometry_grid(source: Intrinsics) -> GeometryGrid:
 
 @lru_cache(maxsize=SIZES_KEPT)
 def _between(pixels: int, wanted: int) -> _Between:
-    return _Between.of(pixels, wanted)
+    # Pixel k covers the image from k - 0.5 to k + 0.5.
+    places = (np.arange(wanted) + 0.5) * pixels / wanted - 0.5
+    before = np.floor(places).astype(np.intp)
+    return _Between(
+        before=before,
+        behind=np.minimum(before + 1, pixels - 1),
+        nearest=np.floor(places + 0.5).astype(np.intp),
+        share=(places - before).astype(np.float32),
+    )

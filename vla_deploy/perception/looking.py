@@ -15,7 +15,7 @@ from vla_deploy.perception.cloud import aim_sigma_rad
 from vla_deploy.perception.eyes import Eyes
 from vla_deploy.perception.frame_check import Use
 from vla_deploy.perception.frame_watch import FrameWatch
-from vla_deploy.perception.geometry_grid import geometry_grid
+from vla_deploy.perception.geometry_grid import GeometryGrid, geometry_grid
 from vla_deploy.perception.near_obstacles import NearObstacles
 from vla_deploy.perception.network_view import NetworkView
 from vla_deploy.perception.pinhole_view import as_pinhole, in_image
@@ -33,12 +33,12 @@ MAX_CAMERA_TURN_RAD_S: Final = 0.35
 class Moment:
     """Hold an image and how the robot stood when it was taken.
 
-    `seen` is the image on the geometry's grid, with its depth in metres and its mask of the robot;
+    `seen` is the image on the geometry's `grid`, with its depth in metres and a mask of the robot;
     `track` is where it was by dead reckoning, `view` turns the camera into that frame, 3 x 3: a
     robot that finds out where it really is has not moved.
     """
 
-    frame: RgbdFrame
+    grid: GeometryGrid
     seen: RgbdFrame
     depth_m: NDArray[np.float32]
     base_from_camera: Array
@@ -106,8 +106,7 @@ class Looking:
         if self._waiting is None or answer is None:
             return False
         moment, self._waiting = self._waiting, None
-        camera = moment.frame.intrinsics
-        self._look(moment, geometry_grid(camera).view(in_image(answer.view, camera)))
+        self._look(moment, moment.grid.view(in_image(answer.view, moment.grid.source)))
         return True
 
     def carry(self, positions: Array, now_ns: int) -> None:
@@ -138,7 +137,7 @@ class Looking:
             moment.base_from_camera,
             moment.base,
             moment.body,
-            moment.frame.stamp_ns,
+            moment.seen.stamp_ns,
             network,
             aim_sigma_rad(moment.turn_rad_s),
         )
@@ -146,9 +145,10 @@ class Looking:
     def _moment(self, frame: RgbdFrame, positions: Array) -> Moment:
         track = self._whereabouts.track_at(frame.stamp_ns)
         view = self._body.view_rotation(frame.stamp_ns, track)
-        seen = geometry_grid(frame.intrinsics).frame(frame)
+        grid = geometry_grid(frame.intrinsics)
+        seen = grid.frame(frame)
         return Moment(
-            frame=frame,
+            grid=grid,
             seen=seen,
             depth_m=seen.depth_m(),
             base_from_camera=self._body.camera_pose(positions),

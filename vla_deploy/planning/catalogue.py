@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
+from vla_deploy.world.relations import NEXT_TO
+from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 ARMS = ("left", "right")
 GRASPABLE_CLASSES = tuple(name for name in OBJECT_CLASSES if name != "box")
-NEXT_TO = "next to"
-RELATIONS = ("in", "on", NEXT_TO)
+RELATIONS = (IN, ON, NEXT_TO)
 NAVIGATION_TIMEOUT_S = 300.0
 MANIPULATION_TIMEOUT_S = 120.0
 DEFAULT_TIMEOUT_S = 60.0

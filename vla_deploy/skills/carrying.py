@@ -10,6 +10,7 @@ from vla_deploy.manipulation.grasps import hand_down
 from vla_deploy.skills.arms import arm_joints, arm_targets, lift
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
+from vla_deploy.skills.frames import side_of
 from vla_deploy.skills.motion import move_joints, settle
 from vla_deploy.skills.underside import leave_underside
 
@@ -104,8 +105,7 @@ def _travel_targets(context: SkillContext, hand: str) -> dict[str, float]:
 def _carry_targets(context: SkillContext, hand: str) -> dict[str, float]:
     """Return the carry posture nearest to the present one."""
     arm = context.arms[hand]
-    side = 1.0 if hand == "left" else -1.0
-    point = (CARRY_POINT_M[0], side * CARRY_POINT_M[1], CARRY_POINT_M[2])
+    point = (CARRY_POINT_M[0], side_of(hand) * CARRY_POINT_M[1], CARRY_POINT_M[2])
     now = context.link.setpoints
     found = []
     for yaw_rad in CARRY_YAWS_RAD:

@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 from vla_deploy.robots.description import FloorPose
 
 
+def side_of(hand: str) -> float:
+    """Return 1 for the left hand and -1 for the right: y grows to the left."""
+    return 1.0 if hand == "left" else -1.0
+
+
 def to_base(pose: FloorPose, point_m: Sequence[float]) -> tuple[float, float, float]:
     """Return a map-frame point (x, y, z) in the base frame of a robot at `pose`."""
     dx, dy = point_m[0] - pose.x_m, point_m[1] - pose.y_m

@@ -80,6 +80,18 @@ def remembered(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any] |
     return None
 
 
+def kept_in_sight(context: SkillContext, query: ObjectQuery) -> Mapping[str, Any]:
+    """Return the object that `remembered` finds.
+
+    Raises:
+        TryAgain: it finds none.
+    """
+    seen = remembered(context, query)
+    if seen is None:
+        raise TryAgain(f"I lost sight of the {query}")
+    return seen
+
+
 def see(context: SkillContext, query: ObjectQuery) -> Skill:
     """Look at an object until it has been seen afresh; read it with `remembered` afterwards.
 

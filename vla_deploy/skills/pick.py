@@ -23,7 +23,7 @@ from vla_deploy.skills.carrying import RESTARTS, carry, or_carry
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
 from vla_deploy.skills.frames import to_base
-from vla_deploy.skills.gaze import remembered
+from vla_deploy.skills.gaze import kept_in_sight
 from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.neighbours import crowding_m
@@ -158,9 +158,7 @@ def _choose(
         TryAgain: the object is out of sight.
         OutOfReach: no hand gets there.
     """
-    seen = remembered(context, query)
-    if seen is None:
-        raise TryAgain(f"I lost sight of the {query}")
+    seen = kept_in_sight(context, query)
     pose = context.link.pose
     centre = to_base(pose, seen["position_m"])
     yaw_rad = float(seen["yaw_rad"]) - pose.yaw_rad

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from vla_deploy.manipulation.errors import ManipulationError
 from vla_deploy.manipulation.grasps import hand_down
-from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.skills.arms import (
@@ -25,11 +24,12 @@ from vla_deploy.skills.carrying import RESTARTS, carry, or_carry
 from vla_deploy.skills.context import Held, Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, OutOfReach, Touched, TryAgain
 from vla_deploy.skills.frames import to_base
-from vla_deploy.skills.gaze import remembered, turn_head, watch
+from vla_deploy.skills.gaze import kept_in_sight, turn_head, watch
 from vla_deploy.skills.motion import pause
 from vla_deploy.skills.navigate import solve_near
 from vla_deploy.skills.surfaces import Spot, free_spots, spots_beside
 from vla_deploy.skills.swing import heights_above
+from vla_deploy.world.relations import NEXT_TO
 
 ABOVE_M = 0.10
 # A thing put into a container is let go this far below the rim: less where the container is low,
@@ -117,13 +117,13 @@ def _release(
     except UnknownObject:
         return (yield from _on_surface(context, hand, held))
     relation = str(parameters["relation"])
-    if relation == NEXT_TO:
-        return (yield from solve_near(context, query, lambda: _beside(context, query, hand, held)))
-    return (
-        yield from solve_near(
-            context, query, lambda: _over_object(context, query, relation, hand, held)
-        )
-    )
+
+    def solve() -> Release:
+        if relation == NEXT_TO:
+            return _beside(context, query, hand, held)
+        return _over_object(context, query, relation, hand, held)
+
+    return (yield from solve_near(context, query, solve))
 
 
 def _on_surface(context: SkillContext, hand: str, held: Held) -> Generator[None, None, Release]:
@@ -164,9 +164,7 @@ def _beside(context: SkillContext, query: ObjectQuery, hand: str, held: Held) ->
         OutOfReach: it reaches none of them.
         TryAgain: the thing is not in sight, or nothing around it is free.
     """
-    seen = remembered(context, query)
-    if seen is None:
-        raise TryAgain(f"I lost sight of the {query}")
+    seen = kept_in_sight(context, query)
     spots = spots_beside(context, hand, seen)
     if not spots:
         raise TryAgain(f"I see no free spot next to the {query}")
@@ -176,9 +174,7 @@ def _beside(context: SkillContext, query: ObjectQuery, hand: str, held: Held) ->
 def _over_object(
     context: SkillContext, query: ObjectQuery, relation: str, hand: str, held: Held
 ) -> Release:
-    seen = remembered(context, query)
-    if seen is None:
-        raise TryAgain(f"I lost sight of the {query}")
+    seen = kept_in_sight(context, query)
     x_m, y_m, z_m = to_base(context.link.pose, seen["position_m"])
     top_m = z_m + float(seen["size_m"][2]) / 2
     if relation == "in" and seen["class"] != "box":

@@ -9,7 +9,7 @@ import numpy as np
 
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import SkillContext
-from vla_deploy.skills.frames import to_base, to_map
+from vla_deploy.skills.frames import side_of, to_base, to_map
 from vla_deploy.world.document import read_thing
 from vla_deploy.world.footprint import depth_inside_m
 from vla_deploy.world.thing import Thing
@@ -31,7 +31,7 @@ Spot = tuple[float, float, float]
 
 def free_spots(context: SkillContext, hand: str) -> list[Spot]:
     """Return points of seen surfaces, in the base frame, with room for a hand; the best first."""
-    side = 1.0 if hand == "left" else -1.0
+    side = side_of(hand)
     return [
         (x_m, side * y_m, height_m)
         for surface in context.link.surfaces
@@ -50,7 +50,7 @@ def spots_beside(context: SkillContext, hand: str, seen: Mapping[str, Any]) -> l
     """
     thing, pose = read_thing(seen), context.link.pose
     x_m, y_m, _ = to_base(pose, thing.position_m)
-    best_m = (REACH_X_M[1], REACH_Y_M[0] * (1.0 if hand == "left" else -1.0))
+    best_m = (REACH_X_M[1], side_of(hand) * REACH_Y_M[0])
     spots = [
         (*spot, height_m)
         for surface in context.link.surfaces

@@ -10,7 +10,6 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Action
@@ -21,6 +20,7 @@ from vla_deploy.planning.symbolic.state import Pose, State
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.errors import TryAgain
 from vla_deploy.world.footprint import gap_m
+from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.touch import is_denied
 
 # A drive ends within centimetres of its goal; farther away the robot is somewhere else.

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Final
 
 from vla_deploy.world.errors import UnknownWord
-from vla_deploy.world.relations import RELATIONS, is_near, is_under
+from vla_deploy.world.relations import NEXT_TO, RELATIONS, is_near, is_under
 from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.thing import Rest, Snapshot, Thing, Viewpoint
 from vla_deploy.world.vocabulary import (
@@ -34,9 +34,9 @@ NEAR: Final = "near"
 PHRASES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "to left of": "left of", "to right of": "right of", "in front of": "in front of",
-        "on top of": ON, "left of": "left of", "right of": "right of", "next to": "next to",
+        "on top of": ON, "left of": "left of", "right of": "right of", "next to": NEXT_TO,
         "close to": NEAR, "inside of": IN,
-        "beside": "next to", "behind": "behind", "inside": IN, "under": "under", "below": "under",
+        "beside": NEXT_TO, "behind": "behind", "inside": IN, "under": "under", "below": "under",
         "near": NEAR, "in": IN, "on": ON,
     }
 )  # fmt: skip

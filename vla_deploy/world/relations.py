@@ -15,6 +15,7 @@ from vla_deploy.world.footprint import depth_inside_m, gap_m, polygon_depth_m
 from vla_deploy.world.resting import IN, ON
 from vla_deploy.world.thing import Rest, Snapshot, Surface, Thing, Viewpoint
 
+NEXT_TO: Final = "next to"
 NEXT_TO_GAP_M: Final = 0.15
 SAME_LEVEL_M: Final = 0.10
 # Things farther apart are in different places rather than beside each other.
@@ -95,7 +96,7 @@ RELATIONS: Final[Mapping[str, Test]] = MappingProxyType(
         IN: _in,
         ON: _on,
         "under": _under,
-        "next to": is_next_to,
+        NEXT_TO: is_next_to,
         "left of": _left,
         "right of": _right,
         "in front of": _in_front,

@@ -12,7 +12,7 @@ from vla_deploy.perception.lens import ray_table
 from vla_deploy.perception.network_view import NetworkView
 
 BARREL = (-0.3, 0.1, 0.0, 0.0, 0.0)
-SIZES = [(512, 384), (640, 480), (848, 480), (1280, 720), (1920, 1200)]
+SIZES = [(321, 240), (512, 384), (640, 480), (848, 480), (1280, 720), (1920, 1200)]
 
 
 def camera(width: int, height: int, distortion: tuple[float, ...] = ()) -> Intrinsics:

@@ -29,7 +29,8 @@ _NEAR: Final = re.compile(
     r"^(?:near|next to|close to|beside|by|up to|over to|towards?|in front of|at|to) "
 )
 PUT_GROUPS: Final = ("object", "relation", "destination")
-BESIDE: Final = r"next to|beside|alongside|close to|near"
+BESIDE_WORDS: Final = ("next to", "beside", "alongside", "close to", "near")
+BESIDE: Final = "|".join(BESIDE_WORDS)
 _PUT_RELATION: Final = re.compile(
     r"(?:^| )(?:(?:back|over|up|down) )?"
     r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
@@ -90,7 +91,7 @@ def split_put(groups: Groups, request: Request) -> tuple[str, str, str]:
     Of several ways to read it the last is meant of which both sides are known.
     """
     text = " ".join(groups[name] for name in PUT_GROUPS)
-    beside = groups["relation"] in BESIDE.split("|")
+    beside = groups["relation"] in BESIDE_WORDS
     ways = [
         (text[: found.start()].strip(), found[0].strip(), text[found.end() :].strip())
         for found in (_PUT_BESIDE if beside else _PUT_RELATION).finditer(text)

@@ -4,11 +4,10 @@ import re
 from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.building import (
-    BESIDE,
+    BESIDE_WORDS,
     NO_THING,
     Groups,
     Step,
@@ -25,6 +24,7 @@ from vla_deploy.planning.understanding.fitting import Use, fitting
 from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
 from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 STORE: Final = "box"
@@ -53,7 +53,7 @@ def put(groups: Groups, request: Request) -> list[Step]:
 
 
 def _relation(said: str) -> str:
-    if said in BESIDE.split("|"):
+    if said in BESIDE_WORDS:
         return NEXT_TO
     return "in" if said in _INTO else "on"
 

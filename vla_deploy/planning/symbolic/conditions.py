@@ -10,7 +10,6 @@ from typing import Any, Final
 
 from vla_deploy.manipulation.errors import TooWide
 from vla_deploy.manipulation.grasps import grasps_from_above
-from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.references import match_place
@@ -20,6 +19,7 @@ from vla_deploy.planning.symbolic.subjects import Subject, subject_of
 from vla_deploy.robots.description import KeepOutZone
 from vla_deploy.world import Snapshot
 from vla_deploy.world.reach import GRIP_HEIGHTS_M
+from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 from vla_deploy.world.thing import FLOOR, Rest
 
@@ -174,11 +174,11 @@ def takes_things(state: State, setting: Setting) -> Answer:
     if relation == NEXT_TO:
         return _has_room_beside(state, subject)
     if place is not None:
-        if relation == "in":
+        if relation == IN:
             return f"nothing is put in the {place}, only on it"
         bare = setting.world.furniture and place not in setting.world.furniture
         return f"there is nothing at the {place} to put things on" if bare else MET
-    if relation == "in" and subject is not None and subject.kind not in PUT_INTO:
+    if relation == IN and subject is not None and subject.kind not in PUT_INTO:
         return f"a {subject.kind} is no container; things go into: {', '.join(sorted(PUT_INTO))}"
     return MET
 

@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.symbolic.conditions import SMALL_MOVE_M, Setting, rest_of_subject
 from vla_deploy.planning.symbolic.state import Held, State
+from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import ON
 from vla_deploy.world.thing import Rest
 

@@ -4,7 +4,6 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 from enum import StrEnum
-from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
@@ -25,10 +24,9 @@ from vla_deploy.planning.understanding.selection import (
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Query, Thing, Viewpoint, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
+from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
-
-BESIDE: Final = "next to"
 
 
 class Use(StrEnum):
@@ -80,7 +78,9 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
 
 def _beside_at_a_distance(query: Query, setting: Setting) -> list[Thing]:
     """Return the nearest on the same furniture where nothing stands right next to a thing."""
-    anchors = find(query.anchor, setting.scene) if query.anchor and query.relation == BESIDE else []
+    anchors = (
+        find(query.anchor, setting.scene) if query.anchor and query.relation == NEXT_TO else []
+    )
     if len(anchors) != 1 or anchors[0].rests is None:
         return []
     on_it = _standing_on({anchors[0].rests.of}, query, setting)

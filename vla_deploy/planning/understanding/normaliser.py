@@ -7,9 +7,10 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-from vla_deploy.planning.catalogue import ARMS, NEXT_TO, SKILLS, Type
+from vla_deploy.planning.catalogue import ARMS, SKILLS, Type
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.understanding.quantities import UNITS, quantity_of
+from vla_deploy.world.relations import NEXT_TO
 
 LONGEST_ID: Final = 48
 DIRECTIONS: Final[Mapping[str, str]] = {

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from vla_deploy.planning.catalogue import NEXT_TO
 from vla_deploy.planning.errors import NotAble, PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place, words_of
@@ -24,6 +23,7 @@ from vla_deploy.planning.understanding.insertions import (
 )
 from vla_deploy.planning.understanding.places import is_like_place, resolve_place
 from vla_deploy.planning.understanding.resolver import Referent, Resolver
+from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 
 Parameters = Mapping[str, Any]

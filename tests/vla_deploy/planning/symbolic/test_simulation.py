@@ -63,6 +63,8 @@ def seen(*things: Thing) -> Snapshot:
 CUP = {"object": "red cup"}
 INTO_BOX = {"destination": "box", "relation": "in"}
 FETCH = (("find_object", CUP), ("navigate_to", CUP), ("pick_up", CUP))
+BESIDE_BOOK = {"destination": "book_1", "relation": "next to"}
+TO_BOOK = (("find_object", {"object": "book_1"}), ("navigate_to", {"object": "book_1"}))
 TO_BOX = (("find_object", {"object": "box"}), ("navigate_to", {"object": "box"}))
 
 
@@ -76,12 +78,9 @@ def test_the_main_plan_keeps_every_rule(butler: World) -> None:
 
 
 def test_what_is_put_beside_a_thing_rests_where_that_rests(butler: World) -> None:
-    book = thing("book_1")
-    scene = seen(thing("cup_1"), book)
-    beside = {"destination": "book_1", "relation": "next to"}
-    to_book = (("find_object", {"object": "book_1"}), ("navigate_to", {"object": "book_1"}))
-    assert faults(butler, *FETCH, *to_book, ("place", beside), scene=scene) == []
-    state = end_state(chain(*FETCH, *to_book, ("place", beside)), butler, scene, HERE)
+    scene = seen(thing("cup_1"), thing("book_1"))
+    assert faults(butler, *FETCH, *TO_BOOK, ("place", BESIDE_BOOK), scene=scene) == []
+    state = end_state(chain(*FETCH, *TO_BOOK, ("place", BESIDE_BOOK)), butler, scene, HERE)
     assert state.rests == {"cup_1": Rest("on", "coffee_table")}
 
 
@@ -94,9 +93,7 @@ def test_what_is_put_beside_a_thing_rests_where_that_rests(butler: World) -> Non
 )
 def test_not_everything_has_room_beside_it(butler: World, rests: Rest, why: str) -> None:
     scene = seen(thing("cup_1"), thing("book_1", rests=rests))
-    beside = {"destination": "book_1", "relation": "next to"}
-    to_book = (("find_object", {"object": "book_1"}), ("navigate_to", {"object": "book_1"}))
-    (fault,) = faults(butler, *FETCH, *to_book, ("place", beside), scene=scene)
+    (fault,) = faults(butler, *FETCH, *TO_BOOK, ("place", BESIDE_BOOK), scene=scene)
     assert why in fault
 
 
