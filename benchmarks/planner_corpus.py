@@ -16,9 +16,9 @@ from benchmarks.planner_world import World
 
 CORPORA: Final = Path(__file__).parent / "corpora"
 COMMANDS: Final = "commands"
-COMMAND_CORPORA: Final = (COMMANDS, "everyday", "neighbours", "strangers")
-"""Of commands: what the planner is measured by, two that rules were written from, and what
-strangers said once, from which nothing may be learnt."""
+COMMAND_CORPORA: Final = (COMMANDS, "everyday", "neighbours", "guests", "strangers", "visitors")
+"""Of commands: what the planner is measured by, three that rules were written from, and two that
+others said once, from which nothing may be learnt: `strangers` and `visitors`."""
 PLAN, ASK, REFUSE, STOP = "plan", "ask", "refuse", "stop"
 MUSTS: Final = (PLAN, ASK, REFUSE, STOP)
 _ID: Final = re.compile(r"[a-z]+_\d+")

@@ -1,12 +1,14 @@
 """Bring what was planned for a command to its end: handed on, asked about, or refused."""
 
 from collections.abc import Callable
+from typing import Final
 
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.dialogue import Dialogue
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
+from vla_deploy.planning.gist_rung import GistRung
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
 from vla_deploy.planning.phrasing import Says, spoken_refusal
@@ -120,7 +122,10 @@ class Conclusions:
             self._telling.aloud(command, Says.HEARD_BADLY)
 
 
+_BY_RULES: Final = frozenset({RulesRung.name, GistRung.name})
+
+
 def _in_full(plan: Plan, answer: Answer) -> str:
     """Return the words that rules have put in the place of a command; others sum it up freely."""
     proposal = answer.proposal
-    return plan.goal if proposal is not None and proposal.rung == RulesRung.name else ""
+    return plan.goal if proposal is not None and proposal.rung in _BY_RULES else ""

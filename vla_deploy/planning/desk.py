@@ -29,7 +29,15 @@ from vla_deploy.planning.rehearing import Rehearing
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
-from vla_deploy.planning.understanding import Outcome, Question, Reply, Turn, Verdict, described
+from vla_deploy.planning.understanding import (
+    Outcome,
+    Question,
+    Reply,
+    Turn,
+    Verdict,
+    described,
+    guessed,
+)
 
 MOST_WAITING: Final = 8
 CANCELLED: Final = "cancelled on request"
@@ -236,6 +244,9 @@ class Desk:
             self._telling.answered(command, waiting.command)
             self.dialogue.settle()
             self._queue.appendleft(replace(waiting.command, text=full))
+        elif (chosen := guessed(waiting.question, command.text)) and not self._is_command(command):
+            self._telling.answered(command, waiting.command)
+            self._go_on(waiting, self.dialogue.chosen(chosen))
         elif command.is_answer:
             self._conclusions.refuse(command, f"that does not answer: {waiting.question.text}")
         else:

@@ -11,6 +11,7 @@ from vla_deploy.planning.asking import Proposal, Request, Rung
 from vla_deploy.planning.correction import CORRECTED
 from vla_deploy.planning.dialects import Json, parse_plan
 from vla_deploy.planning.errors import Declined, NotUnderstood
+from vla_deploy.planning.gist_rung import GistRung
 from vla_deploy.planning.ladder import Answer, Check, Ladder
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
@@ -63,7 +64,7 @@ class Held(Protocol):
 
 
 class Planner:
-    """Hold the two parts of the ladder; the slow one is climbed beside a process' steps.
+    """Hold the parts of the ladder; the slow one is climbed beside a process' steps.
 
     `away` tells which servers it should ask and cannot, with the reason.
     """
@@ -84,11 +85,16 @@ class Planner:
         self.check = check
         self._quick = Ladder((RulesRung(), self.cache), check, clock)
         self._slow = Ladder(slow, check, clock)
+        self._last = Ladder((GistRung(),), check, clock)
+
+    @property
+    def _ladders(self) -> tuple[Ladder, ...]:
+        return self._quick, self._slow, self._last
 
     @property
     def rungs(self) -> tuple[str, ...]:
         """Return the names of all rungs, in the order in which they are asked."""
-        return tuple(rung.name for rung in (*self._quick.rungs, *self._slow.rungs))
+        return tuple(rung.name for ladder in self._ladders for rung in ladder.rungs)
 
     @property
     def slow_rungs(self) -> tuple[str, ...]:
@@ -125,11 +131,17 @@ class Planner:
 
     def plan_at_once(self, request: Request, deadline: Deadline) -> Answer:
         """Return the answer of the rungs that take no time."""
-        return _worded(self._quick.climb(request, deadline), request)
+        answer = self._quick.climb(request, deadline)
+        return answer if self._slow.rungs else self._at_last(request, deadline, answer)
 
     def plan_slowly(self, request: Request, deadline: Deadline, before: Answer) -> Answer:
         """Return the answer of the others too; blocks until the deadline at most."""
-        return _worded(self._slow.climb(request, deadline, before), request)
+        answer = self._slow.climb(request, deadline, before)
+        return self._at_last(request, deadline, answer)
+
+    def _at_last(self, request: Request, deadline: Deadline, before: Answer) -> Answer:
+        """Leave something out where nobody has understood the whole."""
+        return _worded(self._last.climb(request, deadline, before), request)
 
     def check_given(self, document: Json | list[object] | str, request: Request) -> Answer:
         """Return the answer to a plan that somebody made elsewhere, in any dialect."""
@@ -155,7 +167,7 @@ class _GivenPlan:
         return Proposal(plan=parse_plan(self.document), rung=self.name, confidence=1.0)
 
 
-_NOT_KEPT: Final = frozenset({RulesRung.name, PlanCache.name, "given", CORRECTED})
+_NOT_KEPT: Final = frozenset({RulesRung.name, PlanCache.name, GistRung.name, "given", CORRECTED})
 
 
 def _worded(answer: Answer, request: Request) -> Answer:

@@ -14,6 +14,7 @@ from typing import Final
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.gist_rung import GistRung
 from vla_deploy.planning.glued import parted
 from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.ladder import Answer
@@ -63,6 +64,7 @@ class Rehearing:
             return None
         first = self._of(command)
         makes_sense = answer.is_final if first is None else answer.plan is not None
+        makes_sense = makes_sense and not _is_gist(answer)
         seeks_unseen = _is_unsure(command) and _seeks_unseen(answer, request)
         if makes_sense and not seeks_unseen:
             return None
@@ -77,7 +79,8 @@ class Rehearing:
     def concluded(self, command: Command, request: Request, answer: Answer) -> Heard:
         """Return what is to be concluded: of readings without a plan the first."""
         first, self._first = self._of(command), None
-        if first is None or (answer.plan is not None and not _seeks_unseen(answer, request)):
+        makes_sense = answer.plan is not None and not _is_gist(answer)
+        if first is None or (makes_sense and not _seeks_unseen(answer, request)):
             return Heard(command=command, request=request, answer=answer)
         return first
 
@@ -85,6 +88,11 @@ class Rehearing:
         first = self._first
         same = first is not None and first.command.command_id == command.command_id
         return first if same else None
+
+
+def _is_gist(answer: Answer) -> bool:
+    """Tell whether words were left out for a plan: others may make sense as a whole."""
+    return answer.proposal is not None and answer.proposal.rung == GistRung.name
 
 
 def _seeks_unseen(answer: Answer, request: Request) -> bool:

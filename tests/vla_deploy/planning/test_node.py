@@ -61,7 +61,7 @@ def test_why_nobody_planned_it_is_told(desk):
     (refused,) = desk.answers()
     assert refused["event"] == "rejected"
     assert refused["reason"].startswith('I do not understand "sing a sea shanty"')
-    assert [one["rung"] for one in refused["attempts"]] == ["rules", "cache"]
+    assert [one["rung"] for one in refused["attempts"]] == ["rules", "cache", "gist"]
 
 
 def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
@@ -158,7 +158,7 @@ def test_the_status_tells_of_commands_rungs_and_the_cache(desk):
     assert status["by_rung"]["rules"]["planned"] == 1
     assert status["by_rung"]["rules"]["declined"] == 1
     assert status["cache"]["misses"] == 1
-    assert status["rungs"] == ["rules", "cache"]
+    assert status["rungs"] == ["rules", "cache", "gist"]
 
 
 def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(

@@ -42,7 +42,7 @@ _BESIDE_THERE: Final = re.compile(
 )
 NO_THING: Final = re.compile(
     r"^(?:the |my |your )?(?:far |very )?(?:left|right|middle)$|\b(?:is|are|that|which|farthest|"
-    r"furthest|not|lying|standing|sitting|resting)$"
+    r"furthest|nearest|closest|not|lying|standing|sitting|resting)$"
 )
 # What is said of a thing to tell it from others is no name for it.
 _SAYS_MORE: Final = re.compile(
@@ -83,6 +83,11 @@ def pick(groups: Groups, _: Request) -> list[Step]:
     """Take each thing."""
     arm = arm_in(groups)
     return [("pick_up", {"object": part, **arm}) for part in parts_of(groups["object"])]
+
+
+def pick_two(groups: Groups, _: Request) -> list[Step]:
+    """Take a thing of a kind with each hand."""
+    return [("pick_up", {"object": f"two {groups['object']}s"})]
 
 
 def split_put(groups: Groups, request: Request) -> tuple[str, str, str]:

@@ -7,6 +7,7 @@ from typing import Final
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.breaths import without_breaths
 from vla_deploy.planning.rules.figures import in_figures
+from vla_deploy.planning.rules.rewording import reworded
 from vla_deploy.planning.rules.run_together import with_commas
 from vla_deploy.planning.rules.verbs import DOING, any_verb
 from vla_deploy.planning.understanding.purposes import without_purpose
@@ -38,7 +39,7 @@ _POLITE_BEFORE: Final = re.compile(
     r"i would (?:appreciate it|be (?:glad|happy|grateful)) if you(?:'d| would| could)|"
     r"what i (?:want|need) is for you to|possibly|so|well|quickly|maybe|perhaps|"
     r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait|see|"
-    r"check|charge|dock|stand|park|turn|open|close|drop|leave|give)\b)|"
+    r"check|charge|dock|stand|park|turn|open|close|drop|leave|give|have)\b)|"
     r"come (?:and )?(?=(?:get|fetch|pick|take|help|look)\b)|"
     r"(?:would|will) you be able to|are you able to|is it possible (?:for you )?to|"
     r"(?:could|can|may|might) i (?:ask|trouble|get|bother) you to|"
@@ -48,7 +49,12 @@ _POLITE_BEFORE: Final = re.compile(
     r"see if you can|try to|try and|start to|next|finally|also|alright|all right|"
     r"if it(?:'s| is) not too much trouble|excuse me|pardon me|if you don't mind|"
     r"right then|but(?= (?:go|also|do|take|put|pick|bring|keep|hang|hold|leave)\b)|"
-    r"plus)\b[, ]*"
+    r"you(?= (?:look|go|take|get|bring|put|find|pick|fetch|drive|come|turn|search|carry|recharge|"
+    r"charge|move)\b)|"
+    r"(?:would|could|can) you (?:ever|at all|possibly)|"
+    r"when(?:ever)? you (?:get|have) (?:a|the) (?:sec|second|minute|moment|chance)|"
+    r"be an angel and|away and|plus|if you(?:'d| would| could)(?= (?:just|please|kindly)\b)|"
+    r"but(?= don't (?:drop|let go|put down)\b))\b[, ]*"
 )
 _POLITE_AFTER: Final = re.compile(
     r"[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
@@ -56,18 +62,25 @@ _POLITE_AFTER: Final = re.compile(
     r"anywhere|for us|and nothing else|"
     r"for (?:my|our|the) (?:daughter|son|wife|husband|mum|mom|mother|dad|father|"
     r"grandma|granny|gran|grandpa|grandad|sister|brother|kids?|children|baby|guests?|friends?|"
-    r"visitors?|neighbours?|boss|nurse|doctor|partner|girlfriend|boyfriend)|"
-    r"mate|love|dear|darling|pal|buddy|bud|lol|sweetie|"
+    r"missus|visitors?|neighbours?|boss|nurse|doctor|partner|girlfriend|boyfriend)|"
+    r"mate|love|dear|darling|pet|pal|buddy|bud|lol|sweetie|this time|"
+    r"with (?:everything else|the (?:rest|others|other ones))|where (?:it|they) belongs?|"
     r"carefully|gently|my friend|cheers|ta|right away|"
     r"straight away|real quick|asap|okay|ok|if you would|if you don't mind|if possible|"
     r"when(?:ever)? you (?:can|get (?:a|the) (?:chance|moment|minute|second)|"
     r"have (?:a|the) (?:chance|moment|minute|second|time)|(?:are|get) (?:here|back|done|ready|"
     r"finished|home)|'re (?:here|back|done|ready|finished|home))|"
     r"when you're (?:here|back|done|ready|finished|home)|"
-    r"where (?:i|we) can (?:find|see|reach|get at) (?:it|them)(?: \w+)?)$|[.!?, ]+$"
+    r"these days|nowadays|for now|just for now|at (?:the moment|present)|this (?:minute|instant|"
+    r"very \w+)|for once|"
+    r"where (?:i|we) can (?:find|see|reach|get at) (?:it|them)(?: \w+)?)$|"
+    r",\s*(?:son|hen|lad|lass|man|boss|chief|sir|madam|ma'am|honey|sweetheart|guys|folks|eh|yeah|"
+    r"yes|huh|innit|alright)$|[.!?, ]+$"
 )
 # What likens a clause to another one, and says nothing where it can stand alone.
-_ECHO: Final = re.compile(r"[, ]*\b(?:again|too|also|as well|likewise|once more|(?<!the )first)$")
+_ECHO: Final = re.compile(
+    r"[, ]*\b(?:again|too|also|as well|likewise|once more|(?<!the )first|next|after that)$"
+)
 _SPLIT: Final = re.compile(
     r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|"
     r"(?<!\bgo )(?<!\btry )and|(?<=\bgo )and(?= (?:come|go|then|drive|return)\b)|"
@@ -75,29 +88,12 @@ _SPLIT: Final = re.compile(
 )
 # What people say while they think, and words said twice.
 _FILLER: Final = re.compile(
-    r",?\s*\b(?:um+|uh+|er+m?|hmm+|ugh|och|aye|oops|you know|like,|let me (?:think|see)(?=,)|"
+    r",?\s*\b(?:um+|uh+|er+m?|hmm+|ugh|och|aye|oops|(?<!do )(?<!did )you know(?! where| what| if|"
+    r" the)|like,|let me (?:think|see)(?=,)|"
     r"(?:what's|what is|what was|what are) (?:it|that|they|its name)(?: called)?(?: again)?(?=,)|"
     r"how do you (?:say|call it)|what do you call it|whatsit|whatchamacallit)"
     r"(?=[\s,.!?]|$),?\s*"
 )
-# How people run words together.
-_FORMS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
-    (re.compile(rf"\b{pattern}\b"), full)
-    for pattern, full in (
-        ("gimme", "give me"), ("lemme have", "give me"), ("wanna", "want to"),
-        ("gotta", "have to"), ("gonna", "going to"), ("outta", "out of"), ("'em", "them"),
-        ("whereabouts(?= (?:is|are)\\b)", "where"), ("thae", "those"),
-        ("help me look$", "look for it"),
-        ("(?:turn|spin)(?: right| all the way| yourself)? (?:a?round|about),?"
-         "(?: and| to| so(?: that)?)?"
-         "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)", "turn around"),
-        ("face the other (?:way|side|direction)", "turn around"),
-        (r"((?:take|get|fetch|pick|grab|find)\b[^,;.!?]*?),? (?:and )?"
-         r"once you(?:'ve| have) got (?:it|them)",
-         r"\1 and then"),
-        (r"ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
-    )
-)  # fmt: skip
 _TWICE: Final = re.compile(r"\b(\w+)(?: \1\b)+")
 # Whole parts of a sentence that ask for nothing.
 _COURTESY: Final = re.compile(
@@ -112,10 +108,16 @@ _COURTESY: Final = re.compile(
     r"(?:and )?(?:then )?you(?:'re| are) (?:all )?done|(?:and )?(?:you )?can go(?: now)?|"
     r"that(?:'s| is| will be| would be) (?:all|it|great|lovely|enough)|no (?:rush|hurry)|"
     r"(?:no,? )?(?:that's |it's |that was )?(?:the )?wrong one|take your time|"
-    r"good (?:robot|boy|girl|job)|well done|great|perfect|do me a favou?r|"
+    r"yeah|yep|aye|right then|keep going|carry on|good (?:robot|boy|girl|job)|well done|great|"
+    r"perfect|lovely|brilliant|super|excellent|cool|nice|good|fine|do me a favou?r|"
+    r"(?:can|could|would|will) you (?:sort|see to|do|arrange|handle) (?:that|it)(?: out)?(?: for "
+    r"me)?|"
     r"(?:don't|do|haven't|have|isn't|is|aren't|are|can't|can|won't) (?:you|i|we|it|they)|"
     r"not (?:a bit|any|one step|an inch|much)? ?(?:further|farther|more)|"
-    r"(?:my )?(?:dear|love|mate|darling)|where(?:ver)? (?:it|they) (?:is|are|may be|might be)"
+    r"(?:my )?(?:dear|love|mate|darling|pet|buddy|pal|friend|lad|son|sweetheart)|"
+    r"(?:and )?stay (?:there|near me|with me|put|close(?: by)?|where you are)|"
+    r"(?:keep|leave) your (?:wheels|base|feet|body) (?:where they are|where it is|still)|"
+    r"where(?:ver)? (?:it|they) (?:is|are|may be|might be)"
 )
 # At the beginning these ask for nothing either; later on they are a side, and something to do.
 _OPENING: Final = re.compile(r"right(?: then)?|look")
@@ -190,8 +192,7 @@ def plain(text: str) -> str:
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
     text = with_commas(without_purpose(without_breaths(text)))
     text = _REASON.sub("", _ASKED_BETWEEN.sub(", ", text))
-    for pattern, full in _FORMS:
-        text = pattern.sub(full, text)
+    text = reworded(text)
     return in_figures(_TWICE.sub(r"\1", _BETWEEN.sub(r"\1& ", text)))
 
 

@@ -99,9 +99,9 @@ def _fits(clause: str) -> Iterator[Fit]:
 
 
 def _given(found: re.Match[str]) -> Groups:
-    """Return what a pattern has found; further groups for the same thing have a 2 or 3 behind."""
+    """Return what a pattern has found; further groups for the same thing have a number behind."""
     return {
-        name.rstrip("23"): value for name, value in found.groupdict().items() if value is not None
+        name.rstrip("234"): value for name, value in found.groupdict().items() if value is not None
     }
 
 

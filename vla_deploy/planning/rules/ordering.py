@@ -9,30 +9,10 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from vla_deploy.planning.rules.clauses import courtesy_off, is_stop
+from vla_deploy.planning.rules.verbs import FORMS
 
 Known = Callable[[str], bool]
 
-# How the verbs of commands are put in a subordinate clause, each with the one for a command.
-_FORMS: Final[Mapping[str, str]] = {
-    form: verb
-    for verb, forms in {
-        "go": "go going gone went", "drive": "drive driving driven drove",
-        "come": "come coming came", "move": "move moving moved", "return": "return returning "
-        "returned", "turn": "turn turning turned", "put": "put putting", "place": "place placing "
-        "placed", "set": "set setting", "drop": "drop dropping dropped", "leave": "leave leaving "
-        "left", "pick": "pick picking picked", "take": "take taking taken took",
-        "grab": "grab grabbing grabbed", "get": "get getting got gotten", "fetch": "fetch "
-        "fetching fetched", "bring": "bring bringing brought", "give": "give giving given gave",
-        "carry": "carry carrying carried", "find": "find finding found", "look": "look looking "
-        "looked", "search": "search searching searched", "check": "check checking checked",
-        "tidy": "tidy tidying tidied", "clear": "clear clearing cleared", "open": "open opening "
-        "opened", "close": "close closing closed", "say": "say saying said", "visit": "visit "
-        "visiting visited", "deliver": "deliver delivering delivered", "stow": "stow stowing "
-        "stowed", "store": "store storing stored", "tuck": "tuck tucking tucked", "throw":
-        "throw throwing thrown threw",
-    }.items()
-    for form in forms.split()
-}  # fmt: skip
 # How one says that one is somewhere: that is where to go.
 _THERE: Final = re.compile(
     r"(?:are|'re|get|have got|'ve got|have arrived|'ve arrived|arrive|have been|'ve been|reach|"
@@ -95,7 +75,7 @@ def _parted(text: str, is_known: Known) -> str | None:
     under, main = ("later", "first") if found["word"] == "before" else ("first", "later")
     words = found["rest"].split()
     for at in range(len(words) - 1, 1, -1):
-        if words[at] not in _FORMS.values():
+        if words[at] not in FORMS.values():
             continue
         halves = {f"under_{under}": " ".join(words[:at]), main: " ".join(words[at:])}
         commands = (_command(halves, under), halves[main])
@@ -114,7 +94,7 @@ def _command(parts: Mapping[str, str], name: str) -> str | None:
         return f"go to {somewhere['place']}"
     said = re.sub(rf"^{_SUBJECT}", "", said)
     verb, _, rest = said.partition(" ")
-    return f"{_FORMS[verb]} {rest}".strip() if verb in _FORMS else None
+    return f"{FORMS[verb]} {rest}".strip() if verb in FORMS else None
 
 
 def _holds(command: str) -> bool:

@@ -97,6 +97,14 @@ def empty_hand(groups: Groups, _: Request) -> list[Step]:
     return [("place", {"object": f"what is in your {arm.get('arm', '')} hand", **arm})]
 
 
+def empty_hands(groups: Groups, _: Request) -> list[Step]:
+    """Put down, here or somewhere, all that the hands hold."""
+    where: dict[str, Any] = {}
+    if "destination" in groups:
+        where = {"destination": groups["destination"], "relation": _relation(groups["relation"])}
+    return [("place", {"object": "everything you are holding", **where})]
+
+
 def put_away(groups: Groups, _: Request) -> list[Step]:
     """Put things into the box."""
     return _put_each(groups["object"], destination=STORE, relation="in")

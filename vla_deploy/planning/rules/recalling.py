@@ -14,7 +14,8 @@ from vla_deploy.planning.understanding.conversation import Outcome, Turn
 _AGAIN: Final = re.compile(
     r"(?:and )?(?:(?:do|try|say|make|repeat) (?:it|that|this|so|the same(?: thing)?) )?"
     r"(?:(?:once )?again|once more|one more time|(?:yet )?another time|one more|another one)|"
-    r"(?:please )?repeat(?: (?:it|that|this))?|(?:do )?(?:just )?the same(?: thing)?(?: again)?|"
+    r"(?:please )?repeat(?: (?:it|that|this))?|(?:do )?(?:just )?the (?:very |exact )?same(?: "
+    r"thing)?(?: again)?|"
     r"(?:the )?same again|(?:do|try) (?:it|that) again"
 )
 # How much "a bit more" is of the distance, angle or time that was last given outright.
@@ -25,7 +26,7 @@ RATIOS: Final[Mapping[str, float]] = {
     r"": 0.5,
     r"(?:much|a lot|lots)": 1.0,
 }
-_FURTHER: Final = r"(?:more|further|farther|longer)(?: (?:on|ahead|round))?"
+_FURTHER: Final = r"(?:more|further|farther|longer)(?: (?:on|ahead|round))?(?: than that)?"
 _SHARES: Final[Mapping[str, float]] = {
     r"half (?:that|as (?:much|far|long)|the (?:way|distance))(?: again)?": 0.5,
     r"(?:as much|the same amount|that much)(?: again)?": 1.0,
@@ -100,6 +101,12 @@ def recalled(text: str, request: Request) -> str | None:
     if _REVERSE.fullmatch(text):
         return _reverse(request)
     return (_reverse(request) or "go back") if _BACK.fullmatch(text) else None
+
+
+def points_back(text: str) -> bool:
+    """Tell whether words only point at the command before them."""
+    patterns = (_AGAIN, _BACK, _REVERSE, *(pattern for pattern, _ in _MORE))
+    return any(pattern.fullmatch(text) for pattern in patterns)
 
 
 def is_again(text: str) -> bool:

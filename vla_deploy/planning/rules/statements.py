@@ -10,14 +10,14 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.references import words_of
+from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.rules.building import Groups, is_one, is_seen, parts_of
 from vla_deploy.planning.rules.clauses import repaired
 from vla_deploy.planning.rules.fits import known_fit
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world.vocabulary import KIND_WORDS
+from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
 _STOPS: Final = frozenset({"stop", "halt", "freeze"})
 _THING: Final = r"(?P<thing>(?:my|the|our) .+?)"
@@ -28,11 +28,19 @@ _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
         rf"(?:find|see|spot|remember where i (?:put|left)) {_THING}(?: anywhere)?",
         rf"i(?:'ve| have| seem to have| must have| think i(?:'ve)?)? (?:lost|mislaid|misplaced) "
         rf"{_THING}",
-        rf"i(?:'ve| have| must have| think i(?:'ve)?)? (?:left|forgot|forgotten|put) {_THING} "
-        r"(?:in|on|at|by) (?P<place>.+)",
+        rf"i(?:'ve| have| must have| seem to have| think i(?:'ve)?)? (?:left|forgot|forgotten|put)"
+        rf" {_THING} (?:away )?(?:in|on|at|by) (?P<place>.+?)(?: by (?:mistake|accident)| again)?",
+        r"i (?:don't|do not|can't|cannot) (?:see|find|spot) (?P<thing>(?:any|an?|the|my|our) .+?)"
+        r"(?: anywhere)?",
+        r"(?:somewhere )?(?:in|on|at) (?P<place>.+?),? (?:somewhere )?(?:there(?:'s| is| should be|"
+        r" must be)|(?:is|should be|must be)) (?P<thing>(?:an?|my|our|some) .+)",
         r"(?:(?:do|can) you )?see (?P<thing>(?:my|the|our|that|those|these) .+?)"
         r"(?: (?:over )?there)?",
-        rf"{_THING}(?:'s| is| are| must be| should be) (?:still )?(?:in|on|at) (?P<place>.+)",
+        rf"{_THING}(?:'s| is| are| must be| should be|(?: have| has)? ended up| seems? to be|(?: "
+        rf"were| "
+        r"was|'ve been| have been| has been|(?: have| has)? got) left) (?:still |lying |sitting |"
+        r"over )?"
+        r"(?:in|on|at) (?P<place>.+?)(?: again)?",
         rf"(?:someone|somebody|we|he|she|they)(?:'ve| have|'s| has)? (?:left|put|dropped) {_THING} "
         r"(?:in|on|at|by) (?P<place>.+)",
         r"there(?:'s| is| should be| must be| might be| ought to be) "
@@ -53,23 +61,64 @@ _BESIDE: Final = re.compile(
     r"i(?:'m| am) (?:so |very |really |a bit )?"
     r"(?:thirsty|tired|hungry|cold|late|in a hurry|busy)\b.*|"
     r"(?:now )?i (?:just |really )?(?:can't|cannot|don't) .*\bremember\b.*|"
+    r"(?:just )?(?:keep|hold)(?: on to)? (?:it|them) (?:in your (?:hands?|claws?|grippers?)|"
+    r"there|for me)"
+    r"(?: (?:while|until|till|so) .*)?|"
+    r"(?:because|since|as|seeing (?:as|that)|given that|now that|which) "
+    r"(?:i|we|he|she|they|it|there|that|is|are|means|my|the)\b(?!.*\b(?:you|if|unless)\b).*|"
+    r"not (?:lying|sitting|standing|left|hanging)\b.*|"
     r"i (?:need|want) to (?:read|drink|leave|call|go)\b.*)"
 )
+# Somebody who is somewhere: that is where things go that are for them.
+_SOMEBODY_AT: Final = re.compile(
+    r"(?:and |because |since |as )?(?:there(?:'s| is| are|'ll be| will be) )?"
+    r"(?:someone|somebody|an? \w+|(?:my|our) [a-z]+|the (?:guests?|visitors?|kids?|children)|he|"
+    r"she|"
+    r"they|we|i)(?:'s|'m|'re| am| is| are|'ll be| will be)?"
+    r"(?: (?:sitting|waiting|working|standing|lying|resting|busy|already|just|still|up|down|over))*"
+    r" (?:in|at|by|on|near) (?P<place>(?:the|my|our) .+?)"
+    r"(?: (?:any (?:minute|moment|second)|now|already))?"
+    r"(?: (?:who )?(?:needs?|wants?|is asking for|asked for|would like|could use) (?P<thing>.+))?"
+)
+_TO_THEM: Final = re.compile(r"\bto (?:her|him|them|us|me)(?: there)?$")
+_MEET: Final = re.compile(
+    r"(?:go )?(?:and )?(?:meet|greet|see|join|find|welcome|say (?:hello|hi) to) (?:them|him|her|"
+    r"us|me)"
+)
+# "The larger" of the balls that were spoken of.
+_OF_A_KIND: Final = re.compile(
+    rf"\b(?:the|that) (?P<which>(?:\w+(?:er|est)|{'|'.join(COLOURS)}))(?: one)?$"
+)
+_SEVERAL: Final = re.compile(
+    r"(?:there(?:'s| are| is)|i (?:can )?see|you(?:'ve| have)(?: got)?|we(?:'ve| have)(?: got)?|"
+    r"(?:can|do) you see) (?:two|three|four|some|a (?:couple|few|pair) (?:of )?|several|both|"
+    r"those|the)"
+    rf" (?:\w+ ){{0,2}}?(?P<kind>{KIND_WORDS})e?s?\b.*"
+)
+# What stays as it is; nothing that the rest is about.
+_LEFT_ALONE: Final = re.compile(
+    r"(?:and |but |just )*(?:leave|keep) (?P<thing>(?:the|my|that|this|those|these) .+?) "
+    r"(?:where (?:it|they) (?:is|are|lies?|stands?|sits?|belongs?)|alone|be|as (?:it|they) (?:is|"
+    r"are)|"
+    r"in peace|right there)"
+)
 _IT_IS_AT: Final = re.compile(
-    r"(?:it|they)(?:'s|'re| is| are| should be| must be| might be| may be)(?: still| probably)? "
-    r"(?:lying |standing )?(?:in|on|at|by|beside|near|next to) (?P<place>.+)"
+    r"(?:it|they)(?:'s|'re|'ll be| is| are| will be| should be| must be| might be| may be)"
+    r"(?: still| probably)? "
+    r"(?:lying |standing )?(?:in|on|at|by|beside|near|next to) (?P<place>.+?)(?: somewhere)?"
 )
 _BELONGS: Final = re.compile(
     r"(?:the|my|our|this|that|these|those|it|they)\b.* (?:belongs?|lives?|goes|go) (?:in|on|at|to) "
 )
 _PUT_THERE: Final = re.compile(
-    r"(?:so |please )*(?:put|pop|stick|place|set|take|drop|bring|move) (?:it|them|that one) "
-    r"(?:back )?(?:(?:in |on |over )?there|where (?:it|they) belongs?)"
+    r"(?:so |please )*(?:put|pop|stick|place|set|take|drop|bring|move|leave) (?:it|them|that one) "
+    r"(?:back |down )*(?:(?:in |on |over )?there|on it|in it|where (?:it|they) belongs?)"
 )
 # Somebody's doings and states; not what one wants, forbids, or puts under a condition.
 _REMARK: Final = re.compile(
     r"(?:and |but |because |since |as )?(?:i|we|he|she|they|you|it|there|that|nobody|somebody|"
-    r"someone|can't|cannot|couldn't|haven't|(?:my|your|our) \w+)"
+    r"someone|can't|cannot|couldn't|haven't|(?:my|your|our) \w+|the (?:\w+ )?\w+(?= (?:is|are|was|"
+    r"were|has|have|will|comes?|needs)\b|'s\b))"
     r"(?:'(?:m|ve|ll|re|s|d))?\b(?!.*\b(?:must|should|shall|can you|"
     r"need|needs|want|wants|wish|like|please|if|unless|until|when|whenever|after|before|later|"
     r"tomorrow|tonight|don't|do not|not to|never|leave|instead|rather)\b).*"
@@ -78,7 +127,13 @@ _NAMED: Final = re.compile(
     r"\b(?:the|my|our|your|a|an|that|this) (?:\w+ ){0,2}?"
     rf"(?:{KIND_WORDS})(?:e?s)?\b"
 )
-_POINTS: Final = re.compile(r"\b(?:it|them|they|those)\b")
+_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})\b")
+_CARRIED: Final = re.compile(
+    r"(?:bring|take|carry|move|deliver|put|transport|run|return)\b.* (?:to|into|onto|in|on) .+"
+)
+_POINTS: Final = re.compile(
+    r"\b(?:(?:it|them|they|those)\b|that(?= (?:up|over|away|here|out|off|in|on|to|into|for)\b|$))"
+)
 _NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P<place>.+)")
 _NOT_THAT: Final = re.compile(r"(?:no )?not (?P<thing>(?:the|that|this|my) .+|that|this|it)")
 
@@ -91,10 +146,49 @@ def begins_with_statement(text: str) -> bool:
 
 def statements_off(parts: Sequence[str], request: Request) -> list[str]:
     """Return the parts of a command that ask for something, with what the others lend them."""
-    told = _said_once(_found_where_told(list(parts), request))
+    told = _kind_lent(
+        _place_of_people(_said_once(_found_where_told(list(parts), request)), request)
+    )
     asking = [part for part in told if not _BESIDE.fullmatch(part)] or told
     asking = _told_off(_not_that_off(_not_there_off(asking, request), request), request)
-    return _remarks_off(asking, request)
+    return _remarks_off(_left_alone_off(asking, request), request)
+
+
+def _place_of_people(parts: list[str], request: Request) -> list[str]:
+    """Let "take it to her" be to where she is said to be, and "go and meet him" go there."""
+    for at, part in enumerate(parts):
+        found = _SOMEBODY_AT.fullmatch(part)
+        if found is None or match_place(found["place"], request.world.places) is None:
+            continue
+        there = [_to(found["place"], one) for one in parts]
+        if there == parts:
+            continue
+        rest = there[:at] + there[at + 1 :]
+        return rest if found["thing"] is None else [_POINTS.sub(found["thing"], rest[0]), *rest[1:]]
+    return parts
+
+
+def _to(place: str, part: str) -> str:
+    return f"go to {place}" if _MEET.fullmatch(part) else _TO_THEM.sub(f"to {place}", part)
+
+
+def _kind_lent(parts: list[str]) -> list[str]:
+    """Let "the larger" be the larger ball, where only balls were spoken of before."""
+    found = _SEVERAL.fullmatch(parts[0]) if len(parts) > 1 else None
+    if found is None or _NAMED.search(parts[1]):
+        return parts
+    lent = _OF_A_KIND.sub(rf"the \g<which> {found['kind']}", parts[1])
+    return parts if lent == parts[1] else [lent, *parts[2:]]
+
+
+def _left_alone_off(parts: list[str], request: Request) -> list[str]:
+    """Leave out what stays as it is, beside what is to be done with other things."""
+    kept = [part for part in parts if not _LEFT_ALONE.fullmatch(part)]
+    left = [found["thing"] for part in parts if (found := _LEFT_ALONE.fullmatch(part))]
+    if not kept or not left or not all(is_one(one, request) for one in left):
+        return parts
+    nouns = {found[0] for one in left for found in _KIND.finditer(one)}
+    return parts if any(nouns & set(words_of(part)) for part in kept) else kept
 
 
 def _remarks_off(parts: list[str], request: Request) -> list[str]:
@@ -137,8 +231,12 @@ def _said_once(parts: list[str]) -> list[str]:
     return [
         part
         for at, part in enumerate(parts)
-        if not (at and _PUT_THERE.fullmatch(part) and _BELONGS.match(parts[at - 1]))
+        if not (at and _PUT_THERE.fullmatch(part) and _is_put(parts[at - 1]))
     ]
+
+
+def _is_put(part: str) -> bool:
+    return _BELONGS.match(part) is not None or _CARRIED.fullmatch(part) is not None
 
 
 def _told_off(parts: list[str], request: Request) -> list[str]:

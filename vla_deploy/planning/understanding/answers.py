@@ -14,6 +14,7 @@ from enum import StrEnum
 from typing import Final
 
 from vla_deploy.planning.understanding.conversation import Candidate, Conversation, Question
+from vla_deploy.planning.understanding.known_words import known_words
 from vla_deploy.planning.understanding.phrases import (
     EXTREMES,
     NUMBERS,
@@ -24,6 +25,7 @@ from vla_deploy.planning.understanding.phrases import (
 from vla_deploy.planning.understanding.questions import MOST_CHOICES, either, from_side
 from vla_deploy.planning.understanding.wordings import in_plain_words
 from vla_deploy.world.query import ORDERS
+from vla_deploy.world.vocabulary import ARTICLES
 
 
 class Verdict(StrEnum):
@@ -80,7 +82,10 @@ _SILENT: Final = frozenset(
         "that's", "it's", "said", "oh", "sorry", "ah", "hm", "hmm", "actually", "thanks", "thank",
         "you", "cheers", "ta", "mate", "dear", "love", "one's", "i'd", "like", "would",
         "think", "was", "thinking", "meaning", "talking", "about", "then", "guess", "suppose",
-        "should", "have", "had", "aye", "erm", "probably", "maybe", "course", "duh", "obviously",
+        "two", "three", "those", "these", "should", "have", "had", "aye", "erm", "probably",
+        "maybe",        "course", "duh", "obviously", "if", "make", "there's", "isn't",
+        "aren't", "question",
+        "good", "for", "them", "we", "only", "let's", "pet", "alright",
     }
 )  # fmt: skip
 # Words of the questions themselves.
@@ -94,15 +99,25 @@ _PIECE: Final = re.compile(r"\s*(?:[,;.!?]|\s-+\s)\s*")
 _NOT: Final = re.compile(
     r"(?:no )?(?P<any>(?:any|either|anything|whichever)(?: one| of them)? )?(?:the one )?"
     r"(?:but not|but|not|except|other than|apart from|(?:that |which )?is(?:n'?t| not)|"
-    r"i (?:don'?t|do not) (?:want|mean)) (?P<not>.+?)(?: but (?P<rest>.+))?"
+    r"(?:you can )?leave|"
+    r"i (?:don'?t|do not) (?:want|mean)) (?P<not>.+?)(?: alone| where it is)?(?: but (?P<rest>.+))?"
 )
 # What people say when they are asked, before they answer.
 _SURPRISE: Final = re.compile(
     r"(?:oh |ah |well |hm )*"
     r"(?:there(?:'s| is| are| were)|you(?:'ve| have)(?: got)?|i see|are there) "
     r"(?:two|three|four|several|both|more(?: than one)?)(?: of (?:them|those|these))?(?: there)?|"
+    r"(?:isn't|aren't|wasn't|haven't|hasn't) (?:there|it|they|you|we|i)|"
     r"(?:(?:oh|ah|well|hm|good (?:question|point)|fair (?:enough|point)|my mistake|right|sorry)"
     r"\b ?)+"
+)
+# What is told beside an answer, and picks nothing.
+_REMARK: Final = re.compile(
+    r"(?:and |but |because |since )?(?:it|they|that|those|he|she|there|i|we|you|my \w+)"
+    r"(?:'\w+)?\b.*"
+)
+_NEGATES: Final = re.compile(
+    r"\b(?:not|no|never|neither|nor|but|except|what|where|why|how|who)\b|n't\b"
 )
 _OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
 # Words of an answer even where they tell no candidate from the others.
@@ -150,8 +165,39 @@ def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | No
     if agrees and len(question.candidates) == 1:
         return Verdict.CHOSEN, question.candidates[0]
     verdict, chosen = _judged(question.candidates, in_plain_words(text.lower()))
+    if verdict is Verdict.ANEW:
+        verdict, chosen = _beside_remarks(question.candidates, text.lower())
     # "right" is the one on the right where there is one; of several a yes picks none.
     return (Verdict.UNCLEAR if agrees and verdict is Verdict.ANEW else verdict), chosen
+
+
+def guessed(question: Question, text: str) -> Candidate | None:
+    """Return the one candidate that an answer calls, whatever else it says: "the green, my oil".
+
+    That is None where a word of it could mean another thing. Ask first whether it is a command.
+    """
+    said = " ".join(WORD.findall(in_plain_words(text.lower())))
+    if not question.candidates or _NEGATES.search(said):
+        return None
+    known = _known(question.candidates) | _COMPARING
+    words = _telling(question.candidates, said)
+    told = [word for word in words if word in known]
+    if not told or any(word in known_words() - ARTICLES for word in words if word not in known):
+        return None
+    fitting = [one for one in question.candidates if one.features.issuperset(told)]
+    return fitting[0] if len(fitting) == 1 else None
+
+
+def _beside_remarks(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
+    """Let the one piece of an answer count that picks something, if the others only tell."""
+    pieces = [piece for piece in _PIECE.split(text) if piece]
+    judged = [(piece, *_judged(candidates, piece)) for piece in pieces]
+    picks = [(piece, chosen) for piece, verdict, chosen in judged if verdict is Verdict.CHOSEN]
+    if len(picks) != 1 or not all(
+        _REMARK.fullmatch(piece) for piece in pieces if piece != picks[0][0]
+    ):
+        return Verdict.ANEW, None
+    return Verdict.CHOSEN, picks[0][1]
 
 
 def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:

@@ -38,7 +38,11 @@ _STANDING: Final = (
 )
 _PRAISE: Final = (
     r"favou?rite|trusty|lovely|nice|good|beautiful|precious|usual|fancy|cute|damn|damned|bloody|"
-    r"blasted|silly|poor|dear|own|proper|pretty"
+    r"blasted|silly|poor|dear|own|proper|pretty|"
+    # What it is for, which is nothing to see.
+    r"cereal|breakfast|soup|salad|fruit|coffee|tea|beer|soda|coke|cola|water|juice|wine|milk|tennis|"
+    r"toy|bouncy|rubber|car|house|door|office|telly|tv|television|cook|reading|story|school|library|"
+    r"ceramic|plastic|wooden|metal|glass|paper|cardboard|shiny|empty|full"
 )
 _BUILT: Final = r"(?:low|small|little|big|large|wooden|round|square|long|wee|tiny)"
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
@@ -54,7 +58,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r" with (?:the|a|its) (?:handle|lid|label|stripes?|picture|logo|cap|straw|lettering)"
      r"(?: on (?:it|top))?$", ""),
     (rf"\b{_STANDING}{_AT}", ""),
-    (rf"\b(?:{_PRAISE}) (?=[a-z])", ""),
+    (rf"\b(?:{_PRAISE}) (?=(?!table\b|in\b|on\b)[a-z])", ""),
     (r"\bwee\b|\btiny\b", "small"),
     (rf"\b{_BUILT} (?=(?:table|desk|shelf|sideboard)\b)", ""),
 )  # fmt: skip

@@ -8,9 +8,11 @@ is none of that: then all stays, for whoever refuses conditions to see.
 import re
 from typing import Final
 
+from vla_deploy.world.vocabulary import KIND_WORDS
+
 _PERSON: Final = (
     r"(?:i|we|he|she|it|they|someone|somebody|anyone|anybody|everyone|everybody|"
-    r"(?:the|my|our) \w+(?: \w+)?)"
+    rf"(?:the|my|our) (?!(?:\w+ )?(?:{KIND_WORDS})s?\b)\w+(?: \w+)?)"
 )
 _HARM: Final = (
     r"(?:(?:gets?|is|are|'s|'re) (?:lost|broken|wet|dirty|stolen|trodden|crushed|cold)|"
@@ -33,6 +35,7 @@ _BEHIND: Final = tuple(
         r"go on|"
         r"there's a (?:dear|love|pal|good \w+)|if you (?:can )?manage(?: it| that)?|"
         r"if you'd be so kind|if it's no (?:trouble|bother))",
+        r"with whichever hand (?:you (?:like|want|prefer)|is (?:free|nearer|closer))",
         r"(?:with|using) (?:your|the) (?:free|empty|spare) (?:hand|gripper|arm)",
     )
 )

@@ -1,0 +1,152 @@
+"""Find what a command comes down to: what asks for something, without what is told beside it.
+
+"We're done with the film, so the remote can go in the box" asks for one thing, and "my phone's on
+the table, could you run and get it" for another, of which the first half tells what and where it
+is. Rules know few ways to tell things, and people know many: whatever has a subject and asks for
+nothing is taken for one. What forbids, sets a condition or passes on somebody's words is none.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.references import words_of
+from vla_deploy.planning.rules.building import is_one
+from vla_deploy.planning.rules.clauses import MOST_LETTERS, plain, segments
+from vla_deploy.planning.rules.fits import known_fit
+from vla_deploy.planning.rules.recalling import points_back
+from vla_deploy.planning.rules.verbs import any_verb
+from vla_deploy.planning.understanding.known_words import is_kind, single
+from vla_deploy.planning.understanding.phrases import ORDINALS, PRONOUNS, SIDES
+from vla_deploy.world.vocabulary import ARTICLES, COLOURS, KIND_WORDS
+
+_DOING: Final = any_verb("search", "clean", "follow", "switch", "start", "lift", "grab", "carry")
+_SO: Final = re.compile(
+    r"[,:;]? (?:and )?so (?=(?:please |just |kindly )*"
+    rf"(?:would|could|can|will|i'd|i would|i want|i need|the|my|that|{_DOING})\b)|: "
+)
+_SUBJECT: Final = re.compile(
+    r"(?:(?:and|but|because|since|as|for|now|oh|well|ah|today|tonight|also|so|only|though) )*"
+    r"(?:(?:i|we|you|he|she|it|they|there|that|this|these|those|nobody|somebody|someone|everybody|"
+    r"everyone|who|what|which|why|how come|mr|mrs|ms|dr)\b.*"
+    r"|(?:the|my|our|your|his|her|a|an|some|all|both|[a-z]+'s) .*"
+    r"(?:'s|'re|'ve|'ll|\b(?:is|are|was|were|am|has|have|had|will|would|can|could|needs?|wants?|"
+    r"got|gets?|goes|comes?|came|went|left|keeps?|likes?|looks?|makes?|says?|lives?|belongs?|"
+    r"\w+ed|\w+ing))\b.*)"
+)
+# What is chosen from, or how much is coming.
+_OF_SEVERAL: Final = re.compile(
+    r"(?:of|from|out of|among|(?:can you |do you )?see|choose|select) (?:all )?(?:the|those|"
+    r"these) .+|"
+    r"(?:one|two|three|a (?:few|couple of)) (?:\w+ )?(?:jobs?|things?|tasks?|errands?|"
+    r"favou?rs?)\b.*"
+)
+_MOST_EXCLAIMED: Final = 3
+# No remark: it says what not to do or when, or is what somebody else has said.
+_BINDS: Final = re.compile(
+    r"\b(?:must(?! (?:be|have)\b)|mustn't|shall|allowed|forbidden|avoid|careful|dangerous|if|"
+    r"unless|until|till|"
+    r"whenever|except|instead|rather|stop|wait|cancel|halt|freeze|never|said|says|told|tells|"
+    r"asked|asks|wrote|movie|film|dream|quote|again)\b"
+    r"|\byou\b.*(?:n't|\bnot)\b|(?:n't|\bnot)\b.*\byou\b"
+)
+_MATTERS: Final = frozenset(
+    {
+        "no", "not", "never", "nothing", "none", "without", "except", "instead", "rather", "only",
+        "but", "or", "avoid", "if", "when", "whenever", "until", "till", "unless", "once",
+        "before", "after", "while", "later", "tomorrow", "tonight", "today", "every", "each",
+        "always", "again", "twice", "times", "second", "seconds", "minute", "minutes", "hour",
+        "hours", "said", "say", "says", "tell", "told", "ask", "stop", "halt", "freeze", "wait",
+        "hold", "cancel", "leave", "keep", "stay", "pause", "both", "all", "other", "another",
+        "same", "one", "ones", "too", "also", "actually", "sorry", "meant", "mean", "rest",
+        "forward", "forwards", "back", "backward", "backwards", "up", "down", "around", "round",
+        "hand", "hands", "careful", "help",
+    }
+)  # fmt: skip
+_ARTICLE: Final = r"(?:the|my|our|your|a|an|that|this|those|these|his|her)"
+_NAMED: Final = re.compile(rf"\b{_ARTICLE} (?:[\w']+ ){{0,3}}?(?:{KIND_WORDS})(?:e?s)?\b")
+_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})(?:e?s)?\b")
+_WHERE: Final = re.compile(
+    r"(?:'s|'re| is| are| was| were| must be| should be|)"
+    r"(?: (?:lying|sitting|standing|still|over|just|that is|that's|back|up|down))* "
+    r"(?P<where>(?:on|in|at|by|inside|under|next to|beside|near|nearest|closest to) .+)"
+)
+_POINTS: Final = re.compile(
+    r"\b(?:it|them|they|those|that one|this one|(?:the )?(?:two|three|both|lot) of them|"
+    r"(?:that|this)(?= (?:goes|belongs|should|needs|can|ought|has|in|to|on|up|over|into|out)\b)"
+    r"|that$)"
+)
+_ONE: Final = re.compile(
+    r"\b(?P<which>(?:the|that|my) (?:[\w-]+ )?)one\b|\b(?P<than>the \w+(?:er|est))"
+    r"(?: of (?:the two|them))?$"
+)
+
+
+def gist_of(request: Request) -> str:
+    """Return what of a command asks for something; "" where it is all, or nothing is."""
+    if len(request.text) > MOST_LETTERS:
+        return ""
+    asked, told = list[str](), list[str]()
+    for part in segments(_SO.sub(", ", plain(request.text))):
+        if points_back(part) or known_fit(part, request) is not None:
+            asked.append(part)
+        elif _is_exclaimed(part, request) or _is_told(part) or is_one(part, request):
+            told.append(part)
+        else:
+            return ""
+    if not asked or not told:
+        return ""
+    return ", ".join([_with_what_is_told(asked[0], told, request), *asked[1:]])
+
+
+def _is_told(part: str) -> bool:
+    tells = _SUBJECT.fullmatch(part) or _OF_SEVERAL.fullmatch(part)
+    return tells is not None and _BINDS.search(part) is None
+
+
+def _is_exclaimed(part: str, request: Request) -> bool:
+    """Tell whether a part is a short cry that names nothing that the robot knows."""
+    words = words_of(part)
+    places = {word for name in request.world.places for word in name.split()}
+    is_short = len(words) <= _MOST_EXCLAIMED and not ARTICLES.intersection(words)
+    return is_short and not any(_matters(word, places) for word in words)
+
+
+def _matters(word: str, places: set[str]) -> bool:
+    """Tell whether a word may say what is to be done, or that it is not."""
+    named = word in places or word in COLOURS or is_kind(single(word)) or word in SIDES
+    points = word in ORDINALS or PRONOUNS.get(word) in ("there", "here", "them")
+    is_no = word.endswith("n't") or word.isdigit()
+    return named or points or is_no or word in _MATTERS or re.fullmatch(_DOING, word) is not None
+
+
+def _with_what_is_told(asked: str, told: Sequence[str], request: Request) -> str:
+    """Return what is asked with the thing that was told of in the place of "it", or of "one"."""
+    things = list(dict.fromkeys(thing for part in told for thing in _things(part, request)))
+    points = _POINTS.search(asked)
+    if points and things and not _NAMED.search(asked[: points.start()]):
+        whole = (
+            things
+            if points[0] in ("them", "they", "those") or "of them" in points[0]
+            else things[-1:]
+        )
+        return f"{asked[: points.start()]}{' and '.join(whole)}{asked[points.end() :]}"
+    kinds = {single(found[0]) for part in told for found in _KIND.finditer(part)}
+    one = _ONE.search(asked)
+    if one is None or len(kinds) != 1 or _KIND.search(asked):
+        return asked
+    which = one["which"] or f"{one['than']} "
+    return f"{asked[: one.start()]}{which}{kinds.pop()}{asked[one.end() :]}"
+
+
+def _things(part: str, request: Request) -> list[str]:
+    """Return the things that a part names; where the last is makes it no further one."""
+    told = list[str]()
+    for found in _NAMED.finditer(part):
+        where = _WHERE.fullmatch(part, found.end())
+        whole = "" if where is None else f"{found[0]} {where['where']}"
+        told.append(whole if whole and is_one(whole, request) else found[0])
+        if where is not None:
+            break
+    return [re.sub(rf"^{_ARTICLE} ", "the ", one) for one in told]

@@ -1,0 +1,217 @@
+"""Put roundabout ways of commanding into plain ones, before a command is taken apart.
+
+run off to the kitchen for us   the keys, where on earth are they   the ball, bung it in the box
+
+One table, row after row: what is found as whole words, and what takes its place.
+"""
+
+import re
+from typing import Final
+
+from vla_deploy.planning.rules.passives import in_active_voice
+from vla_deploy.world.vocabulary import COLOURS, CONTAINERS, KIND_WORDS
+
+_COLOUR: Final = "|".join(COLOURS)
+_ROWS: Final[tuple[tuple[str, str], ...]] = (
+    ("gimme", "give me"),
+    ("lemme have", "give me"),
+    ("wanna", "want to"),
+    ("gotta", "have to"),
+    ("gonna", "going to"),
+    ("outta", "out of"),
+    ("'em", "them"),
+    ("whereabouts(?= (?:is|are)\\b)", "where"),
+    ("thae", "those"),
+    ("help me look$", "look for it"),
+    (
+        "(?:turn|spin)(?: right| all the way| yourself)? (?:a?round|about),?"
+        "(?: and| to| so(?: that)?)?"
+        "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)",
+        "turn around",
+    ),
+    ("face the other (?:way|side|direction)", "turn around"),
+    (
+        r"((?:take|get|fetch|pick|grab|find)\b[^,;.!?]*?),? (?:and )?"
+        r"once you(?:'ve| have) got (?:it|them)",
+        r"\1 and then",
+    ),
+    (r"(?:the|them) both of them|the (?:two|three|both) of them", "them"),
+    (r"(?<=[a-z] )(it|them) me$", r"\1 to me"),
+    (
+        r"(?:carry|bring|take|fetch|run) ([^,;.!?]+?) (?:in|inside|through|over|across|along|out|"
+        r"round|up|down|back) and (put|place|set|leave|drop|stick|pop) (?:it|them)(?: down)? "
+        r"(?=(?:in|into|on|onto|to|at|by|next)\b)",
+        r"\2 \1 ",
+    ),
+    (
+        rf"(the|that) (\w{{3,}}(?:er|est)|first|second|third|last|left(?:most)?|right(?:most)?|"
+        rf"middle)(?: one)? (?:of|out of|among) (?:the|those|these) (?:two |three |four |five )?"
+        rf"({KIND_WORDS})(?:e?s)",
+        r"\1 \2 \3",
+    ),
+    (
+        rf"^((?:of|from|out of|among) (?:all )?(?:the|those|these) (?:two |three |four |five )?"
+        rf"(?:{KIND_WORDS})e?s) (?=(?:i|take|pick|get|bring|give|grab|lift)\b)",
+        r"\1, ",
+    ),
+    (
+        r"((?:the|that|this|my) [^,]+?) (?:is|are) (?:the ones?|what)(?: that)? "
+        r"(?:i'd like|i want|i need|i would like)(?: you)? to "
+        r"((?:pick|take|bring|fetch|lift|grab|hold|get|find)(?: up)?)(?=$|[,.!?])",
+        r"\2 \1",
+    ),
+    (
+        r"^(?:one|two|three|an?|a (?:few|couple of)) (?:\w+ )?(?:jobs?|things?|tasks?|errands?|"
+        r"favou?rs?)\b[^:,.]*: ",
+        "",
+    ),
+    (r"where've", "where have"),
+    (
+        r"i(?: want|'d like| need| would like) you (?:to be )?(?:waiting |standing |sitting )?"
+        r"(?:at|in|by) (?=(?:the|my|your)\b)",
+        "go to ",
+    ),
+    (r"(open [^,;.!?]*?) (?:nice and )?wide", r"\1"),
+    (
+        r"(?:what(?:ever)?|the (?:thing|one)(?: that)?) (?:you(?:'ve| have)(?: got)?|"
+        r"you(?:'re| are) (?:holding|carrying)|you hold|you carry|is) in (?:your|the) (left|right)"
+        r"(?: (?:hand|arm|gripper))?",
+        r"what is in your \1 hand",
+    ),
+    (
+        r"(the|that|this|my) ((?:\w+ )?\w+) (?:that )?(?:you(?:'re| are) (?:carrying|holding)|"
+        r"you (?:hold|carry|have))(?: there)?(?= (?:goes|belongs|should|needs|can|is|to|on|in)\b)",
+        r"\1 \2 in your hand",
+    ),
+    (r",? here (?=(?:on|in|at) (?:the|this|that)\b)", " "),
+    (r"give (?:me|us) (?=(?:a|an|one) (?:quarter|half|full|complete|whole) (?:turn|spin))", "do "),
+    (r"(?:tip|tilt|bend|lean) your (?:head|neck|face) back", "look up"),
+    (r"(?:raise|lift) your (?:head|eyes|gaze|face)(?: up)?", "look up"),
+    (r"(?:lower|drop) your (?:head|eyes|gaze|face)(?: down)?", "look down"),
+    (
+        r"(?:tip|tilt|bend|lean|point|aim|move|swing) your (?:head|neck|face|eyes|camera|gaze) "
+        r"(?=(?:up|down|left|right|to)\b)",
+        "look ",
+    ),
+    (
+        r",? so (?:that )?you(?:'re| are) (?:looking|facing) (?:behind you|backwards?|away|"
+        r"the (?:other|opposite) (?:way|direction|side)|where you came from)$",
+        "",
+    ),
+    (r"show me how you(?:'d| would| can| could)? (?=[a-z])", ""),
+    (
+        r"^(?:and )?(?:(?:just )?(?:a )?)?((?:little |wee |tiny )?(?:bit|tad|touch)) "
+        r"(?=more|further|farther)",
+        r"a \1 ",
+    ),
+    (
+        r"(the [^,]+?) is where (the [^,]+?) (?:should (?:be|go)|goes|belongs|lives)",
+        r"\2 goes to \1",
+    ),
+    (r"(?:finish|end)(?: up)?(?: back)?(?: here)? (?:at|in|by) (?=(?:the|my|your)\b)", "go to "),
+    (r", while (?=(?:the|my|that|this|both)\b)", ", and "),
+    (
+        rf"((?:in|into|inside) (?:the|that|my) (?:\w+ )?({'|'.join(sorted(CONTAINERS))}))\b(.*?) "
+        r"(in|into|inside) the (\w+) one",
+        r"\1\3 \4 the \5 \2",
+    ),
+    (r"from (?=(?:beside|next to|by|near|under|behind) )", ""),
+    (r"(nearest|closest) (?=(?:the|my|your|that|this)\b)", r"\1 to "),
+    (r"to (?:me|us)(?: here)? (?:in|at|by|on) (?=(?:the|my|our)\b)", "to "),
+    (
+        r"(?:whichever|whatever) ((?:\w+ )?\w+) (?:is|are|lies|stands|sits) "
+        r"(?=(?:closest|nearest|farthest|furthest|next)\b)",
+        r"the \1 that is ",
+    ),
+    (
+        r"((?:come|look|go|turn|open|close|lift|tilt)\b[^,;.!?]*?) (?:for )?(?:a|one|half a) "
+        r"(?:minute|moment|second|sec|tick|mo)(?=$|[,.!?])",
+        r"\1",
+    ),
+    (
+        r"in (?:the|your) (left|right)(?: hand)?((?:,| and\b)[^.;!?]+) in (?:the|your) "
+        r"(left|right)(?: hand)?$",
+        r"in your \1 hand\2 in your \3 hand",
+    ),
+    (
+        r"((?:what(?:'s| is| you(?:'ve| have)(?: got)?)|the (?:thing|one)) in your "
+        r"(?:left|right))(?! (?:hand|arm|gripper|claw))",
+        r"\1 hand",
+    ),
+    (r"ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
+    # --- interjections and fillers inside a sentence
+    (
+        r"(?:on earth|in the world|the (?:hell|heck|devil|blazes)|in (?:the name of )?"
+        r"(?:god|heaven)(?:'s name)?) (?=(?:is|are|did|have|has|do)\b)",
+        "",
+    ),
+    (
+        r"(?:be (?:a|an) (?:dear|love|star|angel|pal|good \w+)|be so (?:kind|good)|"
+        r"do me a favou?r) and (?=[a-z])",
+        "",
+    ),
+    (r"(?:and )?while you(?:'re| are) (?:at it|there|up),? ", ""),
+    (r" for (?:tonight|today|the night|the moment|the time being|now)(?=$|[,.!?]| and\b)", ""),
+    (
+        r"(?:about|roughly|approximately|around|some) (?=(?:\d|one|two|three|four|five|ten|fifteen|"
+        r"twenty|thirty|forty|fifty|sixty|ninety|half a|a (?:half|quarter|foot|metre|meter))\b"
+        r"[^,]*\b(?:degrees?|m|met(?:er|re)s?|cm|centimet(?:er|re)s?|feet|foot|inch(?:es)?|steps?)\b)",
+        "",
+    ),
+    (r"(half|quarter)-(?=turn|circle|spin)", r"\1 "),
+    (r"make (?:me|us) (?=an? )", "do "),
+    (r"open up (?=(?:your|the|both)\b)", "open "),
+    (r"(put|take|tidy|clear) me (away|up|down)", r"\1 \2"),
+    (
+        rf"(?<!bring )(?<!give )(?<!get )(?<!fetch )(?<!hand )(?<!pass )(?<!find )(?<!show )"
+        rf"(?<!tell )(?<!for )(?<!to )me (?=(?:{KIND_WORDS})\b)",
+        "my ",
+    ),
+    (
+        rf"(bring us|give us|get us|fetch us|where are|where's|lost|found) me "
+        rf"(?=(?:{KIND_WORDS})\b)",
+        r"\1 my ",
+    ),
+    # --- "that can go in the box" says what it may, not that it is a can
+    (r"(that|it|this|they|those|these) can (?=(?:go|be|stay|live|come)\b)", r"\1 should "),
+    # --- what is said to be so, and shall be
+    (
+        r"(?:see to it|make sure|ensure|check)(?: that)? ((?:the|my|it|that|this|both|all|they)"
+        r"(?: (?!\bis\b|\bare\b)[\w']+){0,6}?) (?:is|are|ends? up|goes|gets?) "
+        r"(?:put )?(in|into|on|onto) ",
+        r"put \1 \2 ",
+    ),
+    (r"you(?:'re| are) (?:needed|wanted) (?:over )?(?:at|in|by) ", "go to "),
+    (r"i(?: want|'d like| need| would like) you over (?:at|in|by) (?=(?:the|my|your)\b)", "go to "),
+    (
+        r",? after (?:which|that|this),? (?:i want you to |you should |you can |please )?(?=[a-z])",
+        ", then ",
+    ),
+    (r"let(?:'s| us) (?:begin|start) with ([^,]+), which (?=goes|belongs|should)", r"\1 "),
+    # --- telegrams: "red can in the box", "ball goes on the shelf"
+    (
+        rf"(?:(?<=, )|(?<=: )|(?<=and )|^)(?=(?:(?:{_COLOUR}|big|small) (?:{KIND_WORDS})|"
+        rf"(?!can\b)(?:{KIND_WORDS}))s? (?:goes|go|ought|needs?|should|belongs?|has to|wants?|"
+        rf"into|onto|back)\b)",
+        "the ",
+    ),
+    # --- taking and turning
+    (r"(lift|pick|get|take|grab) ([^,;.!?]+?) up off (?=(?:the|that|this|my)\b)", r"\1 up \2 off "),
+    (
+        r"(?:tell me|check|see|find out|say) (?:if|whether) ((?:the|my|a|your) [^,]+?) (is|are) "
+        r"(?=(?:still )?(?:in|on|at|inside)\b)",
+        r"\2 \1 ",
+    ),
+    (
+        r"(?:get|take|bring|put) yourself back on charge|back on charge",
+        "back to your charging station",
+    ),
+)
+_TABLE: Final = tuple((re.compile(rf"(?:\b|(?<=\s)){pattern}"), full) for pattern, full in _ROWS)
+
+
+def reworded(text: str) -> str:
+    """Return a command in lower case in plain words."""
+    for pattern, instead in _TABLE:
+        text = pattern.sub(instead, text)
+    return in_active_voice(text)
