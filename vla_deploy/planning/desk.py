@@ -244,7 +244,7 @@ class Desk:
             self._telling.answered(command, waiting.command)
             self.dialogue.settle()
             self._queue.appendleft(replace(waiting.command, text=full))
-        elif (chosen := guessed(waiting.question, command.text)) and not self._is_command(command):
+        elif (chosen := guessed(waiting.question, command.text)) and not self._has_plan(command):
             self._telling.answered(command, waiting.command)
             self._go_on(waiting, self.dialogue.chosen(chosen))
         elif command.is_answer:
@@ -272,6 +272,12 @@ class Desk:
             return True
         deadline = Deadline.within(self._clock, self.planner.within_s)
         return self.planner.plan_at_once(self._request(command), deadline).is_final
+
+    def _has_plan(self, command: Command) -> bool:
+        """Tell whether whoever takes no time has a plan for words that may be an answer."""
+        deadline = Deadline.within(self._clock, self.planner.within_s)
+        answer = self.planner.plan_at_once(self._request(command), deadline)
+        return command.plan is not None or answer.plan is not None
 
     def _complete(self, waiting: Waiting, text: str) -> None:
         """Plan a command anew together with what answers a question that a model has asked."""

@@ -32,7 +32,7 @@ PUT_GROUPS: Final = ("object", "relation", "destination")
 BESIDE_WORDS: Final = ("next to", "beside", "alongside", "close to", "near")
 BESIDE: Final = "|".join(BESIDE_WORDS)
 _PUT_RELATION: Final = re.compile(
-    r"(?:^| )(?:(?:back|over|up|down) )?"
+    r"(?:^| )(?:(?:back|over|up|down|through|across|along|round|out) )?"
     r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
 )
 _PUT_BESIDE: Final = re.compile(rf"{_PUT_RELATION.pattern}|(?:^| )(?:{BESIDE}) ")

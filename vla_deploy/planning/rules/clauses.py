@@ -40,7 +40,7 @@ _POLITE_BEFORE: Final = re.compile(
     r"what i (?:want|need) is for you to|possibly|so|well|quickly|maybe|perhaps|"
     r"go (?:and )?(?=(?:get|fetch|grab|pick|find|look|search|bring|take|put|tidy|clean|wait|see|"
     r"check|charge|dock|stand|park|turn|open|close|drop|leave|give|have)\b)|"
-    r"come (?:and )?(?=(?:get|fetch|pick|take|help|look)\b)|"
+    r"come (?:and )?(?=(?:stand|wait|get|fetch|pick|take|help|look)\b)|"
     r"(?:would|will) you be able to|are you able to|is it possible (?:for you )?to|"
     r"(?:could|can|may|might) i (?:ask|trouble|get|bother) you to|"
     r"you(?:'d| had)? better|i'd like for you to|i would love (?:it )?(?:if you|for you to)|"
@@ -53,14 +53,20 @@ _POLITE_BEFORE: Final = re.compile(
     r"charge|move)\b)|"
     r"(?:would|could|can) you (?:ever|at all|possibly)|"
     r"when(?:ever)? you (?:get|have) (?:a|the) (?:sec|second|minute|moment|chance)|"
-    r"be an angel and|away and|plus|if you(?:'d| would| could)(?= (?:just|please|kindly)\b)|"
+    r"be an angel and|ever(?= \w)|you(?:'ll| will) have to|you (?:may|might)|"
+    r"(?:would|could) you be (?:good|kind) enough to|let's have you|why don't you|go on then|now "
+    r"then|"
+    r"i(?:'d| would) be obliged if you(?:'d| would)|i wonder whether you (?:could|would)|"
+    r"already(?= \w)|please do|it's time to|time to|away and|plus|if you(?:'d| would| could)(?= "
+    r"(?:just|please|kindly)\b)|"
     r"but(?= don't (?:drop|let go|put down)\b))\b[, ]*"
 )
 _POLITE_AFTER: Final = re.compile(
     r"[, ]*\b(?:please|thanks|thank you|now|right now|if you can|if you could|will you|"
     r"would you|could you|can you|butler|robot|quickly|immediately|at once|instead|somewhere|"
     r"anywhere|for us|and nothing else|"
-    r"for (?:my|our|the) (?:daughter|son|wife|husband|mum|mom|mother|dad|father|"
+    r"for (?:later|good|keeps)|(?<!look )(?<!search )for (?:him|her)|for (?:my|our|the) "
+    r"(?:daughter|son|wife|husband|mum|mom|mother|dad|father|"
     r"grandma|granny|gran|grandpa|grandad|sister|brother|kids?|children|baby|guests?|friends?|"
     r"missus|visitors?|neighbours?|boss|nurse|doctor|partner|girlfriend|boyfriend)|"
     r"mate|love|dear|darling|pet|pal|buddy|bud|lol|sweetie|this time|"
@@ -71,11 +77,13 @@ _POLITE_AFTER: Final = re.compile(
     r"have (?:a|the) (?:chance|moment|minute|second|time)|(?:are|get) (?:here|back|done|ready|"
     r"finished|home)|'re (?:here|back|done|ready|finished|home))|"
     r"when you're (?:here|back|done|ready|finished|home)|"
-    r"these days|nowadays|for now|just for now|at (?:the moment|present)|this (?:minute|instant|"
+    r"these days|nowadays|on the spot|in place|for now|just for now|at (?:the moment|present)|"
+    r"this (?:minute|instant|"
     r"very \w+)|for once|"
     r"where (?:i|we) can (?:find|see|reach|get at) (?:it|them)(?: \w+)?)$|"
     r",\s*(?:son|hen|lad|lass|man|boss|chief|sir|madam|ma'am|honey|sweetheart|guys|folks|eh|yeah|"
-    r"yes|huh|innit|alright)$|[.!?, ]+$"
+    r"yes|huh|innit|alright|hon|bach|miss|darlin'|good fellow|there's a good (?:fellow|chap|"
+    r"lad))$|,\s*right\?$|,\s*no\?$|[.!?, ]+$"
 )
 # What likens a clause to another one, and says nothing where it can stand alone.
 _ECHO: Final = re.compile(
@@ -94,6 +102,7 @@ _FILLER: Final = re.compile(
     r"how do you (?:say|call it)|what do you call it|whatsit|whatchamacallit)"
     r"(?=[\s,.!?]|$),?\s*"
 )
+_DOTS: Final = re.compile(r"\s*(?:\.{2,}|\u2026)\s*")
 _TWICE: Final = re.compile(r"\b(\w+)(?: \1\b)+")
 # Whole parts of a sentence that ask for nothing.
 _COURTESY: Final = re.compile(
@@ -106,9 +115,14 @@ _COURTESY: Final = re.compile(
     r"whichever(?: one)?(?: (?:you (?:like|want|prefer|find)|is (?:closest|nearest|fine)))?|"
     r"(?:it )?(?:doesn't|does not) matter which(?: one)?|i don't (?:mind|care)(?: which(?: one)?)?|"
     r"(?:and )?(?:then )?you(?:'re| are) (?:all )?done|(?:and )?(?:you )?can go(?: now)?|"
-    r"that(?:'s| is| will be| would be) (?:all|it|great|lovely|enough)|no (?:rush|hurry)|"
+    r"that(?:'s| is| will be| would be) (?:all(?: i need)?|it|great|lovely|enough)|no (?:rush|"
+    r"hurry)|"
     r"(?:no,? )?(?:that's |it's |that was )?(?:the )?wrong one|take your time|"
-    r"yeah|yep|aye|right then|keep going|carry on|good (?:robot|boy|girl|job)|well done|great|"
+    r"yeah|yep|aye|right then|keep going|carry on|(?:and )?(?:have a )?rest|take a break|"
+    r"(?:and )?don't (?:let it (?:slip|fall|drop)|drop it|spill (?:it|any))|"
+    r"(?:there's |there is )?no need (?:for you )?to\b.*|(?:did|have|do) you (?:see|seen) (?:it|"
+    r"them)"
+    r"(?: anywhere| somewhere)?|or (?:whether|if) .*|good (?:robot|boy|girl|job)|well done|great|"
     r"perfect|lovely|brilliant|super|excellent|cool|nice|good|fine|do me a favou?r|"
     r"(?:can|could|would|will) you (?:sort|see to|do|arrange|handle) (?:that|it)(?: out)?(?: for "
     r"me)?|"
@@ -189,6 +203,7 @@ _BETWEEN: Final = re.compile(
 @lru_cache(maxsize=256)
 def plain(text: str) -> str:
     """Return a text in lower case without hesitation, with words in full that were run together."""
+    text = _DOTS.sub(", ", text)
     text = " ".join(_FILLER.sub(" ", text.lower().replace("\u2019", "'")).split())
     text = with_commas(without_purpose(without_breaths(text)))
     text = _REASON.sub("", _ASKED_BETWEEN.sub(", ", text))

@@ -8,7 +8,8 @@ from typing import Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.rules.building import PUT_GROUPS, Groups, is_one, parts_of, split_put
 from vla_deploy.planning.rules.intents import Intent
-from vla_deploy.planning.rules.table import RULES, Rule
+from vla_deploy.planning.rules.pattern_parts import Rule
+from vla_deploy.planning.rules.table import RULES
 
 # Which hand to take: said at the end of a clause, whatever it is about. "What is in your left hand"
 # is a thing.

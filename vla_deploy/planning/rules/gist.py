@@ -12,9 +12,10 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.references import words_of
-from vla_deploy.planning.rules.building import is_one
+from vla_deploy.planning.rules.building import is_one, is_seen
 from vla_deploy.planning.rules.clauses import MOST_LETTERS, plain, segments
 from vla_deploy.planning.rules.fits import known_fit
+from vla_deploy.planning.rules.lending import STOPS
 from vla_deploy.planning.rules.recalling import points_back
 from vla_deploy.planning.rules.verbs import any_verb
 from vla_deploy.planning.understanding.known_words import is_kind, single
@@ -35,6 +36,12 @@ _SUBJECT: Final = re.compile(
     r"got|gets?|goes|comes?|came|went|left|keeps?|likes?|looks?|makes?|says?|lives?|belongs?|"
     r"\w+ed|\w+ing))\b.*)"
 )
+# Any other subject, where its verb tells that it is one: "assembly starts at nine".
+_FINITE: Final = re.compile(
+    rf"(?!(?:{_DOING}|please|do|don't|let|make|use|go|wipe|wash|play|call|cook|switch|follow|try)\b)"
+    r"\w+(?: \w+){0,3}?(?:'s| (?:is|are|was|were|am|has|have|had|will|starts?|begins?|ends?|comes?|"
+    r"needs?|wants?|likes?|looks?|gets?|rings?|rests?|waits?|tips?))\b.*"
+)
 # What is chosen from, or how much is coming.
 _OF_SEVERAL: Final = re.compile(
     r"(?:of|from|out of|among|(?:can you |do you )?see|choose|select) (?:all )?(?:the|those|"
@@ -47,9 +54,9 @@ _MOST_EXCLAIMED: Final = 3
 _BINDS: Final = re.compile(
     r"\b(?:must(?! (?:be|have)\b)|mustn't|shall|allowed|forbidden|avoid|careful|dangerous|if|"
     r"unless|until|till|"
-    r"whenever|except|instead|rather|stop|wait|cancel|halt|freeze|never|said|says|told|tells|"
-    r"asked|asks|wrote|movie|film|dream|quote|again)\b"
-    r"|\byou\b.*(?:n't|\bnot)\b|(?:n't|\bnot)\b.*\byou\b"
+    r"whenever|except|instead|rather|wait|cancel|never|said|says|told|tells|"
+    r"asked|asks|wrote|quote|again)\b"
+    r"|\byou\b.*\b(?:(?:do|must|should|need|sha)n't|not)\b|\b(?:(?:do|must|should)n't|not)\b.*\byou\b"
 )
 _MATTERS: Final = frozenset(
     {
@@ -95,21 +102,21 @@ def gist_of(request: Request) -> str:
             told.append(part)
         else:
             return ""
-    if not asked or not told:
+    if not asked or not (told or points_back(asked[0])):
         return ""
     return ", ".join([_with_what_is_told(asked[0], told, request), *asked[1:]])
 
 
 def _is_told(part: str) -> bool:
-    tells = _SUBJECT.fullmatch(part) or _OF_SEVERAL.fullmatch(part)
-    return tells is not None and _BINDS.search(part) is None
+    tells = _SUBJECT.fullmatch(part) or _OF_SEVERAL.fullmatch(part) or _FINITE.fullmatch(part)
+    return tells is not None and not (_BINDS.search(part) or STOPS & set(words_of(part)))
 
 
 def _is_exclaimed(part: str, request: Request) -> bool:
     """Tell whether a part is a short cry that names nothing that the robot knows."""
     words = words_of(part)
     places = {word for name in request.world.places for word in name.split()}
-    is_short = len(words) <= _MOST_EXCLAIMED and not ARTICLES.intersection(words)
+    is_short = len(words) <= _MOST_EXCLAIMED and not ARTICLES.intersection(part.split())
     return is_short and not any(_matters(word, places) for word in words)
 
 
@@ -146,7 +153,9 @@ def _things(part: str, request: Request) -> list[str]:
     for found in _NAMED.finditer(part):
         where = _WHERE.fullmatch(part, found.end())
         whole = "" if where is None else f"{found[0]} {where['where']}"
-        told.append(whole if whole and is_one(whole, request) else found[0])
+        told.append(
+            whole if whole and is_one(whole, request) and is_seen(whole, request) else found[0]
+        )
         if where is not None:
             break
     return [re.sub(rf"^{_ARTICLE} ", "the ", one) for one in told]

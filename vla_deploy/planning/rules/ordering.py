@@ -22,7 +22,7 @@ _THERE: Final = re.compile(
 _DONE: Final = re.compile(
     r",? ?\b(?:once|when|as soon as|after) (?:you(?:'re| are| get| have got|'ve got| have arrived|"
     r"'ve arrived| arrive| have done| have finished|'ve done|'ve finished)(?: (?:back|over))?"
-    r"(?: (?:there|done|finished|ready|that|it|so))*|that(?:'s| is| has been)? done|"
+    r"(?: (?:there|done|finished|ready|that|it|so))*|(?:that|it)(?:'s| is| has been)? done|"
     r"(?:you(?:'ve| have)(?: got)?|you hold) (?:it|them))(?:,| then\b)? ?"
 )
 _AFTER: Final = r"(?:after(?:wards)?|once|as soon as|when)"

@@ -36,7 +36,8 @@ _VERBS: Final = {
     **{
         form: verb
         for form, verb in FORMS.items()
-        if form != verb and form.endswith(("ed", "en", "t", "n", "d", "ing"))
+        if (form != verb or form in ("put", "set"))
+        and form.endswith(("ed", "en", "t", "n", "d", "ing"))
     },
     **DOING,
     **_MORE,
@@ -49,12 +50,18 @@ _THING: Final = (
 )
 _TO_BE: Final = (
     r"(?:needs? (?:to be )?|has to be |have to be |should be |must be |ought to be |can be |"
-    r"could be |(?:is|are) to be |wants? (?:to be )?|could do with (?:being )?)"
+    r"could be |gets? |will be |(?:is|are) to be |wants? (?:to be )?|could do with (?:being )?)"
 )
 _PATTERNS: Final = (
     re.compile(
         rf"(?:(?<=^)|(?<=, )|(?<=\. )|(?<=; )|(?<=and )|(?<=so )|(?<=\? ))(?:i think |i believe )?"
         rf"(?:that )?{_THING} {_TO_BE}{_VERB}"
+    ),
+    re.compile(
+        r"^(?P<thing>)(?:what|how about|(?:it|that)(?:'d| would) (?:be \w+(?: \w+)?|suit me(?: "
+        r"better)?|"
+        r"help(?: me)?(?: a (?:great deal|lot|bit))?)|i(?:'d| would) (?:like it|love it|"
+        rf"appreciate it|be \w+)),? if you (?:could |would |were to )?{_VERB}"
     ),
     re.compile(rf"\bi(?:'d like| want| need| would like) {_THING} (?:to be )?{_VERB}"),
 )
@@ -68,7 +75,8 @@ def in_active_voice(text: str) -> str:
 
 
 def _commanded(found: re.Match[str]) -> str:
-    return f"{_VERBS[found['verb']]} {_THEM.get(found['thing'], found['thing'])}{found['rest']}"
+    thing = _THEM.get(found["thing"], found["thing"])
+    return f"{_VERBS[found['verb']]} {thing}".strip() + found["rest"]
 
 
 _THEM: Final = {"they": "them"}

@@ -29,8 +29,10 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 STORE: Final = "box"
 """What "put it away" means where nothing else is said."""
-_WAY: Final = re.compile(r"^(?:back|over|up|down) ")
-_TOWARDS: Final = frozenset({"to", "over to", "back to", "at"})
+_WAY: Final = re.compile(r"^(?:back|over|up|down|through|across|along|round|out) ")
+_TOWARDS: Final = frozenset(
+    {"to", "at", *(f"{way} to" for way in ("over", "back", "through", "across", "along", "out"))}
+)
 _INTO: Final = frozenset({"in", "into", "inside", "inside of"})
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NothingBefore
+from vla_deploy.planning.plan import Action
 from vla_deploy.planning.understanding.conversation import Outcome, Turn
 
 _AGAIN: Final = re.compile(
@@ -26,7 +27,10 @@ RATIOS: Final[Mapping[str, float]] = {
     r"": 0.5,
     r"(?:much|a lot|lots)": 1.0,
 }
-_FURTHER: Final = r"(?:more|further|farther|longer)(?: (?:on|ahead|round))?(?: than that)?"
+_FURTHER: Final = (
+    r"(?:more|further|farther|longer)(?: (?:on|ahead|round))?"
+    r"(?: than that|,? (?:the same|that) way|,? in (?:the same|that) direction)?"
+)
 _SHARES: Final[Mapping[str, float]] = {
     r"half (?:that|as (?:much|far|long)|the (?:way|distance))(?: again)?": 0.5,
     r"(?:as much|the same amount|that much)(?: again)?": 1.0,
@@ -186,12 +190,24 @@ def _amount(turn: Turn) -> tuple[str, float] | None:
 
 
 def _reverse(request: Request) -> str | None:
-    """Return the last straight way or turn in the other direction, None where it was neither."""
-    amount = _amount(_last(request))
+    """Return the last straight way, turn or look in the other direction, None for other things."""
+    last = _last(request)
+    if last.plan is not None and (way := _looked(last.plan.actions[-1])):
+        return f"look {_OPPOSITE[way]}"
+    amount = _amount(last)
     if amount is None or amount[0] == "wait":
         return None
     skill, value = amount
     return _AMOUNTS[skill][1](-value)
+
+
+_OPPOSITE: Final = {"left": "right", "right": "left", "up": "down", "down": "up"}
+
+
+def _looked(action: Action) -> str:
+    """Return the side to which an action turned the head, "" for none."""
+    way = str(action.parameters.get("direction", ""))
+    return way if action.skill == "look_at" and way in _OPPOSITE else ""
 
 
 def _number(value: Any) -> float:

@@ -33,7 +33,8 @@ REFUSALS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
          r"(?!.*\b(?:in|into|on|onto|inside|to)\b).+",
          "I put things in, on or next to something, not under, behind or before it"),
         (r"(?:carry|lift|move|push|pull|drag|shift|bring|take|pick up|raise|turn over) "
-         r"(?:up )?(?:the|that|this|my|our|your) (?:\w+ ){0,2}(?:table|sofa|couch|bed|chair|"
+         r"(?:up )?(?:the|that|this|my|our|your) (?:(?!off\b|from\b|on\b|in\b|to\b)\w+ "
+         r"){0,2}(?:table|sofa|couch|bed|chair|"
          r"armchair|desk|shelf|cupboard|wardrobe|fridge|bookcase|furniture)"
          r"(?: (?:up|over|away|out|closer|nearer|(?:in)?to|across|from|for|with|by)\b.*)?",
          "furniture is too large and heavy for me"),

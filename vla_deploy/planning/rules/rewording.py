@@ -1,27 +1,21 @@
 """Put roundabout ways of commanding into plain ones, before a command is taken apart.
 
-run off to the kitchen for us   the keys, where on earth are they   the ball, bung it in the box
+off to the kitchen with you               -> go to the kitchen
+use your left hand and take the book      -> take the book with your left hand
+make sure that the can ends up in the box -> put the can in the box
 
-One table, row after row: what is found as whole words, and what takes its place.
+One table, row after row: what is found from the beginning of a word, and what takes its place.
 """
 
 import re
 from typing import Final
 
 from vla_deploy.planning.rules.passives import in_active_voice
+from vla_deploy.planning.rules.short_forms import in_full
 from vla_deploy.world.vocabulary import COLOURS, CONTAINERS, KIND_WORDS
 
 _COLOUR: Final = "|".join(COLOURS)
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
-    ("gimme", "give me"),
-    ("lemme have", "give me"),
-    ("wanna", "want to"),
-    ("gotta", "have to"),
-    ("gonna", "going to"),
-    ("outta", "out of"),
-    ("'em", "them"),
-    ("whereabouts(?= (?:is|are)\\b)", "where"),
-    ("thae", "those"),
     ("help me look$", "look for it"),
     (
         "(?:turn|spin)(?: right| all the way| yourself)? (?:a?round|about),?"
@@ -35,8 +29,6 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"once you(?:'ve| have) got (?:it|them)",
         r"\1 and then",
     ),
-    (r"(?:the|them) both of them|the (?:two|three|both) of them", "them"),
-    (r"(?<=[a-z] )(it|them) me$", r"\1 to me"),
     (
         r"(?:carry|bring|take|fetch|run) ([^,;.!?]+?) (?:in|inside|through|over|across|along|out|"
         r"round|up|down|back) and (put|place|set|leave|drop|stick|pop) (?:it|them)(?: down)? "
@@ -65,7 +57,6 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"favou?rs?)\b[^:,.]*: ",
         "",
     ),
-    (r"where've", "where have"),
     (
         r"i(?: want|'d like| need| would like) you (?:to be )?(?:waiting |standing |sitting )?"
         r"(?:at|in|by) (?=(?:the|my|your)\b)",
@@ -81,9 +72,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (
         r"(the|that|this|my) ((?:\w+ )?\w+) (?:that )?(?:you(?:'re| are) (?:carrying|holding)|"
         r"you (?:hold|carry|have))(?: there)?(?= (?:goes|belongs|should|needs|can|is|to|on|in)\b)",
-        r"\1 \2 in your hand",
+        r"\1 \2 you are holding",
     ),
-    (r",? here (?=(?:on|in|at) (?:the|this|that)\b)", " "),
     (r"give (?:me|us) (?=(?:a|an|one) (?:quarter|half|full|complete|whole) (?:turn|spin))", "do "),
     (r"(?:tip|tilt|bend|lean) your (?:head|neck|face) back", "look up"),
     (r"(?:raise|lift) your (?:head|eyes|gaze|face)(?: up)?", "look up"),
@@ -92,6 +82,12 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"(?:tip|tilt|bend|lean|point|aim|move|swing) your (?:head|neck|face|eyes|camera|gaze) "
         r"(?=(?:up|down|left|right|to)\b)",
         "look ",
+    ),
+    (
+        r"(?:spin|turn|swing)(?: right)? (?:a?round|about),? so (?:that )?you(?:'re| are) "
+        r"(?:looking|facing) (?:behind you|backwards?|away|the (?:other|opposite) "
+        r"(?:way|direction|side))",
+        "turn around",
     ),
     (
         r",? so (?:that )?you(?:'re| are) (?:looking|facing) (?:behind you|backwards?|away|"
@@ -109,14 +105,11 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"\2 goes to \1",
     ),
     (r"(?:finish|end)(?: up)?(?: back)?(?: here)? (?:at|in|by) (?=(?:the|my|your)\b)", "go to "),
-    (r", while (?=(?:the|my|that|this|both)\b)", ", and "),
     (
         rf"((?:in|into|inside) (?:the|that|my) (?:\w+ )?({'|'.join(sorted(CONTAINERS))}))\b(.*?) "
         r"(in|into|inside) the (\w+) one",
         r"\1\3 \4 the \5 \2",
     ),
-    (r"from (?=(?:beside|next to|by|near|under|behind) )", ""),
-    (r"(nearest|closest) (?=(?:the|my|your|that|this)\b)", r"\1 to "),
     (r"to (?:me|us)(?: here)? (?:in|at|by|on) (?=(?:the|my|our)\b)", "to "),
     (
         r"(?:whichever|whatever) ((?:\w+ )?\w+) (?:is|are|lies|stands|sits) "
@@ -138,43 +131,20 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"(?:left|right))(?! (?:hand|arm|gripper|claw))",
         r"\1 hand",
     ),
-    (r"ma(?= (?:keys|phone|remote|book|cup|bottle|ball|can|bowl)\b)", "my"),
-    # --- interjections and fillers inside a sentence
+    (r"help me (?:to )?(?=(?:find|look|search)\b)", ""),
+    (r"(?:shift|get|move|take|haul|drag|bring) yourself (?:\w+ )?(?:in)?to ", "go to "),
+    (r"(?:come (?:and )?)?keep me company (?:in|at) (?=(?:the|my|your)\b)", "go to "),
     (
-        r"(?:on earth|in the world|the (?:hell|heck|devil|blazes)|in (?:the name of )?"
-        r"(?:god|heaven)(?:'s name)?) (?=(?:is|are|did|have|has|do)\b)",
-        "",
+        r"^(?:with|using|use) (?:your|the) (left|right) (hand|arm)(?: now| please| for this(?: "
+        r"one)?)?,? "
+        r"(?:and |to )?([^,.;]+)",
+        r"\3 with your \1 \2",
     ),
-    (
-        r"(?:be (?:a|an) (?:dear|love|star|angel|pal|good \w+)|be so (?:kind|good)|"
-        r"do me a favou?r) and (?=[a-z])",
-        "",
-    ),
-    (r"(?:and )?while you(?:'re| are) (?:at it|there|up),? ", ""),
-    (r" for (?:tonight|today|the night|the moment|the time being|now)(?=$|[,.!?]| and\b)", ""),
-    (
-        r"(?:about|roughly|approximately|around|some) (?=(?:\d|one|two|three|four|five|ten|fifteen|"
-        r"twenty|thirty|forty|fifty|sixty|ninety|half a|a (?:half|quarter|foot|metre|meter))\b"
-        r"[^,]*\b(?:degrees?|m|met(?:er|re)s?|cm|centimet(?:er|re)s?|feet|foot|inch(?:es)?|steps?)\b)",
-        "",
-    ),
-    (r"(half|quarter)-(?=turn|circle|spin)", r"\1 "),
+    (r"(?:do|make) an? (?:one[- ]eighty|180)", "turn around"),
+    (r"(turn|swing|spin) yourself about", "turn around"),
     (r"make (?:me|us) (?=an? )", "do "),
     (r"open up (?=(?:your|the|both)\b)", "open "),
-    (r"(put|take|tidy|clear) me (away|up|down)", r"\1 \2"),
-    (
-        rf"(?<!bring )(?<!give )(?<!get )(?<!fetch )(?<!hand )(?<!pass )(?<!find )(?<!show )"
-        rf"(?<!tell )(?<!for )(?<!to )me (?=(?:{KIND_WORDS})\b)",
-        "my ",
-    ),
-    (
-        rf"(bring us|give us|get us|fetch us|where are|where's|lost|found) me "
-        rf"(?=(?:{KIND_WORDS})\b)",
-        r"\1 my ",
-    ),
-    # --- "that can go in the box" says what it may, not that it is a can
-    (r"(that|it|this|they|those|these) can (?=(?:go|be|stay|live|come)\b)", r"\1 should "),
-    # --- what is said to be so, and shall be
+    (r"(put|take|tidy|clear) me (away|up|down)\b", r"\1 \2"),
     (
         r"(?:see to it|make sure|ensure|check)(?: that)? ((?:the|my|it|that|this|both|all|they)"
         r"(?: (?!\bis\b|\bare\b)[\w']+){0,6}?) (?:is|are|ends? up|goes|gets?) "
@@ -188,15 +158,25 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         ", then ",
     ),
     (r"let(?:'s| us) (?:begin|start) with ([^,]+), which (?=goes|belongs|should)", r"\1 "),
-    # --- telegrams: "red can in the box", "ball goes on the shelf"
     (
         rf"(?:(?<=, )|(?<=: )|(?<=and )|^)(?=(?:(?:{_COLOUR}|big|small) (?:{KIND_WORDS})|"
         rf"(?!can\b)(?:{KIND_WORDS}))s? (?:goes|go|ought|needs?|should|belongs?|has to|wants?|"
         rf"into|onto|back)\b)",
         "the ",
     ),
-    # --- taking and turning
-    (r"(lift|pick|get|take|grab) ([^,;.!?]+?) up off (?=(?:the|that|this|my)\b)", r"\1 up \2 off "),
+    (r"(lift|pick|get|take|grab) ([^,;.!?]+?) up off (?=(?:the|that|this|my)\b)", r"\1 \2 off "),
+    (
+        r"((?:pick|lift|take|get|grab|remove|fetch)\b[^,;.!?]*?) off (?:of )?(?=(?:the|that|this|"
+        r"my)\b)",
+        r"\1 from ",
+    ),
+    (r"off to ([^,;.!?]+?) with you", r"go to \1"),
+    (
+        r"(?:let's |let us )?get rid of ([^,;.!?]+)[,;:.]+ (?:just )?(leave|put|drop) (?:it|them)",
+        r"\2 \1",
+    ),
+    (r"i(?:'d| would) (?:rather|prefer to) (?:have|see)", "i want"),
+    (r",? until you(?:'re| are) (?:looking|facing) (?=(?:up|down|left|right)\b)", " "),
     (
         r"(?:tell me|check|see|find out|say) (?:if|whether) ((?:the|my|a|your) [^,]+?) (is|are) "
         r"(?=(?:still )?(?:in|on|at|inside)\b)",
@@ -212,6 +192,7 @@ _TABLE: Final = tuple((re.compile(rf"(?:\b|(?<=\s)){pattern}"), full) for patter
 
 def reworded(text: str) -> str:
     """Return a command in lower case in plain words."""
+    text = in_full(text)
     for pattern, instead in _TABLE:
         text = pattern.sub(instead, text)
     return in_active_voice(text)

@@ -10,16 +10,22 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.building import Groups, is_one, is_seen, parts_of
 from vla_deploy.planning.rules.clauses import repaired
 from vla_deploy.planning.rules.fits import known_fit
+from vla_deploy.planning.rules.lending import (
+    NAMED,
+    POINTS,
+    STOPS,
+    kind_lent,
+    left_alone_off,
+    place_of_people,
+)
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
-_STOPS: Final = frozenset({"stop", "halt", "freeze"})
 _THING: Final = r"(?P<thing>(?:my|the|our) .+?)"
 _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
     re.compile(pattern)
@@ -34,6 +40,8 @@ _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
         r"(?: anywhere)?",
         r"(?:somewhere )?(?:in|on|at) (?P<place>.+?),? (?:somewhere )?(?:there(?:'s| is| should be|"
         r" must be)|(?:is|should be|must be)) (?P<thing>(?:an?|my|our|some) .+)",
+        rf"did (?:i|we) (?:leave|put|forget|drop) {_THING} (?:in|on|at) (?P<place>.+?)"
+        r"(?: (?:last night|this morning|yesterday|earlier))?",
         r"(?:(?:do|can) you )?see (?P<thing>(?:my|the|our|that|those|these) .+?)"
         r"(?: (?:over )?there)?",
         rf"{_THING}(?:'s| is| are| must be| should be|(?: have| has)? ended up| seems? to be|(?: "
@@ -65,42 +73,14 @@ _BESIDE: Final = re.compile(
     r"there|for me)"
     r"(?: (?:while|until|till|so) .*)?|"
     r"(?:because|since|as|seeing (?:as|that)|given that|now that|which) "
-    r"(?:i|we|he|she|they|it|there|that|is|are|means|my|the)\b(?!.*\b(?:you|if|unless)\b).*|"
+    r"(?:i|we|he|she|they|it|there|that|is|are|means|my|the)\b(?!.*\b(?:if|unless|not)\b|.*n't\b).*|"
+    r"(?:seeing (?:as|that)|given that|now that|since|as) you(?:'ve|'re| have| are)\b"
+    r"(?!.*\b(?:if|unless|not)\b).*|"
+    r"before (?:i|we|my|the|somebody|someone|he|she|they|anyone|anybody)\b(?!.*\byou\b).*|"
+    r"taking care\b.*|(?:be|being) careful\b.*|mind (?:you don't|it doesn't)\b.*|"
+    r"without (?:spilling|dropping|breaking|waking)\b.*|"
     r"not (?:lying|sitting|standing|left|hanging)\b.*|"
     r"i (?:need|want) to (?:read|drink|leave|call|go)\b.*)"
-)
-# Somebody who is somewhere: that is where things go that are for them.
-_SOMEBODY_AT: Final = re.compile(
-    r"(?:and |because |since |as )?(?:there(?:'s| is| are|'ll be| will be) )?"
-    r"(?:someone|somebody|an? \w+|(?:my|our) [a-z]+|the (?:guests?|visitors?|kids?|children)|he|"
-    r"she|"
-    r"they|we|i)(?:'s|'m|'re| am| is| are|'ll be| will be)?"
-    r"(?: (?:sitting|waiting|working|standing|lying|resting|busy|already|just|still|up|down|over))*"
-    r" (?:in|at|by|on|near) (?P<place>(?:the|my|our) .+?)"
-    r"(?: (?:any (?:minute|moment|second)|now|already))?"
-    r"(?: (?:who )?(?:needs?|wants?|is asking for|asked for|would like|could use) (?P<thing>.+))?"
-)
-_TO_THEM: Final = re.compile(r"\bto (?:her|him|them|us|me)(?: there)?$")
-_MEET: Final = re.compile(
-    r"(?:go )?(?:and )?(?:meet|greet|see|join|find|welcome|say (?:hello|hi) to) (?:them|him|her|"
-    r"us|me)"
-)
-# "The larger" of the balls that were spoken of.
-_OF_A_KIND: Final = re.compile(
-    rf"\b(?:the|that) (?P<which>(?:\w+(?:er|est)|{'|'.join(COLOURS)}))(?: one)?$"
-)
-_SEVERAL: Final = re.compile(
-    r"(?:there(?:'s| are| is)|i (?:can )?see|you(?:'ve| have)(?: got)?|we(?:'ve| have)(?: got)?|"
-    r"(?:can|do) you see) (?:two|three|four|some|a (?:couple|few|pair) (?:of )?|several|both|"
-    r"those|the)"
-    rf" (?:\w+ ){{0,2}}?(?P<kind>{KIND_WORDS})e?s?\b.*"
-)
-# What stays as it is; nothing that the rest is about.
-_LEFT_ALONE: Final = re.compile(
-    r"(?:and |but |just )*(?:leave|keep) (?P<thing>(?:the|my|that|this|those|these) .+?) "
-    r"(?:where (?:it|they) (?:is|are|lies?|stands?|sits?|belongs?)|alone|be|as (?:it|they) (?:is|"
-    r"are)|"
-    r"in peace|right there)"
 )
 _IT_IS_AT: Final = re.compile(
     r"(?:it|they)(?:'s|'re|'ll be| is| are| will be| should be| must be| might be| may be)"
@@ -123,16 +103,12 @@ _REMARK: Final = re.compile(
     r"need|needs|want|wants|wish|like|please|if|unless|until|when|whenever|after|before|later|"
     r"tomorrow|tonight|don't|do not|not to|never|leave|instead|rather)\b).*"
 )
-_NAMED: Final = re.compile(
-    r"\b(?:the|my|our|your|a|an|that|this) (?:\w+ ){0,2}?"
-    rf"(?:{KIND_WORDS})(?:e?s)?\b"
-)
-_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})\b")
 _CARRIED: Final = re.compile(
     r"(?:bring|take|carry|move|deliver|put|transport|run|return)\b.* (?:to|into|onto|in|on) .+"
 )
-_POINTS: Final = re.compile(
-    r"\b(?:(?:it|them|they|those)\b|that(?= (?:up|over|away|here|out|off|in|on|to|into|for)\b|$))"
+# "Into the box with it": what goes before is no other thing.
+_WITH_IT: Final = re.compile(
+    r"(?:(?:off|over|back|away) )?(?:in|into|on|onto|to) .+ with (?:it|them)"
 )
 _NOT_THERE: Final = re.compile(r"(?:and |but )?not (?:in|into|on|onto|to|at) (?P<place>.+)")
 _NOT_THAT: Final = re.compile(r"(?:no )?not (?P<thing>(?:the|that|this|my) .+|that|this|it)")
@@ -146,49 +122,10 @@ def begins_with_statement(text: str) -> bool:
 
 def statements_off(parts: Sequence[str], request: Request) -> list[str]:
     """Return the parts of a command that ask for something, with what the others lend them."""
-    told = _kind_lent(
-        _place_of_people(_said_once(_found_where_told(list(parts), request)), request)
-    )
+    told = kind_lent(place_of_people(_said_once(_found_where_told(list(parts), request)), request))
     asking = [part for part in told if not _BESIDE.fullmatch(part)] or told
     asking = _told_off(_not_that_off(_not_there_off(asking, request), request), request)
-    return _remarks_off(_left_alone_off(asking, request), request)
-
-
-def _place_of_people(parts: list[str], request: Request) -> list[str]:
-    """Let "take it to her" be to where she is said to be, and "go and meet him" go there."""
-    for at, part in enumerate(parts):
-        found = _SOMEBODY_AT.fullmatch(part)
-        if found is None or match_place(found["place"], request.world.places) is None:
-            continue
-        there = [_to(found["place"], one) for one in parts]
-        if there == parts:
-            continue
-        rest = there[:at] + there[at + 1 :]
-        return rest if found["thing"] is None else [_POINTS.sub(found["thing"], rest[0]), *rest[1:]]
-    return parts
-
-
-def _to(place: str, part: str) -> str:
-    return f"go to {place}" if _MEET.fullmatch(part) else _TO_THEM.sub(f"to {place}", part)
-
-
-def _kind_lent(parts: list[str]) -> list[str]:
-    """Let "the larger" be the larger ball, where only balls were spoken of before."""
-    found = _SEVERAL.fullmatch(parts[0]) if len(parts) > 1 else None
-    if found is None or _NAMED.search(parts[1]):
-        return parts
-    lent = _OF_A_KIND.sub(rf"the \g<which> {found['kind']}", parts[1])
-    return parts if lent == parts[1] else [lent, *parts[2:]]
-
-
-def _left_alone_off(parts: list[str], request: Request) -> list[str]:
-    """Leave out what stays as it is, beside what is to be done with other things."""
-    kept = [part for part in parts if not _LEFT_ALONE.fullmatch(part)]
-    left = [found["thing"] for part in parts if (found := _LEFT_ALONE.fullmatch(part))]
-    if not kept or not left or not all(is_one(one, request) for one in left):
-        return parts
-    nouns = {found[0] for one in left for found in _KIND.finditer(one)}
-    return parts if any(nouns & set(words_of(part)) for part in kept) else kept
+    return _remarks_off(left_alone_off(asking, request), request)
 
 
 def _remarks_off(parts: list[str], request: Request) -> list[str]:
@@ -197,20 +134,21 @@ def _remarks_off(parts: list[str], request: Request) -> list[str]:
     The one thing that it names is what a pronoun of the rest means.
     """
     asking = [part for part in parts if not _is_remark(part) or known_fit(part, request)]
-    points = _POINTS.search(asking[0]) if asking else None
-    if points is None or _NAMED.search(asking[0][: points.start()]):
+    points = POINTS.search(asking[0]) if asking else None
+    is_told_where = points is not None and _WITH_IT.fullmatch(asking[0]) is not None
+    if points is None or (NAMED.search(asking[0][: points.start()]) and not is_told_where):
         return asking or parts
     told = " ".join(part for part in parts if part not in asking)
-    named = [found[0] for found in _NAMED.finditer(told)]
+    named = [found[0] for found in NAMED.finditer(told)]
     if len(named) > 1:
         return parts
-    return [_POINTS.sub(named[0], asking[0], count=1), *asking[1:]] if named else asking
+    return [POINTS.sub(named[0], asking[0], count=1), *asking[1:]] if named else asking
 
 
 def _is_remark(part: str) -> bool:
     is_told = _REMARK.fullmatch(part) is not None and repaired(part) is None
     is_told = is_told and not any(pattern.fullmatch(part) for pattern in _SAID)
-    return is_told and not _STOPS.intersection(words_of(part))
+    return is_told and not STOPS.intersection(words_of(part))
 
 
 def _found_where_told(parts: list[str], request: Request) -> list[str]:
@@ -244,12 +182,12 @@ def _told_off(parts: list[str], request: Request) -> list[str]:
     if len(parts) < 2:
         return parts
     found = next((one for pattern in _SAID if (one := pattern.fullmatch(parts[0]))), None)
-    if found is None or not _POINTS.search(parts[1]) or not is_one(found["thing"], request):
+    if found is None or not POINTS.search(parts[1]) or not is_one(found["thing"], request):
         return parts
     place = found.groupdict().get("place")
     if place is not None and not is_one(place, request):
         return parts
-    asked = _POINTS.sub(found["thing"], parts[1], count=1)
+    asked = POINTS.sub(found["thing"], parts[1], count=1)
     return [*([f"go to {place}"] if place else []), asked, *parts[2:]]
 
 

@@ -1,125 +1,50 @@
 """List the rules: what a clause looks like, what it is for, and what builds its steps."""
 
 import re
-from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.planning.rules import building, cleaning, moving, placing, returning, telling
-from vla_deploy.planning.rules.building import Builder
+from vla_deploy.planning.rules import building, cleaning, moving, placing, questions, returning
 from vla_deploy.planning.rules.intents import Intent
-from vla_deploy.planning.understanding.quantities import NUMBER
+from vla_deploy.planning.rules.pattern_parts import (
+    ANGLE,
+    HAND,
+    INTO,
+    LITTLE,
+    METRES,
+    OBJECT,
+    PLACE,
+    ROLL,
+    SAID_OF,
+    SECONDS,
+    SHARE,
+    SIDE,
+    WAY,
+    Row,
+    Rule,
+)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rule:
-    """Hold one row; a clause that fits `pattern` whole is built by `build`."""
-
-    intent: Intent
-    pattern: re.Pattern[str]
-    build: Builder
-
-
-_OBJECT: Final = r"(?P<object>.+?)"
-_PLACE: Final = r"(?P<place>.+)"
-_SAID_OF: Final = (
-    r"(?P<object>(?:the|my|our|this|that|these|those|both|all)(?: (?!you\b|i\b|we\b)[\w']+){1,8}?|"
-    r"it|they|that|this)"
-)
-_METRES: Final = (
-    rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:m|meters?|metres?|cm|centimeters?|centimetres?|"
-    r"feet|foot|steps?|paces?|inch|inches))"
-)
-_ANGLE: Final = rf"(?P<quantity>{NUMBER} ?(?:degrees?|deg|°|rad|radians?))"
-_SECONDS: Final = (
-    rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|moment))"
-)
-_WAY: Final = r"(?P<way>forwards?|ahead|straight(?: ahead| on)?|backwards?|back(?: up)?|in reverse)"
-_LITTLE: Final = (
-    r"(?:a (?:little|(?:wee |tiny |little )?(?:bit|tad|touch|smidge(?:n)?|hair|fraction|notch|"
-    r"tick))|"
-    r"slightly|an inch or (?:two|so)|a couple of inches|ever so slightly)"
-)
-_ROLL: Final = r"(?:shuffle|scoot|shift|nudge|inch|edge|creep|slide|budge|ease|crawl|nip|hop)"
-_SIDE: Final = r"(?P<way>left|right|a?round|clockwise|counter-?clockwise|anti-?clockwise)"
-_SHARE: Final = (
-    r"(?:an? |one )?(?P<share>half|(?:three[ -])?quarters?|full|whole|complete)(?: an?| of an?)?"
-)
-_HAND: Final = r"(?:the |your |a )?(?:(?P<arm>left|right) )?(?:grippers?|hands?|fingers|claws?)"
-_INTO: Final = (
-    r"(?P<relation>(?:back )?(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon))"
-)
-_ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
-    # --- stop
-    (Intent.STOP, r"(?:stop|halt|freeze|stand still)(?: moving| there)?", building.stop),
-    # --- questions
-    (Intent.QUESTION, r"what (?:do|can) you see|what is there|what's there|what is around(?: you)?|"
-     r"describe (?:the (?:scene|room)|what you see)|tell me what you see|what is in front of you|"
-     r"what objects (?:do you see|are there)", telling.tell_sight),
-    (Intent.QUESTION, rf"what(?:'s| is| do you see| can you see)(?: there)? (?:on|at) {_PLACE}",
-     telling.tell_sight),
-    (Intent.QUESTION, rf"(?:which|what) {_OBJECT} (?:is|are|stands?|lies?)(?: there)? "
-     rf"(?P<where>(?:on|in|at) .+)", telling.tell_which),
-    (Intent.QUESTION, r"what (?:are you holding|do you (?:hold|have)|have you got)"
-     r"(?: in your hands?)?|what(?:'s| is) in your (?:left |right )?hands?|"
-     r"(?:are you holding|do you (?:hold|have)) (?:anything|something)(?: in your hands?)?",
-     telling.tell_hands),
-    (Intent.QUESTION, r"where are you|where am i|which room (?:are you|is this)(?: in)?",
-     telling.tell_place),
-    (Intent.QUESTION, r"(?:do you (?:happen to |by any chance )?(?:know|remember|recall) |any "
-                      r"idea |"
-     r"(?:can|could) you (?:tell me|remember) |tell me |i wonder |i forgot )?where (?:i|we|you|"
-     r"somebody|someone|he|she|they)(?:'ve| have|'s| has|'d| had)? (?:left|put|leave|dropped|laid) "
-     rf"{_OBJECT}(?: last night| this morning| yesterday| earlier| before)?", telling.tell_or_find),
-    (Intent.QUESTION, r"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
-     r"have you seen|you have(?:n't| not)(?: by any chance)? seen|(?:do you (?:happen to |by any "
-     r"chance )?know|(?:have you (?:got )?|do you have |got )?(?:any|an?|the (?:faintest|"
-     r"slightest)) "
-     rf"(?:idea|notion|clue)|tell me|i wonder|find out|see) where|what (?:have|has|did) "
-     rf"(?:[a-z]+ ){{1,3}}?(?:done|do) with|where (?:have|had|did) (?:i|we|you|they) (?:left|"
-     rf"leave|put)) "
-     rf"{_OBJECT}"
-     r"(?: is| are|(?:'s| has| have)? gone|(?:'s| has| have)? got to| went| ended up| might be| "
-     r"could be)?(?: anywhere| somewhere)?"
-     r"(?: have you)?",
-     telling.tell_or_find),
-    (Intent.QUESTION, r"(?:(?:do|did) you (?:happen to )?know |any idea |tell me )?"
-     rf"what(?:'s| has)? (?:become|became|happened|gone) (?:of|to|with) {_OBJECT}",
-     telling.tell_or_find),
-    (Intent.QUESTION, rf"(?:do you see|is there|are there|see|(?:have|do) (?:we|you|i) (?:got|"
-                      rf"have)) (?:any |an? )?{_OBJECT}"
-     r"(?: there| here| anywhere)?", telling.tell_whether),
-    (Intent.QUESTION, rf"how many {_OBJECT}(?: are there| do you see| can you see| are here)?"
-     r"(?: here| there)?", telling.tell_number),
-    (Intent.QUESTION, r"(?:is|are) (?P<object>(?:the|my|your|a) .+ (?:on|in) .+)",
-     telling.tell_whether),
-    # --- assist
-    (Intent.ASSIST, r"help(?: me)?|i need (?:some |your )?help|assist(?: me)?|help out|"
-     r"what (?:can|could) you do(?: for me)?|who are you|what are you|how can you help(?: me)?",
-     telling.tell_abilities),
-    (Intent.ASSIST, r"(?:hold|take) (?:this|that) from me|hold this", building.hold),
-    (Intent.SEARCH, r"have a (?:\w+ )?(?:look|scout|search|hunt|rummage|nosey|gander|check)"
-     rf"(?: a?round| about)? for {_OBJECT}|(?:hunt|track|chase) down (?P<object2>.+?)|"
-     r"(?:hunt|track|chase) (?P<object3>.+?) down", building.find),
+_ROWS: Final[tuple[Row, ...]] = (
+    *questions.ROWS,
     # --- bring
-    (Intent.MANIPULATION, r"(?:bring|fetch|get|give|hand|pass) (?:me|us)"
-     rf"(?: back| over| in| up| down| out)? {_OBJECT}",
+    (Intent.MANIPULATION, r"(?:bring|fetch|get|give|hand|pass|run|grab|lend) (?:me|us)"
+     rf"(?: back| over| in| up| down| out)? {OBJECT}",
      building.bring),
     (Intent.MANIPULATION, r"i(?:'d| would)? (?:want|need|like) (?P<object>(?:the|my|that|this|"
-     rf"those|these|both|all) .+) to (?:go|be|be put) (?:back )?{_INTO} (?P<destination>.+)",
+     rf"those|these|both|all) .+) to (?:go|be|be put) (?:back )?{INTO} (?P<destination>.+)",
      placing.put),
-    (Intent.MANIPULATION, rf"box(?: up)? {_OBJECT}", placing.put_away),
+    (Intent.MANIPULATION, rf"box(?: up)? {OBJECT}", placing.put_away),
     (Intent.MANIPULATION, r"i(?:'d| would)? (?:want|need|like) "
      r"(?P<object>(?:the|my|that|this|those|these|both|all) .+?) (?:to (?:be|go) |put |moved )?"
-     rf"(?:back )?{_INTO} (?P<destination>.+)", placing.want),
+     rf"(?:back )?{INTO} (?P<destination>.+)", placing.want),
     (Intent.MANIPULATION, rf"(?:bring|carry|take|fetch|get|hand|give|deliver|pass|run|move) "
-                          rf"{_OBJECT} "
+                          rf"{OBJECT} "
      r"(?:over |in |through |up |out |down )?(?:here(?: (?:to|for) me)?|(?:back )?to me(?: here)?)|"
      r"(?:bring|fetch|carry) (?P<object2>.+?) (?:through|over|in|along)",
      building.bring),
-    (Intent.MANIPULATION, rf"(?:i )?need {_OBJECT} (?:over |in )?here(?: (?:to|with|for) me)?|"
+    (Intent.MANIPULATION, rf"(?:i )?need {OBJECT} (?:over |in )?here(?: (?:to|with|for) me)?|"
      r"(?:come|return|be|run) (?:straight )?back(?: here| to me)? with (?P<object2>.+)",
      building.bring),
-    (Intent.MANIPULATION, rf"(?:get|fetch|grab|take|pick up|bring) {_OBJECT} for me|"
+    (Intent.MANIPULATION, rf"(?:get|fetch|grab|take|pick up|bring) {OBJECT} for me|"
      r"(?:i )?(?:need|want|would like|'d like) (?P<object2>(?:the|my|a|an|that|this) .+)",
      building.bring),
     (Intent.MANIPULATION, r"i (?:could do with|could use|fancy|'d love|would love|'d like|"
@@ -127,7 +52,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.MANIPULATION, r"i(?:'d)? (?:want|need|would like|like) (?P<object>.+?) back"
      r"(?: (?:again|here))?|i(?:'ll| will) (?:take|have) (?P<object2>.+?)"
      r"(?: back| (?:off|from) you)?", building.bring),
-    (Intent.MANIPULATION, rf"fetch {_OBJECT}", building.bring),
+    (Intent.MANIPULATION, rf"fetch {OBJECT}", building.bring),
     (Intent.MANIPULATION, r"(?:(?:can|could|may|might) (?:i|we) (?:please |just |maybe )?"
      r"(?:have|get|borrow|trouble you for|bother you for|ask (?:you )?for)|"
      r"let (?:me|us) (?:have|borrow)|(?:is there )?any chance of(?: getting)?|"
@@ -140,71 +65,74 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"where you (?:were|are)(?: now)?))?|(?:and )?back (?:here|to me)", building.go_back),
     (Intent.NAVIGATION, r"(?:go|drive|come|move|navigate|return|walk|head|travel|roll|proceed|get|"
      rf"run)(?: back| over| on| off| out| in| along| down| up| through| across)?(?: over)? (?:to|"
-     rf"towards?|into|for) {_PLACE}", building.go),
+     rf"towards?|into|for) {PLACE}", building.go),
     (Intent.NAVIGATION, r"(?:off (?:you go|with you)|be off|off|(?:roll|trundle|nip|duck|slip|"
                         r"whizz|trot|march|toddle|zip|pop|scoot|hop|"
      r"wander|zoom|run|dash|glide|cruise)(?: off| over| along| across)?)(?: back)? "
-     rf"(?:to|into|over to|through to) {_PLACE}", building.go),
-    (Intent.NAVIGATION, rf"(?:home(?: you go)?|on|through|up|down|across) to {_PLACE}",
+     rf"(?:to|into|over to|through to|in) {PLACE}", building.go),
+    (Intent.NAVIGATION, rf"(?:home(?: you go)?|on|through|up|down|across) to {PLACE}",
      building.go),
-    (Intent.NAVIGATION, rf"(?:meet|join) (?:me|us) (?:in|at|by|over at) {_PLACE}|"
+    (Intent.NAVIGATION, rf"(?:come (?:and )?)?(?:meet|join|find|see) (?:me|us) (?:in|at|by|over "
+                        rf"at) {PLACE}|"
      r"(?:get |right )?back (?:on|onto|to|into|in|at|over to) (?P<place2>(?:the|your|my) .+)|"
      r"(?:run |go )?(?:wait|stay|stand)(?: for (?:me|us|them|him|her|it))? at (?P<place4>.+)|"
      r"(?:swing|stop|drop|call|pass) (?:by|in at|by at|round) (?P<place3>.+)", building.go),
-    (Intent.NAVIGATION, rf"(?:go|get|move|come|drive) (?:up )?close(?:r)? to {_PLACE}",
+    (Intent.NAVIGATION, rf"(?:go|get|move|come|drive) (?:up )?close(?:r)? to {PLACE}",
      building.go),
     (Intent.NAVIGATION, rf"(?:take|bring|get) yourself (?:back |off |over |along |out |in )?to "
-                        rf"{_PLACE}|"
+                        rf"{PLACE}|"
      r"to (?P<place2>the .+)", building.go),
     # --- wait
-    (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay)(?: here| there)?(?: (?:for )?{_SECONDS})?",
+    (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay|hang (?:about|around|on))(?: here| "
+                    rf"there)?(?: (?:for )?{SECONDS})?",
      building.wait),
     (Intent.NAVIGATION, r"(?:wait|stay|stand|stop)(?: there| for me)? (?:in|by|near|beside|"
-     rf"next to|outside) {_PLACE}", building.go),
+     rf"next to|outside) {PLACE}", building.go),
     # --- keep
     (Intent.MANIPULATION, r"(?:keep (?:a )?hold of|keep holding(?: on to)?|keep|hang on to|"
-     rf"hang onto|hold on to|hold onto|don't (?:put down|drop|let go of)) {_OBJECT}"
+     rf"hang onto|hold on to|hold onto|don't (?:put down|drop|let go of)) {OBJECT}"
      r"(?: in your (?:left |right )?hands?)?", placing.keep),
     # --- put
-    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand|leave|park) {_OBJECT} "
+    (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand|leave|park) {OBJECT} "
      r"(?:down )?on (?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of "
      r"(?:you|me|us)",
      placing.put_here),
-    (Intent.MANIPULATION, rf"(?:put|drop|pop|stick|place|throw|set|lay) {_OBJECT} in(?:side)?",
+    (Intent.MANIPULATION, rf"(?:put|drop|pop|stick|place|throw|set|lay) {OBJECT} in(?:side)?(?: "
+                          rf"there)?",
      placing.put_into_that),
-    (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry|leave) {_OBJECT} "
+    (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry|leave) {OBJECT} "
      r"(?:back )?(?:to )?where (?:it|they|that|you) (?:(?:was|were|came from|belongs?|had been)"
      r"(?: before)?|(?:found|got|took|had) (?:it|them)(?: from)?)", returning.put_back),
-    (Intent.MANIPULATION, rf"(?:put|set|place|lay) back {_OBJECT} {_INTO} (?P<destination>.+)",
+    (Intent.MANIPULATION, rf"(?:put|set|place|lay) back {OBJECT} {INTO} (?P<destination>.+)",
      placing.put),
-    (Intent.MANIPULATION, rf"(?:put|set|place|lay) {_OBJECT} back(?: again)?|"
+    (Intent.MANIPULATION, rf"(?:put|set|place|lay) {OBJECT} back(?: again)?|"
      r"(?:put|set|place|lay) back (?P<object2>.+)", returning.put_back),
-    (Intent.MANIPULATION, rf"(?:put|set|lay|place) {_OBJECT} (?:back )?down|"
+    (Intent.MANIPULATION, rf"(?:put|set|lay|place) {OBJECT} (?:back )?down|"
      r"(?:put|set|lay|place|pop) down (?P<object2>.+?)",
      placing.put_down),
     (Intent.MANIPULATION, r"(?:let go(?: of)?|drop|release|let loose)(?: of)?(?: (?P<object>it|"
      r"that|this|them))?", placing.put_down),
-    (Intent.MANIPULATION, rf"(?:let go of|release|let loose of) {_OBJECT}", placing.put_down),
+    (Intent.MANIPULATION, rf"(?:let go of|release|let loose of) {OBJECT}", placing.put_down),
     (Intent.MANIPULATION, r"(?:free|empty) (?:(?:both )?your|both) hands(?: here)?",
      placing.empty_hands),
-    (Intent.MANIPULATION, rf"(?:free|empty) {_HAND}", placing.empty_hand),
+    (Intent.MANIPULATION, rf"(?:free|empty) {HAND}", placing.empty_hand),
     (Intent.MANIPULATION, r"(?:free|empty) (?:(?:both )?your|both) hands(?: here)? "
      r"(?P<relation>in|into|on|onto) (?P<destination>.+)", placing.empty_hands),
-    (Intent.MANIPULATION, rf"(?:tidy|clear|pack) {_OBJECT} (?:away|up) {_INTO} (?P<destination>.+)",
+    (Intent.MANIPULATION, rf"(?:tidy|clear|pack) {OBJECT} (?:away|up) {INTO} (?P<destination>.+)",
      placing.put),
-    (Intent.MANIPULATION, rf"(?:tidy|clear|pack|clean)(?: up| away)? {_OBJECT} "
+    (Intent.MANIPULATION, rf"(?:tidy|clear|pack|clean)(?: up| away)? {OBJECT} "
      r"(?P<relation>in|into|inside) (?P<destination>.+)", placing.put),
-    (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {_OBJECT} away|"
+    (Intent.MANIPULATION, rf"(?:put|stow|tidy|clear|pack|store|take) {OBJECT} away|"
      r"(?:put away|stow(?: away)?|store|pack away) "
      r"(?P<object2>(?:(?! (?:in|into|inside|on|onto) ).)+)", placing.put_away),
     (Intent.MANIPULATION, rf"(?:put|place|drop|set|throw|lay|move|carry|bring|stow|store|"
-     rf"stack|leave|deposit|stick|insert|deliver|return|transfer|transport) {_OBJECT} "
-     rf"(?:down |away |off )?{_INTO} (?P<destination>.+)", placing.put),
+     rf"stack|stand|leave|deposit|stick|insert|deliver|return|transfer|transport) {OBJECT} "
+     rf"(?:down |away |off )?{INTO} (?P<destination>.+)", placing.put),
     # What is taken or brought so is what stands there already.
-    (Intent.MANIPULATION, rf"(?:put|place|drop|set|lay|move|stick|pop|deposit) {_OBJECT} "
+    (Intent.MANIPULATION, rf"(?:put|place|drop|set|lay|move|stick|pop|deposit) {OBJECT} "
      rf"(?:down |over |back |in )?(?:right |just )?(?P<relation>{building.BESIDE}) "
      r"(?P<destination>.+)", placing.put),
-    (Intent.MANIPULATION, rf"(?:take|bring|carry) {_OBJECT} (?:along|with you)(?: with you)?",
+    (Intent.MANIPULATION, rf"(?:take|bring|carry) {OBJECT} (?:along|with you)(?: with you)?",
      building.pick),
     (Intent.MANIPULATION, r"(?:(?:away|off|down|over|back|out) with (?P<object2>.+?) "
                           r"(?P<relation2>in|into|on|onto|to) "
@@ -212,81 +140,82 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"(?:(?:over|off|back|up|down) )?(?P<relation>in|into|on|onto|to) "
      r"(?P<destination>(?:the|my|that|this) .+?) "
      r"with (?P<object>(?:the|my|that|this|both|all) .+|it|them)", placing.put),
-    (Intent.MANIPULATION, rf"(?:take|carry|run|bring|move) {_OBJECT} "
-     r"(?P<relation>(?:back |over |up |down |through |across |along |round )?(?:to|into|onto|"
+    (Intent.MANIPULATION, rf"(?:take|carry|run|bring|move) {OBJECT} "
+     r"(?P<relation>(?:back |over |up |down |through |across |along |round |out )?(?:to|into|onto|"
      r"over to)|back (?:in|on)) (?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling|"
      r"park|rest|plant|lodge|prop|plunk|whack|fling) "
-     rf"{_OBJECT} (?:down |away |back )?(?P<relation>into|inside|in|onto|on top of|on) "
+     rf"{OBJECT} (?:down |away |back )?(?P<relation>into|inside|in|onto|on top of|on) "
      r"(?P<destination>.+)", placing.put),
-    (Intent.MANIPULATION, r"(?:put|place|take|bring|carry|move|pop|stick|chuck|drop|set|lay) "
-     rf"{_OBJECT} "
+    (Intent.MANIPULATION, r"(?:put|place|take|bring|carry|move|pop|stick|chuck|drop|set|lay|leave) "
+     rf"{OBJECT} "
      r"(?P<destination>(?:over |back )?there)", placing.put_there),
-    (Intent.MANIPULATION, rf"(?:leave|keep|put|set|drop|lay|place) {_OBJECT} (?:down )?"
+    (Intent.MANIPULATION, rf"(?:leave|keep|put|set|drop|lay|place) {OBJECT} (?:down )?"
      r"(?:(?:right |over )?here(?: on (?:the|this) (?:table|desk|shelf|surface))?|"
      r"on this (?:table|desk|shelf|surface)(?: here)?)", placing.leave_here),
-    (Intent.MANIPULATION, rf"{_SAID_OF} (?:goes|go|belongs?|lives?|(?:should|must|has to|have to|"
+    (Intent.MANIPULATION, rf"{SAID_OF} (?:goes|go|belongs?|lives?|(?:should|must|has to|have to|"
                           rf"(?:is|are) to|"
-     rf"needs to|need to|ought to|can|wants to) (?:go|be|live|stand|sit|stay|end up|lie)) "
-     rf"(?:back )?{_INTO} "
+     rf"had better|needs to|need to|ought to|can|wants to) (?:go|be|live|stand|sit|stay|end up|"
+     rf"lie)) "
+     rf"(?:back )?{INTO} "
      r"(?P<destination>.+)", placing.put),
     # --- straight and turning
-    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come|{_ROLL}) (?P<little>{_LITTLE} )?{_WAY}"
-     rf"(?: (?:by |for )?{_METRES})?(?P<little2> {_LITTLE})?", moving.drive),
-    (Intent.NAVIGATION, rf"(?:(?:move|drive|go|roll|step)(?: by)? )?{_METRES} {_WAY}",
+    (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come|{ROLL}) (?P<little>{LITTLE} )?{WAY}"
+     rf"(?: (?:by |for )?{METRES})?(?P<little2> {LITTLE})?", moving.drive),
+    (Intent.NAVIGATION, rf"(?:(?:move|drive|go|roll|step)(?: by)? )?{METRES} {WAY}",
      moving.drive),
-    (Intent.NAVIGATION, rf"(?:roll|drive|carry|keep going) (?P<way>on)(?: for| by)? {_METRES}",
+    (Intent.NAVIGATION, rf"(?:roll|drive|carry|keep going) (?P<way>on)(?: for| by)? {METRES}",
      moving.drive),
-    (Intent.NAVIGATION, rf"(?P<way>back (?:up|off|away)|reverse)(?: (?:by )?{_METRES})?"
-     rf"(?P<little> {_LITTLE})?", moving.drive),
+    (Intent.NAVIGATION, rf"(?P<way>back (?:up|off|away)|reverse)(?: (?:by )?{METRES})?"
+     rf"(?P<little> {LITTLE})?", moving.drive),
     (Intent.NAVIGATION, r"(?:turn|spin|rotate) (?:a?round once|once a?round|"
      r"(?:all the way|right|completely) a?round(?: once)?|(?:in )?(?:a|one) circle)",
      moving.turn_whole),
     (Intent.NAVIGATION, r"(?:turn|spin|rotate) half(?: ?way)? (?P<way>a?round)", moving.turn),
-    (Intent.NAVIGATION, rf"(?:(?:turn|spin|rotate|make|do|take)(?: by)? )?{_SHARE} "
-     rf"(?:turn|circle|rotation|spin)(?: (?:to )?(?:the |your )?{_SIDE})?", moving.turn_share),
-    (Intent.NAVIGATION, rf"(?:turn|spin|rotate)(?: by)? {_SHARE} (?:to )?(?:the |your )?{_SIDE}",
+    (Intent.NAVIGATION, rf"(?:(?:turn|spin|rotate|make|do|take)(?: by)? )?{SHARE} "
+     rf"(?:turn|circle|rotation|spin)(?: (?:to )?(?:the |your )?{SIDE})?", moving.turn_share),
+    (Intent.NAVIGATION, rf"(?:turn|spin|rotate)(?: by)? {SHARE} (?:to )?(?:the |your )?{SIDE}",
      moving.turn_share),
-    (Intent.NAVIGATION, rf"(?:turn|spin|rotate) (?:to )?(?:the |your )?{_SIDE}(?: by)? {_SHARE}"
+    (Intent.NAVIGATION, rf"(?:turn|spin|rotate) (?:to )?(?:the |your )?{SIDE}(?: by)? {SHARE}"
      r"(?: turn| circle)?", moving.turn_share),
-    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|face|swivel)(?P<little> {_LITTLE})?"
-     rf"(?: to)?(?: the| your)? ?{_SIDE}(?: (?:by )?{_ANGLE})?(?P<little2> {_LITTLE})?",
+    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|face|swivel)(?P<little> {LITTLE})?"
+     rf"(?: to)?(?: the| your)? ?{SIDE}(?: (?:by )?{ANGLE})?(?P<little2> {LITTLE})?",
      moving.turn),
     (Intent.SEARCH, r"turn your head (?P<what>.+?)(?: for (?:a|one) (?:moment|second|bit|while))?",
      building.look),
-    (Intent.NAVIGATION, rf"{_ANGLE} (?:to (?:the|your) )?(?P<way>left|right)", moving.turn),
-    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|swivel|pivot)(?: by)? {_ANGLE}"
-     rf"(?: (?:(?:to|on|towards) )?(?:the |your )?{_SIDE})?", moving.turn),
+    (Intent.NAVIGATION, rf"{ANGLE} (?:to (?:the|your) )?(?P<way>left|right)", moving.turn),
+    (Intent.NAVIGATION, rf"(?:turn|rotate|spin|swivel|pivot)(?: by)? {ANGLE}"
+     rf"(?: (?:(?:to|on|towards) )?(?:the |your )?{SIDE})?", moving.turn),
     (Intent.NAVIGATION, r"(?:make|take|do) an? (?P<way>left|right)(?: turn)?|do a u-?turn",
      moving.turn),
     # --- arms
-    (Intent.MANIPULATION, rf"(?P<verb>open|close|shut) {_HAND}", building.gripper),
+    (Intent.MANIPULATION, rf"(?P<verb>open|close|shut) {HAND}", building.gripper),
     (Intent.MANIPULATION, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?"
      r"(?: in)?", building.tuck),
     (Intent.MANIPULATION, r"(?:move|bring|put) (?:your |the )?(?:(?P<arm>left|right) )?arms? "
      r"(?:to|into|in) (?:the )?(?P<pose>[a-z_ ]+?)(?: pose| position)?", building.pose),
     # --- go
-    (Intent.NAVIGATION, rf"(?:go|come|return|drive|head|walk|navigate|move)(?: back)? {_PLACE}",
+    (Intent.NAVIGATION, rf"(?:go|come|return|drive|head|walk|navigate|move)(?: back)? {PLACE}",
      building.go),
     (Intent.NAVIGATION, rf"(?:visit|approach|make your way to|find your way to|park at|dock at|"
      rf"wait at|stand (?:by|at|before)|(?:park|plant|place|put|station) (?:yourself )?(?:at|on|"
      rf"in front of|by|beside|next to)|"
-     rf"position yourself at) {_PLACE}", building.go),
+     rf"position yourself at) {PLACE}", building.go),
     (Intent.NAVIGATION, r"(?:go )?(?:dock|charge|recharge)(?: yourself| your batter(?:y|ies))?",
      building.dock),
     # --- search
-    (Intent.SEARCH, rf"(?:search|check|look (?:in|on|around|through)|scan) {_PLACE} for {_OBJECT}",
+    (Intent.SEARCH, rf"(?:search|check|look (?:in|on|around|through)|scan) {PLACE} for {OBJECT}",
      building.find),
     (Intent.SEARCH, r"(?:check|see|look|find out) (?:if|whether) (?:there(?:'s| is| are)|"
-     rf"(?:you can|you|we have|we've got)(?: see| find| spot)?) (?:any |an? |some )?{_OBJECT}"
+     rf"(?:you can|you|we have|we've got)(?: see| find| spot)?) (?:any |an? |some )?{OBJECT}"
      r"(?: (?:some|any)where)?(?: (?:in|around) (?:the|this|our) (?:flat|house|apartment|home))?",
      building.find),
     (Intent.SEARCH, rf"(?:find out|find me|find|search for|locate|look for|seek|hunt for|"
      rf"track down|spot|detect|show me|point out|go (?:and )?find|(?:have a )?look around for|"
-     rf"check) {_OBJECT}(?: to me)?", building.find),
+     rf"check) {OBJECT}(?: to me)?", building.find),
     (Intent.SEARCH, r"look around|have a look around|scan (?:the )?(?:room|area|surroundings)",
      building.look_around),
-    (Intent.SEARCH, rf"(?:look around|scan|check(?: on)?) (?:in |at |on )?{_PLACE}",
+    (Intent.SEARCH, rf"(?:look around|scan|check(?: on)?) (?:in |at |on )?{PLACE}",
      building.look_around),
     (Intent.SEARCH, r"(?:look|glance|(?:have|take) a (?:\w+ )?look) (?P<side>up|down|left|right) "
                     r"(?:at|to|towards?|on) "
@@ -297,9 +226,10 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     # --- clean
     (Intent.CLEANING, r"(?:clean|tidy|clear)(?: things)?(?: up)?|clear (?:things )?away",
      cleaning.tidy),
-    (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", cleaning.tidy),
-    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|(?:do )?(?:a )?(?:quick |little )?(?:round|"
-                      r"tour))\b[^:]*: ?(?:first )?"
+    (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {PLACE}", cleaning.tidy),
+    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|"
+     r"(?:time for |do |make |have )?(?:an? |your |the )?(?:\w+ )?(?:rounds?|tour|loop|lap|"
+     r"walk))\b[^:]*: ?(?:first )?"
      r"(?P<place>.+)", cleaning.visit),
     (Intent.CLEANING, r"(?:patrol|visit|inspect|tour) (?:the |my |our )?"
      r"(?:flat|house|apartment|home|rooms?|place) (?:and )?(?:first )?(?P<place>.+)",
@@ -308,12 +238,12 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"drive (?:all )?over(?: the floor (?:of|in))?) (?P<place>.+?)(?: floor)?", cleaning.patrol),
     # --- pick
     (Intent.MANIPULATION, rf"(?:get|take|fish|dig|pull|pick|lift|fetch|bring|remove|retrieve|grab|"
-     rf"scoop|collect) {_OBJECT} (?:back )?(?:up )?(?:out(?: of| from)|from inside) (?P<source>.+)",
+     rf"scoop|collect) {OBJECT} (?:back )?(?:up )?(?:out(?: of| from)|from inside) (?P<source>.+)",
      building.pick_from),
-    (Intent.MANIPULATION, rf"bring {_OBJECT}(?: over)?", building.bring),
+    (Intent.MANIPULATION, rf"bring {OBJECT}(?: over)?", building.bring),
     (Intent.MANIPULATION, r"(?:get|take|fish|dig|pull|pick|lift|fetch|scoop) (?P<object>.+?) "
      r"(?:back )?(?:out(?: of (?:it|there))?|off (?:it|there|that))", building.pick),
-    (Intent.MANIPULATION, rf"(?:pick|lift|take up)(?: up)? {_OBJECT}(?: up| off)?", building.pick),
+    (Intent.MANIPULATION, rf"(?:pick|lift|take up)(?: up)? {OBJECT}(?: up| off)?", building.pick),
     (Intent.MANIPULATION, r"(?:(?:grab|take|grasp|get|collect|hold|pick up|put) )?(?:a|an|one) "
      r"(?P<object>.+?) in(?:to)? (?:each|either|both)(?: of your)?(?: hands?| fists?| grippers?)?",
      building.pick_two),
@@ -321,7 +251,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      r"(?P<object2>(?:the|my|that|this) .+) in(?:to)? your hand", building.pick),
     (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove|nab|snag|"
      rf"snatch|swipe|clutch|nick)"
-     rf"(?: (?:a )?hold of)? {_OBJECT}", building.pick),
+     rf"(?: (?:a )?hold of)? {OBJECT}", building.pick),
     # --- the rest
     (Intent.ASSIST, r"(?:(?:say|announce|repeat after me)[:,]?|tell [a-z]+(?= that))(?: that)? "
      r"(?P<text>.+)|(?:tell|let) (?:(?:the|my|our) )?(?:kids?|children|boys?|girls?|family|guests?|"

@@ -83,7 +83,7 @@ _SILENT: Final = frozenset(
         "you", "cheers", "ta", "mate", "dear", "love", "one's", "i'd", "like", "would",
         "think", "was", "thinking", "meaning", "talking", "about", "then", "guess", "suppose",
         "two", "three", "those", "these", "should", "have", "had", "aye", "erm", "probably",
-        "maybe",        "course", "duh", "obviously", "if", "make", "there's", "isn't",
+        "maybe", "course", "duh", "obviously", "if", "make", "there's", "isn't",
         "aren't", "question",
         "good", "for", "them", "we", "only", "let's", "pet", "alright",
     }
@@ -107,7 +107,7 @@ _SURPRISE: Final = re.compile(
     r"(?:oh |ah |well |hm )*"
     r"(?:there(?:'s| is| are| were)|you(?:'ve| have)(?: got)?|i see|are there) "
     r"(?:two|three|four|several|both|more(?: than one)?)(?: of (?:them|those|these))?(?: there)?|"
-    r"(?:isn't|aren't|wasn't|haven't|hasn't) (?:there|it|they|you|we|i)|"
+    r"(?:(?:is|are) not|isn't|aren't|wasn't|haven't|hasn't) (?:there|it|they|you|we|i)|"
     r"(?:(?:oh|ah|well|hm|good (?:question|point)|fair (?:enough|point)|my mistake|right|sorry)"
     r"\b ?)+"
 )

@@ -11,13 +11,15 @@ from typing import Final
 from vla_deploy.world.vocabulary import KIND_WORDS
 
 _PERSON: Final = (
-    r"(?:i|we|he|she|it|they|someone|somebody|anyone|anybody|everyone|everybody|"
+    r"(?:i|we|he|she|it|they|someone|somebody|(?:anyone|anybody|somebody|someone)(?: (?:in|from|"
+    r"at) (?:the|this|that|my|our) \w+)?|everyone|everybody|"
     rf"(?:the|my|our) (?!(?:\w+ )?(?:{KIND_WORDS})s?\b)\w+(?: \w+)?)"
 )
 _HARM: Final = (
     r"(?:(?:gets?|is|are|'s|'re) (?:lost|broken|wet|dirty|stolen|trodden|crushed|cold)|"
     r"does|do|sits?|steps?|treads?|trips?|falls?|rolls?|breaks?|spills?|drops?|knocks?|kicks?|"
-    r"grabs?|takes?|gets? (?:it|them|there|to it|hold)|finds?|eats?|wakes?|notices?)"
+    r"grabs?|takes?|loses?|forgets?|ruins?|spoils?|gets? (?:it|them|there|to it|hold)|finds?|"
+    r"eats?|wakes?|notices?)"
 )
 _REST: Final = (
     r"(?:(?!\b(?:if|when|whenever|until|till|unless|after|before|once|only|but|not yet|later|"
@@ -46,6 +48,12 @@ _WAITING: Final = re.compile(
     rf"while (?:i|we) {_REST}[ .!?,]*"
 )
 
+# What stays put meanwhile needs nobody to wait for the end of it.
+_STAYING: Final = re.compile(
+    r"(?P<own>.*\b(?:put|keep|leave|pop|set|hang on to|hold on to)\b[^,;.!?]+?),? (?:until|till) "
+    rf"{_PERSON}(?:'\w+)? {_REST}[ .!?,]*"
+)
+
 
 def without_purpose(text: str) -> str:
     """Return a command in lower case without what it is for; one that is nothing else stays."""
@@ -53,7 +61,7 @@ def without_purpose(text: str) -> str:
         before = text
         for pattern in _BEHIND:
             text = pattern.sub("", text) or text
-        waiting = _WAITING.fullmatch(text)
+        waiting = _WAITING.fullmatch(text) or _STAYING.fullmatch(text)
         text = text if waiting is None else waiting["own"]
         if text == before:
             return text

@@ -1,0 +1,43 @@
+"""Roundabout commands become plain ones, and words that belong together stay so."""
+
+import pytest
+
+from vla_deploy.planning.rules.rewording import reworded
+
+
+@pytest.mark.parametrize(
+    ("said", "plain"),
+    [
+        ("gimme the cup", "give me the cup"),
+        ("where on earth are my keys", "where are my keys"),
+        ("bring us me keys", "bring us my keys"),
+        ("that can go in the box", "that should go in the box"),
+        ("pick up his phone", "pick up the phone"),
+        ("off to the kitchen with you", "go to the kitchen"),
+        ("use your left hand and take the book", "take the book with your left hand"),
+        ("make sure that the red can ends up in the box", "put the red can in the box"),
+        ("pick out the middle one of the three books", "pick out the middle book"),
+        ("take the cup off the table", "take the cup from the table"),
+        ("red can goes in the box", "the red can goes in the box"),
+        ("you're needed at the entrance", "go to the entrance"),
+        ("turn about ninety degrees", "turn ninety degrees"),
+    ],
+)
+def test_a_roundabout_command_is_put_plainly(said: str, plain: str) -> None:
+    assert reworded(said) == plain
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "bring me keys",
+        "pick up that can",
+        "bring her the cup",
+        "turn around",
+        "say that can is red",
+        "put the cup next to the book",
+        "take the ball to the kitchen",
+    ],
+)
+def test_a_plain_command_stays_as_it_is(said: str) -> None:
+    assert reworded(said) == said

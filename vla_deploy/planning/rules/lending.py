@@ -1,0 +1,93 @@
+"""Let what a command tells beside lend to the rest where people are, and what "the larger" is.
+
+"My wife's at the coffee table, take it to her" is to the coffee table; "there are two balls, take
+the larger" the larger ball; "leave the book, take the cup" is about the cup alone.
+"""
+
+import re
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.rules.building import is_one
+from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
+
+STOPS: Final = frozenset({"stop", "halt", "freeze"})
+NAMED: Final = re.compile(
+    r"\b(?:the|my|our|your|a|an|that|this) (?:\w+ ){0,2}?"
+    rf"(?:{KIND_WORDS})(?:e?s)?\b"
+)
+POINTS: Final = re.compile(
+    r"\b(?:(?:it|them|they|those)\b|that(?= (?:up|over|away|here|out|off|in|on|to|into|for)\b|$))"
+)
+_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})\b")
+# Somebody who is somewhere: that is where things go that are for them.
+_SOMEBODY_AT: Final = re.compile(
+    r"(?:and |because |since |as )?(?:there(?:'s| is| are|'ll be| will be) )?"
+    r"(?:someone|somebody|an? \w+|(?:my|our) [a-z]+|the (?:guests?|visitors?|kids?|children)|he|"
+    r"she|"
+    r"they|we|i)(?:'s|'m|'re| am| is| are|'ll be| will be)?"
+    r"(?: (?:sitting|waiting|working|standing|lying|resting|busy|already|just|still|up|down|over))*"
+    r" (?:in|at|by|on|near) (?P<place>(?:the|my|our) .+?)"
+    r"(?: (?:any (?:minute|moment|second)|now|already))?"
+    r"(?: (?:who )?(?:needs?|wants?|is asking for|asked for|would like|could use) (?P<thing>.+))?"
+)
+_TO_THEM: Final = re.compile(r"\bto (?:her|him|them|us|me)(?: there)?$")
+_MEET: Final = re.compile(
+    r"(?:go )?(?:and )?(?:meet|greet|see|join|find|welcome|say (?:hello|hi) to) (?:them|him|her|"
+    r"us|me)"
+)
+# "The larger" of the balls that were spoken of.
+_OF_A_KIND: Final = re.compile(
+    rf"\b(?:the|that) (?P<which>(?:\w+(?:er|est)|{'|'.join(COLOURS)}))(?: one)?$"
+)
+_SEVERAL: Final = re.compile(
+    r"(?:there(?:'s| are| is)|i (?:can )?see|you(?:'ve| have)(?: got)?|we(?:'ve| have)(?: got)?|"
+    r"(?:can|do) you see) (?:two|three|four|some|a (?:couple|few|pair) (?:of )?|several|both|"
+    r"those|the)"
+    rf" (?:\w+ ){{0,2}}?(?P<kind>{KIND_WORDS})e?s?\b.*"
+)
+# What stays as it is; nothing that the rest is about.
+_LEFT_ALONE: Final = re.compile(
+    r"(?:and |but |just )*(?:leave|keep) (?P<thing>(?:the|my|that|this|those|these) .+?) "
+    r"(?:where (?:it|they) (?:is|are|lies?|stands?|sits?|belongs?)|alone|be|as (?:it|they) (?:is|"
+    r"are)|"
+    r"in peace|right there)"
+)
+
+
+def place_of_people(parts: list[str], request: Request) -> list[str]:
+    """Let "take it to her" be to where she is said to be, and "go and meet him" go there."""
+    for at, part in enumerate(parts):
+        found = _SOMEBODY_AT.fullmatch(part)
+        if found is None or match_place(found["place"], request.world.places) is None:
+            continue
+        there = [_to(found["place"], one) for one in parts]
+        if there == parts:
+            continue
+        rest = there[:at] + there[at + 1 :]
+        return rest if found["thing"] is None else [POINTS.sub(found["thing"], rest[0]), *rest[1:]]
+    return parts
+
+
+def _to(place: str, part: str) -> str:
+    return f"go to {place}" if _MEET.fullmatch(part) else _TO_THEM.sub(f"to {place}", part)
+
+
+def kind_lent(parts: list[str]) -> list[str]:
+    """Let "the larger" be the larger ball, where only balls were spoken of before."""
+    found = _SEVERAL.fullmatch(parts[0]) if len(parts) > 1 else None
+    if found is None or NAMED.search(parts[1]):
+        return parts
+    lent = _OF_A_KIND.sub(rf"the \g<which> {found['kind']}", parts[1])
+    return parts if lent == parts[1] else [lent, *parts[2:]]
+
+
+def left_alone_off(parts: list[str], request: Request) -> list[str]:
+    """Leave out what stays as it is, beside what is to be done with other things."""
+    kept = [part for part in parts if not _LEFT_ALONE.fullmatch(part)]
+    left = [found["thing"] for part in parts if (found := _LEFT_ALONE.fullmatch(part))]
+    if not kept or not left or not all(is_one(one, request) for one in left):
+        return parts
+    nouns = {found[0] for one in left for found in _KIND.finditer(one)}
+    return parts if any(nouns & set(words_of(part)) for part in kept) else kept
