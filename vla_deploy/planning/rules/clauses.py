@@ -118,7 +118,7 @@ _COURTESY: Final = re.compile(
     r"that(?:'s| is| will be| would be) (?:all(?: i need)?|it|great|lovely|enough)|no (?:rush|"
     r"hurry)|"
     r"(?:no,? )?(?:that's |it's |that was )?(?:the )?wrong one|take your time|"
-    r"yeah|yep|aye|right then|keep going|carry on|(?:and )?(?:have a )?rest|take a break|"
+    r"(?:oh|ah|aw|ooh|well|hm+|mm+|righto|ok|okay|yes)(?: yes| yeah| well)?|yeah|yep|aye|right then|keep going|carry on|(?:and )?(?:have a )?rest|take a break|"
     r"(?:and )?don't (?:let it (?:slip|fall|drop)|drop it|spill (?:it|any))|"
     r"(?:there's |there is )?no need (?:for you )?to\b.*|(?:did|have|do) you (?:see|seen) (?:it|"
     r"them)"

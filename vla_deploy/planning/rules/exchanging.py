@@ -37,7 +37,8 @@ def continued(said: str, clause: str, thing: str, request: Request) -> tuple[str
     verb, own = clause[: clause.index(thing)], of_kind(said, thing, request)
     if _PREPOSITION.match(said) and _BEHIND.search(verb):
         return None
-    wholes = (f"{verb}{own}", clause.replace(thing, own, 1)) if verb else ()
+    # "The cup goes in the box" begins with its thing, which alone asks for nothing.
+    wholes = (*([f"{verb}{own}"] if verb else ()), clause.replace(thing, own, 1))
     found = [(whole, fit) for whole in wholes if (fit := known_fit(whole, request)) is not None]
     before = fit_of(clause, request)
     said_before = set() if before is None else before.groups.keys() - _MANNERS

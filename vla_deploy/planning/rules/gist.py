@@ -20,7 +20,7 @@ from vla_deploy.planning.rules.recalling import points_back
 from vla_deploy.planning.rules.verbs import any_verb
 from vla_deploy.planning.understanding.known_words import is_kind, single
 from vla_deploy.planning.understanding.phrases import ORDINALS, PRONOUNS, SIDES
-from vla_deploy.world.vocabulary import ARTICLES, COLOURS, KIND_WORDS
+from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
 _DOING: Final = any_verb("search", "clean", "follow", "switch", "start", "lift", "grab", "carry")
 _SO: Final = re.compile(
@@ -50,6 +50,7 @@ _OF_SEVERAL: Final = re.compile(
     r"favou?rs?)\b.*"
 )
 _MOST_EXCLAIMED: Final = 3
+_NOUN_FOLLOWS: Final = frozenset({"the", "a", "an", "my", "your", "our"})
 # No remark: it says what not to do or when, or is what somebody else has said.
 _BINDS: Final = re.compile(
     r"\b(?:must(?! (?:be|have)\b)|mustn't|shall|allowed|forbidden|avoid|careful|dangerous|if|"
@@ -116,7 +117,7 @@ def _is_exclaimed(part: str, request: Request) -> bool:
     """Tell whether a part is a short cry that names nothing that the robot knows."""
     words = words_of(part)
     places = {word for name in request.world.places for word in name.split()}
-    is_short = len(words) <= _MOST_EXCLAIMED and not ARTICLES.intersection(part.split())
+    is_short = len(words) <= _MOST_EXCLAIMED and not _NOUN_FOLLOWS & set(part.split())
     return is_short and not any(_matters(word, places) for word in words)
 
 

@@ -178,6 +178,11 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"i(?:'d| would) (?:rather|prefer to) (?:have|see)", "i want"),
     (r",? until you(?:'re| are) (?:looking|facing) (?=(?:up|down|left|right)\b)", " "),
     (
+        r"^(the|that|my) ([^,;.!?]+?) you (?:can|may|should|could|ought to) "
+        r"(put down|put away|take|leave)((?: [^,;.!?]*)?)",
+        r"\3 \1 \2\4",
+    ),
+    (
         r"(?:tell me|check|see|find out|say) (?:if|whether) ((?:the|my|a|your) [^,]+?) (is|are) "
         r"(?=(?:still )?(?:in|on|at|inside)\b)",
         r"\2 \1 ",

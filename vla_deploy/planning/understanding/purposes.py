@@ -25,12 +25,14 @@ _REST: Final = (
     r"(?:(?!\b(?:if|when|whenever|until|till|unless|after|before|once|only|but|not yet|later|"
     r"as soon|as long|provided|and|then|or|no|never)\b)[^,;.!?])*"
 )
+# When that will be is nothing to wait for.
+_WHAT_FOR: Final = r"(?:(?!\b(?:if|unless|until|till|when|whenever|once|but|and|then|or)\b)[^,;.!?])*"
 _BEHIND: Final = tuple(
     re.compile(rf",? {pattern}[ .!?,]*$")
     for pattern in (
         rf"before {_PERSON} {_HARM}\b{_REST}",
         rf"so (?:that )?{_PERSON} (?:don't|doesn't|do not|does not|won't|will not|can|can't|cannot|"
-        rf"could|needn't|may) (?!you\b){_REST}",
+        rf"could|needn't|may) (?!you\b){_WHAT_FOR}",
         rf"as an? (?:test|favou?r|treat|surprise|experiment)\b{_REST}",
         r"for (?:safe ?keeping|the time being|good measure|a change|a start)",
         r"(?:chop chop|hurry(?: up)?|be quick(?: about it)?|quick(?:ly)?|snappy|asap|sharpish|"
