@@ -318,7 +318,7 @@ TOPICS: tuple[Topic, ...] = (
         owner="any",
         summary="what became of a command: planning, asked, plan, rejected, action, said, finished",
         slots=256,
-        slot_bytes=16384,
+        slot_bytes=32768,
     ),
     Topic(
         name="executor_status",

@@ -88,7 +88,7 @@ GO_ALL_OVER = [{"skill": "navigate_to", "parameters": {"place": "kitchen"}}]
     "plan",
     [
         {"actions": [{"skill": "speak", "parameters": {"text": "x" * 500}}] * 60},
-        {"actions": [{"skill": "speak", "parameters": {"text": "\U0001f600" * 499}}] * 9},
+        {"actions": [{"skill": "speak", "parameters": {"text": "\U0001f600" * 499}}] * 20},
         {"actions": GO_ALL_OVER, "safety_concerns": ["\U0001f600" * 10_000]},
         {"actions": GO_ALL_OVER, "goal": "g" * 60_000},
     ],
@@ -97,6 +97,14 @@ def test_a_plan_too_long_to_be_told_is_refused(desk, plan):
     desk.give(plan={"goal": "talk"} | plan)
     assert [(one["event"]) for one in desk.answers()] == ["rejected"]
     assert desk.plans() == []
+
+
+def test_a_long_plan_is_told_whole(desk):
+    said = [{"skill": "speak", "parameters": {"text": "y" * 400}}] * 20
+    desk.give(plan={"goal": "talk", "actions": said})
+    desk.answers()
+    (plan,) = desk.plans()
+    assert len(plan["plan"]["actions"]) == 20
 
 
 @pytest.mark.parametrize("text", ["\\ud800", "\\u0000\\u001b[2J", "\U0001f600" * 2_000])

@@ -51,7 +51,8 @@ _BACK: Final = re.compile(
 _REVERSE: Final = re.compile(r"(?:and )?(?:now )?the other way(?: (?:round|around))?")
 # What a command begins or ends with that leans on the one before it.
 _LEANING: Final = re.compile(
-    r"(?:(?:ok|okay|oh|ah|yes|yeah|great|good|fine|lovely|perfect|brilliant|thanks|thank you|please|"
+    r"(?:(?:ok|okay|oh|ah|yes|yeah|great|good|fine|lovely|perfect|brilliant|thanks|thank you|"
+    r"please|"
     r"butler|robot|so|right|actually)[,. ]+)*"
     r"(?:and|also|plus|then|now|next|(?:do |try )?(?:exactly |just )?(?:the )?same)\b.*|"
     r".*\b(?:too|as well|also|likewise)(?:,? (?:please|thanks|thank you|then))?"

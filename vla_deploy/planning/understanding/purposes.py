@@ -26,7 +26,9 @@ _REST: Final = (
     r"as soon|as long|provided|and|then|or|no|never)\b)[^,;.!?])*"
 )
 # When that will be is nothing to wait for.
-_WHAT_FOR: Final = r"(?:(?!\b(?:if|unless|until|till|when|whenever|once|but|and|then|or)\b)[^,;.!?])*"
+_WHAT_FOR: Final = (
+    r"(?:(?!\b(?:if|unless|until|till|when|whenever|once|but|and|then|or)\b)[^,;.!?])*"
+)
 _BEHIND: Final = tuple(
     re.compile(rf",? {pattern}[ .!?,]*$")
     for pattern in (
