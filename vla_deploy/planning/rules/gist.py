@@ -12,10 +12,10 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.references import words_of
-from vla_deploy.planning.rules.building import is_one, is_seen
+from vla_deploy.planning.rules.building import is_one
 from vla_deploy.planning.rules.clauses import MOST_LETTERS, plain, segments
 from vla_deploy.planning.rules.fits import known_fit
-from vla_deploy.planning.rules.lending import STOPS
+from vla_deploy.planning.rules.lending import NAMED, STOPS, things_told
 from vla_deploy.planning.rules.recalling import points_back
 from vla_deploy.planning.rules.verbs import any_verb
 from vla_deploy.planning.understanding.known_words import is_kind, single
@@ -72,14 +72,7 @@ _MATTERS: Final = frozenset(
         "hand", "hands", "careful", "help",
     }
 )  # fmt: skip
-_ARTICLE: Final = r"(?:the|my|our|your|a|an|that|this|those|these|his|her)"
-_NAMED: Final = re.compile(rf"\b{_ARTICLE} (?:[\w']+ ){{0,3}}?(?:{KIND_WORDS})(?:e?s)?\b")
 _KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})(?:e?s)?\b")
-_WHERE: Final = re.compile(
-    r"(?:'s|'re| is| are| was| were| must be| should be|)"
-    r"(?: (?:lying|sitting|standing|still|over|just|that is|that's|back|up|down))* "
-    r"(?P<where>(?:on|in|at|by|inside|under|next to|beside|near|nearest|closest to) .+)"
-)
 _POINTS: Final = re.compile(
     r"\b(?:it|them|they|those|that one|this one|(?:the )?(?:two|three|both|lot) of them|"
     r"(?:that|this)(?= (?:goes|belongs|should|needs|can|ought|has|in|to|on|up|over|into|out)\b)"
@@ -131,9 +124,9 @@ def _matters(word: str, places: set[str]) -> bool:
 
 def _with_what_is_told(asked: str, told: Sequence[str], request: Request) -> str:
     """Return what is asked with the thing that was told of in the place of "it", or of "one"."""
-    things = list(dict.fromkeys(thing for part in told for thing in _things(part, request)))
+    things = things_told(told, request)
     points = _POINTS.search(asked)
-    if points and things and not _NAMED.search(asked[: points.start()]):
+    if points and things and not NAMED.search(asked[: points.start()]):
         whole = (
             things
             if points[0] in ("them", "they", "those") or "of them" in points[0]
@@ -146,17 +139,3 @@ def _with_what_is_told(asked: str, told: Sequence[str], request: Request) -> str
         return asked
     which = one["which"] or f"{one['than']} "
     return f"{asked[: one.start()]}{which}{kinds.pop()}{asked[one.end() :]}"
-
-
-def _things(part: str, request: Request) -> list[str]:
-    """Return the things that a part names; where the last is makes it no further one."""
-    told = list[str]()
-    for found in _NAMED.finditer(part):
-        where = _WHERE.fullmatch(part, found.end())
-        whole = "" if where is None else f"{found[0]} {where['where']}"
-        told.append(
-            whole if whole and is_one(whole, request) and is_seen(whole, request) else found[0]
-        )
-        if where is not None:
-            break
-    return [re.sub(rf"^{_ARTICLE} ", "the ", one) for one in told]

@@ -5,11 +5,13 @@ the larger" the larger ball; "leave the book, take the cup" is about the cup alo
 """
 
 import re
+from collections.abc import Sequence
 from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.references import match_place, words_of
-from vla_deploy.planning.rules.building import is_one
+from vla_deploy.planning.rules.building import is_one, is_seen
+from vla_deploy.planning.understanding.known_words import single
 from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
 STOPS: Final = frozenset({"stop", "halt", "freeze"})
@@ -18,9 +20,25 @@ NAMED: Final = re.compile(
     rf"(?:{KIND_WORDS})(?:e?s)?\b"
 )
 POINTS: Final = re.compile(
-    r"\b(?:(?:it|them|they|those)\b|that(?= (?:up|over|away|here|out|off|in|on|to|into|for)\b|$))"
+    r"\b(?:that one\b|this one\b|(?:it|them|they|those)\b|that(?= (?:up|over|away|here|out|off|"
+    r"in|on|to|into|for)\b|$))"
 )
 _KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})\b")
+_ARTICLE: Final = r"(?:the|my|our|your|a|an|that|this|those|these|his|her)"
+_CALLED: Final = re.compile(
+    rf"\b{_ARTICLE} (?:(?!{_ARTICLE}\b)[\w']+ "
+    rf"){{0,3}}?(?:{KIND_WORDS})(?:e?s)?\b"
+)
+_WHERE: Final = re.compile(
+    r"(?:'s|'re| is| are| was| were| must be| should be|)"
+    r"(?: (?:lying|sitting|standing|still|over|just|that is|that's|back|up|down))* "
+    r"(?P<where>(?:on|in|at|by|inside|under|next to|beside|near|nearest|closest to) .+)"
+)
+_ONE_OF: Final = re.compile(
+    r"\b(?:the|that) (?P<which>(?!other\b|only\b|first\b)[\w-]+ )?one(?: (?:over|out|down|up|"
+    r"back))?"
+    r"(?P<where> (?:in|on|at|by|next to|beside|near) .+?)?(?='s\b| is\b| i\b| was\b|$)"
+)
 # Somebody who is somewhere: that is where things go that are for them.
 _SOMEBODY_AT: Final = re.compile(
     r"(?:and |because |since |as )?(?:there(?:'s| is| are|'ll be| will be) )?"
@@ -91,3 +109,29 @@ def left_alone_off(parts: list[str], request: Request) -> list[str]:
         return parts
     nouns = {found[0] for one in left for found in _KIND.finditer(one)}
     return parts if any(nouns & set(words_of(part)) for part in kept) else kept
+
+
+def things_told(told: Sequence[str], request: Request) -> list[str]:
+    """Return the things that parts of a command name; the last is the likeliest to be meant.
+
+    Of "there are two cups, the left one is empty" it is the left cup alone.
+    """
+    kinds = {single(found[0]) for part in told for found in _KIND.finditer(part)}
+    ones = [found for part in told for found in _ONE_OF.finditer(part)] if len(kinds) == 1 else []
+    if ones:
+        kind = next(iter(kinds))
+        return [f"the {ones[-1]['which'] or ''}{kind}{ones[-1]['where'] or ''}"]
+    return list(dict.fromkeys(thing for part in told for thing in _things(part, request)))
+
+
+def _things(part: str, request: Request) -> list[str]:
+    """Return the things that a part names; where the last is makes it no further one."""
+    told = list[str]()
+    for found in _CALLED.finditer(part):
+        where = _WHERE.fullmatch(part, found.end())
+        whole = "" if where is None else f"{found[0]} {where['where']}"
+        is_known = bool(whole) and is_one(whole, request) and is_seen(whole, request)
+        told.append(whole if is_known else found[0])
+        if where is not None:
+            break
+    return [re.sub(rf"^{_ARTICLE} ", "the ", one) for one in told]

@@ -10,6 +10,7 @@ from vla_deploy.world.vocabulary import KIND_WORDS
 
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("gimme", "give me"),
+    (r"(i|he|she|they)(?:'ve|'s| have| has) (?:gone|been) and ", r"\1 have "),
     ("lemme have", "give me"),
     ("wanna", "want to"),
     ("gotta", "have to"),

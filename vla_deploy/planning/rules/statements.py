@@ -21,6 +21,7 @@ from vla_deploy.planning.rules.lending import (
     kind_lent,
     left_alone_off,
     place_of_people,
+    things_told,
 )
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
@@ -138,8 +139,7 @@ def _remarks_off(parts: list[str], request: Request) -> list[str]:
     is_told_where = points is not None and _WITH_IT.fullmatch(asking[0]) is not None
     if points is None or (NAMED.search(asking[0][: points.start()]) and not is_told_where):
         return asking or parts
-    told = " ".join(part for part in parts if part not in asking)
-    named = [found[0] for found in NAMED.finditer(told)]
+    named = things_told([part for part in parts if part not in asking], request)
     if len(named) > 1:
         return parts
     return [POINTS.sub(named[0], asking[0], count=1), *asking[1:]] if named else asking
