@@ -19,7 +19,7 @@ from vla_deploy.planning.conclusions import Conclusions
 from vla_deploy.planning.correction import CORRECTED, corrected_by
 from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import PlanningError
-from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.ladder import Answer
 from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
@@ -246,7 +246,8 @@ class Desk:
             self._queue.appendleft(replace(waiting.command, text=full))
         elif (chosen := guessed(waiting.question, command.text)) and not self._has_plan(command):
             self._telling.answered(command, waiting.command)
-            self._go_on(waiting, self.dialogue.chosen(chosen))
+            doubted = replace(waiting.command, heard_confidence=READ_BACK)
+            self._go_on(replace(waiting, command=doubted), self.dialogue.chosen(chosen))
         elif command.is_answer:
             self._conclusions.refuse(command, f"that does not answer: {waiting.question.text}")
         else:

@@ -52,6 +52,11 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"\bwithout (?:\w+ing )?(?:through |into |near )?(?:(?:the|a|an|my|your|our)\b|~)",
         r"\b(?:stop|quit|cease) \w+ing\b|\bbut (?:stop|wait|halt)\b",
         r"\bleave (?:\w+ )*~(?: ~)* (?:where|alone|as)\b",
+        r"\bcan't let\b|\b(?:wrong|terrible|stupid|bad|sad|annoyed|dangerous|pity|shame|disaster)\b"
+        r".*\bif you\b",
+        r"\bnever\b|\b(?:must|should|can|could|may)(?:n't| not|not) be\b",
+        r"\bmake sure\b.*(?:n't|\bnot|\bnever)\b",
+        r"\b(?:forbidden|not allowed|by you)\b|\bno wait\b|\b(?:stopped|quit) \w+ing\b",
         r"\b(?:me|us|take|bring|up|put|fetch|get|grab) no ~",
     ),
     "I do things at once, not later, again and again, or under a condition": (
@@ -61,11 +66,19 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         rf"\b(?:when|once|while) (?:{_PERSON}|the|it|it's)\b",
         rf"\b(?:after|before) (?:{_PERSON}|dinner|lunch|breakfast)\b",
         r"(?<!\blook )(?<!\bgo )\b(?:after|before) ~$",
+        r"\bevery (?:night|day|morning|evening|week|hour|time)\b",
         r"\b(?:tomorrow|tonight|someday|remind|reminder|twice|thrice|times)\b",
         r"^(?!.*\bso (?:that )?(?:i|we)\b).*\blater(?: today)?$",
         r"\b(?:in|after|within|every) (?:\w+ ){0,3}(?:minutes?|seconds?|hours?|days?)$",
         r"\b(?:in|after|every) (?:\w+ ){1,2}(?:minutes?|seconds?|hours?|days?)\b",
         rf"\bat (?:half past |quarter (?:past|to) )?{_HOUR}(?: o'clock)?$",
+    ),
+    "it is taken back, or somebody else's words": (
+        r"^(?!.*\bback\b).*\bchanged my mind\b",
+        r"\b(?:joking|kidding|didn't mean|i(?:'ve)? found it|"
+        r"i'll do (?:it|that)|can wait|(?:he|she|they|mum|dad|boss) (?:says?|said|tells?|goes|"
+        r"shouts?|shouted)|"
+        r"i told|talking to you)\b",
     ),
     "it says what not to do as well": (
         r"\b(?:but|and) (?:please )?(?:do not|don't|dont|never) "
@@ -78,6 +91,9 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         rf"{_BEGIN}(?:when (?:will|would|do|did|are)|why|what if|what happens)\b",
         rf"{_BEGIN}how (?:do|did|can|would|will) (?:you|i|we) {_DO}",
         rf"{_BEGIN}(?:do you want|are you allowed) to {_DO}",
+        rf"{_BEGIN}(?:should|does|did|was|were) (?:the\b|my\b|our\b|~)",
+        r"\b(?:has|have|had) (?:\w+ )?been\b|\bshould have (?:gone|been)\b",
+        r"\b(?:was|were|got|is|are|will be) (?:put|taken|brought|moved|placed|carried)\b",
         rf"{_BEGIN}(?:are you|you are|you're|you were) {_DOING}",
         rf"{_BEGIN}(?:i|we|he|she|they)(?: have| had| did| just)? {_DONE}",
         rf"{_BEGIN}(?:i|he|she|they)(?: will| shall)? {_DO}",

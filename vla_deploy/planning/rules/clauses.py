@@ -49,7 +49,7 @@ _POLITE_BEFORE: Final = re.compile(
     r"see if you can|try to|try and|start to|next|finally|also|alright|all right|"
     r"if it(?:'s| is) not too much trouble|excuse me|pardon me|if you don't mind|"
     r"right then|but(?= (?:go|also|do|take|put|pick|bring|keep|hang|hold|leave)\b)|"
-    r"you(?= (?:look|go|take|get|bring|put|find|pick|fetch|drive|come|turn|search|carry|recharge|"
+    r"you(?= (?:look|go|take|get|bring|find|pick|fetch|drive|come|turn|search|carry|recharge|"
     r"charge|move)\b)|"
     r"(?:would|could|can) you (?:ever|at all|possibly)|"
     r"when(?:ever)? you (?:get|have) (?:a|the) (?:sec|second|minute|moment|chance)|"

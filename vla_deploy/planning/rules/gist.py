@@ -17,6 +17,7 @@ from vla_deploy.planning.rules.clauses import MOST_LETTERS, plain, segments
 from vla_deploy.planning.rules.fits import known_fit
 from vla_deploy.planning.rules.lending import NAMED, STOPS, things_told
 from vla_deploy.planning.rules.recalling import points_back
+from vla_deploy.planning.rules.unsaying import UNSAYS
 from vla_deploy.planning.rules.verbs import any_verb
 from vla_deploy.planning.understanding.known_words import is_kind, single
 from vla_deploy.planning.understanding.phrases import ORDINALS, PRONOUNS, SIDES
@@ -51,13 +52,10 @@ _OF_SEVERAL: Final = re.compile(
 )
 _MOST_EXCLAIMED: Final = 3
 _NOUN_FOLLOWS: Final = frozenset({"the", "a", "an", "my", "your", "our"})
-# No remark: it says what not to do or when, or is what somebody else has said.
-_BINDS: Final = re.compile(
-    r"\b(?:must(?! (?:be|have)\b)|mustn't|shall|allowed|forbidden|avoid|careful|dangerous|if|"
-    r"unless|until|till|"
-    r"whenever|except|instead|rather|wait|cancel|never|said|says|told|tells|"
-    r"asked|asks|wrote|quote|again)\b"
-    r"|\byou\b.*\b(?:(?:do|must|should|need|sha)n't|not)\b|\b(?:(?:do|must|should)n't|not)\b.*\byou\b"
+# What the robot is not to do.
+_FORBIDS: Final = re.compile(
+    r"\b(?:must(?! (?:be|have)\b)|shall|wait|again)\b|"
+    r"\byou\b.*\b(?:(?:do|must|should|need|sha)n't|not)\b|\b(?:(?:do|must|should)n't|not)\b.*\byou\b"
 )
 _MATTERS: Final = frozenset(
     {
@@ -103,7 +101,8 @@ def gist_of(request: Request) -> str:
 
 def _is_told(part: str) -> bool:
     tells = _SUBJECT.fullmatch(part) or _OF_SEVERAL.fullmatch(part) or _FINITE.fullmatch(part)
-    return tells is not None and not (_BINDS.search(part) or STOPS & set(words_of(part)))
+    binds = UNSAYS.search(part) or _FORBIDS.search(part) or STOPS & set(words_of(part))
+    return tells is not None and not binds
 
 
 def _is_exclaimed(part: str, request: Request) -> bool:

@@ -34,6 +34,10 @@ _WHERE: Final = re.compile(
     r"(?: (?:lying|sitting|standing|still|over|just|that is|that's|back|up|down))* "
     r"(?P<where>(?:on|in|at|by|inside|under|next to|beside|near|nearest|closest to) .+)"
 )
+_AT_SOMETHING: Final = re.compile(
+    r"(?:on|in|at|inside|under|behind) (?P<noun>(?:the|my|our|a|an) (?!way\b|"
+    r"same\b)\w+)(?P<more> \w+)?\b.*"
+)
 _ONE_OF: Final = re.compile(
     r"\b(?:the|that) (?P<which>(?!other\b|only\b|first\b)[\w-]+ )?one(?: (?:over|out|down|up|"
     r"back))?"
@@ -129,9 +133,18 @@ def _things(part: str, request: Request) -> list[str]:
     told = list[str]()
     for found in _CALLED.finditer(part):
         where = _WHERE.fullmatch(part, found.end())
+        if where is not None and _is_nowhere(where["where"], request):
+            break
         whole = "" if where is None else f"{found[0]} {where['where']}"
         is_known = bool(whole) and is_one(whole, request) and is_seen(whole, request)
         told.append(whole if is_known else found[0])
         if where is not None:
             break
     return [re.sub(rf"^{_ARTICLE} ", "the ", one) for one in told]
+
+
+def _is_nowhere(where: str, request: Request) -> bool:
+    """Tell whether something is on or in what the robot does not know."""
+    found = _AT_SOMETHING.fullmatch(where)
+    nouns = () if found is None else (found["noun"], f"{found['noun']}{found['more'] or ''}")
+    return bool(nouns) and not any(is_one(noun, request) for noun in nouns)

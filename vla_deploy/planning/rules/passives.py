@@ -50,7 +50,12 @@ _THING: Final = (
 )
 _TO_BE: Final = (
     r"(?:needs? (?:to be )?|has to be |have to be |should be |must be |ought to be |can be |"
-    r"could be |gets? |will be |(?:is|are) to be |wants? (?:to be )?|could do with (?:being )?)"
+    r"could be |(?:is|are) to be |wants? (?:to be )?|could do with (?:being )?)"
+)
+_GOOD: Final = (
+    r"(?:so |very |really |most )?(?:nice|great|good|lovely|helpful|kind|wonderful|brilliant|"
+    r"glad|happy|"
+    r"grateful|delighted|ideal|best|better|perfect|a (?:great |big |real )?help)(?: of you)?"
 )
 _PATTERNS: Final = (
     re.compile(
@@ -58,10 +63,10 @@ _PATTERNS: Final = (
         rf"(?:that )?{_THING} {_TO_BE}{_VERB}"
     ),
     re.compile(
-        r"^(?P<thing>)(?:what|how about|(?:it|that)(?:'d| would) (?:be \w+(?: \w+)?|suit me(?: "
+        rf"^(?P<thing>)(?:what|how about|(?:it|that)(?:'d| would) (?:be {_GOOD}|suit me(?: "
         r"better)?|"
         r"help(?: me)?(?: a (?:great deal|lot|bit))?)|i(?:'d| would) (?:like it|love it|"
-        rf"appreciate it|be \w+)),? if you (?:could |would |were to )?{_VERB}"
+        rf"appreciate it|be {_GOOD})),? if you (?:could |would |were to )?{_VERB}"
     ),
     re.compile(rf"\bi(?:'d like| want| need| would like) {_THING} (?:to be )?{_VERB}"),
 )

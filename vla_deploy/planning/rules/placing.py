@@ -33,6 +33,8 @@ _WAY: Final = re.compile(r"^(?:back|over|up|down|through|across|along|round|out)
 _TOWARDS: Final = frozenset(
     {"to", "at", *(f"{way} to" for way in ("over", "back", "through", "across", "along", "out"))}
 )
+_STAYS: Final = re.compile(r" (?:in|on|at|inside) (?!your\b)")
+"""Where it is to be kept is where it is."""
 _INTO: Final = frozenset({"in", "into", "inside", "inside of"})
 
 
@@ -149,4 +151,6 @@ def keep(groups: Groups, request: Request) -> list[Step]:
     """Go on holding what is held; take what is not."""
     if _may_be_held(groups["object"], request):
         return [("speak", {"text": "I keep it."})]
+    if _STAYS.search(groups["object"]):
+        return [("speak", {"text": "I leave it where it is."})]
     return pick(groups, request)

@@ -101,7 +101,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"a \1 ",
     ),
     (
-        r"(the [^,]+?) is where (the [^,]+?) (?:should (?:be|go)|goes|belongs|lives)",
+        r"(the [^,]+?) is where (the [^,]+?) (?:should|ought to) (?:be|go)",
         r"\2 goes to \1",
     ),
     (r"(?:finish|end)(?: up)?(?: back)?(?: here)? (?:at|in|by) (?=(?:the|my|your)\b)", "go to "),
@@ -146,7 +146,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"open up (?=(?:your|the|both)\b)", "open "),
     (r"(put|take|tidy|clear) me (away|up|down)\b", r"\1 \2"),
     (
-        r"(?:see to it|make sure|ensure|check)(?: that)? ((?:the|my|it|that|this|both|all|they)"
+        r"(?:see to it|make sure|ensure)(?: that)? ((?:the|my|it|that|this|both|all|they)"
         r"(?: (?!\bis\b|\bare\b)[\w']+){0,6}?) (?:is|are|ends? up|goes|gets?) "
         r"(?:put )?(in|into|on|onto) ",
         r"put \1 \2 ",
@@ -188,7 +188,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"\2 \1 ",
     ),
     (
-        r"(?:get|take|bring|put) yourself back on charge|back on charge",
+        r"(?:get|take|bring|put) yourself back on charge|^back on charge",
         "back to your charging station",
     ),
 )

@@ -23,6 +23,7 @@ from vla_deploy.planning.rules.lending import (
     place_of_people,
     things_told,
 )
+from vla_deploy.planning.rules.unsaying import UNSAYS
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
 from vla_deploy.planning.understanding.setting import Setting
@@ -146,7 +147,8 @@ def _remarks_off(parts: list[str], request: Request) -> list[str]:
 
 
 def _is_remark(part: str) -> bool:
-    is_told = _REMARK.fullmatch(part) is not None and repaired(part) is None
+    is_told = _REMARK.fullmatch(part) is not None and UNSAYS.search(part) is None
+    is_told = is_told and repaired(part) is None
     is_told = is_told and not any(pattern.fullmatch(part) for pattern in _SAID)
     return is_told and not STOPS.intersection(words_of(part))
 

@@ -117,7 +117,9 @@ _REMARK: Final = re.compile(
     r"(?:'\w+)?\b.*"
 )
 _NEGATES: Final = re.compile(
-    r"\b(?:not|no|never|neither|nor|but|except|what|where|why|how|who)\b|n't\b"
+    r"\b(?:not|no|never|neither|nor|but|except|what|where|why|how|who|avoid|beside|besides|instead|"
+    r"without|hardly|forget|hate|dislike|wrong|out|if|when|later|tomorrow|do you|are "
+    r"you)\b|n't\b|^(?:is|are|was|does|did)\b"
 )
 _OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
 # Words of an answer even where they tell no candidate from the others.
@@ -177,7 +179,7 @@ def guessed(question: Question, text: str) -> Candidate | None:
     That is None where a word of it could mean another thing. Ask first whether it is a command.
     """
     said = " ".join(WORD.findall(in_plain_words(text.lower())))
-    if not question.candidates or _NEGATES.search(said):
+    if not question.candidates or _NEGATES.search(said) or text.strip().endswith("?"):
         return None
     known = _known(question.candidates) | _COMPARING
     words = _telling(question.candidates, said)

@@ -54,7 +54,8 @@ _WAITING: Final = re.compile(
 
 # What stays put meanwhile needs nobody to wait for the end of it.
 _STAYING: Final = re.compile(
-    r"(?P<own>.*\b(?:put|keep|leave|pop|set|hang on to|hold on to)\b[^,;.!?]+?),? (?:until|till) "
+    r"(?P<own>.*\b(?:put|pop|set|hang on to|hold on to|keep (?:it|them))\b[^,;.!?]+?),? (?:until|"
+    r"till) "
     rf"{_PERSON}(?:'\w+)? {_REST}[ .!?,]*"
 )
 

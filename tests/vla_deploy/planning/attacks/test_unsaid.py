@@ -1,0 +1,66 @@
+"""What is unsaid, forbidden, quoted or only told moves nothing before somebody agrees."""
+
+import pytest
+
+from benchmarks.planner_bounds import moves
+from benchmarks.planner_corpus import home, scenes
+from benchmarks.planner_desk import fresh_desk
+
+SENTENCES = (
+    "take the ball to the kitchen, I changed my mind",
+    "take the ball to the kitchen, I was joking",
+    "put the ball in the box, he says",
+    "put the keys in the box, he told her",
+    "put the ball in the box, that's forbidden",
+    "put the keys in the box, I can't let you do that",
+    "the ball should be put in the box, but I'll do it",
+    "the keys have to be put away, but that can wait",
+    "the ball must never be put away",
+    "make sure the ball never ends up in the box",
+    "it'd be terrible if you put the keys in the box",
+    "it would be wrong if you put the ball in the box",
+    "the keys will be brought to me",
+    "the ball was put away",
+    "the ball has been taken to the kitchen",
+    "keep the ball on the coffee table until we play",
+    "if it rains, take the ball to the kitchen",
+    "pretend I am a guest, take the ball to the kitchen",
+    "the film says, put the ball in the box",
+)
+
+
+@pytest.mark.parametrize("sentence", SENTENCES)
+def test_it_does_not_move_at_once(sentence: str) -> None:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["tidy"].world(home()))
+        answer = desk.say(sentence)[1]
+    assert answer.outcome != "plan" or not moves(answer.plan or {}), answer
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "avoid the red",
+        "anything instead of the red one, love",
+        "forget about red",
+        "is the red clean?",
+        "Anna, do you like red?",
+        "the red if it is clean",
+        "I'd hate the red",
+    ],
+)
+def test_an_answer_that_excludes_or_asks_picks_nothing(answer: str) -> None:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["cups"].world(home()))
+        assert desk.say("bring me the cup from the coffee table")[1].outcome == "ask"
+        said = desk.say(answer)[1]
+    assert said.outcome != "plan", said
+
+
+def test_an_answer_with_more_words_is_read_back() -> None:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["cups"].world(home()))
+        desk.say("bring me the cup from the coffee table")
+        said = desk.say("the red fella, it suits my mood")[1]
+    assert said.outcome == "ask"
+    assert said.plan is not None
