@@ -17,8 +17,7 @@ _WITH_HAND: Final = re.compile(
     r"(?P<own>.+?),? "
     r"(?:(?:with|using|(?<! is )(?<!'s )(?<!thing )(?<!object )(?<! one )in) (?:the|your) "
     r"(?P<arm>left|right) (?:hand|arm|gripper)|"
-    r"(?:with|using) (?:the|your) (?P<arm2>left|right)(?: one)?|"
-    r"in your (?P<arm3>left|right))"
+    r"(?:with|using) (?:the|your) (?P<arm2>left|right)(?: one)?|in your (?P<arm3>left|right))"
 )
 # "In one hand": in either.
 _IN_A_HAND: Final = re.compile(

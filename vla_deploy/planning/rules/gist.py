@@ -15,13 +15,13 @@ from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.building import is_one
 from vla_deploy.planning.rules.clauses import MOST_LETTERS, plain, segments
 from vla_deploy.planning.rules.fits import known_fit
-from vla_deploy.planning.rules.lending import NAMED, STOPS, things_told
+from vla_deploy.planning.rules.lending import KIND, NAMED, POINTS, STOPS, things_told
 from vla_deploy.planning.rules.recalling import points_back
 from vla_deploy.planning.rules.unsaying import UNSAYS
 from vla_deploy.planning.rules.verbs import any_verb
 from vla_deploy.planning.understanding.known_words import is_kind, single
 from vla_deploy.planning.understanding.phrases import ORDINALS, PRONOUNS, SIDES
-from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
+from vla_deploy.world.vocabulary import COLOURS
 
 _DOING: Final = any_verb("search", "clean", "follow", "switch", "start", "lift", "grab", "carry")
 _SO: Final = re.compile(
@@ -46,8 +46,7 @@ _FINITE: Final = re.compile(
 # What is chosen from, or how much is coming.
 _OF_SEVERAL: Final = re.compile(
     r"(?:of|from|out of|among|(?:can you |do you )?see|choose|select) (?:all )?(?:the|those|"
-    r"these) .+|"
-    r"(?:one|two|three|a (?:few|couple of)) (?:\w+ )?(?:jobs?|things?|tasks?|errands?|"
+    r"these) .+|(?:one|two|three|a (?:few|couple of)) (?:\w+ )?(?:jobs?|things?|tasks?|errands?|"
     r"favou?rs?)\b.*"
 )
 _MOST_EXCLAIMED: Final = 3
@@ -70,12 +69,6 @@ _MATTERS: Final = frozenset(
         "hand", "hands", "careful", "help",
     }
 )  # fmt: skip
-_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})(?:e?s)?\b")
-_POINTS: Final = re.compile(
-    r"\b(?:it|them|they|those|that one|this one|(?:the )?(?:two|three|both|lot) of them|"
-    r"(?:that|this)(?= (?:goes|belongs|should|needs|can|ought|has|in|to|on|up|over|into|out)\b)"
-    r"|that$)"
-)
 _ONE: Final = re.compile(
     r"\b(?P<which>(?:the|that|my) (?:[\w-]+ )?)one\b|\b(?P<than>the \w+(?:er|est))"
     r"(?: of (?:the two|them))?$"
@@ -124,7 +117,7 @@ def _matters(word: str, places: set[str]) -> bool:
 def _with_what_is_told(asked: str, told: Sequence[str], request: Request) -> str:
     """Return what is asked with the thing that was told of in the place of "it", or of "one"."""
     things = things_told(told, request)
-    points = _POINTS.search(asked)
+    points = POINTS.search(asked)
     if points and things and not NAMED.search(asked[: points.start()]):
         whole = (
             things
@@ -132,9 +125,9 @@ def _with_what_is_told(asked: str, told: Sequence[str], request: Request) -> str
             else things[-1:]
         )
         return f"{asked[: points.start()]}{' and '.join(whole)}{asked[points.end() :]}"
-    kinds = {single(found[0]) for part in told for found in _KIND.finditer(part)}
+    kinds = {single(found[0]) for part in told for found in KIND.finditer(part)}
     one = _ONE.search(asked)
-    if one is None or len(kinds) != 1 or _KIND.search(asked):
+    if one is None or len(kinds) != 1 or KIND.search(asked):
         return asked
     which = one["which"] or f"{one['than']} "
     return f"{asked[: one.start()]}{which}{kinds.pop()}{asked[one.end() :]}"

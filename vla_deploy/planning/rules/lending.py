@@ -20,10 +20,12 @@ NAMED: Final = re.compile(
     rf"(?:{KIND_WORDS})(?:e?s)?\b"
 )
 POINTS: Final = re.compile(
-    r"\b(?:that one\b|this one\b|(?:it|them|they|those)\b|that(?= (?:up|over|away|here|out|off|"
-    r"in|on|to|into|for)\b|$))"
+    r"\b(?:(?:the )?(?:two|three|both|lot) of them|that one|this one|it|them|they|those|"
+    r"(?:that|this)(?= (?:goes|belongs|should|needs|can|ought|has|up|over|away|here|out|off|in|"
+    r"on|to|"
+    r"into|for)\b)|that(?=$))\b"
 )
-_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})\b")
+KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})(?:e?s)?\b")
 _ARTICLE: Final = r"(?:the|my|our|your|a|an|that|this|those|these|his|her)"
 _CALLED: Final = re.compile(
     rf"\b{_ARTICLE} (?:(?!{_ARTICLE}\b)[\w']+ "
@@ -40,15 +42,13 @@ _AT_SOMETHING: Final = re.compile(
 )
 _ONE_OF: Final = re.compile(
     r"\b(?:the|that) (?P<which>(?!other\b|only\b|first\b)[\w-]+ )?one(?: (?:over|out|down|up|"
-    r"back))?"
-    r"(?P<where> (?:in|on|at|by|next to|beside|near) .+?)?(?='s\b| is\b| i\b| was\b|$)"
+    r"back))?(?P<where> (?:in|on|at|by|next to|beside|near) .+?)?(?='s\b| is\b| i\b| was\b|$)"
 )
 # Somebody who is somewhere: that is where things go that are for them.
 _SOMEBODY_AT: Final = re.compile(
     r"(?:and |because |since |as )?(?:there(?:'s| is| are|'ll be| will be) )?"
     r"(?:someone|somebody|an? \w+|(?:my|our) [a-z]+|the (?:guests?|visitors?|kids?|children)|he|"
-    r"she|"
-    r"they|we|i)(?:'s|'m|'re| am| is| are|'ll be| will be)?"
+    r"she|they|we|i)(?:'s|'m|'re| am| is| are|'ll be| will be)?"
     r"(?: (?:sitting|waiting|working|standing|lying|resting|busy|already|just|still|up|down|over))*"
     r" (?:in|at|by|on|near) (?P<place>(?:the|my|our) .+?)"
     r"(?: (?:any (?:minute|moment|second)|now|already))?"
@@ -66,15 +66,13 @@ _OF_A_KIND: Final = re.compile(
 _SEVERAL: Final = re.compile(
     r"(?:there(?:'s| are| is)|i (?:can )?see|you(?:'ve| have)(?: got)?|we(?:'ve| have)(?: got)?|"
     r"(?:can|do) you see) (?:two|three|four|some|a (?:couple|few|pair) (?:of )?|several|both|"
-    r"those|the)"
-    rf" (?:\w+ ){{0,2}}?(?P<kind>{KIND_WORDS})e?s?\b.*"
+    rf"those|the) (?:\w+ ){{0,2}}?(?P<kind>{KIND_WORDS})e?s?\b.*"
 )
 # What stays as it is; nothing that the rest is about.
 _LEFT_ALONE: Final = re.compile(
     r"(?:and |but |just )*(?:leave|keep) (?P<thing>(?:the|my|that|this|those|these) .+?) "
     r"(?:where (?:it|they) (?:is|are|lies?|stands?|sits?|belongs?)|alone|be|as (?:it|they) (?:is|"
-    r"are)|"
-    r"in peace|right there)"
+    r"are)|in peace|right there)"
 )
 
 
@@ -111,7 +109,7 @@ def left_alone_off(parts: list[str], request: Request) -> list[str]:
     left = [found["thing"] for part in parts if (found := _LEFT_ALONE.fullmatch(part))]
     if not kept or not left or not all(is_one(one, request) for one in left):
         return parts
-    nouns = {found[0] for one in left for found in _KIND.finditer(one)}
+    nouns = {found[0] for one in left for found in KIND.finditer(one)}
     return parts if any(nouns & set(words_of(part)) for part in kept) else kept
 
 
@@ -120,7 +118,7 @@ def things_told(told: Sequence[str], request: Request) -> list[str]:
 
     Of "there are two cups, the left one is empty" it is the left cup alone.
     """
-    kinds = {single(found[0]) for part in told for found in _KIND.finditer(part)}
+    kinds = {single(found[0]) for part in told for found in KIND.finditer(part)}
     ones = [found for part in told for found in _ONE_OF.finditer(part)] if len(kinds) == 1 else []
     if ones:
         kind = next(iter(kinds))

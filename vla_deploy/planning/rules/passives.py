@@ -64,8 +64,7 @@ _PATTERNS: Final = (
     ),
     re.compile(
         rf"^(?P<thing>)(?:what|how about|(?:it|that)(?:'d| would) (?:be {_GOOD}|suit me(?: "
-        r"better)?|"
-        r"help(?: me)?(?: a (?:great deal|lot|bit))?)|i(?:'d| would) (?:like it|love it|"
+        r"better)?|help(?: me)?(?: a (?:great deal|lot|bit))?)|i(?:'d| would) (?:like it|love it|"
         rf"appreciate it|be {_GOOD})),? if you (?:could |would |were to )?{_VERB}"
     ),
     re.compile(rf"\bi(?:'d like| want| need| would like) {_THING} (?:to be )?{_VERB}"),

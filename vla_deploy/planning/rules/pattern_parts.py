@@ -25,8 +25,7 @@ PLACE: Final = r"(?P<place>.+)"
 SAID_OF: Final = (
     r"(?P<object>(?:the|that|this|my) (?:\w+ ){1,2}you are holding|"
     r"(?:the|my|our|this|that|these|those|both|all)"
-    r"(?: (?!you\b|i\b|we\b|should\b|must\b|has to\b|needs to\b)[\w']+){1,8}?|"
-    r"it|they|that|this)"
+    r"(?: (?!you\b|i\b|we\b|should\b|must\b|has to\b|needs to\b)[\w']+){1,8}?|it|they|that|this)"
 )
 METRES: Final = (
     rf"(?P<quantity>{NUMBER}(?: of a| an?)? ?(?:m|meters?|metres?|cm|centimeters?|centimetres?|"
@@ -39,8 +38,7 @@ SECONDS: Final = (
 WAY: Final = r"(?P<way>forwards?|ahead|straight(?: ahead| on)?|backwards?|back(?: up)?|in reverse)"
 LITTLE: Final = (
     r"(?:a (?:little|(?:wee |tiny |little )?(?:bit|tad|touch|smidge(?:n)?|hair|fraction|notch|"
-    r"tick))|"
-    r"slightly|an inch or (?:two|so)|a couple of inches|ever so slightly)"
+    r"tick))|slightly|an inch or (?:two|so)|a couple of inches|ever so slightly)"
 )
 ROLL: Final = r"(?:shuffle|scoot|shift|nudge|inch|edge|creep|slide|budge|ease|crawl|nip|hop)"
 SIDE: Final = r"(?P<way>left|right|a?round|clockwise|counter-?clockwise|anti-?clockwise)"

@@ -34,8 +34,7 @@ ROWS: Final[tuple[Row, ...]] = (
      r"slightest)) "
      rf"(?:idea|notion|clue)|tell me|i wonder|find out|see) where|what (?:have|has|did) "
      rf"(?:[a-z]+ ){{1,3}}?(?:done|do) with|where (?:have|had|did) (?:i|we|you|they) (?:left|"
-     rf"leave|put)) "
-     rf"{OBJECT}"
+     rf"leave|put)) {OBJECT}"
      r"(?: is| are|(?:'s| has| have)? gone|(?:'s| has| have)? got to| went| ended up| might be| "
      r"could be)?(?: anywhere| somewhere)?"
      r"(?: have you)?",

@@ -16,8 +16,7 @@ _AGAIN: Final = re.compile(
     r"(?:and )?(?:(?:do|try|say|make|repeat) (?:it|that|this|so|the same(?: thing)?) )?"
     r"(?:(?:once )?again|once more|one more time|(?:yet )?another time|one more|another one)|"
     r"(?:please )?repeat(?: (?:it|that|this))?|(?:do )?(?:just )?the (?:very |exact )?same(?: "
-    r"thing)?(?: again)?|"
-    r"(?:the )?same again|(?:do|try) (?:it|that) again"
+    r"thing)?(?: again)?|(?:the )?same again|(?:do|try) (?:it|that) again"
 )
 # How much "a bit more" is of the distance, angle or time that was last given outright.
 RATIOS: Final[Mapping[str, float]] = {
@@ -52,8 +51,7 @@ _REVERSE: Final = re.compile(r"(?:and )?(?:now )?the other way(?: (?:round|aroun
 # What a command begins or ends with that leans on the one before it.
 _LEANING: Final = re.compile(
     r"(?:(?:ok|okay|oh|ah|yes|yeah|great|good|fine|lovely|perfect|brilliant|thanks|thank you|"
-    r"please|"
-    r"butler|robot|so|right|actually)[,. ]+)*"
+    r"please|butler|robot|so|right|actually)[,. ]+)*"
     r"(?:and|also|plus|then|now|next|(?:do |try )?(?:exactly |just )?(?:the )?same)\b.*|"
     r".*\b(?:too|as well|also|likewise)(?:,? (?:please|thanks|thank you|then))?"
 )

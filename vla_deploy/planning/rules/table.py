@@ -156,8 +156,7 @@ _ROWS: Final[tuple[Row, ...]] = (
     (Intent.MANIPULATION, rf"{SAID_OF} (?:goes|go|belongs?|lives?|(?:should|must|has to|have to|"
                           rf"(?:is|are) to|"
      rf"had better|needs to|need to|ought to|can|wants to) (?:go|be|live|stand|sit|stay|end up|"
-     rf"lie)) "
-     rf"(?:back )?{INTO} "
+     rf"lie)) (?:back )?{INTO} "
      r"(?P<destination>.+)", placing.put),
     # --- straight and turning
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come|{ROLL}) (?P<little>{LITTLE} )?{WAY}"

@@ -8,8 +8,7 @@ from vla_deploy.planning.understanding.conversation import Question
 
 _WHERE: Final = re.compile(
     r"(?:(?:no|yes|well|um|uh|oh|ah|sorry|pet|love|dear|mate|i (?:mean|meant|want|said)|it(?:'s| "
-    r"is)|"
-    r"take|make it|use) )*"
+    r"is)|take|make it|use) )*"
     r"(?:the|that) (?:one|(?P<noun>[a-z]+)) (?:(?:that|which)(?:'s| is) )?(?P<where>(?:right )?"
     r"(?:next to|close to|beside|behind|in front of|near|nearer to|closer to|nearest(?: to)?|"
     r"closest to|by|between|"

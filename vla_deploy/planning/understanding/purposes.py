@@ -38,8 +38,7 @@ _BEHIND: Final = tuple(
         rf"as an? (?:test|favou?r|treat|surprise|experiment)\b{_REST}",
         r"for (?:safe ?keeping|the time being|good measure|a change|a start)",
         r"(?:chop chop|hurry(?: up)?|be quick(?: about it)?|quick(?:ly)?|snappy|asap|sharpish|"
-        r"go on|"
-        r"there's a (?:dear|love|pal|good \w+)|if you (?:can )?manage(?: it| that)?|"
+        r"go on|there's a (?:dear|love|pal|good \w+)|if you (?:can )?manage(?: it| that)?|"
         r"if you'd be so kind|if it's no (?:trouble|bother))",
         r"with whichever hand (?:you (?:like|want|prefer)|is (?:free|nearer|closer))",
         r"(?:with|using) (?:your|the) (?:free|empty|spare) (?:hand|gripper|arm)",
@@ -55,8 +54,7 @@ _WAITING: Final = re.compile(
 # What stays put meanwhile needs nobody to wait for the end of it.
 _STAYING: Final = re.compile(
     r"(?P<own>.*\b(?:put|pop|set|hang on to|hold on to|keep (?:it|them))\b[^,;.!?]+?),? (?:until|"
-    r"till) "
-    rf"{_PERSON}(?:'\w+)? {_REST}[ .!?,]*"
+    rf"till) {_PERSON}(?:'\w+)? {_REST}[ .!?,]*"
 )
 
 
