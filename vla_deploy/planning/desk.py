@@ -29,15 +29,7 @@ from vla_deploy.planning.rehearing import Rehearing
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
-from vla_deploy.planning.understanding import (
-    Outcome,
-    Question,
-    Reply,
-    Turn,
-    Verdict,
-    described,
-    guessed,
-)
+from vla_deploy.planning.understanding import Outcome, Question, Reply, Turn, Verdict, described
 
 MOST_WAITING: Final = 8
 CANCELLED: Final = "cancelled on request"
@@ -244,10 +236,10 @@ class Desk:
             self._telling.answered(command, waiting.command)
             self.dialogue.settle()
             self._queue.appendleft(replace(waiting.command, text=full))
-        elif (chosen := guessed(waiting.question, command.text)) and not self._has_plan(command):
+        elif (guess := self.dialogue.guess(command.text)) and not self._has_plan(command):
             self._telling.answered(command, waiting.command)
             doubted = replace(waiting.command, heard_confidence=READ_BACK)
-            self._go_on(replace(waiting, command=doubted), self.dialogue.chosen(chosen))
+            self._go_on(replace(waiting, command=doubted), guess)
         elif command.is_answer:
             self._conclusions.refuse(command, f"that does not answer: {waiting.question.text}")
         else:
@@ -269,16 +261,15 @@ class Desk:
 
     def _is_command(self, command: Command) -> bool:
         """Tell whether words that could answer anything are a command to whoever takes no time."""
-        if command.plan is not None:
-            return True
-        deadline = Deadline.within(self._clock, self.planner.within_s)
-        return self.planner.plan_at_once(self._request(command), deadline).is_final
+        return command.plan is not None or self._at_once(command).is_final
 
     def _has_plan(self, command: Command) -> bool:
         """Tell whether whoever takes no time has a plan for words that may be an answer."""
+        return command.plan is not None or self._at_once(command).plan is not None
+
+    def _at_once(self, command: Command) -> Answer:
         deadline = Deadline.within(self._clock, self.planner.within_s)
-        answer = self.planner.plan_at_once(self._request(command), deadline)
-        return command.plan is not None or answer.plan is not None
+        return self.planner.plan_at_once(self._request(command), deadline)
 
     def _complete(self, waiting: Waiting, text: str) -> None:
         """Plan a command anew together with what answers a question that a model has asked."""

@@ -11,13 +11,13 @@ from vla_deploy.planning.ladder import Answer
 from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import (
-    Candidate,
     Conversation,
     Outcome,
     Question,
     Reply,
     Turn,
     Verdict,
+    guess,
     reply,
 )
 
@@ -88,18 +88,9 @@ class Dialogue:
         """Return what an utterance is to the question that waits, changing nothing."""
         return reply(self.talk, text, self._clock.now_ns())
 
-    def chosen(self, candidate: Candidate) -> Reply:
-        """Return the answer that picks a candidate of the question that waits."""
-        question = self.talk.question
-        choices = (
-            {} if question is None else {**question.choices, question.expression: candidate.name}
-        )
-        return Reply(
-            verdict=Verdict.CHOSEN,
-            text="" if question is None else question.command_text,
-            conversation=self.talk.settled(choices),
-            chosen=candidate,
-        )
+    def guess(self, text: str) -> Reply | None:
+        """Return the choice that an utterance seems to make, None where it makes none."""
+        return guess(self.talk, text)
 
     def declines(self, text: object) -> bool:
         """Tell whether words such as "never mind" mean what was asked, and not all that goes on."""

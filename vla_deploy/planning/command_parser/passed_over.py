@@ -52,8 +52,8 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"\bwithout (?:\w+ing )?(?:through |into |near )?(?:(?:the|a|an|my|your|our)\b|~)",
         r"\b(?:stop|quit|cease) \w+ing\b|\bbut (?:stop|wait|halt)\b",
         r"\bleave (?:\w+ )*~(?: ~)* (?:where|alone|as)\b",
-        r"\bcan't let\b|\b(?:wrong|terrible|stupid|bad|sad|annoyed|dangerous|pity|shame|disaster)\b"
-        r".*\bif you\b",
+        r"\bcan't let\b|\b(?:wrong|terrible|stupid|bad|sad|annoyed|dangerous|pity|shame|"
+        r"disaster)\b.*\bif you\b",
         r"\bnever\b|\b(?:must|should|can|could|may)(?:n't| not|not) be\b",
         r"\bmake sure\b.*(?:n't|\bnot|\bnever)\b",
         r"\b(?:forbidden|not allowed|by you)\b|\bno wait\b|\b(?:stopped|quit) \w+ing\b",

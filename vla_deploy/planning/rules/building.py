@@ -31,8 +31,9 @@ _NEAR: Final = re.compile(
 PUT_GROUPS: Final = ("object", "relation", "destination")
 BESIDE_WORDS: Final = ("next to", "beside", "alongside", "close to", "near")
 BESIDE: Final = "|".join(BESIDE_WORDS)
+WAYS: Final = "back|over|up|down|through|across|along|round|out"
 _PUT_RELATION: Final = re.compile(
-    r"(?:^| )(?:(?:back|over|up|down|through|across|along|round|out) )?"
+    rf"(?:^| )(?:(?:{WAYS}) )?"
     r"(?:into|inside of|inside|in|onto|on top of|on|to|at|over to|upon) "
 )
 _PUT_BESIDE: Final = re.compile(rf"{_PUT_RELATION.pattern}|(?:^| )(?:{BESIDE}) ")

@@ -15,9 +15,9 @@ from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.building import is_one
 from vla_deploy.planning.rules.clauses import MOST_LETTERS, plain, segments
 from vla_deploy.planning.rules.fits import known_fit
-from vla_deploy.planning.rules.lending import KIND, NAMED, POINTS, STOPS, things_told
+from vla_deploy.planning.rules.lending import KIND, NAMED, POINTS, kinds_told, things_told
 from vla_deploy.planning.rules.recalling import points_back
-from vla_deploy.planning.rules.unsaying import UNSAYS
+from vla_deploy.planning.rules.unsaying import unsays
 from vla_deploy.planning.rules.verbs import any_verb
 from vla_deploy.planning.understanding.known_words import is_kind, single
 from vla_deploy.planning.understanding.phrases import ORDINALS, PRONOUNS, SIDES
@@ -94,8 +94,7 @@ def gist_of(request: Request) -> str:
 
 def _is_told(part: str) -> bool:
     tells = _SUBJECT.fullmatch(part) or _OF_SEVERAL.fullmatch(part) or _FINITE.fullmatch(part)
-    binds = UNSAYS.search(part) or _FORBIDS.search(part) or STOPS & set(words_of(part))
-    return tells is not None and not binds
+    return tells is not None and not unsays(part) and _FORBIDS.search(part) is None
 
 
 def _is_exclaimed(part: str, request: Request) -> bool:
@@ -125,7 +124,7 @@ def _with_what_is_told(asked: str, told: Sequence[str], request: Request) -> str
             else things[-1:]
         )
         return f"{asked[: points.start()]}{' and '.join(whole)}{asked[points.end() :]}"
-    kinds = {single(found[0]) for part in told for found in KIND.finditer(part)}
+    kinds = kinds_told(told)
     one = _ONE.search(asked)
     if one is None or len(kinds) != 1 or KIND.search(asked):
         return asked

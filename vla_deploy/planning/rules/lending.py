@@ -14,22 +14,15 @@ from vla_deploy.planning.rules.building import is_one, is_seen
 from vla_deploy.planning.understanding.known_words import single
 from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
-STOPS: Final = frozenset({"stop", "halt", "freeze"})
-NAMED: Final = re.compile(
-    r"\b(?:the|my|our|your|a|an|that|this) (?:\w+ ){0,2}?"
-    rf"(?:{KIND_WORDS})(?:e?s)?\b"
-)
 POINTS: Final = re.compile(
-    r"\b(?:(?:the )?(?:two|three|both|lot) of them|that one|this one|it|them|they|those|"
-    r"(?:that|this)(?= (?:goes|belongs|should|needs|can|ought|has|up|over|away|here|out|off|in|"
-    r"on|to|"
-    r"into|for)\b)|that(?=$))\b"
+    r"\b(?:(?:the )?(?:two|three|both|lot) of them|that one|this one|it|them|they|those|(?:that|"
+    r"this)(?= (?:goes|belongs|should|needs|can|ought|has|up|over|away|here|out|off|in|on|to|into|"
+    r"for)\b)|that(?=$))\b"
 )
 KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})(?:e?s)?\b")
 _ARTICLE: Final = r"(?:the|my|our|your|a|an|that|this|those|these|his|her)"
-_CALLED: Final = re.compile(
-    rf"\b{_ARTICLE} (?:(?!{_ARTICLE}\b)[\w']+ "
-    rf"){{0,3}}?(?:{KIND_WORDS})(?:e?s)?\b"
+NAMED: Final = re.compile(
+    rf"\b{_ARTICLE} (?:(?!{_ARTICLE}\b)[\w']+ ){{0,3}}?(?:{KIND_WORDS})(?:e?s)?\b"
 )
 _WHERE: Final = re.compile(
     r"(?:'s|'re| is| are| was| were| must be| should be|)"
@@ -113,12 +106,17 @@ def left_alone_off(parts: list[str], request: Request) -> list[str]:
     return parts if any(nouns & set(words_of(part)) for part in kept) else kept
 
 
+def kinds_told(told: Sequence[str]) -> set[str]:
+    """Return the kinds of things that parts of a command name, in the singular."""
+    return {single(found[0]) for part in told for found in KIND.finditer(part)}
+
+
 def things_told(told: Sequence[str], request: Request) -> list[str]:
     """Return the things that parts of a command name; the last is the likeliest to be meant.
 
     Of "there are two cups, the left one is empty" it is the left cup alone.
     """
-    kinds = {single(found[0]) for part in told for found in KIND.finditer(part)}
+    kinds = kinds_told(told)
     ones = [found for part in told for found in _ONE_OF.finditer(part)] if len(kinds) == 1 else []
     if ones:
         kind = next(iter(kinds))
@@ -129,7 +127,7 @@ def things_told(told: Sequence[str], request: Request) -> list[str]:
 def _things(part: str, request: Request) -> list[str]:
     """Return the things that a part names; where the last is makes it no further one."""
     told = list[str]()
-    for found in _CALLED.finditer(part):
+    for found in NAMED.finditer(part):
         where = _WHERE.fullmatch(part, found.end())
         if where is not None and _is_nowhere(where["where"], request):
             break

@@ -10,28 +10,13 @@ from typing import Final
 
 from vla_deploy.planning.rules.verbs import DOING, FORMS
 
+# What FORMS and DOING lack, or put otherwise.
 _MORE: Final = {
-    "kept": "put",
-    "lifted": "lift",
-    "dropped": "drop",
-    "moved": "move",
-    "handed": "hand",
-    "lifting": "lift",
-    "boxing": "box",
-    "fetched": "fetch",
-    "collected": "get",
-    "removed": "get",
-    "popped": "put",
-    "stuck": "put",
-    "deposited": "put",
-    "transferred": "move",
-    "left": "leave",
-    "held": "hold",
-    "picked": "pick",
-    "opened": "open",
-    "closed": "close",
-    "located": "find",
-}
+    "kept": "put", "lifted": "lift", "handed": "hand", "boxing": "box", "collected": "get",
+    "removed": "get", "popped": "put", "stuck": "put", "deposited": "put", "transferred": "move",
+    "held": "hold", "located": "find",
+}  # fmt: skip
+_THEM: Final = {"they": "them"}
 _VERBS: Final = {
     **{
         form: verb
@@ -53,9 +38,8 @@ _TO_BE: Final = (
     r"could be |(?:is|are) to be |wants? (?:to be )?|could do with (?:being )?)"
 )
 _GOOD: Final = (
-    r"(?:so |very |really |most )?(?:nice|great|good|lovely|helpful|kind|wonderful|brilliant|"
-    r"glad|happy|"
-    r"grateful|delighted|ideal|best|better|perfect|a (?:great |big |real )?help)(?: of you)?"
+    r"(?:so |very |really |most )?(?:nice|great|good|lovely|helpful|kind|wonderful|brilliant|glad|"
+    r"happy|grateful|delighted|ideal|best|better|perfect|a (?:great |big |real )?help)(?: of you)?"
 )
 _PATTERNS: Final = (
     re.compile(
@@ -81,6 +65,3 @@ def in_active_voice(text: str) -> str:
 def _commanded(found: re.Match[str]) -> str:
     thing = _THEM.get(found["thing"], found["thing"])
     return f"{_VERBS[found['verb']]} {thing}".strip() + found["rest"]
-
-
-_THEM: Final = {"they": "them"}

@@ -9,6 +9,7 @@ from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.building import (
     BESIDE_WORDS,
     NO_THING,
+    WAYS,
     Groups,
     Step,
     arm_in,
@@ -29,7 +30,7 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 STORE: Final = "box"
 """What "put it away" means where nothing else is said."""
-_WAY: Final = re.compile(r"^(?:back|over|up|down|through|across|along|round|out) ")
+_WAY: Final = re.compile(rf"^(?:{WAYS}) ")
 _TOWARDS: Final = frozenset(
     {"to", "at", *(f"{way} to" for way in ("over", "back", "through", "across", "along", "out"))}
 )

@@ -23,31 +23,27 @@ ROWS: Final[tuple[Row, ...]] = (
      telling.tell_hands),
     (Intent.QUESTION, r"where are you|where am i|which room (?:are you|is this)(?: in)?",
      telling.tell_place),
-    (Intent.QUESTION, r"(?:do you (?:happen to |by any chance )?(?:know|remember|recall) |any "
-                      r"idea |"
-     r"(?:can|could) you (?:tell me|remember) |tell me |i wonder |i forgot )?where (?:i|we|you|"
-     r"somebody|someone|he|she|they)(?:'ve| have|'s| has|'d| had)? (?:left|put|leave|dropped|laid) "
-     rf"{OBJECT}(?: last night| this morning| yesterday| earlier| before)?", telling.tell_or_find),
-    (Intent.QUESTION, r"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|"
-     r"have you seen|you have(?:n't| not)(?: by any chance)? seen|(?:do you (?:happen to |by any "
-     r"chance )?know|(?:have you (?:got )?|do you have |got )?(?:any|an?|the (?:faintest|"
-     r"slightest)) "
-     rf"(?:idea|notion|clue)|tell me|i wonder|find out|see) where|what (?:have|has|did) "
-     rf"(?:[a-z]+ ){{1,3}}?(?:done|do) with|where (?:have|had|did) (?:i|we|you|they) (?:left|"
-     rf"leave|put)) {OBJECT}"
-     r"(?: is| are|(?:'s| has| have)? gone|(?:'s| has| have)? got to| went| ended up| might be| "
-     r"could be)?(?: anywhere| somewhere)?"
-     r"(?: have you)?",
+    (Intent.QUESTION, rf"(?:do you (?:happen to |by any chance )?(?:know|remember|recall) |any "
+     rf"idea |(?:can|could) you (?:tell me|remember) |tell me |i wonder |i forgot )?where (?:i|we|"
+     rf"you|somebody|someone|he|she|they)(?:'ve| have|'s| has|'d| had)? (?:left|put|leave|dropped|"
+     rf"laid) {OBJECT}(?: last night| this morning| yesterday| earlier| before)?",
+     telling.tell_or_find),
+    (Intent.QUESTION, rf"(?:where is|where are|where's|where did (?:i|you) (?:put|leave)|have you "
+     rf"seen|you have(?:n't| not)(?: by any chance)? seen|(?:do you (?:happen to |by any chance "
+     rf")?know|(?:have you (?:got )?|do you have |got )?(?:any|an?|the (?:faintest|slightest)) "
+     rf"(?:idea|notion|clue)|tell me|i wonder|find out|see) where|what (?:have|has|did) (?:[a-z]+ "
+     rf"){{1,3}}?(?:done|do) with|where (?:have|had|did) (?:i|we|you|they) (?:left|leave|put)) "
+     rf"{OBJECT}(?: is| are|(?:'s| has| have)? gone|(?:'s| has| have)? got to| went| ended up| "
+     rf"might be| could be)?(?: anywhere| somewhere)?(?: have you)?",
      telling.tell_or_find),
     (Intent.QUESTION, r"(?:(?:do|did) you (?:happen to )?know |any idea |tell me )?"
      rf"what(?:'s| has)? (?:become|became|happened|gone) (?:of|to|with) {OBJECT}",
      telling.tell_or_find),
     (Intent.QUESTION, rf"(?:do you see|is there|are there|see|(?:have|do) (?:we|you|i) (?:got|"
-                      rf"have)) (?:any |an? )?{OBJECT}"
-     r"(?: there| here| anywhere)?", telling.tell_whether),
-    (Intent.QUESTION, rf"did (?:i|we|you) (?:leave|put|forget|drop) {OBJECT} (?:in |over |"
-                      rf"around )?"
-     r"(?:here|somewhere|anywhere)(?: with me)?(?: last night| this morning| yesterday| earlier)?",
+     rf"have)) (?:any |an? )?{OBJECT}(?: there| here| anywhere)?", telling.tell_whether),
+    (Intent.QUESTION, rf"did (?:i|we|you) (?:leave|put|forget|drop) {OBJECT} (?:in |over |around "
+     rf")?(?:here|somewhere|anywhere)(?: with me)?(?: last night| this morning| yesterday| "
+     rf"earlier)?",
      telling.tell_or_find),
     (Intent.QUESTION, rf"where (?:did|do|have|has) {OBJECT} (?:end(?:ed)? up|go|gone|g[eo]t to)",
      telling.tell_or_find),

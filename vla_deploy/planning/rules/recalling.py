@@ -109,8 +109,9 @@ def recalled(text: str, request: Request) -> str | None:
 
 def points_back(text: str) -> bool:
     """Tell whether words only point at the command before them."""
-    patterns = (_AGAIN, _BACK, _REVERSE, *(pattern for pattern, _ in _MORE))
-    return any(pattern.fullmatch(text) for pattern in patterns)
+    if is_again(text) or _ratio(text) is not None:
+        return True
+    return any(pattern.fullmatch(text) for pattern in (_BACK, _REVERSE))
 
 
 def is_again(text: str) -> bool:

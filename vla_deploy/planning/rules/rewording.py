@@ -11,7 +11,7 @@ import re
 from typing import Final
 
 from vla_deploy.planning.rules.passives import in_active_voice
-from vla_deploy.planning.rules.short_forms import in_full
+from vla_deploy.planning.rules.short_forms import ROWS as SHORT_FORMS
 from vla_deploy.world.vocabulary import COLOURS, CONTAINERS, KIND_WORDS
 
 _COLOUR: Final = "|".join(COLOURS)
@@ -96,7 +96,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     ),
     (r"show me how you(?:'d| would| can| could)? (?=[a-z])", ""),
     (
-        r"^(?:and )?(?:(?:just )?(?:a )?)?((?:little |wee |tiny )?(?:bit|tad|touch)) "
+        r"^(?:and )?(?:just )?(?:a )?((?:little |wee |tiny )?(?:bit|tad|touch)) "
         r"(?=more|further|farther)",
         r"a \1 ",
     ),
@@ -127,7 +127,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"in your \1 hand\2 in your \3 hand",
     ),
     (
-        r"((?:what(?:'s| is| you(?:'ve| have)(?: got)?)|the (?:thing|one)) in your "
+        r"((?:what's|the (?:thing|one)) in your "
         r"(?:left|right))(?! (?:hand|arm|gripper|claw))",
         r"\1 hand",
     ),
@@ -136,12 +136,11 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"(?:come (?:and )?)?keep me company (?:in|at) (?=(?:the|my|your)\b)", "go to "),
     (
         r"^(?:with|using|use) (?:your|the) (left|right) (hand|arm)(?: now| please| for this(?: "
-        r"one)?)?,? "
-        r"(?:and |to )?([^,.;]+)",
+        r"one)?)?,? (?:and |to )?([^,.;]+)",
         r"\3 with your \1 \2",
     ),
     (r"(?:do|make) an? (?:one[- ]eighty|180)", "turn around"),
-    (r"(turn|swing|spin) yourself about", "turn around"),
+    (r"(?:turn|swing|spin) yourself about", "turn around"),
     (r"make (?:me|us) (?=an? )", "do "),
     (r"open up (?=(?:your|the|both)\b)", "open "),
     (r"(put|take|tidy|clear) me (away|up|down)\b", r"\1 \2"),
@@ -192,12 +191,14 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         "back to your charging station",
     ),
 )
-_TABLE: Final = tuple((re.compile(rf"(?:\b|(?<=\s)){pattern}"), full) for pattern, full in _ROWS)
+_TABLE: Final = tuple(
+    (re.compile(rf"(?:\b|(?<=\s)){pattern}"), instead)
+    for pattern, instead in (*SHORT_FORMS, *_ROWS)
+)
 
 
 def reworded(text: str) -> str:
     """Return a command in lower case in plain words."""
-    text = in_full(text)
     for pattern, instead in _TABLE:
         text = pattern.sub(instead, text)
     return in_active_voice(text)

@@ -1,14 +1,13 @@
-"""Put into plain words what people run together, slip in, or say by habit.
+"""List what people run together, slip in, or say by habit, each with the plain words for it.
 
 gimme the keys   where on earth are me keys   that can go in the box   about a foot
 """
 
-import re
 from typing import Final
 
 from vla_deploy.world.vocabulary import KIND_WORDS
 
-_ROWS: Final[tuple[tuple[str, str], ...]] = (
+ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("gimme", "give me"),
     (r"(i|he|she|they)(?:'ve|'s| have| has) (?:gone|been) and ", r"\1 have "),
     ("lemme have", "give me"),
@@ -75,11 +74,3 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"(that|it|this|they|those|these) can (?=(?:go|be|stay|live|come)\b)", r"\1 should "),
     (r"(on|in|at) (the|that|this) (\w+) there(?=$|[,.;!?]| and\b| then\b)", r"\1 \2 \3"),
 )
-_TABLE: Final = tuple((re.compile(rf"(?:\b|(?<=\s)){pattern}"), full) for pattern, full in _ROWS)
-
-
-def in_full(text: str) -> str:
-    """Return a command in lower case with such words in full, or left out."""
-    for pattern, full in _TABLE:
-        text = pattern.sub(full, text)
-    return text

@@ -17,13 +17,12 @@ from vla_deploy.planning.rules.fits import known_fit
 from vla_deploy.planning.rules.lending import (
     NAMED,
     POINTS,
-    STOPS,
     kind_lent,
     left_alone_off,
     place_of_people,
     things_told,
 )
-from vla_deploy.planning.rules.unsaying import UNSAYS
+from vla_deploy.planning.rules.unsaying import unsays
 from vla_deploy.planning.understanding.expressions import Scope, read_expression
 from vla_deploy.planning.understanding.phrases import THEM
 from vla_deploy.planning.understanding.setting import Setting
@@ -47,10 +46,8 @@ _SAID: Final[tuple[re.Pattern[str], ...]] = tuple(
         r"(?:(?:do|can) you )?see (?P<thing>(?:my|the|our|that|those|these) .+?)"
         r"(?: (?:over )?there)?",
         rf"{_THING}(?:'s| is| are| must be| should be|(?: have| has)? ended up| seems? to be|(?: "
-        rf"were| "
-        r"was|'ve been| have been| has been|(?: have| has)? got) left) (?:still |lying |sitting |"
-        r"over )?"
-        r"(?:in|on|at) (?P<place>.+?)(?: again)?",
+        rf"were| was|'ve been| have been| has been|(?: have| has)? got) left) (?:still |lying |"
+        rf"sitting |over )?(?:in|on|at) (?P<place>.+?)(?: again)?",
         rf"(?:someone|somebody|we|he|she|they)(?:'ve| have|'s| has)? (?:left|put|dropped) {_THING} "
         r"(?:in|on|at|by) (?P<place>.+)",
         r"there(?:'s| is| should be| must be| might be| ought to be) "
@@ -146,10 +143,9 @@ def _remarks_off(parts: list[str], request: Request) -> list[str]:
 
 
 def _is_remark(part: str) -> bool:
-    is_told = _REMARK.fullmatch(part) is not None and UNSAYS.search(part) is None
-    is_told = is_told and repaired(part) is None
+    is_told = _REMARK.fullmatch(part) is not None and repaired(part) is None
     is_told = is_told and not any(pattern.fullmatch(part) for pattern in _SAID)
-    return is_told and not STOPS.intersection(words_of(part))
+    return is_told and not unsays(part)
 
 
 def _found_where_told(parts: list[str], request: Request) -> list[str]:

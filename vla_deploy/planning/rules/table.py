@@ -37,9 +37,8 @@ _ROWS: Final[tuple[Row, ...]] = (
      r"(?P<object>(?:the|my|that|this|those|these|both|all) .+?) (?:to (?:be|go) |put |moved )?"
      rf"(?:back )?{INTO} (?P<destination>.+)", placing.want),
     (Intent.MANIPULATION, rf"(?:bring|carry|take|fetch|get|hand|give|deliver|pass|run|move) "
-                          rf"{OBJECT} "
-     r"(?:over |in |through |up |out |down )?(?:here(?: (?:to|for) me)?|(?:back )?to me(?: here)?)|"
-     r"(?:bring|fetch|carry) (?P<object2>.+?) (?:through|over|in|along)",
+     rf"{OBJECT} (?:over |in |through |up |out |down )?(?:here(?: (?:to|for) me)?|(?:back )?to "
+     rf"me(?: here)?)|(?:bring|fetch|carry) (?P<object2>.+?) (?:through|over|in|along)",
      building.bring),
     (Intent.MANIPULATION, rf"(?:i )?need {OBJECT} (?:over |in )?here(?: (?:to|with|for) me)?|"
      r"(?:come|return|be|run) (?:straight )?back(?: here| to me)? with (?P<object2>.+)",
@@ -66,25 +65,23 @@ _ROWS: Final[tuple[Row, ...]] = (
     (Intent.NAVIGATION, r"(?:go|drive|come|move|navigate|return|walk|head|travel|roll|proceed|get|"
      rf"run)(?: back| over| on| off| out| in| along| down| up| through| across)?(?: over)? (?:to|"
      rf"towards?|into|for) {PLACE}", building.go),
-    (Intent.NAVIGATION, r"(?:off (?:you go|with you)|be off|off|(?:roll|trundle|nip|duck|slip|"
-                        r"whizz|trot|march|toddle|zip|pop|scoot|hop|"
-     r"wander|zoom|run|dash|glide|cruise)(?: off| over| along| across)?)(?: back)? "
-     rf"(?:to|into|over to|through to|in) {PLACE}", building.go),
+    (Intent.NAVIGATION, rf"(?:off (?:you go|with you)|be off|off|(?:roll|trundle|nip|duck|slip|"
+     rf"whizz|trot|march|toddle|zip|pop|scoot|hop|wander|zoom|run|dash|glide|cruise)(?: off| over|"
+     rf" along| across)?)(?: back)? (?:to|into|over to|through to|in) {PLACE}", building.go),
     (Intent.NAVIGATION, rf"(?:home(?: you go)?|on|through|up|down|across) to {PLACE}",
      building.go),
     (Intent.NAVIGATION, rf"(?:come (?:and )?)?(?:meet|join|find|see) (?:me|us) (?:in|at|by|over "
-                        rf"at) {PLACE}|"
-     r"(?:get |right )?back (?:on|onto|to|into|in|at|over to) (?P<place2>(?:the|your|my) .+)|"
-     r"(?:run |go )?(?:wait|stay|stand)(?: for (?:me|us|them|him|her|it))? at (?P<place4>.+)|"
-     r"(?:swing|stop|drop|call|pass) (?:by|in at|by at|round) (?P<place3>.+)", building.go),
+     rf"at) {PLACE}|(?:get |right )?back (?:on|onto|to|into|in|at|over to) (?P<place2>(?:the|your|"
+     rf"my) .+)|(?:run |go )?(?:wait|stay|stand)(?: for (?:me|us|them|him|her|it))? at "
+     rf"(?P<place4>.+)|(?:swing|stop|drop|call|pass) (?:by|in at|by at|round) (?P<place3>.+)",
+     building.go),
     (Intent.NAVIGATION, rf"(?:go|get|move|come|drive) (?:up )?close(?:r)? to {PLACE}",
      building.go),
     (Intent.NAVIGATION, rf"(?:take|bring|get) yourself (?:back |off |over |along |out |in )?to "
-                        rf"{PLACE}|"
-     r"to (?P<place2>the .+)", building.go),
+     rf"{PLACE}|to (?P<place2>the .+)", building.go),
     # --- wait
     (Intent.ASSIST, rf"(?:wait|pause|rest|hold on|stay|hang (?:about|around|on))(?: here| "
-                    rf"there)?(?: (?:for )?{SECONDS})?",
+     rf"there)?(?: (?:for )?{SECONDS})?",
      building.wait),
     (Intent.NAVIGATION, r"(?:wait|stay|stand|stop)(?: there| for me)? (?:in|by|near|beside|"
      rf"next to|outside) {PLACE}", building.go),
@@ -94,11 +91,11 @@ _ROWS: Final[tuple[Row, ...]] = (
      r"(?: in your (?:left |right )?hands?)?", placing.keep),
     # --- put
     (Intent.MANIPULATION, rf"(?:put|set|drop|lay|place|pop|stick|stand|leave|park) {OBJECT} "
-     r"(?:down )?on (?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of "
-     r"(?:you|me|us)",
+     rf"(?:down )?on (?:the|this) (?:table|desk|shelf|surface|one)(?: right| just)? in front of "
+     rf"(?:you|me|us)",
      placing.put_here),
     (Intent.MANIPULATION, rf"(?:put|drop|pop|stick|place|throw|set|lay) {OBJECT} in(?:side)?(?: "
-                          rf"there)?",
+     rf"there)?",
      placing.put_into_that),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry|leave) {OBJECT} "
      r"(?:back )?(?:to )?where (?:it|they|that|you) (?:(?:was|were|came from|belongs?|had been)"
@@ -135,29 +132,24 @@ _ROWS: Final[tuple[Row, ...]] = (
     (Intent.MANIPULATION, rf"(?:take|bring|carry) {OBJECT} (?:along|with you)(?: with you)?",
      building.pick),
     (Intent.MANIPULATION, r"(?:(?:away|off|down|over|back|out) with (?P<object2>.+?) "
-                          r"(?P<relation2>in|into|on|onto|to) "
-     r"(?P<destination2>(?:the|my|that|this) .+))|"
-     r"(?:(?:over|off|back|up|down) )?(?P<relation>in|into|on|onto|to) "
-     r"(?P<destination>(?:the|my|that|this) .+?) "
-     r"with (?P<object>(?:the|my|that|this|both|all) .+|it|them)", placing.put),
+     r"(?P<relation2>in|into|on|onto|to) (?P<destination2>(?:the|my|that|this) .+))|(?:(?:over|"
+     r"off|back|up|down) )?(?P<relation>in|into|on|onto|to) (?P<destination>(?:the|my|that|this) "
+     r".+?) with (?P<object>(?:the|my|that|this|both|all) .+|it|them)", placing.put),
     (Intent.MANIPULATION, rf"(?:take|carry|run|bring|move) {OBJECT} "
-     r"(?P<relation>(?:back |over |up |down |through |across |along |round |out )?(?:to|into|onto|"
+     rf"(?P<relation>(?:(?:{building.WAYS}) )?(?:to|into|onto|"
      r"over to)|back (?:in|on)) (?P<destination>.+)", placing.put),
     (Intent.MANIPULATION, rf"(?:pop|chuck|slip|tuck|dump|plonk|plop|slide|shove|toss|bung|sling|"
      r"park|rest|plant|lodge|prop|plunk|whack|fling) "
      rf"{OBJECT} (?:down |away |back )?(?P<relation>into|inside|in|onto|on top of|on) "
      r"(?P<destination>.+)", placing.put),
-    (Intent.MANIPULATION, r"(?:put|place|take|bring|carry|move|pop|stick|chuck|drop|set|lay|leave) "
-     rf"{OBJECT} "
-     r"(?P<destination>(?:over |back )?there)", placing.put_there),
+    (Intent.MANIPULATION, rf"(?:put|place|take|bring|carry|move|pop|stick|chuck|drop|set|lay|"
+     rf"leave) {OBJECT} (?P<destination>(?:over |back )?there)", placing.put_there),
     (Intent.MANIPULATION, rf"(?:leave|keep|put|set|drop|lay|place) {OBJECT} (?:down )?"
      r"(?:(?:right |over )?here(?: on (?:the|this) (?:table|desk|shelf|surface))?|"
      r"on this (?:table|desk|shelf|surface)(?: here)?)", placing.leave_here),
     (Intent.MANIPULATION, rf"{SAID_OF} (?:goes|go|belongs?|lives?|(?:should|must|has to|have to|"
-                          rf"(?:is|are) to|"
-     rf"had better|needs to|need to|ought to|can|wants to) (?:go|be|live|stand|sit|stay|end up|"
-     rf"lie)) (?:back )?{INTO} "
-     r"(?P<destination>.+)", placing.put),
+     rf"(?:is|are) to|had better|needs to|need to|ought to|can|wants to) (?:go|be|live|stand|sit|"
+     rf"stay|end up|lie)) (?:back )?{INTO} (?P<destination>.+)", placing.put),
     # --- straight and turning
     (Intent.NAVIGATION, rf"(?:move|drive|go|roll|step|come|{ROLL}) (?P<little>{LITTLE} )?{WAY}"
      rf"(?: (?:by |for )?{METRES})?(?P<little2> {LITTLE})?", moving.drive),
@@ -189,15 +181,15 @@ _ROWS: Final[tuple[Row, ...]] = (
      moving.turn),
     # --- arms
     (Intent.MANIPULATION, rf"(?P<verb>open|close|shut) {HAND}", building.gripper),
-    (Intent.MANIPULATION, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?"
-     r"(?: in)?", building.tuck),
+    (Intent.MANIPULATION, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?",
+     building.tuck),
     (Intent.MANIPULATION, r"(?:move|bring|put) (?:your |the )?(?:(?P<arm>left|right) )?arms? "
      r"(?:to|into|in) (?:the )?(?P<pose>[a-z_ ]+?)(?: pose| position)?", building.pose),
     # --- go
     (Intent.NAVIGATION, rf"(?:go|come|return|drive|head|walk|navigate|move)(?: back)? {PLACE}",
      building.go),
-    (Intent.NAVIGATION, rf"(?:visit|approach|make your way to|find your way to|park at|dock at|"
-     rf"wait at|stand (?:by|at|before)|(?:park|plant|place|put|station) (?:yourself )?(?:at|on|"
+    (Intent.NAVIGATION, rf"(?:visit|approach|make your way to|find your way to|dock at|"
+     rf"stand (?:by|at|before)|(?:park|plant|place|put|station) (?:yourself )?(?:at|on|"
      rf"in front of|by|beside|next to)|"
      rf"position yourself at) {PLACE}", building.go),
     (Intent.NAVIGATION, r"(?:go )?(?:dock|charge|recharge)(?: yourself| your batter(?:y|ies))?",
@@ -217,19 +209,16 @@ _ROWS: Final[tuple[Row, ...]] = (
     (Intent.SEARCH, rf"(?:look around|scan|check(?: on)?) (?:in |at |on )?{PLACE}",
      building.look_around),
     (Intent.SEARCH, r"(?:look|glance|(?:have|take) a (?:\w+ )?look) (?P<side>up|down|left|right) "
-                    r"(?:at|to|towards?|on) "
-     r"(?P<what>.+)", building.look),
+     r"(?:at|to|towards?|on) (?P<what>.+)", building.look),
     (Intent.SEARCH, r"(?:look|(?:have|take) a (?:wee |quick |good |close |closer |little )?look|"
-                    r"gaze|glance)(?: at| to| towards?)? "
-     r"(?P<what>.+?)(?: for me)?", building.look),
+     r"gaze|glance)(?: at| to| towards?)? (?P<what>.+?)(?: for me)?", building.look),
     # --- clean
     (Intent.CLEANING, r"(?:clean|tidy|clear)(?: things)?(?: up)?|clear (?:things )?away",
      cleaning.tidy),
     (Intent.CLEANING, rf"(?:clean|tidy|clear)(?: up| off)? {PLACE}", cleaning.tidy),
-    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|"
-     r"(?:time for |do |make |have )?(?:an? |your |the )?(?:\w+ )?(?:rounds?|tour|loop|lap|"
-     r"walk))\b[^:]*: ?(?:first )?"
-     r"(?P<place>.+)", cleaning.visit),
+    (Intent.CLEANING, r"(?:patrol|visit|inspect|tour|(?:time for |do |make |have )?(?:an? |your |"
+     r"the )?(?:\w+ )?(?:rounds?|tour|loop|lap|walk))\b[^:]*: ?(?:first )?(?P<place>.+)",
+     cleaning.visit),
     (Intent.CLEANING, r"(?:patrol|visit|inspect|tour) (?:the |my |our )?"
      r"(?:flat|house|apartment|home|rooms?|place) (?:and )?(?:first )?(?P<place>.+)",
      cleaning.visit),
@@ -239,14 +228,14 @@ _ROWS: Final[tuple[Row, ...]] = (
     (Intent.MANIPULATION, rf"(?:get|take|fish|dig|pull|pick|lift|fetch|bring|remove|retrieve|grab|"
      rf"scoop|collect) {OBJECT} (?:back )?(?:up )?(?:out(?: of| from)|from inside) (?P<source>.+)",
      building.pick_from),
-    (Intent.MANIPULATION, rf"bring {OBJECT}(?: over)?", building.bring),
+    (Intent.MANIPULATION, rf"bring {OBJECT}", building.bring),
     (Intent.MANIPULATION, r"(?:get|take|fish|dig|pull|pick|lift|fetch|scoop) (?P<object>.+?) "
      r"(?:back )?(?:out(?: of (?:it|there))?|off (?:it|there|that))", building.pick),
     (Intent.MANIPULATION, rf"(?:pick|lift|take up)(?: up)? {OBJECT}(?: up| off)?", building.pick),
     (Intent.MANIPULATION, r"(?:(?:grab|take|grasp|get|collect|hold|pick up|put) )?(?:a|an|one) "
      r"(?P<object>.+?) in(?:to)? (?:each|either|both)(?: of your)?(?: hands?| fists?| grippers?)?",
      building.pick_two),
-    (Intent.MANIPULATION, r"(?:have|hold|keep) (?P<object>it|them|that) in your hands?|"
+    (Intent.MANIPULATION, r"(?:have|hold) (?P<object>it|them|that) in your hands?|"
      r"(?P<object2>(?:the|my|that|this) .+) in(?:to)? your hand", building.pick),
     (Intent.MANIPULATION, rf"(?:grab|take|grasp|get|collect|hold|raise|seize|catch|remove|nab|snag|"
      rf"snatch|swipe|clutch|nick)"

@@ -6,6 +6,8 @@
 import re
 from typing import Final
 
+from vla_deploy.planning.references import words_of
+
 _WORDS: Final = (
     # taken back, or done by somebody else
     r"changed (?:my|our) mind|jok(?:e|ing)|kidding|take (?:it|that|this) back|didn't mean|"
@@ -24,8 +26,13 @@ _WORDS: Final = (
     r"said|says|told|tells|asked|asks|shout(?:s|ed)|wrote|quote|words|she goes|he goes|song|"
     r"always going",
 )
-UNSAYS: Final = re.compile(
+_UNSAYS: Final = re.compile(
     rf"\b(?:{'|'.join(_WORDS)})\b|"
     r"^(?:and |but )?(?:until|till|provided|in case|assuming|suppos(?:e|ing)|imagine|pretend)\b"
 )
-"""What none of the parts may hold that are left out of a command, in lower case."""
+_STOPS: Final = frozenset({"stop", "halt", "freeze"})
+
+
+def unsays(part: str) -> bool:
+    """Tell whether a part of a command, in lower case, may not be left out as a remark."""
+    return _UNSAYS.search(part) is not None or not _STOPS.isdisjoint(words_of(part))

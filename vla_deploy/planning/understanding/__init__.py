@@ -1,6 +1,6 @@
 """Understand what a command refers to: by the conversation, the scene and the robot's places."""
 
-from vla_deploy.planning.understanding.answers import Reply, Verdict, guessed, reply
+from vla_deploy.planning.understanding.answers import Reply, Verdict, guess, reply
 from vla_deploy.planning.understanding.conversation import (
     Candidate,
     Conversation,
@@ -23,6 +23,6 @@ __all__ = [
     "Turn",
     "Verdict",
     "described",
-    "guessed",
+    "guess",
     "reply",
 ]

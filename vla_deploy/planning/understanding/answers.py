@@ -141,6 +141,26 @@ def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
     if verdict is Verdict.UNCLEAR:
         again = replace(conversation, question=replace(narrowed(question, text), asked_ns=now_ns))
         return Reply(verdict=verdict, text=question.command_text, conversation=again)
+    return _going_on(conversation, question, verdict, chosen)
+
+
+def guess(conversation: Conversation, text: str) -> Reply | None:
+    """Return the reply that picks the one candidate which an answer calls, whatever else it says.
+
+    "The green, my oil". None where a word of it could mean another thing. Ask first whether it is a
+    command.
+    """
+    question = conversation.question
+    chosen = None if question is None else _guessed(question, text)
+    if question is None or chosen is None:
+        return None
+    return _going_on(conversation, question, Verdict.CHOSEN, chosen)
+
+
+def _going_on(
+    conversation: Conversation, question: Question, verdict: Verdict, chosen: Candidate | None
+) -> Reply:
+    """Return the reply by which the waiting command goes on, with what it settles."""
     choices = dict(question.choices)
     if chosen is not None:
         choices[question.expression] = chosen.name
@@ -173,11 +193,7 @@ def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | No
     return (Verdict.UNCLEAR if agrees and verdict is Verdict.ANEW else verdict), chosen
 
 
-def guessed(question: Question, text: str) -> Candidate | None:
-    """Return the one candidate that an answer calls, whatever else it says: "the green, my oil".
-
-    That is None where a word of it could mean another thing. Ask first whether it is a command.
-    """
+def _guessed(question: Question, text: str) -> Candidate | None:
     said = " ".join(WORD.findall(in_plain_words(text.lower())))
     if not question.candidates or _NEGATES.search(said) or text.strip().endswith("?"):
         return None

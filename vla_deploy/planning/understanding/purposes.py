@@ -11,8 +11,8 @@ from typing import Final
 from vla_deploy.world.vocabulary import KIND_WORDS
 
 _PERSON: Final = (
-    r"(?:i|we|he|she|it|they|someone|somebody|(?:anyone|anybody|somebody|someone)(?: (?:in|from|"
-    r"at) (?:the|this|that|my|our) \w+)?|everyone|everybody|"
+    r"(?:i|we|he|she|it|they|(?:anyone|anybody|somebody|someone)(?: (?:in|from|at) "
+    r"(?:the|this|that|my|our) \w+)?|everyone|everybody|"
     rf"(?:the|my|our) (?!(?:\w+ )?(?:{KIND_WORDS})s?\b)\w+(?: \w+)?)"
 )
 _HARM: Final = (
