@@ -20,7 +20,7 @@ from sim_twin.renderer import open_gl_context
 from training.detector.average_precision import Rows
 from training.detector.dataset import IMAGES_PER_SHARD, Shard, draw_shard
 from training.detector.drawing import HEIGHT_PX, WIDTH_PX
-from training.detector.evaluation import judge_file
+from training.detector.evaluation import RECALLS, judge_file
 from training.detector.table_scenes import TableScene, draw_scenes
 from vla_deploy.inference.manifest import Variant
 from vla_deploy.inference.roles import ModelShelf, choice_for
@@ -87,7 +87,7 @@ def _accuracy(shelf: ModelShelf, drawn: Shard) -> dict[str, Any]:
     return {
         "labels": figures["fp32"]["labels"],
         **{f"map50_{name}": one["map50"] for name, one in figures.items()},
-        **{f"recall_{name}": one["recall"] for name, one in figures.items()},
+        **{f"{key}_{name}": one[key] for key in RECALLS for name, one in figures.items()},
     }
 
 

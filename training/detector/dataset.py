@@ -98,7 +98,7 @@ def draw_image(
         pose_robot(stage, layout, random)
         dress(stage, layout, random)
         image, geoms = drawing.draw()
-        labels = label(stage, layout, geoms)
+        labels = label(stage, layout, geoms, drawing.pixels_alone)
         if any(item.judged for item in labels) or random.random() < EMPTY_KEPT_CHANCE:
             return spoil(image, random), labels
 

@@ -1,5 +1,6 @@
-"""Draw a stage: colour, and which geom each pixel shows."""
+"""Draw a stage: colour, which geom each pixel shows, and how much of it a thing would fill."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -12,6 +13,8 @@ from training.detector.scene_model import Stage
 
 WIDTH_PX, HEIGHT_PX = 512, 384
 VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
+ALONE_GROUP, OTHER_GROUP = 0, 1
+"""Of the geoms that are drawn alone, and of all others meanwhile."""
 MAX_GEOMS = 2500
 Image = NDArray[np.uint8]
 
@@ -28,26 +31,39 @@ class Drawing:
         self._scene = mujoco.MjvScene(stage.model, maxgeom=MAX_GEOMS)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
         self._option = mujoco.MjvOption()
-        self._option.geomgroup[:] = VISIBLE_GROUPS
         self._rect = mujoco.MjrRect(0, 0, WIDTH_PX, HEIGHT_PX)
         self._camera = fixed_camera(stage.model, CAMERA)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
 
     def draw(self) -> tuple[Image, NDArray[np.int32]]:
         """Return the RGB image and the geom of each pixel, -1 where there is none."""
-        stage = self._stage
-        mujoco.mjv_updateScene(
-            stage.model, stage.data, self._option, mujoco.MjvPerturb(), self._camera,
-            mujoco.mjtCatBit.mjCAT_ALL.value, self._scene,
-        )  # fmt: skip
+        self._update(VISIBLE_GROUPS)
         rgb = self._pixels(segments=False)
         codes = self._pixels(segments=True).astype(np.int32)
         index = codes[..., 0] + (codes[..., 1] << 8) + (codes[..., 2] << 16)
         return rgb, self._geoms()[index]
 
+    def pixels_alone(self, members: list[int]) -> int:
+        """Return how many pixels of the image those geoms would fill if nothing hid them."""
+        groups = self._stage.model.geom_group
+        kept = groups.copy()
+        groups[:] = OTHER_GROUP
+        groups[members] = ALONE_GROUP
+        self._update([group == ALONE_GROUP for group in range(len(VISIBLE_GROUPS))])
+        groups[:] = kept
+        return int(self._pixels(segments=True).any(axis=2).sum())
+
     def close(self) -> None:
         """Release what this stage took of the context."""
         self._context.free()
+
+    def _update(self, groups: Sequence[int]) -> None:
+        """Take over what the geoms of some groups look like now."""
+        self._option.geomgroup[:] = groups
+        mujoco.mjv_updateScene(
+            self._stage.model, self._stage.data, self._option, mujoco.MjvPerturb(), self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value, self._scene,
+        )  # fmt: skip
 
     def _pixels(self, segments: bool) -> Image:
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = segments

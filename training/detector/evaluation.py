@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from training.detector.average_precision import MATCH_IOU, SURE_SCORE, Judgement, judge
+from training.detector.average_precision import MATCH_IOU, SURE_SCORE, WEAK_SCORE, Judgement, judge
 from training.detector.dataset import Shard, load
 from training.detector.files import METRICS
 from training.detector.settings import Settings
@@ -22,8 +22,9 @@ from vla_deploy.perception.detectors.centre_net import decode
 
 SAME_CLASS_IOU = 0.5
 """Boxes of one class that overlap more are one thing, for the manifest too."""
-LOW_SCORE = 0.05
+LOW_SCORE = 0.01
 """Average precision needs also the boxes that nobody would trust."""
+RECALLS = ("recall", "sure_recall")
 _LOG = logging.getLogger(__name__)
 
 
@@ -33,14 +34,19 @@ def evaluate(folder: Path, data: Path, files: Mapping[str, str], settings: Setti
     Raises:
         FileNotFoundError: data or a model are not there.
     """
-    report: dict[str, Any] = {"iou": MATCH_IOU, "sure_score": SURE_SCORE, "splits": {}}
+    report: dict[str, Any] = {
+        "iou": MATCH_IOU,
+        "sure_score": SURE_SCORE,
+        "weak_score": WEAK_SCORE,
+        "splits": {},
+    }
     for split in ("heldout", "flat"):
         shard = load(data, split, range(settings.shard_count(split)))
         report["splits"][split] = {"images": len(shard.images), "models": {}}
         for precision, name in files.items():
             figures = judge_file(folder / name, shard)
             report["splits"][split]["models"][precision] = figures
-            told = {key: round(figures[key], 4) for key in ("map50", "map75", "recall")}
+            told = {key: round(figures[key], 4) for key in ("map50", "map75", *RECALLS)}
             _LOG.info("%s %s: %s", split, precision, told)
     text = json.dumps(report, indent=1) + "\n"
     (folder / METRICS).write_text(text, encoding="utf-8")
@@ -88,17 +94,24 @@ def rows_by_image(shard: Shard) -> list[NDArray[np.float32]]:
 def summary(judgements: Mapping[str, Judgement]) -> dict[str, Any]:
     """Return mean figures over the classes that occur, and those of each class."""
     there = {name: found for name, found in judgements.items() if found.labels}
-    labels = sum(found.labels for found in there.values())
+    labels = [found.labels for found in there.values()]
     return {
         "map50": float(np.mean([found.ap50 for found in there.values()])),
         "map75": float(np.mean([found.ap75 for found in there.values()])),
-        "recall": sum(found.recall * found.labels for found in there.values()) / labels,
-        "labels": labels,
+        **{
+            key: _over_all([getattr(one, key) for one in there.values()], labels) for key in RECALLS
+        },
+        "labels": sum(labels),
         "classes": {
             name: {key: _rounded(value) for key, value in asdict(found).items()}
             for name, found in there.items()
         },
     }
+
+
+def _over_all(ratios: Sequence[float], labels: Sequence[int]) -> float:
+    """Return the ratio over all labels of those of each class."""
+    return float(np.average(ratios, weights=labels))
 
 
 def _rounded(value: float) -> float:

@@ -1,5 +1,6 @@
 """Turn a segmentation into labelled boxes, and say which are too little seen to be judged."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,11 @@ NEAR_LONG_PX = 128.0
 near, just when they matter.
 """
 MIN_SEEN_RATIO = 0.45
+"""Of the pixels that a thing would fill if nothing hid it: a chair of which a leg and a corner are
+seen fills its box and is still hidden.
+"""
+PixelsAlone = Callable[[list[int]], int]
+"""Count the pixels of some geoms that nothing hides."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +46,9 @@ class Label:
     judged: bool
 
 
-def label(stage: Stage, layout: Layout, geoms: NDArray[np.int32]) -> list[Label]:
+def label(
+    stage: Stage, layout: Layout, geoms: NDArray[np.int32], pixels_alone: PixelsAlone
+) -> list[Label]:
     """Return a label for each thing of which the image shows anything."""
     wanted = [(p.thing.class_name, p.geoms) for p in layout.shown if p.thing.class_name != CLUTTER]
     owner = np.full(stage.model.ngeom + 1, -1, np.int32)
@@ -48,19 +56,29 @@ def label(stage: Stage, layout: Layout, geoms: NDArray[np.int32]) -> list[Label]
     for number, (_, members) in enumerate(groups):
         owner[members] = number
     seen = owner[geoms]
-    labels = (_label(stage, *group, seen == number) for number, group in enumerate(groups))
+    labels = (
+        _label(stage, *group, seen == number, pixels_alone) for number, group in enumerate(groups)
+    )
     return [found for found in labels if found is not None]
 
 
 def _label(
-    stage: Stage, class_name: str, members: list[int], mask: NDArray[np.bool_]
+    stage: Stage,
+    class_name: str,
+    members: list[int],
+    mask: NDArray[np.bool_],
+    pixels_alone: PixelsAlone,
 ) -> Label | None:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return None
     box = (float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1))
-    known = class_name in CLASSES
-    judged = known and _is_clear(stage, class_name, members, box, int(mask.sum()))
+    pixels = int(mask.sum())
+    judged = (
+        class_name in CLASSES
+        and _is_clear(stage, class_name, members, box, pixels)
+        and pixels >= MIN_SEEN_RATIO * pixels_alone(members)
+    )
     # What is too little seen to be judged may be given any name; of a person or chair, its own:
     # they are large, and other things stand before them.
     named = judged or class_name in LARGE
@@ -71,7 +89,7 @@ def _label(
 def _is_clear(
     stage: Stage, class_name: str, members: list[int], box: tuple[float, ...], pixels: int
 ) -> bool:
-    """Tell whether enough of the thing is seen, in pixels and as a share of its whole extent."""
+    """Tell whether the thing is large enough in the image, and enough of it inside."""
     wide, high = box[2] - box[0], box[3] - box[1]
     least = LARGE_LEAST if class_name in LARGE else SMALL_LEAST
     if pixels < least.pixels or max(wide, high) < least.long_px or min(wide, high) < least.short_px:
@@ -81,8 +99,7 @@ def _is_clear(
         return class_name in LARGE
     inside = whole.clip(0, [WIDTH_PX, HEIGHT_PX, WIDTH_PX, HEIGHT_PX])
     near = class_name in LARGE and max(wide, high) >= NEAR_LONG_PX
-    shown = near or _area(inside) >= least.in_image * _area(whole)
-    return shown and wide * high >= MIN_SEEN_RATIO * _area(inside)
+    return near or _area(inside) >= least.in_image * _area(whole)
 
 
 def _area(box: NDArray[np.float64]) -> float:

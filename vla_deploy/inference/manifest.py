@@ -100,8 +100,9 @@ class Measured:
 class Detection:
     """Declare how a detector's outputs are read; `adapter` names the reader.
 
-    Boxes of one class that overlap by more than `iou_threshold` count as one thing. `measured` is
-    None where nobody has measured it.
+    Boxes of one class that overlap by more than `iou_threshold` count as one thing. Boxes below
+    `score_threshold`, from `weak_score_threshold` on if there is one, only help to name what other
+    senses show. `measured` is None where nobody has measured it.
     """
 
     adapter: str
@@ -109,7 +110,14 @@ class Detection:
     score_threshold: float
     iou_threshold: float
     image: ImageInput
+    weak_score_threshold: float | None = None
     measured: Measured | None = None
+
+    @property
+    def least_score(self) -> float:
+        """Return the score below which no box is read."""
+        weak = self.weak_score_threshold
+        return self.score_threshold if weak is None else weak
 
 
 class Context(StrEnum):

@@ -80,6 +80,7 @@ RATIO: Final = Check(
 )
 COUNT: Final = Check(expected="an integer above 0", holds=_is_count)
 TALLY: Final = Check(expected="an integer from 0", holds=_is_tally)
+OPTIONAL_RATIO: Final = Check(expected=RATIO.expected, holds=RATIO.holds, is_optional=True)
 OPTIONAL_TALLY: Final = Check(expected=TALLY.expected, holds=TALLY.holds, is_optional=True)
 OPTIONAL_TABLES: Final = Check(expected=TABLES.expected, holds=TABLES.holds, is_optional=True)
 THREE: Final = Check(expected="three numbers", holds=_is_three)
@@ -119,6 +120,7 @@ _DETECTION: Shape = {
     "adapter": TEXT,
     "classes": Check(expected="a list of names, none twice", holds=_are_classes),
     "score_threshold": RATIO,
+    "weak_score_threshold": OPTIONAL_RATIO,
     "iou_threshold": RATIO,
     "image": TABLE,
     "measured": OPTIONAL_TABLE,
@@ -226,7 +228,17 @@ def _cross_faults(document: Mapping[str, Any], folder_name: str) -> Iterator[Fau
         yield Fault(key="detection", got="nothing", expected="a table, as the role is detector")
     if "detection" in document and document["inputs"]:
         yield from _image_faults(document)
+        yield from _score_faults(document["detection"])
         yield from _class_faults(document["detection"])
+
+
+def _score_faults(detection: Mapping[str, Any]) -> Iterator[Fault]:
+    """Find a weak score that is above the sure one."""
+    sure = detection["score_threshold"]
+    weak = detection.get("weak_score_threshold", sure)
+    if weak > sure:
+        expected = f"at most score_threshold, {sure}"
+        yield Fault(key="detection.weak_score_threshold", got=repr(weak), expected=expected)
 
 
 def _class_faults(detection: Mapping[str, Any]) -> Iterator[Fault]:

@@ -52,11 +52,10 @@ def find_bystanders(cloud: Cloud, network: NetworkView | None, base: Pose2D) -> 
     """Return the people and chairs in an image, the surest first; `base` is the robot's pose."""
     if network is None:
         return []
-    words = [(number, network.word(number)) for number in range(len(network.boxes))]
     found = [
-        _place(cloud, network.boxes.corners_px[number], word.class_name, word.chance, base)
-        for number, word in words
-        if word.class_name in BYSTANDERS and word.chance >= LEAST_CHANCE
+        _place(cloud, corners_px, word.class_name, word.chance, base)
+        for corners_px, word in network.sure_words(BYSTANDERS)
+        if word.chance >= LEAST_CHANCE
     ]
     return [one for one in found if one is not None]
 

@@ -131,10 +131,10 @@ def _name(cluster: Cluster, shape: Shape, network: NetworkView | None) -> Name:
         form = Form(name=OTHER, fits=frozenset(), impossible=form.impossible)
     if network is None:
         return by_form(form)
-    word = network.word_for(cluster.box_px)
-    if word is None:
+    words = network.words_for(cluster.box_px)
+    if not words:
         return by_form(form, network.silence(cluster.box_px, form.name))
-    return by_both(form, word)
+    return by_both(form, words)
 
 
 def _detection(cluster: Cluster, look: _Look) -> Detection:

@@ -5,11 +5,14 @@ if they erred independently, and the surest class wins with its share of all odd
 
     odds = (1 + o(form)) * (1 + o(network)) - 1        confidence = odds / (1 + sum of all odds)
 
+A network may have several words for one thing, of which one at most is right: the odds of a word
+are its chance against the chance that none is.
+
 So agreement makes a name surer and a contradiction makes every name unsure. What the measures rule
 out never becomes the name; the network's word for it counts as one for something else.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -69,19 +72,27 @@ def by_form(form: Form, silence: float = 0.0) -> Name:
     )
 
 
-def by_both(form: Form, word: Word) -> Name:
-    """Name a thing by its form and what a network says of its place."""
-    odds, said = _form_odds(form), word.chance / (1.0 - word.chance)
-    something_else = 1.0
-    if word.class_name in form.impossible:
-        something_else += said
-    else:
-        odds[word.class_name] = (1.0 + odds.get(word.class_name, 0.0)) * (1.0 + said) - 1.0
+def by_both(form: Form, words: Sequence[Word]) -> Name:
+    """Name a thing by its form and what a network says of its place, each class once."""
+    odds, something_else = _form_odds(form), 1.0
+    for class_name, said in _word_odds(words):
+        if class_name in form.impossible:
+            something_else += said
+        else:
+            odds[class_name] = (1.0 + odds.get(class_name, 0.0)) * (1.0 + said) - 1.0
     best = max(odds, key=lambda name: odds[name], default=OTHER)
     if odds.get(best, 0.0) <= something_else:
         return Name(class_name=OTHER, confidence=OTHER_CONFIDENCE, source=Source.NONE)
     confidence = odds[best] / (something_else + sum(odds.values()))
-    return Name(class_name=best, confidence=confidence, source=_source(best, form, word))
+    return Name(class_name=best, confidence=confidence, source=_source(best, form, words))
+
+
+def _word_odds(words: Sequence[Word]) -> Iterator[tuple[str, float]]:
+    """Yield each class with its chance over the chance that no word is right."""
+    total = sum(word.chance for word in words)
+    share = min(1.0, HIGHEST_CHANCE / total)
+    for word in words:
+        yield word.class_name, share * word.chance / (1.0 - share * total)
 
 
 def _form_odds(form: Form) -> dict[str, float]:
@@ -92,7 +103,7 @@ def _form_odds(form: Form) -> dict[str, float]:
     return {name: LOOK_ALIKE_ODDS[name == form.name] for name in sorted(form.fits)}
 
 
-def _source(name: str, form: Form, word: Word) -> Source:
-    if name != word.class_name:
+def _source(name: str, form: Form, words: Sequence[Word]) -> Source:
+    if all(name != word.class_name for word in words):
         return Source.FORM
     return Source.BOTH if name in form.fits else Source.NETWORK

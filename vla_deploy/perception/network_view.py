@@ -1,17 +1,20 @@
 """Hold what a network saw in one image, for whoever asks about a place in it."""
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from vla_deploy.inference.manifest import Detection
-from vla_deploy.perception.detectors.boxes import Boxes, iou
+from vla_deploy.perception.detectors.boxes import Boxes, Floats, iou
 from vla_deploy.perception.naming import Word, chance_of
 from vla_deploy.perception.voices import Voice, voices_of
 
 SAME_IOU: Final = 0.5
 """Above one half, no box can be the same thing as two that do not overlap."""
+SAME_PLACE_IOU: Final = 0.85
+"""Boxes that overlap more are one person or chair, whichever of the two they were called."""
 SEEN_PX: Final = 12
 """A network says nothing of smaller things; its silence there means nothing."""
 Box = tuple[int, int, int, int]
@@ -23,17 +26,41 @@ class NetworkView:
 
     boxes: Boxes
     voices: tuple[Voice, ...]
+    sure_score: float = 0.0
+    """From which a box tells of a thing by itself; one below only helps to name what is there."""
 
     @classmethod
     def of(cls, boxes: Boxes, detection: Detection) -> "NetworkView":
         """Return the view of a model that declares how its outputs are read."""
-        return cls(boxes=boxes, voices=voices_of(detection))
+        voices, sure_score = voices_of(detection), detection.score_threshold
+        return cls(boxes=boxes, voices=voices, sure_score=sure_score)
 
-    def word_for(self, box_px: Box) -> Word | None:
-        """Return the surest word for the thing that fills a box (left, top, right, bottom)."""
+    def words_for(self, box_px: Box) -> list[Word]:
+        """Return the words for the thing that fills a box (left, top, right, bottom).
+
+        There is one for each class that was seen in its place, the surest first.
+        """
         overlaps = iou(np.array(box_px, dtype=np.float32), self.boxes.corners_px)
-        same = np.flatnonzero(overlaps > SAME_IOU)
-        return self.word(int(same[0])) if same.size else None
+        words = [self.word(int(number)) for number in np.flatnonzero(overlaps > SAME_IOU)]
+        by_class: dict[str, Word] = {}
+        for word in sorted(words, key=lambda word: word.chance, reverse=True):
+            by_class.setdefault(word.class_name, word)
+        return list(by_class.values())
+
+    def sure_words(self, classes: Collection[str]) -> Iterator[tuple[Floats, Word]]:
+        """Yield the places of some classes, left, top, right, bottom, and what each was called.
+
+        Boxes that are not sure, and further names for the same place, are left out.
+        """
+        told: list[Floats] = []
+        for number in np.flatnonzero(self.boxes.scores >= self.sure_score):
+            corners, word = self.boxes.corners_px[number], self.word(int(number))
+            if word.class_name not in classes or any(
+                iou(corners, other[None])[0] > SAME_PLACE_IOU for other in told
+            ):
+                continue
+            told.append(corners)
+            yield corners, word
 
     def word(self, number: int) -> Word:
         """Return what one of the boxes says."""

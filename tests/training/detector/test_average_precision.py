@@ -26,7 +26,8 @@ def labels(*rows: tuple[int, tuple[float, ...], int]) -> np.ndarray:
 def test_finding_everything_once_is_perfect() -> None:
     found = judge([boxes((CUP, 0.9, PLACE))], [labels((CUP, PLACE, 1))])["cup"]
 
-    assert (found.ap50, found.ap75, found.recall, found.precision, found.labels) == (1, 1, 1, 1, 1)
+    assert (found.ap50, found.ap75, found.recall, found.sure_recall) == (1, 1, 1, 1)
+    assert (found.precision, found.labels) == (1, 1)
 
 
 def test_a_second_box_on_the_same_thing_is_wrong() -> None:
@@ -55,10 +56,13 @@ def test_a_loose_box_hits_the_centre_and_misses_the_overlap() -> None:
     assert (found.recall, found.ap50) == (1.0, 0.0)
 
 
-def test_an_unsure_box_counts_for_average_precision_alone() -> None:
-    found = judge([boxes((CUP, 0.2, PLACE))], [labels((CUP, PLACE, 1))])["cup"]
+@pytest.mark.parametrize(("score", "recall"), [(0.2, 1.0), (0.1, 0.0)])
+def test_a_weak_box_is_no_sure_find_and_one_below_counts_for_average_precision_alone(
+    score: float, recall: float
+) -> None:
+    found = judge([boxes((CUP, score, PLACE))], [labels((CUP, PLACE, 1))])["cup"]
 
-    assert (found.ap50, found.recall) == (1.0, 0.0)
+    assert (found.ap50, found.recall, found.sure_recall) == (1.0, recall, 0.0)
 
 
 @pytest.mark.parametrize("index", [CUP, -1])

@@ -46,6 +46,6 @@ def test_card_and_manifest_are_written_beside_the_files(tmp_path: Path) -> None:
 def test_the_card_begins_with_whether_the_aim_is_reached(
     map50: float, recall: float, told: str
 ) -> None:
-    models = {"fp32": {"map50": map50, "recall": recall}}
+    models = {"fp32": {"map50": map50, "recall": recall, "sure_recall": 0.8}}
 
     assert told in verdict({"splits": {"heldout": {"models": models}}})

@@ -118,10 +118,26 @@ def test_every_fault_is_told_at_once(faults_of):
         (('name = "mine"', 'name = "ours"'), "name: got 'ours', expected 'mine', as its folder"),
         (("[files.fp32]", "[files.fp64]"), "files.fp64: got an unknown key, expected one of fp32"),
         (("[[outputs]]", "[[inputs]]"), "outputs: got nothing, expected a list of tables"),
+        (
+            ("[detection.image]", "weak_score_threshold = 0.3\n[detection.image]"),
+            "detection.weak_score_threshold: got 0.3, expected at most score_threshold, 0.25",
+        ),
     ],
 )
 def test_what_does_not_fit_together_is_told(faults_of, change, fault):
     assert faults_of(WRITTEN.replace(*change, 1))[0].startswith(fault)
+
+
+@pytest.mark.parametrize(("line", "least"), [("", 0.25), ("weak_score_threshold = 0.1\n", 0.1)])
+def test_weak_boxes_are_read_where_the_manifest_says_so(tmp_path, line, least):
+    text = WRITTEN.replace("[detection.image]", f"{line}[detection.image]")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "model.toml").write_text(text)
+    manifest = read_manifest(tmp_path / "mine")
+    assert manifest.detection is not None
+    assert manifest.detection.least_score == least
+    write_manifest(tmp_path / "mine", manifest)
+    assert read_manifest(tmp_path / "mine") == manifest
 
 
 def test_a_detector_needs_to_say_how_it_is_read(faults_of):

@@ -19,7 +19,7 @@ def said(class_name: str, chance: float) -> Word:
 
 @pytest.mark.parametrize("chance", [0.05, POOR, GOOD])
 def test_agreement_makes_a_name_surer_than_either(chance: float) -> None:
-    name = by_both(form("ball"), said("ball", chance))
+    name = by_both(form("ball"), [said("ball", chance)])
     assert (name.class_name, name.source) == ("ball", Source.BOTH)
     assert name.confidence > max(chance, by_form(form("ball")).confidence)
 
@@ -30,9 +30,9 @@ def test_agreement_makes_a_name_surer_than_either(chance: float) -> None:
 def test_a_good_network_that_contradicts_the_form_leaves_no_sure_name(
     impossible: frozenset[str],
 ) -> None:
-    disputed = by_both(form("keys", impossible=impossible), said("bottle", GOOD))
+    disputed = by_both(form("keys", impossible=impossible), [said("bottle", GOOD)])
     assert disputed.confidence < 0.7
-    doubted = by_both(form("keys", impossible=impossible), said("bottle", POOR))
+    doubted = by_both(form("keys", impossible=impossible), [said("bottle", POOR)])
     assert doubted.class_name == "keys"
     assert disputed.confidence < doubted.confidence < by_form(form("keys")).confidence
 
@@ -41,13 +41,13 @@ def test_a_good_network_that_contradicts_the_form_leaves_no_sure_name(
 def test_what_the_measures_rule_out_is_never_the_name(chance: float) -> None:
     for told in ("bottle", "person", "chair"):
         keys, unknown = (form(one, impossible=frozenset({"bottle"})) for one in ("keys", OTHER))
-        assert by_both(keys, said(told, chance)).class_name in ("keys", OTHER)
-        assert by_both(unknown, said(told, chance)).class_name == OTHER
+        assert by_both(keys, [said(told, chance)]).class_name in ("keys", OTHER)
+        assert by_both(unknown, [said(told, chance)]).class_name == OTHER
 
 
 def test_among_look_alikes_a_good_network_decides_and_a_poor_one_does_not() -> None:
     alike = form("cup", "can")
-    poor, good = by_both(alike, said("can", POOR)), by_both(alike, said("can", GOOD))
+    poor, good = by_both(alike, [said("can", POOR)]), by_both(alike, [said("can", GOOD)])
     assert poor.class_name == "cup"
     assert poor.confidence < 0.6
     assert (good.class_name, good.source) == ("can", Source.BOTH)
@@ -55,10 +55,30 @@ def test_among_look_alikes_a_good_network_decides_and_a_poor_one_does_not() -> N
 
 
 def test_what_no_form_names_is_named_by_the_network_as_surely_as_it_is_right() -> None:
-    assert by_both(form(OTHER), said("cup", 0.8)) == Name(
+    assert by_both(form(OTHER), [said("cup", 0.8)]) == Name(
         class_name="cup", confidence=pytest.approx(0.8), source=Source.NETWORK
     )
-    assert by_both(form(OTHER), said("cup", 0.45)).class_name == OTHER
+    assert by_both(form(OTHER), [said("cup", 0.45)]).class_name == OTHER
+
+
+def test_of_two_words_the_one_that_the_form_allows_is_the_name() -> None:
+    words = [said("remote", 0.6), said("phone", 0.3)]
+    only_a_phone = form("phone", impossible=frozenset({"remote"}))
+    assert by_both(form(OTHER), words).class_name == "remote"
+    assert by_both(only_a_phone, words).class_name == "phone"
+    lone = by_both(only_a_phone, words[:1])
+    assert by_both(only_a_phone, words).confidence > lone.confidence
+
+
+def test_words_that_share_a_thing_are_no_surer_together_than_one_can_be() -> None:
+    name = by_both(form(OTHER), [said("cup", 0.6), said("can", 0.4)])
+    assert (name.class_name, name.confidence) == ("cup", pytest.approx(0.6 * 0.97))
+
+
+def test_a_weak_word_of_its_own_names_nothing_and_supports_the_form() -> None:
+    weak = [said("cup", 0.3)]
+    assert by_both(form(OTHER), weak).class_name == OTHER
+    assert by_both(form("cup"), weak).confidence > by_form(form("cup")).confidence
 
 
 def test_the_silence_of_a_network_that_finds_most_things_costs_confidence() -> None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,19 +26,35 @@ def view(*rows: tuple[tuple[float, ...], float, int], voices: tuple[Voice, ...])
     )
 
 
-def test_a_place_has_the_surest_word_of_those_that_fill_the_same_box() -> None:
+def test_a_place_has_a_word_of_each_class_that_fills_the_same_box_the_surest_first() -> None:
     seen = view(
         ((0, 0, 100, 100), 0.9, 1),
         ((12, 10, 30, 40), 0.8, 0),
-        ((10, 10, 30, 40), 0.4, 1),
+        ((10, 10, 30, 40), 0.25, 1),
+        ((11, 10, 30, 40), 0.2, 2),
         voices=MEASURED,
     )
-    assert seen.word_for((10, 10, 30, 40)) == Word(class_name="cup", chance=0.7)
-    assert seen.word_for((60, 10, 90, 40)) is None
+    cup, ball = (Word(class_name="cup", chance=0.7), Word(class_name="ball", chance=0.35))
+    assert seen.words_for((10, 10, 30, 40)) == [cup, ball]
+    assert seen.words_for((60, 10, 90, 40)) == []
 
 
 def test_an_image_in_which_nothing_was_found_has_no_word() -> None:
-    assert view(voices=UNMEASURED).word_for((0, 0, 20, 20)) is None
+    assert view(voices=UNMEASURED).words_for((0, 0, 20, 20)) == []
+
+
+def test_sure_words_have_a_place_each_and_leave_weak_ones_out() -> None:
+    seen = view(
+        ((0, 0, 100, 100), 0.9, 1),
+        ((1, 0, 100, 100), 0.8, 0),
+        ((200, 0, 300, 100), 0.3, 1),
+        ((50, 0, 150, 100), 0.4, 0),
+        voices=MEASURED,
+    )
+    sure = replace(seen, sure_score=0.35)
+    assert [word.class_name for _, word in sure.sure_words({"cup", "ball"})] == ["ball", "cup"]
+    assert [place[0] for place, _ in sure.sure_words({"cup"})] == [1, 50]
+    assert len([*seen.sure_words({"ball"})]) == 2
 
 
 def test_silence_tells_as_much_as_the_network_finds_of_a_class_and_nothing_of_what_is_tiny() -> (
@@ -55,6 +73,5 @@ def test_silence_says_nothing_of_a_class_that_the_network_does_not_know() -> Non
 
 @pytest.mark.parametrize("score", [0.4, 1.0])
 def test_a_model_that_nobody_measured_names_nothing_by_itself(score: float) -> None:
-    word = view(((0, 0, 20, 20), score, 0), voices=UNMEASURED).word_for((0, 0, 20, 20))
-    assert word is not None
+    (word,) = view(((0, 0, 20, 20), score, 0), voices=UNMEASURED).words_for((0, 0, 20, 20))
     assert word.chance <= 0.5

@@ -35,7 +35,7 @@ def test_a_box_that_a_network_draws_lies_on_the_thing_in_the_cameras_image() -> 
     boxes = Boxes(corners_px=box, scores=np.array([0.9], np.float32), classes=np.array([0]))
     view = in_image(NetworkView(boxes=boxes, voices=(Voice(class_name="cup"),)), CAMERA)
     assert view is not None
-    assert view.word_for(SQUARE) is not None
+    assert view.words_for(SQUARE)
     assert view.boxes.corners_px[0] == pytest.approx(SQUARE, abs=6.0)
 
 

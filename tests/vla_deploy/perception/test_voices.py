@@ -97,7 +97,8 @@ def test_words_that_say_nothing_of_the_kind_never_raise_a_names_confidence(
     voice = voices_of(
         measured(row("cell phone", 0.95, 0.9, 500), row("dining table", 0.95, 0.9, 500))
     )[said]
-    name = by_both(form, Word(class_name=voice.class_name, chance=chance_of(0.99, voice.precision)))
+    word = Word(class_name=voice.class_name, chance=chance_of(0.99, voice.precision))
+    name = by_both(form, [word])
     alone = by_form(form)
     assert (name.class_name, name.source) in {(form.name, alone.source), (OTHER, Source.NONE)}
     assert name.confidence <= alone.confidence
@@ -105,6 +106,7 @@ def test_words_that_say_nothing_of_the_kind_never_raise_a_names_confidence(
 
 def test_a_measured_word_for_a_cell_phone_makes_a_phone_surer() -> None:
     phone = voices_of(measured(row("cell phone", 0.95, 0.9, 500)))[0]
-    name = by_both(PHONE, Word(class_name=phone.class_name, chance=chance_of(0.9, phone.precision)))
+    word = Word(class_name=phone.class_name, chance=chance_of(0.9, phone.precision))
+    name = by_both(PHONE, [word])
     assert (name.class_name, name.source) == ("phone", Source.BOTH)
     assert name.confidence > by_form(PHONE).confidence

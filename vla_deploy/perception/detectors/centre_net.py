@@ -1,24 +1,15 @@
 """Read the maps of a centre network: peaks of the heat are things, around them lie their edges."""
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.inference.manifest import Detection, Tensor
-from vla_deploy.perception.detectors.boxes import (
-    Boxes,
-    Floats,
-    Indices,
-    iou,
-    sound,
-    without_doubles,
-)
+from vla_deploy.perception.detectors.boxes import Boxes, Floats, Indices, sound, without_doubles
 
 Outputs = tuple[NDArray[Any], ...]
-SAME_PLACE_IOU: Final = 0.85
-"""Boxes that overlap more are one thing, whatever classes they were given."""
 
 
 def faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
@@ -45,7 +36,7 @@ def read(outputs: Outputs, detection: Detection) -> Boxes:
         heat,
         edges,
         stride_px=detection.image.width_px / heat.shape[2],
-        score_threshold=detection.score_threshold,
+        score_threshold=detection.least_score,
         iou_threshold=detection.iou_threshold,
     )
 
@@ -69,7 +60,7 @@ def decode(
     )
     height_px, width_px = (size * stride_px for size in heat.shape[1:])
     inside = _within(sound(boxes, score_threshold), width_px, height_px)
-    return _one_class_each(without_doubles(inside, iou_threshold))
+    return without_doubles(inside, iou_threshold)
 
 
 def _within(boxes: Boxes, width_px: float, height_px: float) -> Boxes:
@@ -95,12 +86,3 @@ def _peaks(heat: Floats, score_threshold: float) -> tuple[Indices, Indices, Indi
             beside_column = (columns + right).clip(0, last_column)
             top &= heat[classes, beside_row, beside_column] <= values
     return classes[top], rows[top], columns[top]
-
-
-def _one_class_each(boxes: Boxes) -> Boxes:
-    """Return the boxes, which come the surest first, without further names for the same place."""
-    kept: list[int] = []
-    for number, corners in enumerate(boxes.corners_px):
-        if not (iou(corners, boxes.corners_px[kept]) > SAME_PLACE_IOU).any():
-            kept.append(number)
-    return boxes.where(np.array(kept, dtype=np.intp))

@@ -49,14 +49,14 @@ def read_raw(outputs: Outputs, detection: Detection) -> Boxes:
     by_class = table[_COORDINATES:]
     classes = by_class.argmax(axis=0)
     scores = by_class[classes, np.arange(by_class.shape[1])]
-    promising = scores >= detection.score_threshold
+    promising = scores >= detection.least_score
     centre, half = table[:2, promising].T, 0.5 * table[2:_COORDINATES, promising].T
     boxes = Boxes(
         corners_px=np.hstack([centre - half, centre + half]),
         scores=scores[promising],
         classes=classes[promising],
     )
-    return without_doubles(sound(boxes, detection.score_threshold), detection.iou_threshold)
+    return without_doubles(sound(boxes, detection.least_score), detection.iou_threshold)
 
 
 def end_to_end_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
@@ -79,7 +79,7 @@ def read_end_to_end(outputs: Outputs, detection: Detection) -> Boxes:
     if table.shape[1] != _END_TO_END:
         raise RunFailed(f"told rows of {table.shape[1]} numbers, expected {_END_TO_END}")
     boxes = Boxes(corners_px=table[:, :4], scores=table[:, 4], classes=_class_numbers(table[:, 5]))
-    return sound(boxes, detection.score_threshold)
+    return sound(boxes, detection.least_score)
 
 
 def counted_faults(outputs: tuple[Tensor, ...], detection: Detection) -> Iterator[str]:
@@ -114,7 +114,7 @@ def read_counted(outputs: Outputs, detection: Detection) -> Boxes:
         scores=np.asarray(scores[0, :count], dtype=np.float32),
         classes=_class_numbers(classes[0, :count]),
     )
-    return sound(boxes, detection.score_threshold)
+    return sound(boxes, detection.least_score)
 
 
 def _class_numbers(values: NDArray[Any]) -> NDArray[np.intp]:

@@ -79,7 +79,7 @@ def measure(
     """
     detection = model.manifest.detection
     assert detection is not None, "only detectors are measured"
-    keen = dataclasses.replace(detection, score_threshold=_MEASURING_SCORE)
+    keen = dataclasses.replace(detection, weak_score_threshold=_MEASURING_SCORE)
     manifest = dataclasses.replace(only(model, variant).manifest, detection=keen)
     keen_model = dataclasses.replace(model, manifest=manifest)
     detector = Detector(open_session(keen_model, PLAIN_CHOICE, engines=engines, clock=clock))
