@@ -122,7 +122,7 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings) -> str:
 
 
 def measured(metrics: dict[str, Any]) -> tuple[float, float]:
-    """Return the precision of sure boxes of the CPU's int8 file, a mean over classes, and recall."""
+    """Return precision, a mean over classes, and recall of the CPU's int8 file by sure boxes."""
     told = metrics["splits"]["heldout"]["models"]["int8_u8s8"]
     classes = told["classes"].values()
     return sum(one["precision"] for one in classes) / len(classes), told["sure_recall"]
