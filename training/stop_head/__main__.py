@@ -1,0 +1,59 @@
+"""Run one step, or all: python -m training.stop_head all --out /data/stop_head.
+
+`speak` says the clips that `training.stop_words` learns from; those that are there already stay.
+"""
+
+import argparse
+import logging
+import os
+from pathlib import Path
+from typing import Final
+
+CLIPS: Final = "clips"
+STEPS: Final = ("speak", "train", "ship")
+RECOGNISER: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "commands-whisper"
+
+
+def main() -> None:
+    """Parse the command line and run the steps."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    parser = argparse.ArgumentParser(
+        prog="python -m training.stop_head",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example: nice python -m training.stop_head all --out /data/stop_head",
+    )
+    parser.add_argument("step", choices=[*STEPS, "all"])
+    parser.add_argument("--out", type=Path, required=True, help="folder for clips and weights")
+    parser.add_argument("--minutes", type=float, default=25.0, help="of learning (default: 25)")
+    parser.add_argument("--seed", type=int, default=22)
+    parser.add_argument("--scale", type=float, default=1.0, help="share of the clips (default: 1)")
+    parser.add_argument(
+        "--recogniser", type=Path, default=RECOGNISER,
+        help="folder of the recogniser that it is for (default: the one that is shipped)",
+    )  # fmt: skip
+    given = parser.parse_args()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
+    for step in STEPS if given.step == "all" else (given.step,):
+        _run(step, given)
+
+
+# What a step needs beyond numpy is imported by that step alone.
+def _run(step: str, given: argparse.Namespace) -> None:
+    clips = given.out / CLIPS
+    if step == "speak":
+        from training.stop_words.corpus import speak
+
+        speak(clips, given.seed, given.scale)
+    elif step == "train":
+        from training.stop_head.training import train
+
+        train(clips, given.recogniser, given.out, given.minutes, given.seed)
+    else:
+        from training.stop_head.export import ship
+
+        ship(given.out, given.recogniser)
+
+
+if __name__ == "__main__":
+    main()
