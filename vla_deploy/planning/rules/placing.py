@@ -31,9 +31,7 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 STORE: Final = "box"
 """What "put it away" means where nothing else is said."""
 _WAY: Final = re.compile(rf"^(?:{WAYS}) ")
-_TOWARDS: Final = frozenset(
-    {"to", "at", *(f"{way} to" for way in ("over", "back", "through", "across", "along", "out"))}
-)
+_TOWARDS: Final = frozenset({"to", "at", *(f"{way} to" for way in WAYS.split("|"))})
 _STAYS: Final = re.compile(r" (?:in|on|at|inside) (?!your\b)")
 """Where it is to be kept is where it is."""
 _INTO: Final = frozenset({"in", "into", "inside", "inside of"})

@@ -189,9 +189,8 @@ _ROWS: Final[tuple[Row, ...]] = (
     (Intent.NAVIGATION, rf"(?:go|come|return|drive|head|walk|navigate|move)(?: back)? {PLACE}",
      building.go),
     (Intent.NAVIGATION, rf"(?:visit|approach|make your way to|find your way to|dock at|"
-     rf"stand (?:by|at|before)|(?:park|plant|place|put|station) (?:yourself )?(?:at|on|"
-     rf"in front of|by|beside|next to)|"
-     rf"position yourself at) {PLACE}", building.go),
+     rf"stand (?:by|at|before)|(?:(?:park|plant|station)(?: yourself)?|(?:place|put) yourself) "
+     rf"(?:at|on|in front of|by|beside|next to)|position yourself at) {PLACE}", building.go),
     (Intent.NAVIGATION, r"(?:go )?(?:dock|charge|recharge)(?: yourself| your batter(?:y|ies))?",
      building.dock),
     # --- search
