@@ -47,6 +47,21 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"\1, ",
     ),
     (
+        r"^(?:(?:of|from|out of|among) )?(?:all )?(?:(?:the|those|these) )?(?:two|three|four|five)"
+        rf" ({KIND_WORDS})e?s(?: there| here|(?: on| in| at) the [^,;.!?]+?)?, "
+        rf"([^;.!?]*?)\b(the (?:\w+er|\w+est|{_COLOUR}|middle|left|right|first|second|third|last)) "
+        r"one\b",
+        r"\2\3 \1",
+    ),
+    (
+        rf"^not (?:the|that|my) (?:\w+ )*?({KIND_WORDS})(?: [^,;.!?]*)?, (?:but |it's |i mean )?"
+        r"(the \w+) one\b",
+        r"\2 \1",
+    ),
+    (r"^not (?:the|that|my) \w+ one, (?=the |my |that )", ""),
+    (r"(?:pick|take|get|grab) (?:that|this) in(?:to)? your hand", "pick it up"),
+    (r"i(?: want|'d like| need| would like) you (?:holding|to be holding) ", "hold "),
+    (
         r"((?:the|that|this|my) [^,]+?) (?:is|are) (?:the ones?|what)(?: that)? "
         r"(?:i'd like|i want|i need|i would like)(?: you)? to "
         r"((?:pick|take|bring|fetch|lift|grab|hold|get|find)(?: up)?)(?=$|[,.!?])",

@@ -14,7 +14,7 @@ from vla_deploy.planning.rules.gist import gist_of
         ("My ball is on the coffee table, could you run and get it for me?",
          "get the ball on the coffee table for me"),
         ("Assembly starts at nine, find the keys", "find the keys"),
-        ("Of the two cups there, take the red one", "take the red cup"),
+        ("Of all the cups there, take the red one", "take the red cup"),
         ("a bit more, it's still in my eyes", "a bit more"),
     ],
 )  # fmt: skip
