@@ -30,6 +30,8 @@ _LOG = logging.getLogger(__name__)
 def train(clips: Path, recogniser: Path, out: Path, minutes: float, seed: int) -> None:
     """Learn for that long on one core from the clips, and write the head's weights.
 
+    Where weights are already, it goes on from them.
+
     Raises:
         FileNotFoundError: there are no clips.
         NotReadable: the folder `recogniser` is none that `training.speech` made.
@@ -38,6 +40,8 @@ def train(clips: Path, recogniser: Path, out: Path, minutes: float, seed: int) -
     torch.set_num_threads(1)
     corpus = Corpus(clips, np.random.default_rng([seed, 1]))
     encoder, head = encoder_of(recogniser, SIZES["full"]), StopHead(SIZES["full"].width)
+    if (out / WEIGHTS).exists():
+        head.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
     optimiser = torch.optim.AdamW(head.parameters(), weight_decay=DECAY)
     began_s, steps, progress = time.monotonic(), 0, 0.0
     while progress < 1.0:

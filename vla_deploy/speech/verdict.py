@@ -8,11 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from enum import StrEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.recogniser import Reading
-from vla_deploy.speech.words import holds_stop, is_courtesy, is_stop, words_of
+from vla_deploy.speech.words import (
+    holds_form_of_stop,
+    holds_stop,
+    is_courtesy,
+    is_stop,
+    words_of,
+)
 
 FASTEST_WORDS_S: Final = 7.0
 MOST_COMPRESSION: Final = 2.4
@@ -38,6 +44,29 @@ STRONG_SUSPICION: Final = 0.7
 """From these shares of its threshold on, what the spotter heard counts beside words that were read
 within others, beside a stop that may have been read instead, and beside any word that may be one.
 """
+
+
+class _Witnesses(NamedTuple):
+    """Hold what three witnesses say of a stop word in a phrase, each from 0 to 1.
+
+    The head in the recogniser's encoder, the share of what may have been said, and the spotter.
+    """
+
+    surety: float
+    share: float
+    suspicion: float
+
+    def reach(self, least: "_Witnesses") -> bool:
+        """Tell whether each says as much as one of `STOP_WITNESSES` asks."""
+        return all(told >= needed for told, needed in zip(self, least, strict=True))
+
+
+STOP_WITNESSES: Final = (
+    _Witnesses(surety=0.95, share=0.0, suspicion=0.0),
+    _Witnesses(surety=0.4, share=0.1, suspicion=0.0),
+    _Witnesses(surety=0.5, share=0.0, suspicion=0.4),
+)
+"""So much is enough for a stop, whatever words were read unless a form of one: one of the rows."""
 
 
 class Verdict(StrEnum):
@@ -112,7 +141,19 @@ def stops(
         return True
     suspected = suspicion >= SLIGHT_SUSPICION
     least = STOP_SUSPECTED_CONFIDENCE if suspected else STOP_WITHIN_CONFIDENCE
-    return confidence >= least and holds_stop(reading.text, is_all=is_all)
+    if confidence >= least and holds_stop(reading.text, is_all=is_all):
+        return True
+    if holds_form_of_stop(reading.text):
+        return False
+    surety = reading.stop_surety if is_all else reading.stop_surety_within
+    witnesses = _Witnesses(surety, _stop_share(reading), suspicion)
+    return any(witnesses.reach(row) for row in STOP_WITNESSES)
+
+
+def _stop_share(reading: Reading) -> float:
+    """Return the share of what may have been said that holds a stop, each text by its odds."""
+    texts = [(reading.text, 1.0), *((one.text, one.odds) for one in reading.others)]
+    return sum(odds for text, odds in texts if holds_stop(text)) / sum(odds for _, odds in texts)
 
 
 def _without_words(case: Case) -> str:

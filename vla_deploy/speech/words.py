@@ -4,6 +4,9 @@ import re
 from typing import Final
 
 STOPS: Final = frozenset({"stop", "halt", "freeze"})
+_FORMS: Final = re.compile(
+    r"\b(?:stop(?:ped|ping|per|s)|halt(?:ed|ing|er|s)|freez(?:ing|er|es)|froze|frozen)\b"
+)
 _POLITE: Final = frozenset(
     {
         "robot", "butler", "please", "now", "hey", "moving", "it", "that", "okay", "ok", "no", "oh",
@@ -40,6 +43,11 @@ def holds_stop(text: str, *, is_all: bool = True) -> bool:
     """Tell whether a call to stop is among the words; of words cut off the last may be another."""
     words = words_of(text)
     return any(word in STOPS for word in (words if is_all else words[:-1]))
+
+
+def holds_form_of_stop(text: str) -> bool:
+    """Tell whether a word is among the others that sounds like a call to stop and is none."""
+    return _FORMS.search(text.lower()) is not None
 
 
 def is_courtesy(text: str) -> bool:

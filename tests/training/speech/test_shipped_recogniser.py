@@ -47,6 +47,21 @@ def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: 
     assert confidence(reading, recogniser.declared.calibration) >= LEAST_CONFIDENCE
 
 
+@pytest.mark.parametrize(
+    ("text", "is_stop"), [*((text, False) for text in COMMANDS[:2]), ("stop", True), ("halt", True)]
+)
+def test_the_head_tells_stop_words_from_commands_in_noise(
+    recogniser: Recogniser, text: str, is_stop: bool
+) -> None:
+    try:
+        ctypes.CDLL("libespeak-ng.so.1")
+    except OSError:
+        pytest.skip("no libespeak-ng1")
+    spoken = say(text, Speaker(engine="espeak", voice="en-us"), Style())
+    clip = heard(spoken, np.random.default_rng(1), 15.0)
+    assert (recogniser.read(clip.samples).stop_surety > 0.5) is is_stop
+
+
 def test_a_command_is_read_right_at_any_length(recogniser: Recogniser) -> None:
     try:
         ctypes.CDLL("libespeak-ng.so.1")
