@@ -16,7 +16,8 @@ RECOGNISER: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "comma
 
 def main() -> None:
     """Parse the command line and run the steps."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    # Threads that wait for each other at barriers cost more than they bring on a busy computer.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     parser = argparse.ArgumentParser(
         prog="python -m training.stop_head",
         description=__doc__,
@@ -25,6 +26,9 @@ def main() -> None:
     )
     parser.add_argument("step", choices=[*STEPS, "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for clips and weights")
+    parser.add_argument(
+        "--talk", type=Path, help="clips of `training.speech data`, as more of other talk"
+    )
     parser.add_argument("--minutes", type=float, default=25.0, help="of learning (default: 25)")
     parser.add_argument("--seed", type=int, default=22)
     parser.add_argument("--scale", type=float, default=1.0, help="share of the clips (default: 1)")
@@ -48,7 +52,7 @@ def _run(step: str, given: argparse.Namespace) -> None:
     elif step == "train":
         from training.stop_head.training import train
 
-        train(clips, given.recogniser, given.out, given.minutes, given.seed)
+        train(clips, given.talk, given.recogniser, given.out, given.minutes, given.seed)
     else:
         from training.stop_head.export import ship
 

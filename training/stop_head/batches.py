@@ -14,7 +14,9 @@ from training.speech.features import HOP, WARPS, frames
 from training.speech.network import FRAMES_PER_STATE, MELS
 from training.speech.spoiling import Spoiler, draw_gains
 from training.stop_words.corpus import TRAIN, Clips, Said
+from training.stop_words.texts import is_clean
 from training.voices.clip import RATE_HZ
+from training.voices.clip_store import read_shard, shards
 
 IGNORED: Final = -100
 BATCH_S: Final = 100.0
@@ -40,17 +42,37 @@ class Batch:
     targets: Tensor
 
 
+class Talk:
+    """Hold the clips of the recogniser's training in which no stop word is."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open what `python -m training.speech data` has written."""
+        clips = (clip for shard in shards(folder) for clip in read_shard(shard))
+        self._clips = [clip for clip in clips if is_clean(clip.text)]
+
+    def __len__(self) -> int:
+        return len(self._clips)
+
+    def __getitem__(self, number: int) -> Said:
+        clip = self._clips[number]
+        none = np.zeros((0, 3), np.float32)
+        return Said(samples=clip.data, voice=clip.voice, events=none, phones=none[:, :2])
+
+
 class Corpus:
     """Hold clips with and without stop words, and make batches of them."""
 
-    def __init__(self, folder: Path, random: Random) -> None:
-        """Open what `python -m training.stop_words speak` has written.
+    def __init__(self, folder: Path, talk: Path | None, random: Random) -> None:
+        """Open what `python -m training.stop_words speak` has written, and the recogniser's clips.
 
         Raises:
             FileNotFoundError: nothing was spoken yet.
         """
         self._random = random
-        self._parts = [Clips(folder, TRAIN, kind) for kind in ("stops", "others")]
+        self._parts: list[Clips | Talk] = [
+            *(Clips(folder, TRAIN, kind) for kind in ("stops", "others")),
+            *([] if talk is None else [Talk(talk)]),
+        ]
         self._places = [(part, n) for part in self._parts for n in range(len(part))]
         others = self._parts[1]
         talk = [_wave(others[int(n)]) for n in random.integers(len(others), size=TALKERS)]

@@ -27,18 +27,20 @@ TELL_EVERY_STEPS: Final = 50
 _LOG = logging.getLogger(__name__)
 
 
-def train(clips: Path, recogniser: Path, out: Path, minutes: float, seed: int) -> None:
-    """Learn for that long on one core from the clips, and write the head's weights.
+def train(
+    clips: Path, talk: Path | None, recogniser: Path, out: Path, minutes: float, seed: int
+) -> None:
+    """Learn for that long from the clips, and write the head's weights.
 
-    Where weights are already, it goes on from them.
+    `talk` are clips that the recogniser has learnt from. Where weights are already, it goes on from
+    them.
 
     Raises:
         FileNotFoundError: there are no clips.
         NotReadable: the folder `recogniser` is none that `training.speech` made.
     """
     torch.manual_seed(seed)
-    torch.set_num_threads(1)
-    corpus = Corpus(clips, np.random.default_rng([seed, 1]))
+    corpus = Corpus(clips, talk, np.random.default_rng([seed, 1]))
     encoder, head = encoder_of(recogniser, SIZES["full"]), StopHead(SIZES["full"].width)
     if (out / WEIGHTS).exists():
         head.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))

@@ -15,8 +15,9 @@ from vla_deploy.speech.phrases import ABOVE_FLOOR_DB, OFFSET, Happening, Phrase,
 from vla_deploy.speech.readings import Answer, Readings
 from vla_deploy.speech.recogniser import Reading
 from vla_deploy.speech.sound import SoundBlock, level_db
+from vla_deploy.speech.stopping import stops
 from vla_deploy.speech.surroundings import Music, NoiseFloor
-from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge, stops
+from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge
 from vla_deploy.speech.voice_activity import VoiceActivity
 from vla_deploy.speech.words import is_unfinished
 

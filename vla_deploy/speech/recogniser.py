@@ -6,7 +6,6 @@ from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.latency import LatencyHistogram
@@ -21,7 +20,7 @@ from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import SpeechMissing
 from vla_deploy.speech.sound import RATE_HZ, Sound
-from vla_deploy.speech.stop_head import CUT_OFF_S, STATE_S, open_stop_head
+from vla_deploy.speech.stop_head import open_stop_head
 
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
@@ -52,9 +51,7 @@ class Alternative:
 class Reading:
     """Hold what a model read in a phrase, and what speaks for it.
 
-    `stop_surety` is how surely a stop word is in it by the head for them, nought without one, and
-    `stop_surety_within` how surely before the last quarter of a second: what comes last may be cut
-    off, and go on.
+    `stop_surety` is how surely a stop word is in it by the head for them, nought without one.
     `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
     `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
     as far as the model knows several. `others` is what may have been said instead, the likeliest
@@ -70,7 +67,6 @@ class Reading:
     took_s: float
     others: tuple[Alternative, ...] = ()
     stop_surety: float = 0.0
-    stop_surety_within: float = 0.0
 
 
 class Recogniser:
@@ -113,7 +109,6 @@ class Recogniser:
         self.latency.record(took_ns)
         weights = [max(1, len(one.tokens)) for one in segments]
         text = " ".join(one.text.strip() for one in segments).strip()
-        sureties = self._stop_sureties()
         return Reading(
             text=text,
             log_probability=_mean([one.avg_logprob for one in segments], weights, 0.0),
@@ -123,8 +118,7 @@ class Recogniser:
             duration_s=len(samples) / RATE_HZ,
             took_s=took_ns / NS_PER_S,
             others=others_of(self._whisper.hypotheses),
-            stop_surety=float(sureties.max(initial=0.0)),
-            stop_surety_within=float(sureties[: _settled(samples)].max(initial=0.0)),
+            stop_surety=self._stop_surety(),
         )
 
     def document(self) -> dict[str, Any]:
@@ -148,12 +142,9 @@ class Recogniser:
         self._whisper = None
         self.claim.release()
 
-    def _stop_sureties(self) -> NDArray[np.float32]:
-        """Return how surely a stop word was said, every 40 ms, of one window of sound."""
-        states = self._whisper.states
-        if self._stop_head is None or len(states) != 1:
-            return np.zeros(0, np.float32)
-        return self._stop_head.sureties(states[0])
+    def _stop_surety(self) -> float:
+        head = self._stop_head
+        return max(map(head.surety, self._whisper.states), default=0.0) if head else 0.0
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper
@@ -232,11 +223,6 @@ def others_of(windows: list[list[tuple[str, float]]]) -> tuple[Alternative, ...]
             odds.setdefault(text, math.exp(min(0.0, log_probability - best_log)))
     ranked = sorted(odds.items(), key=lambda one: -one[1])
     return tuple(Alternative(text, round(one, 4)) for text, one in ranked if one >= _LEAST_ODDS)
-
-
-def _settled(samples: Sound) -> int:
-    """Return the count of states before what may be a word that is cut off."""
-    return max(0, int((len(samples) / RATE_HZ - CUT_OFF_S) / STATE_S))
 
 
 def _provider(choice: ModelChoice, runtime: Any) -> str:

@@ -19,11 +19,8 @@ from vla_deploy.inference.store import Model
 
 FILE: Final = "stop_head.npz"
 TENSORS: Final = ("near.weight", "near.bias", "far.weight", "far.bias", "last.weight", "last.bias")
-STATE_S: Final = 0.04
 SETTLING: Final = 2
-"""So many states in a row tell a word: one alone may be chance."""
-CUT_OFF_S: Final = 0.25
-"""In so much sound at the end of what is read while somebody speaks, "stop" may be "stopped"."""
+"""So many states in a row tell a word, 40 ms each: one alone may be chance."""
 Array = NDArray[np.float32]
 
 
@@ -35,10 +32,10 @@ class StopHead:
         self._layers = [_Layer.of(weights, name) for name in ("near", "far")]
         self._last, self._last_bias = weights["last.weight"].T, weights["last.bias"]
 
-    def sureties(self, states: Array) -> Array:
-        """Return how surely each of the states (time, width) tells one of the words: 0 to 1."""
+    def surety(self, states: Array) -> float:
+        """Return how surely one of the words is in states (time, width): from 0 to 1."""
         if len(states) < SETTLING:
-            return np.zeros(len(states), np.float32)
+            return 0.0
         x = states
         for layer in self._layers:
             x = layer.run(x)
@@ -47,7 +44,7 @@ class StopHead:
         chances = np.exp(logits)
         chances /= chances.sum(axis=1, keepdims=True)
         runs = np.lib.stride_tricks.sliding_window_view(chances[:, 1:], SETTLING, axis=0)
-        return runs.mean(axis=2).max(axis=1)  # type: ignore[no-any-return]
+        return float(runs.mean(axis=2).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

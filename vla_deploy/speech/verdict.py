@@ -8,17 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from enum import StrEnum
-from typing import Final, NamedTuple
+from typing import Final
 
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.recogniser import Reading
-from vla_deploy.speech.words import (
-    holds_form_of_stop,
-    holds_stop,
-    is_courtesy,
-    is_stop,
-    words_of,
-)
+from vla_deploy.speech.stopping import stops
+from vla_deploy.speech.words import is_courtesy, words_of
 
 FASTEST_WORDS_S: Final = 7.0
 MOST_COMPRESSION: Final = 2.4
@@ -30,43 +25,6 @@ OWN_RATIO: Final = 0.7
 """The robot's own are so many of its words in a row, and all in all so many of the phrase's."""
 DOUBT_RATIO: Final = 0.5
 """What is understood by this share of what is needed may still make sense to the planner."""
-STOP_CONFIDENCE: Final = 0.25
-"""A stop is taken where another command would be asked again: a stop too many does no harm."""
-STOP_WITHIN_CONFIDENCE: Final = 0.85
-STOP_SUSPECTED_CONFIDENCE: Final = 0.5
-"""The same, of a stop word anywhere among others: more words may be misread as one. The second is
-enough where the spotter suspects one."""
-STOP_ODDS: Final = 0.2
-"""What was at least by so much as likely as the words that were read counts beside them."""
-SLIGHT_SUSPICION: Final = 0.3
-SUSPICION: Final = 0.4
-STRONG_SUSPICION: Final = 0.7
-"""From these shares of its threshold on, what the spotter heard counts beside words that were read
-within others, beside a stop that may have been read instead, and beside any word that may be one.
-"""
-
-
-class _Witnesses(NamedTuple):
-    """Hold what three witnesses say of a stop word in a phrase, each from 0 to 1.
-
-    The head in the recogniser's encoder, the share of what may have been said, and the spotter.
-    """
-
-    surety: float
-    share: float
-    suspicion: float
-
-    def reach(self, least: "_Witnesses") -> bool:
-        """Tell whether each says as much as one of `STOP_WITNESSES` asks."""
-        return all(told >= needed for told, needed in zip(self, least, strict=True))
-
-
-STOP_WITNESSES: Final = (
-    _Witnesses(surety=0.95, share=0.0, suspicion=0.0),
-    _Witnesses(surety=0.4, share=0.1, suspicion=0.0),
-    _Witnesses(surety=0.5, share=0.0, suspicion=0.4),
-)
-"""So much is enough for a stop, whatever words were read unless a form of one: one of the rows."""
 
 
 class Verdict(StrEnum):
@@ -122,38 +80,6 @@ def judge(case: Case) -> Judgement:
             verdict = Verdict.DOUBTED if is_doubted else Verdict.REJECTED
             return Judgement(verdict=verdict, reason=reason, ask_again=row.ask_again)
     return Judgement(verdict=Verdict.ACCEPTED)
-
-
-def stops(
-    reading: Reading, confidence: float, suspicion: float = 0.0, *, is_all: bool = True
-) -> bool:
-    """Tell whether words read by that confidence stop the robot; `is_all` unless more may follow.
-
-    As on the stream, the word itself does, whatever is meant by it. The less sure the words are,
-    the more the spotter must suspect one; then what may have been said instead counts, too.
-    """
-    likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
-    if suspicion >= STRONG_SUSPICION and any(map(holds_stop, (reading.text, *likely))):
-        return True
-    if is_all and suspicion >= SUSPICION and any(map(is_stop, likely)):
-        return True
-    if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
-        return True
-    suspected = suspicion >= SLIGHT_SUSPICION
-    least = STOP_SUSPECTED_CONFIDENCE if suspected else STOP_WITHIN_CONFIDENCE
-    if confidence >= least and holds_stop(reading.text, is_all=is_all):
-        return True
-    if holds_form_of_stop(reading.text):
-        return False
-    surety = reading.stop_surety if is_all else reading.stop_surety_within
-    witnesses = _Witnesses(surety, _stop_share(reading), suspicion)
-    return any(witnesses.reach(row) for row in STOP_WITNESSES)
-
-
-def _stop_share(reading: Reading) -> float:
-    """Return the share of what may have been said that holds a stop, each text by its odds."""
-    texts = [(reading.text, 1.0), *((one.text, one.odds) for one in reading.others)]
-    return sum(odds for text, odds in texts if holds_stop(text)) / sum(odds for _, odds in texts)
 
 
 def _without_words(case: Case) -> str:

@@ -9,8 +9,8 @@ import pytest
 from vla_deploy.inference.manifest import Calibration
 from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.recogniser import Alternative, Reading
-from vla_deploy.speech.verdict import Case, Verdict, judge, stops
+from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.verdict import Case, Verdict, judge
 from vla_deploy.speech.words import is_stop, is_unfinished, words_of
 
 READING = Reading(
@@ -139,35 +139,6 @@ def test_a_call_to_stop_is_taken_where_a_command_would_not_be(text: str) -> None
     unsure = case(reading={"text": text}, phrase=own, confidence=0.3)
     assert judge(unsure).verdict is Verdict.STOP
     assert judge(case(reading={"text": text}, confidence=0.1)).verdict is Verdict.REJECTED
-
-
-def heard(text: str, *others: tuple[str, float], surety: float, **told: Any) -> Reading:
-    alternatives = tuple(Alternative(one, odds) for one, odds in others)
-    return replace(READING, text=text, others=alternatives, stop_surety=surety, **told)
-
-
-@pytest.mark.parametrize(
-    ("reading", "suspicion", "is_stop"),
-    [
-        (heard("you should hold", surety=0.96), 0.0, True),
-        (heard("you should hold", surety=0.9), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.5), 0.0, True),
-        (heard("you should hold", ("you should halt", 0.05), surety=0.5), 0.0, False),
-        (heard("please, please", surety=0.6), 0.45, True),
-        (heard("please, please", surety=0.3), 0.45, False),
-        (heard("he stopped at the shop", ("he stop at the shop", 0.9), surety=0.99), 0.6, False),
-    ],
-)
-def test_three_witnesses_stop_together_what_no_words_would(
-    reading: Reading, suspicion: float, is_stop: bool
-) -> None:
-    assert stops(reading, 0.3, suspicion) is is_stop
-
-
-def test_while_somebody_speaks_a_word_at_the_end_may_go_on() -> None:
-    cut_off = heard("he", surety=0.99)
-    assert not stops(cut_off, 0.3, is_all=False)
-    assert stops(replace(cut_off, stop_surety_within=0.99), 0.3, is_all=False)
 
 
 @pytest.mark.parametrize("text", ["stop at the table", "", "please", "do not stop", "it"])

@@ -1,0 +1,92 @@
+"""Decide whether what was read in a phrase, or in one so far, stops the robot.
+
+A stop too many does no harm: words that would be asked again as a command are enough for it, and
+where they are not, other witnesses may be.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.words import holds_form_of_stop, holds_stop, is_stop
+
+STOP_CONFIDENCE: Final = 0.25
+"""A stop is taken where another command would be asked again: a stop too many does no harm."""
+STOP_WITHIN_CONFIDENCE: Final = 0.85
+STOP_SUSPECTED_CONFIDENCE: Final = 0.5
+"""The same, of a stop word anywhere among others: more words may be misread as one. The second is
+enough where the spotter suspects one."""
+STOP_ODDS: Final = 0.2
+"""What was at least by so much as likely as the words that were read counts beside them."""
+SLIGHT_SUSPICION: Final = 0.3
+SUSPICION: Final = 0.4
+STRONG_SUSPICION: Final = 0.7
+"""From these shares of its threshold on, what the spotter heard counts beside words that were read
+within others, beside a stop that may have been read instead, and beside any word that may be one.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Enough:
+    """Bound what three witnesses must say of a stop word in a phrase, each from 0 to 1.
+
+    They are the head in the recogniser's encoder, the share of what may have been said in which a
+    stop word is, and the spotter. Words read by more than `most_confidence` outweigh them.
+    """
+
+    surety: float
+    share: float = 0.0
+    suspicion: float = 0.0
+    most_confidence: float = 1.0
+
+
+STOP_WITNESSES: Final = (
+    _Enough(surety=0.9, most_confidence=0.3),
+    _Enough(surety=0.2, share=0.05),
+    _Enough(surety=0.5, suspicion=0.3, most_confidence=0.3),
+)
+"""Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
+was read. While somebody speaks, "stop" may become "stopped": then words alone count.
+"""
+
+
+def stops(
+    reading: Reading, confidence: float, suspicion: float = 0.0, *, is_all: bool = True
+) -> bool:
+    """Tell whether words read by that confidence stop the robot; `is_all` unless more may follow.
+
+    As on the stream, the word itself does, whatever is meant by it. The less sure the words are,
+    the more the spotter must suspect one; then what may have been said instead counts, too.
+    """
+    likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
+    if suspicion >= STRONG_SUSPICION and any(map(holds_stop, (reading.text, *likely))):
+        return True
+    if is_all and suspicion >= SUSPICION and any(map(is_stop, likely)):
+        return True
+    if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
+        return True
+    suspected = suspicion >= SLIGHT_SUSPICION
+    least = STOP_SUSPECTED_CONFIDENCE if suspected else STOP_WITHIN_CONFIDENCE
+    if confidence >= least and holds_stop(reading.text, is_all=is_all):
+        return True
+    return is_all and _is_witnessed(reading, confidence, suspicion)
+
+
+def _is_witnessed(reading: Reading, confidence: float, suspicion: float) -> bool:
+    """Tell whether other witnesses than the words that were read say enough of a stop."""
+    if holds_form_of_stop(reading.text):
+        return False
+    share = _stop_share(reading)
+    return any(
+        reading.stop_surety >= row.surety
+        and share >= row.share
+        and suspicion >= row.suspicion
+        and confidence <= row.most_confidence
+        for row in STOP_WITNESSES
+    )
+
+
+def _stop_share(reading: Reading) -> float:
+    """Return the share of what may have been said that holds a stop, each text by its odds."""
+    texts = [(reading.text, 1.0), *((one.text, one.odds) for one in reading.others)]
+    return sum(odds for text, odds in texts if holds_stop(text)) / sum(odds for _, odds in texts)
