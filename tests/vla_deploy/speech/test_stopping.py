@@ -27,12 +27,13 @@ def heard(text: str, *others: tuple[str, float], surety: float, **told: Any) -> 
 @pytest.mark.parametrize(
     ("reading", "suspicion", "is_stop"),
     [
-        (heard("you should hold", surety=0.92), 0.0, True),
-        (heard("you should hold", surety=0.85), 0.0, False),
+        (heard("you should hold", surety=0.99), 0.0, False),
         (heard("you should hold", ("you should halt", 0.3), surety=0.5), 0.0, True),
+        (heard("you should hold", ("you should halt", 0.3), surety=0.1), 0.0, False),
         (heard("you should hold", ("you should halt", 0.04), surety=0.5), 0.0, False),
-        (heard("please, please", surety=0.6), 0.45, True),
-        (heard("please, please", surety=0.3), 0.45, False),
+        (heard("please, please", surety=0.8), 0.45, True),
+        (heard("please, please", surety=0.8), 0.35, False),
+        (heard("please, please", surety=0.6), 0.45, False),
         (heard("he stopped at the shop", ("he stop at the shop", 0.9), surety=0.99), 0.6, False),
     ],
 )
@@ -44,8 +45,8 @@ def test_three_witnesses_stop_together_what_no_words_would(
 
 def test_words_that_were_read_for_sure_outweigh_the_head() -> None:
     reading = heard("which cup", surety=0.95)
-    assert stops(reading, 0.3)
-    assert not stops(reading, 0.4)
+    assert stops(reading, 0.3, 0.5)
+    assert not stops(reading, 0.4, 0.5)
 
 
 def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
