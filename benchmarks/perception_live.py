@@ -1,10 +1,11 @@
 """Measure perception's real process on the twin, under the profile of the smallest board.
 
 `frame_to_object_*` is from the exposure of an image to the publication of the scene with the things
-in it, tracked and placed on the map: transport, the wait for a step, network and geometry. CPU and
-memory are those of the process as the supervisor accounts them to its budget. The robot works
-meanwhile. What the profile asks of hardware that is not here is taken back: its GPU providers and
-its cores.
+in it, tracked and placed on the map: transport, the wait for a step, network and geometry. Every
+image is searched for obstacles (`images_per_s`), those that were taken while the camera stood still
+for things as well (`looks_per_s`). CPU and memory are those of the process as the supervisor
+accounts them to its budget. The robot works meanwhile. What the profile asks of hardware that is
+not here is taken back: its GPU providers and its cores.
 """
 
 import sys
@@ -47,12 +48,15 @@ class _Seen:
 
     delays_s: list[float] = field(default_factory=list)
     stamps_ns: set[int] = field(default_factory=set)
+    obstacles_ns: set[int] = field(default_factory=set)
     memory_mb: float = 0.0
     sight: dict[str, Any] = field(default_factory=dict)
     image: dict[str, Any] = field(default_factory=dict)
 
     def look(self, session: Session) -> None:
-        sample = session.fresh("scene")
+        obstacles, sample = session.fresh("near_obstacles"), session.fresh("scene")
+        if obstacles is not None:
+            self.obstacles_ns.add(obstacles.stamp_ns)
         if sample is None:
             return
         document = sample.document()
@@ -98,6 +102,7 @@ def _report(
     return {
         "profile": named,
         "perception_rate_hz": profile.perception_rate_hz,
+        "images_per_s": len(seen.obstacles_ns) / elapsed_s,
         "looks": looks,
         "looks_per_s": looks / elapsed_s,
         "frame_to_object_median_s": float(np.median(seen.delays_s)),
