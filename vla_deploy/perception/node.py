@@ -165,10 +165,11 @@ class PerceptionNode:
         if frame is None:
             return
         self._looking.came(frame, now_ns)
-        if now_ns < self._next_look_ns:
+        # By the images' own time: one that had to wait for a step must not cost the next one.
+        if frame.stamp_ns < self._next_look_ns:
             return
         rate_hz = self._profile.perception_rate_hz * self._rate_ratio
-        self._next_look_ns = now_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
+        self._next_look_ns = frame.stamp_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
         self._publish_image(frame)
         if self._looking.see(frame):
             self._publish_obstacles(1.0 / rate_hz)
