@@ -90,9 +90,9 @@ def by_both(form: Form, words: Sequence[Word]) -> Name:
 def _word_odds(words: Sequence[Word]) -> Iterator[tuple[str, float]]:
     """Yield each class with its chance over the chance that no word is right."""
     total = sum(word.chance for word in words)
-    share = min(1.0, HIGHEST_CHANCE / total)
+    excess = max(1.0, total / HIGHEST_CHANCE)
     for word in words:
-        yield word.class_name, share * word.chance / (1.0 - share * total)
+        yield word.class_name, word.chance / (excess - total)
 
 
 def _form_odds(form: Form) -> dict[str, float]:

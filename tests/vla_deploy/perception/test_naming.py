@@ -75,6 +75,13 @@ def test_words_that_share_a_thing_are_no_surer_together_than_one_can_be() -> Non
     assert (name.class_name, name.confidence) == ("cup", pytest.approx(0.6 * 0.97))
 
 
+def test_words_that_were_never_right_leave_the_form_as_it_is() -> None:
+    words = [said("cup", 0.0), said("can", 0.0)]
+    alone = by_form(form("ball")).confidence
+    assert by_both(form("ball"), words).confidence == pytest.approx(alone)
+    assert by_both(form(OTHER), words).class_name == OTHER
+
+
 def test_a_weak_word_of_its_own_names_nothing_and_supports_the_form() -> None:
     weak = [said("cup", 0.3)]
     assert by_both(form(OTHER), weak).class_name == OTHER
