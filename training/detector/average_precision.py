@@ -53,7 +53,8 @@ def _judge_class(index: int, found: Sequence[Boxes], labels: Sequence[Rows]) -> 
     ]
     count = sum(int(_judged(index, rows).sum()) for rows in labels)
     recall, sure_recall = (
-        _recall(index, found, labels, score) for score in (WEAK_SCORE, SURE_SCORE)
+        _centres_hit(index, found, labels, score) / max(count, 1)
+        for score in (WEAK_SCORE, SURE_SCORE)
     )
     scores, right = _joined(at50)
     sure = scores >= SURE_SCORE
@@ -106,19 +107,15 @@ def _mostly_inside(box: Rows, spare: Rows) -> bool:
     return bool((shared.clip(0).prod(axis=1) >= 0.5 * area).any())
 
 
-def _recall(index: int, found: Sequence[Boxes], labels: Sequence[Rows], score: float) -> float:
-    """Return the share of a class's labels that boxes from a score on hit."""
-    pairs = list(zip(found, labels, strict=True))
-    count = sum(int(_judged(index, rows).sum()) for _, rows in pairs)
-    hits = sum(
-        _centres_hit(index, boxes.where(boxes.scores >= score), rows) for boxes, rows in pairs
-    )
-    return hits / max(count, 1)
+def _centres_hit(index: int, found: Sequence[Boxes], labels: Sequence[Rows], score: float) -> int:
+    """Count a class's labels over all images that boxes from a score on hit."""
+    pairs = zip(found, labels, strict=True)
+    return sum(_hit_in_one(index, boxes, rows, score) for boxes, rows in pairs)
 
 
-def _centres_hit(index: int, boxes: Boxes, rows: Rows) -> int:
+def _hit_in_one(index: int, boxes: Boxes, rows: Rows, score: float) -> int:
     """Count labels whose centre lies in a box of their class that overlaps them notably."""
-    mine = boxes.classes == index
+    mine = (boxes.classes == index) & (boxes.scores >= score)
     hits = 0
     for label in rows[_judged(index, rows), 2:6]:
         x, y = (label[0] + label[2]) / 2, (label[1] + label[3]) / 2

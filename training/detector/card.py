@@ -1,6 +1,5 @@
 """Write the model's card and manifest from what was measured."""
 
-import hashlib
 import json
 from pathlib import Path
 from string import Template
@@ -15,9 +14,11 @@ from training.detector.files import CARD, FILES, MANIFEST, METRICS
 from training.detector.labels import LARGE_LEAST, MIN_SEEN_RATIO, NEAR_LONG_PX, SMALL_LEAST
 from training.detector.settings import Settings
 from training.detector.targets import STRIDE_PX
+from vla_deploy.inference.file_check import sha256_of
 
 AIM_MAP50, AIM_RECALL = 0.90, 0.93
 TEMPLATE = Path(__file__).with_name("card_template.md")
+MANIFEST_TEMPLATE = Path(__file__).with_name("manifest_template.toml")
 TITLES = {
     "heldout": "Unseen scenes, lights and textures",
     "flat": "The flat of the twin as it is, with things not seen in training",
@@ -131,56 +132,24 @@ def measured(metrics: dict[str, Any]) -> tuple[float, float]:
 def manifest(models: Path) -> str:
     """Return the manifest that the runtime reads, with what the files were measured at."""
     precision, recall = measured(json.loads((models / METRICS).read_text(encoding="utf-8")))
-    rows, columns = HEIGHT_PX // STRIDE_PX, WIDTH_PX // STRIDE_PX
     files = "\n".join(
-        f'[files.{key}]\npath = "{name}"\nsha256 = "{_digest(models / name)}"\n'
+        f'[files.{key}]\npath = "{name}"\nsha256 = "{sha256_of(models / name)}"\n'
         for key, name in FILES.items()
     )
-    return f"""name = "detector"
-role = "detector"
-summary = "Household things, people and chairs, trained on renders of the twin"
-licence = "Apache-2.0"
-card = "{CARD}"
-
-{files}
-[detection]
-adapter = "centre_net"
-classes = {json.dumps(CLASSES)}
-score_threshold = {SURE_SCORE}
-weak_score_threshold = {WEAK_SCORE}
-iou_threshold = {SAME_CLASS_IOU}
-
-[detection.measured]
-precision = {precision:.3f}
-recall = {recall:.3f}
-
-[detection.image]
-width_px = {WIDTH_PX}
-height_px = {HEIGHT_PX}
-layout = "nchw"
-colour = "rgb"
-fit = "letterbox"
-fill = 114
-scale = {1 / 255!r}
-mean = [0.0, 0.0, 0.0]
-std = [1.0, 1.0, 1.0]
-
-[[inputs]]
-name = "image"
-shape = [1, 3, {HEIGHT_PX}, {WIDTH_PX}]
-dtype = "float32"
-
-[[outputs]]
-name = "heat"
-shape = [1, {len(CLASSES)}, {rows}, {columns}]
-dtype = "float32"
-
-[[outputs]]
-name = "edges"
-shape = [1, 4, {rows}, {columns}]
-dtype = "float32"
-"""
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    values = {
+        "card": CARD,
+        "files": files,
+        "classes": json.dumps(CLASSES),
+        "class_count": len(CLASSES),
+        "sure_score": SURE_SCORE,
+        "weak_score": WEAK_SCORE,
+        "same_class_iou": SAME_CLASS_IOU,
+        "precision": f"{precision:.3f}",
+        "recall": f"{recall:.3f}",
+        "width_px": WIDTH_PX,
+        "height_px": HEIGHT_PX,
+        "rows": HEIGHT_PX // STRIDE_PX,
+        "columns": WIDTH_PX // STRIDE_PX,
+        "scale": repr(1 / 255),
+    }
+    return Template(MANIFEST_TEMPLATE.read_text(encoding="utf-8")).substitute(values)

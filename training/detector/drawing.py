@@ -15,6 +15,7 @@ WIDTH_PX, HEIGHT_PX = 512, 384
 VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
 ALONE_GROUP, OTHER_GROUP = 0, 1
 """Of the geoms that are drawn alone, and of all others meanwhile."""
+ALONE_GROUPS = (1, 0, 0, 0, 0, 0)
 MAX_GEOMS = 2500
 Image = NDArray[np.uint8]
 
@@ -49,7 +50,7 @@ class Drawing:
         kept = groups.copy()
         groups[:] = OTHER_GROUP
         groups[members] = ALONE_GROUP
-        self._update([group == ALONE_GROUP for group in range(len(VISIBLE_GROUPS))])
+        self._update(ALONE_GROUPS)
         groups[:] = kept
         return int(self._pixels(segments=True).any(axis=2).sum())
 

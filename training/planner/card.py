@@ -1,6 +1,5 @@
 """Write the model's card and manifest from what was measured."""
 
-import hashlib
 import json
 from pathlib import Path
 from string import Template
@@ -10,6 +9,7 @@ from training.planner.clause import load_groups
 from training.planner.evaluation import MOST_TOKENS
 from training.planner.files import CARD, GRAPH, METRICS, NAME, PARTS
 from training.planner.settings import Settings
+from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Certainty, Language, Manifest, ModelFile, Use
 from vla_deploy.inference.manifest_file import write_manifest
 
@@ -41,7 +41,7 @@ def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
         summary=SUMMARY,
         licence="Apache-2.0",
         card=CARD,
-        parts=tuple(ModelFile(path=name, sha256=_digest(models / name)) for name in PARTS),
+        parts=tuple(ModelFile(path=name, sha256=sha256_of(models / name)) for name in PARTS),
         language=Language(
             use=Use.COMMAND_PARSER,
             most_tokens=MOST_TOKENS,
@@ -87,10 +87,6 @@ def table(metrics: dict[str, Any]) -> str:
 def _count(held_out: bool) -> int:
     groups = [one for every in load_groups(held_out).values() for one in every]
     return sum(len(one.imperative) + len(one.free) for one in groups)
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 _TALK: Final = (

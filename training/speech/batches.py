@@ -9,22 +9,20 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from training.speech.features import HOP, WARPS, frames
-from training.speech.network import FRAMES_PER_STATE, LARGEST_FRAMES, MELS
-from training.speech.spoiling import Spoiler, draw_gains
+from training.speech.framing import IGNORED, draw_hop, framed, in_groups, padded
+from training.speech.network import LARGEST_FRAMES, MELS
+from training.speech.spoiling import Spoiler
 from training.speech.tokens import Coder
 from training.voices.clip import RATE_HZ, Wave
 from training.voices.clip_store import StoredClip, read_shard, shards
 from training.voices.phones import NUMBERS
 
-IGNORED: Final = -100
 _LARGEST_CLIP_S: Final = 9.0
 _EMPTY_SHARE: Final = 0.04
 """Of clips without speech, from which the model learns to write nothing."""
 _WIDE_SHARE: Final = 0.01
 """Of batches padded to Whisper's whole half minute."""
 _WIDE_CLIPS: Final = 4
-_PADDING_FRAMES: Final = (20, 60)
 
 Random = np.random.Generator
 
@@ -61,17 +59,9 @@ class Clips:
         self, batch_s: float, random: Random, short_share: float
     ) -> Iterator[list[StoredClip]]:
         """Yield all clips once in groups of like length, or the shorter share of them alone."""
-        lengths = np.array([len(clip.data) for clip in self.clips]) / RATE_HZ
-        order = np.argsort(lengths * random.uniform(0.92, 1.08, len(lengths)))
-        order = order[: max(1, int(len(order) * short_share))]
-        groups: list[list[StoredClip]] = [[]]
-        for number in order:
-            longest_s = lengths[number] + 1.3
-            if groups[-1] and longest_s * (len(groups[-1]) + 1) > batch_s:
-                groups.append([])
-            groups[-1].append(self.clips[number])
-        for place in random.permutation(len(groups)):
-            yield groups[place]
+        lengths_s = np.array([len(clip.data) for clip in self.clips]) / RATE_HZ
+        for group in in_groups(lengths_s, batch_s, random, short_share):
+            yield [self.clips[number] for number in group]
 
 
 class Maker:
@@ -85,7 +75,7 @@ class Maker:
         """Return the batch; the same clips come out differently each time."""
         wide = random.random() < _WIDE_SHARE
         clips = clips[:_WIDE_CLIPS] if wide else clips
-        hop = int(HOP * random.uniform(0.84, 1.22)) if random.random() < 0.6 else HOP
+        hop = draw_hop(random)
         empty = random.random(len(clips)) < _EMPTY_SHARE
         leads_s = random.uniform(0.0, 0.5, len(clips))
         waves = [
@@ -94,7 +84,9 @@ class Maker:
             else self._spoiler.spoil(clip.samples, lead_s, random.uniform(0.0, 0.6), random)
             for clip, bare, lead_s in zip(clips, empty, leads_s, strict=True)
         ]
-        made = self._frames(waves, hop, wide, random)
+        made = framed(waves, hop, random)
+        _mask(made, random)
+        made = padded(made, random, LARGEST_FRAMES if wide else None)
         sounds = np.full((len(clips), made.shape[2]), IGNORED)
         for row, (clip, bare, lead_s) in enumerate(zip(clips, empty, leads_s, strict=True)):
             inside = (len(waves[row]) + 160) // hop
@@ -112,20 +104,6 @@ class Maker:
         """Return noise alone, or next to silence."""
         made = self._spoiler.noise(count, random)
         return made * np.float32(10.0 ** random.uniform(-4.0, -0.7))
-
-    def _frames(self, waves: Sequence[Wave], hop: int, wide: bool, random: Random) -> Tensor:
-        counts = torch.tensor([len(wave) for wave in waves])
-        stacked = torch.zeros(len(waves), int(counts.max()))
-        for row, wave in enumerate(waves):
-            stacked[row, : len(wave)] = torch.from_numpy(wave)
-        warps = torch.from_numpy(random.integers(len(WARPS), size=len(waves)))
-        gains = torch.from_numpy(draw_gains(len(waves), MELS, random))
-        made = frames(stacked, counts, hop, warps, gains)
-        _mask(made, random)
-        low, high = _PADDING_FRAMES
-        length = LARGEST_FRAMES if wide else made.shape[2] + int(random.integers(low, high))
-        length += length % FRAMES_PER_STATE
-        return torch.nn.functional.pad(made, (0, length - made.shape[2]))
 
     def _texts(
         self, clips: Sequence[StoredClip], empty: "np.ndarray[tuple[int], np.dtype[np.bool_]]",

@@ -17,8 +17,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.speech.batches import IGNORED, Batch, Clips, Maker
+from training.speech.batches import Batch, Clips, Maker
 from training.speech.card import METRICS, read_metrics
+from training.speech.framing import IGNORED
 from training.speech.network import Recogniser
 from training.speech.sentences import draw_sentence
 from training.speech.sizes import Size

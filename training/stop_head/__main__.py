@@ -9,9 +9,10 @@ import os
 from pathlib import Path
 from typing import Final
 
+from training.speech.shipping import SHIPPED
+
 CLIPS: Final = "clips"
 STEPS: Final = ("speak", "train", "ship")
-RECOGNISER: Final = Path(__file__).parents[2] / "vla_deploy" / "models" / "commands-whisper"
 
 
 def main() -> None:
@@ -33,7 +34,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=22)
     parser.add_argument("--scale", type=float, default=1.0, help="share of the clips (default: 1)")
     parser.add_argument(
-        "--recogniser", type=Path, default=RECOGNISER,
+        "--recogniser", type=Path, default=SHIPPED,
         help="folder of the recogniser that it is for (default: the one that is shipped)",
     )  # fmt: skip
     given = parser.parse_args()

@@ -10,27 +10,24 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from training.speech.features import HOP, WARPS, frames
-from training.speech.network import FRAMES_PER_STATE, MELS
-from training.speech.spoiling import Spoiler, draw_gains
+from training.speech.framing import IGNORED, draw_hop, framed, in_groups, padded
+from training.speech.network import FRAMES_PER_STATE
+from training.speech.spoiling import Spoiler
 from training.stop_words.corpus import TRAIN, Clips, Said
 from training.stop_words.texts import is_clean
-from training.voices.clip import RATE_HZ
+from training.voices.clip import RATE_HZ, Wave
 from training.voices.clip_store import read_shard, shards
 
-IGNORED: Final = -100
 BATCH_S: Final = 100.0
 TALKERS: Final = 300
 CUT_SHARE: Final = 0.3
 """Of clips that end while somebody still speaks, as phrases do that are read in a glance."""
-OTHER_PACE_SHARE: Final = 0.5
 SAID_FROM: Final = 0.5
 """Share of a word after which a state may tell it."""
 SETTLED_S: Final = 0.08
 """How long after its end a state is to tell it still."""
 UNSETTLED_S: Final = 0.2
 """How long around a word a state may say what it likes."""
-PADDING_FRAMES: Final = (20, 60)
 Random = np.random.Generator
 
 
@@ -75,8 +72,8 @@ class Corpus:
         ]
         self._places = [(part, n) for part in self._parts for n in range(len(part))]
         others = self._parts[1]
-        talk = [_wave(others[int(n)]) for n in random.integers(len(others), size=TALKERS)]
-        self._spoiler = Spoiler(talk, random)
+        talkers = [others[int(n)].wave for n in random.integers(len(others), size=TALKERS)]
+        self._spoiler = Spoiler(talkers, random)
 
     def __len__(self) -> int:
         return len(self._places)
@@ -84,50 +81,28 @@ class Corpus:
     def batches(self) -> Iterator[Batch]:
         """Yield all clips once, in groups of like length."""
         lengths_s = np.array([len(part[n].samples) / RATE_HZ for part, n in self._places])
-        order = np.argsort(lengths_s * self._random.uniform(0.9, 1.1, len(lengths_s)))
-        groups: list[list[int]] = [[]]
-        for number in order:
-            longest_s = lengths_s[number] + 1.2
-            if groups[-1] and longest_s * (len(groups[-1]) + 1) > BATCH_S:
-                groups.append([])
-            groups[-1].append(int(number))
-        for place in self._random.permutation(len(groups)):
-            clips = [part[n] for part, n in (self._places[number] for number in groups[place])]
-            yield self._batch(clips)
+        for group in in_groups(lengths_s, BATCH_S, self._random):
+            places = (self._places[number] for number in group)
+            yield self._batch([part[n] for part, n in places])
 
     def _batch(self, clips: Sequence[Said]) -> Batch:
-        random = self._random
-        other_pace = random.random() < OTHER_PACE_SHARE
-        hop = int(HOP * random.uniform(0.84, 1.22)) if other_pace else HOP
-        made = [self._spoilt(clip) for clip in clips]
-        counts = torch.tensor([len(wave) for wave, _ in made])
-        stacked = torch.zeros(len(made), int(counts.max()))
-        for row, (wave, _) in enumerate(made):
-            stacked[row, : len(wave)] = torch.from_numpy(wave)
-        warps = torch.from_numpy(random.integers(len(WARPS), size=len(made)))
-        gains = torch.from_numpy(draw_gains(len(made), MELS, random))
-        told = frames(stacked, counts, hop, warps, gains)
-        length = told.shape[2] + int(random.integers(*PADDING_FRAMES))
-        length += length % FRAMES_PER_STATE
-        state_s = FRAMES_PER_STATE * hop / RATE_HZ
-        targets = np.stack([_targets(e, length // FRAMES_PER_STATE, state_s) for _, e in made])
-        padded = torch.nn.functional.pad(told, (0, length - told.shape[2]))
-        return Batch(frames=padded, targets=torch.from_numpy(targets))
+        hop = draw_hop(self._random)
+        waves, events = zip(*map(self._spoilt, clips), strict=True)
+        made = padded(framed(waves, hop, self._random), self._random)
+        count, state_s = made.shape[2] // FRAMES_PER_STATE, FRAMES_PER_STATE * hop / RATE_HZ
+        targets = np.stack([_targets(each, count, state_s) for each in events])
+        return Batch(frames=made, targets=torch.from_numpy(targets))
 
-    def _spoilt(self, clip: Said) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _spoilt(self, clip: Said) -> tuple[Wave, NDArray[np.float32]]:
         """Return one clip's sound, spoilt, and its words in seconds from its beginning."""
         random = self._random
         lead_s, tail_s = random.uniform(0.0, 0.5), random.uniform(0.0, 0.6)
-        wave = self._spoiler.spoil(_wave(clip), lead_s, tail_s, random)
+        wave = self._spoiler.spoil(clip.wave, lead_s, tail_s, random)
         events = clip.events + np.array((0.0, lead_s, lead_s), np.float32)
         if random.random() < CUT_SHARE:
             first_s = float(events[-1, 2]) if len(events) else lead_s + 0.2
             wave = wave[: int(RATE_HZ * max(first_s, random.uniform(0.0, len(wave) / RATE_HZ)))]
         return np.ascontiguousarray(wave, np.float32), events
-
-
-def _wave(clip: Said) -> NDArray[np.float32]:
-    return clip.samples.astype(np.float32) / np.float32(32_767.0)
 
 
 def _targets(events: NDArray[np.float32], count: int, state_s: float) -> NDArray[np.int64]:

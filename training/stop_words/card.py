@@ -1,6 +1,5 @@
 """Write the model's card and manifest from what was measured."""
 
-import hashlib
 import json
 import time
 from pathlib import Path
@@ -15,6 +14,7 @@ from training.stop_words.export import FILE, FRAMES, INPUT, MOMENTS, OUTPUT
 from training.stop_words.network import REACH, StopNet
 from training.stop_words.settings import Settings
 from training.stop_words.texts import WORDS
+from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import (
     KeyWords,
     Manifest,
@@ -124,11 +124,7 @@ def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
         card=CARD,
         inputs=(Tensor(name=INPUT, shape=(1, BANDS, FRAMES), dtype="float32"),),
         outputs=(Tensor(name=OUTPUT, shape=(1, 1 + len(WORDS), MOMENTS), dtype="float32"),),
-        files={
-            Variant.FP32: ModelFile(
-                path=FILE, sha256=hashlib.sha256((models / FILE).read_bytes()).hexdigest()
-            )
-        },
+        files={Variant.FP32: ModelFile(path=FILE, sha256=sha256_of(models / FILE))},
         key_words=KeyWords(
             features=NAME,
             words=WORDS,

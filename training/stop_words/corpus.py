@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from training.stop_words.cast import PARTS, Part, draw_style
 from training.stop_words.texts import WORDS, other_talk, stop_phrases
 from training.stop_words.timing import sounding, word_times
-from training.voices.clip import RATE_HZ, Clip
+from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.errors import SynthesisFailed
 from training.voices.phones import NUMBERS
 
@@ -36,6 +36,11 @@ class Said:
     voice: str
     events: NDArray[np.float32]
     phones: NDArray[np.float32]
+
+    @property
+    def wave(self) -> Wave:
+        """Return the samples as a share of full scale."""
+        return self.samples.astype(np.float32) / np.float32(_FULL_SCALE)
 
 
 class Clips:

@@ -7,7 +7,9 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from training.stop_head.batches import IGNORED, _targets  # noqa: E402
+from training.speech.framing import IGNORED  # noqa: E402
+from training.speech.shipping import SHIPPED  # noqa: E402
+from training.stop_head.batches import _targets  # noqa: E402
 from training.stop_head.export import ship  # noqa: E402
 from training.stop_head.network import StopHead  # noqa: E402
 from training.stop_head.training import WEIGHTS  # noqa: E402
@@ -15,7 +17,6 @@ from vla_deploy.inference.manifest_file import read_manifest  # noqa: E402
 from vla_deploy.inference.store import Model  # noqa: E402
 from vla_deploy.speech.stop_head import FILE, SETTLING, open_stop_head  # noqa: E402
 
-SHIPPED = Path(__file__).parents[3] / "vla_deploy" / "models" / "commands-whisper"
 WIDTH = 256
 
 
