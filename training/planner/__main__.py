@@ -30,6 +30,9 @@ def main() -> None:
     parser.add_argument(
         "--chatter", type=Path, metavar="FILE", help="data_full.json of CLINC150: other talk"
     )
+    parser.add_argument(
+        "--start-from", type=Path, metavar="OUT", help="folder of a training to go on from"
+    )
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     for name in STEPS if arguments.step == "all" else [arguments.step]:
@@ -47,7 +50,7 @@ def _train(arguments: argparse.Namespace, settings: Settings) -> None:
     from training.planner.training import train
 
     torch.set_num_threads(arguments.threads)
-    train(arguments.out, settings, _talk(arguments))
+    train(arguments.out, settings, _talk(arguments), arguments.start_from)
 
 
 def _export(arguments: argparse.Namespace, settings: Settings) -> None:

@@ -12,7 +12,7 @@ from training.planner.composing import Composer, Example
 from training.planner.tokens import END, PAD, prompt_of
 
 # Longer ones are rare, and would make a batch of their own.
-MOST_TOKENS = 96
+MOST_TOKENS = 112
 
 
 @dataclass(frozen=True, slots=True)

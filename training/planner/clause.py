@@ -129,11 +129,12 @@ def make_clause(
             spoken, step[_FIELD_OF[part.source]] = random.choice(CLOSED[part.source])
             words += [(word, None) for word in spoken.split()]
         else:
-            words += _filled(part, random, after_thing)
+            words += filled(part, random, after_thing)
     return Clause(tuple(words), step, is_imperative)
 
 
-def _filled(slot: Slot, random: Random, after_thing: bool) -> list[tuple[str, str | None]]:
+def filled(slot: Slot, random: Random, after_thing: bool) -> list[tuple[str, str | None]]:
+    """Return words for a slot, each with the field that it belongs to, or None."""
     field = slot.field if slot.field in COPIED_FIELDS else None
     source = SOURCES[slot.source]
     if field == "what" and after_thing and random.random() < 0.55:

@@ -12,6 +12,7 @@ from training.planner.hearing import misheard
 from training.planner.manners import CALLS, ENDINGS
 from training.planner.openings import OPENINGS, REASONS
 from training.planner.slips import CLAUSE_SLIPS, FILLERS, JOINTS
+from training.planner.telling import AFTER, BEFORE, load_remarks, load_told
 from vla_deploy.planning.command_parser.grammar import answer_text
 
 # How often each kind of step is drawn, of those that may stand among others.
@@ -20,6 +21,12 @@ WEIGHTS: Final[Mapping[str, float]] = {
     "turn": 7, "open": 4, "close": 3, "pose": 3, "say": 6, "wait": 5, "stop": 2, "give": 1.5,
     "tidy": 1.5, "ask": 2.5,
 }  # fmt: skip
+_TOLD: Final = 45
+"""Of sentences that were written out whole, to 100 of all others."""
+_REMARKED: Final = 0.15
+"""Share of commands with a remark before, and of those with one behind."""
+_ONLY_REMARKS: Final = 0.12
+"""Share of what commands nothing."""
 _LATER: Final = frozenset(WEIGHTS) - {"where", "stop"}
 _ALONE: Final[Mapping[str, float]] = {"unknown": 12, "impossible": 7, "nothing": 3}
 _DOUBLING: Final = frozenset({"get", "put", "grab", "set", "stop", "spin", "run", "drop", "pop",
@@ -43,10 +50,12 @@ class Composer:
         self._every = load_groups(held_out=False)
         self._groups = load_groups(held_out=True) if held_out else self._every
         self._chatter = chatter
+        self._told = load_told(held_out)
+        self._before, self._after = (load_remarks(one, held_out) for one in (BEFORE, AFTER))
         alone = {do: weight for do, weight in _ALONE.items() if do in self._groups}
         several = {do: weight for do, weight in WEIGHTS.items() if do in self._groups}
-        self._kinds = ["steps", *alone]
-        self._kind_weights = [100 - sum(alone.values()), *alone.values()]
+        self._kinds = ["steps", "told", *alone]
+        self._kind_weights = [100 - sum(alone.values()), _TOLD if self._told else 0, *alone.values()]
         self._actions, self._action_weights = [*several], [*several.values()]
 
     def example(self, random: Random) -> Example:
@@ -61,9 +70,18 @@ class Composer:
 
     def _drawn(self, random: Random) -> tuple[list[Clause], list[Said]]:
         kind = random.choices(self._kinds, self._kind_weights)[0]
-        return self._steps(random) if kind == "steps" else self._alone(kind, random)
+        if kind == "steps":
+            return self._steps(random)
+        return self._whole(random) if kind == "told" else self._alone(kind, random)
+
+    def _whole(self, random: Random) -> tuple[list[Clause], list[Said]]:
+        clauses, sentence = random.choice(self._told).drawn(random)
+        called = _words(CALLS, random) if random.random() < 0.1 else []
+        return clauses, self._remarked([*called, *sentence], random)
 
     def _alone(self, kind: str, random: Random) -> tuple[list[Clause], list[Said]]:
+        if kind == "unknown" and self._before and random.random() < _ONLY_REMARKS:
+            return [Clause((), {"do": "unknown"}, False)], self._remarks(random)
         if kind == "unknown" and self._chatter and random.random() < 0.6:
             words = random.choice(self._chatter).split()
             clause = Clause(tuple((word, None) for word in words), {"do": "unknown"}, False)
@@ -87,7 +105,7 @@ class Composer:
             sentence += _words(JOINTS, random) if number else []
             sentence += self._polite(clause, number, random, 0.55 if number == 0 else 0.12)
             clauses.append(clause)
-        return clauses, self._surrounded(sentence, random)
+        return clauses, self._remarked(self._surrounded(sentence, random), random)
 
     def _surrounded(self, sentence: list[Said], random: Random) -> list[Said]:
         """Put a slip or a remark before a command, which change nothing."""
@@ -104,6 +122,16 @@ class Composer:
             )
             return [*sentence, *_unowned(never), *_plain(dropped)]
         return [*sentence, *_words(REASONS, random)] if chance < 0.11 else sentence
+
+    def _remarked(self, sentence: list[Said], random: Random) -> list[Said]:
+        """Put what people say beside a command around it."""
+        before = self._before if random.random() < _REMARKED else ()
+        after = self._after if random.random() < _REMARKED else ()
+        return [*_one_of(before, random), *sentence, *_one_of(after, random)]
+
+    def _remarks(self, random: Random) -> list[Said]:
+        kinds = random.choice(((self._before,), (self._after,), (self._before, self._after)))
+        return [word for kind in kinds for word in _one_of(kind, random)]
 
     def _action(self, random: Random, number: int) -> str:
         while True:
@@ -185,6 +213,10 @@ def _is_saying(clause: Clause) -> bool:
 
 def _words(sequence: Sequence, random: Random) -> list[Said]:
     return [Said(str(word), None) for word in expand(sequence, random)]
+
+
+def _one_of(remarks: tuple[tuple[str, ...], ...], random: Random) -> list[Said]:
+    return [Said(word, None) for word in random.choice(remarks)] if remarks else []
 
 
 def _plain(clause: Clause) -> list[Said]:

@@ -74,6 +74,10 @@ PRONOUNS: Final = ("it",) * 14 + ("that", "this", "them", "that one", "this one"
                    "the thing you are holding", "what you are holding", "whatever you are holding",
                    "what you have in your hand", "the thing in your hand",
                    "what you're holding")  # fmt: skip
+# Before several of which one is meant.
+OF_WHICH: Final = ("the two", "the three", "those two", "these two", "two", "three", "both", "the",
+                   "those", "these", "both the", "my two", "our", "my", "a couple of", "the pair of",
+                   "a few", "four", "all those", "two different")  # fmt: skip
 # Before several, and before one.
 QUANTITIES: Final = ("all the", "both", "all", "all of the", "both of the", "two", "three",
                      "the two", "one of the", "most of the", "both the", "both my", "all my",

@@ -19,7 +19,7 @@ from training.planner.describing import (
     said,
     unmeant,
 )
-from training.planner.singling import counted, one_like, singled_out
+from training.planner.singling import counted, one_like, several, singled_out, which
 from vla_deploy.world.vocabulary import OBJECT_CLASSES
 
 Source = Callable[[Random], list[Word]]
@@ -28,6 +28,11 @@ Source = Callable[[Random], list[Word]]
 def thing(random: Random) -> list[Word]:
     """Return a thing: "the big red cup on the table", "my keys", "a wug"."""
     return [*unmeant(random.choice(pointing.ARTICLES)), *description(random, depth=0)]
+
+
+def bare_thing(random: Random) -> list[Word]:
+    """Return a thing without its article, as after "that": "red cup on the table"."""
+    return description(random, depth=0)
 
 
 def what(random: Random) -> list[Word]:
@@ -159,6 +164,9 @@ SOURCES: Final[Mapping[str, Source]] = {
     "what": what,
     "thing": thing,
     "moved": moved,
+    "bare": bare_thing,
+    "several": several,
+    "which": which,
     "any": any_thing,
     "place": place,
     "where": target,

@@ -27,6 +27,20 @@ def one_like(random: Random) -> list[Word]:
     return [*article, *said(random.choice(picks)), *said("one"), *maybe_place(random, 0.2)]
 
 
+def several(random: Random) -> list[Word]:
+    """Return "the two bottles", "those cups on the shelf": what one is then singled out from."""
+    quantity = random.choice(pointing.OF_WHICH)
+    return [*unmeant(quantity), *said(plural(a_noun(random))), *maybe_place(random, 0.25)]
+
+
+def which(random: Random) -> list[Word]:
+    """Return "the smaller one", "the one on the left": one of several that were named before."""
+    if random.random() < 0.35:
+        return [*unmeant("the"), *said("one"), *maybe_place(random, 1.0)]
+    picks = (*words.COLOUR_WORDS, *words.SIZE_WORDS, *words.ORDER_WORDS, *pointing.COMPARED)
+    return [*unmeant("the"), *said(random.choice(picks)), *said("one")]
+
+
 def counted(random: Random) -> list[Word]:
     """Return "both red cups", "each book on the shelf", "a couple of bottles"."""
     if random.random() < 0.25:

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,12 +59,21 @@ class Course:
         self.spent_s, self.steps = state["spent_s"], state["steps"]
 
 
-def train(out: Path, settings: Settings, chatter: tuple[str, ...] = ()) -> Decoder:
-    """Train until the time is spent, and write the weights; return the network."""
+def train(
+    out: Path, settings: Settings, chatter: tuple[str, ...] = (), start_from: Path | None = None
+) -> Decoder:
+    """Train until the time is spent, and write the weights; return the network.
+
+    `start_from` is the folder of a finished training of the same shape, whose weights and tokens
+    this one begins with.
+    """
     out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(settings.seed)
-    tokenizer = tokenizer_in(out, chatter)
     network = Decoder(settings.shape)
+    if start_from is not None:
+        network.load_state_dict(torch.load(start_from / WEIGHTS, weights_only=True))
+        shutil.copyfile(start_from / TOKENIZER, out / TOKENIZER)
+    tokenizer = tokenizer_in(out, chatter)
     course = Course(network, optimizers_of(network, settings), settings)
     if (out / STATE).exists():
         course.resume(torch.load(out / STATE, weights_only=True))

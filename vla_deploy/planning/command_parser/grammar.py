@@ -34,7 +34,7 @@ STEPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
         "go": ("where",),
         "pick": ("what", "[from]", "[arm]"),
-        "put": ("what", "[how]", "[where]"),
+        "put": ("what", "[from]", "[how]", "[where]"),
         "bring": ("what", "[from]", "[to]"),
         "give": (),
         "find": ("what", "[from]"),

@@ -12,6 +12,7 @@ from typing import Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.amounts import METRES, RADIANS, SECONDS, amount_of
 from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.lending import kind_lent
 from vla_deploy.planning.command_parser.spans import find_span
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
 from vla_deploy.planning.plan import Action
@@ -99,7 +100,7 @@ class Steps:
     def things(self, step: Step) -> str:
         """Return what a step is about, each thing with where it is to be taken from."""
         _, behind = self.source(step)
-        spoken, _, _ = self.spoken(step, "what").partition(" from ")
+        spoken, _, _ = kind_lent(self.spoken(step, "what")).partition(" from ")
         return " and ".join(part + behind for part in building.parts_of(spoken))
 
     def _where_from(self, step: Step) -> str:
@@ -169,16 +170,27 @@ def _put_down(groups: building.Groups, _: Request) -> list[Skill]:
 
 
 def _bring(steps: Steps, step: Step) -> list[Skill]:
-    to_whom = step.get("to", "me")
-    if to_whom not in _SPEAKERS:
-        raise UnknownPlace(to_whom, set(steps.request.world.places.values()))
     way, behind = steps.source(step)
-    parts = building.parts_of(steps.spoken(step, "what").partition(" from ")[0])
+    parts = building.parts_of(kind_lent(steps.spoken(step, "what")).partition(" from ")[0])
     brought: list[Skill] = []
     for part in parts:
-        picked, *rest = building.bring({"object": part}, steps.request)
-        brought += [*way, (picked[0], {"object": part + behind}), *rest]
+        picked, *back = building.bring({"object": part}, steps.request)
+        brought += [*way, (picked[0], {"object": part + behind}), *_delivered(steps, step, back)]
     return brought
+
+
+def _delivered(steps: Steps, step: Step, back: list[Skill]) -> list[Skill]:
+    """Return the way to where somebody is to get it: back to the speaker, or to a place.
+
+    Raises:
+        UnknownPlace: it is to go to a person, of whom nobody knows where they are.
+    """
+    if step.get("to", "me") in _SPEAKERS:
+        return back
+    to_whom, places = steps.spoken(step, "to"), steps.request.world.places
+    if match_place(to_whom, places) is None:
+        raise UnknownPlace(to_whom, set(places.values()))
+    return [("navigate_to", {"place": to_whom})]
 
 
 def _give(_steps: Steps, _step: Step) -> list[Skill]:
