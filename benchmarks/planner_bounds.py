@@ -27,6 +27,7 @@ SKILLS: Final[Mapping[str, Mapping[str, Range | None]]] = MappingProxyType({
     "find_object": {"object": None},
     "pick_up": {"object": None, "arm": None},
     "place": {"destination": None, "relation": None, "arm": None},
+    "hand_over": {"arm": None},
     "open_gripper": {"arm": None},
     "close_gripper": {"arm": None},
     "move_arm": {"pose": None, "arm": None},

@@ -176,6 +176,17 @@ def _must_be_near(world: World, thing: Thing) -> None:
         raise ActionFails(f"the {thing.kind} is {away_m:.1f} m away")
 
 
+def _give(world: World, given: Parameters) -> None:
+    """Let the person take what is held, who stands before the robot."""
+    full = [hand for hand in _hands(given) if world.held_in(hand) is not None]
+    if len(full) != 1:
+        raise ActionFails(f"{len(full)} hands hold something, expected one that it is taken from")
+    held = world.held_in(full[0])
+    if held is not None:
+        world.things[held.thing_id] = replace(held, held_by="", rests=("with", "speaker"))
+    world.open_hands[full[0]] = True
+
+
 def _open(world: World, given: Parameters) -> None:
     for hand in _hands(given):
         held = world.held_in(hand)
@@ -231,8 +242,8 @@ def _plain(text: object) -> str:
 SKILLS: Final[Mapping[str, Callable[[World, Parameters], None]]] = MappingProxyType(
     {
         "navigate_to": _navigate, "move": _move, "turn": _turn, "look_at": _look,
-        "find_object": _find, "pick_up": _pick, "place": _put, "open_gripper": _open,
-        "close_gripper": _close, "move_arm": _pose_arm, "speak": _speak, "wait": _wait,
-        "stop": _stop,
+        "find_object": _find, "pick_up": _pick, "place": _put, "hand_over": _give,
+        "open_gripper": _open, "close_gripper": _close, "move_arm": _pose_arm, "speak": _speak,
+        "wait": _wait, "stop": _stop,
     }
 )  # fmt: skip

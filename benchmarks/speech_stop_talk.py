@@ -56,7 +56,8 @@ _NEAR: Final = (
     "please fetch the chopped peas",
 )
 _PAGES: Final = Path(__file__).resolve().parents[1] / "docs"
-_OFF_DOMAIN: Final = Path(__file__).resolve().parent / "corpora" / "off_domain.txt"
+_CORPORA: Final = Path(__file__).resolve().parent / "corpora"
+_TALK: Final = ("off_domain.txt", "overheard.txt")
 _SENTENCE: Final = re.compile(r"[A-Z][a-z]+(?: [a-z]+[,;]?){3,20}[.?!]")
 
 
@@ -123,7 +124,7 @@ def phrases(
 
 def other_talk(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
     """Yield talk of other things without a stop word, without end."""
-    return _endless([*_off_domain(), *_documented()], voices, random)
+    return _endless([*_overheard(), *_documented()], voices, random)
 
 
 def words_alike(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
@@ -147,9 +148,10 @@ def _all_voices(part: Part) -> tuple[str, ...]:
     return (*part.voices, *part.held_voices)
 
 
-def _off_domain() -> Iterator[str]:
-    lines = _OFF_DOMAIN.read_text(encoding="utf-8").splitlines()
-    return (line for line in lines if line and not line.startswith("#") and is_clean(line))
+def _overheard() -> Iterator[str]:
+    for name in _TALK:
+        lines = (_CORPORA / name).read_text(encoding="utf-8").splitlines()
+        yield from (line for line in lines if line and line[0] != "#" and is_clean(line))
 
 
 def _documented() -> Iterator[str]:

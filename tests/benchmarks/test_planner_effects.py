@@ -75,6 +75,14 @@ def test_an_open_hand_drops_what_it_held() -> None:
     assert flat.things["cup_1"].rests == ("on", "floor")
 
 
+def test_what_is_handed_over_is_with_who_takes_it() -> None:
+    flat = world("holding")
+    perform(flat, actions(("hand_over", {})))
+    assert flat.things["cup_1"].rests == ("with", "speaker")
+    with pytest.raises(ActionFails, match="0 hands hold"):
+        perform(flat, actions(("hand_over", {})))
+
+
 def test_actions_wait_for_those_that_they_depend_on() -> None:
     steps = actions(TAKE_CUP, GO_TO_CUP)
     steps[0]["depends_on"] = ["a1"]

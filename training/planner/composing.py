@@ -55,7 +55,11 @@ class Composer:
         alone = {do: weight for do, weight in _ALONE.items() if do in self._groups}
         several = {do: weight for do, weight in WEIGHTS.items() if do in self._groups}
         self._kinds = ["steps", "told", *alone]
-        self._kind_weights = [100 - sum(alone.values()), _TOLD if self._told else 0, *alone.values()]
+        self._kind_weights = [
+            100 - sum(alone.values()),
+            _TOLD if self._told else 0,
+            *alone.values(),
+        ]
         self._actions, self._action_weights = [*several], [*several.values()]
 
     def example(self, random: Random) -> Example:

@@ -76,8 +76,8 @@ PRONOUNS: Final = ("it",) * 14 + ("that", "this", "them", "that one", "this one"
                    "what you're holding")  # fmt: skip
 # Before several of which one is meant.
 OF_WHICH: Final = ("the two", "the three", "those two", "these two", "two", "three", "both", "the",
-                   "those", "these", "both the", "my two", "our", "my", "a couple of", "the pair of",
-                   "a few", "four", "all those", "two different")  # fmt: skip
+                   "those", "these", "both the", "my two", "our", "my", "a couple of",
+                   "the pair of", "a few", "four", "all those", "two different")  # fmt: skip
 # Before several, and before one.
 QUANTITIES: Final = ("all the", "both", "all", "all of the", "both of the", "two", "three",
                      "the two", "one of the", "most of the", "both the", "both my", "all my",

@@ -16,7 +16,12 @@ from zlib import crc32
 from training.planner.clause import PHRASES, Clause, Said, filled
 from training.planner.grammar import PatternInvalid, Slot
 from training.planner.referring import SOURCES
-from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, STEPS, answer_text, field_names
+from vla_deploy.planning.command_parser.grammar import (
+    COPIED_FIELDS,
+    STEPS,
+    answer_text,
+    field_names,
+)
 from vla_deploy.planning.command_parser.wording import plain_words
 
 TOLD: Final = PHRASES / "told"

@@ -147,6 +147,12 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             estimated_duration_s=12.0,
             retryable=True,
         ),
+        "hand_over": SkillSpec(
+            summary="give a person what a hand holds: it opens when it feels a pull",
+            parameters={"arm": _ARM},
+            resources=("base", "arms", "speaker"),
+            estimated_duration_s=8.0,
+        ),
         "open_gripper": SkillSpec(
             summary="open a gripper, letting go of what it holds",
             parameters={"arm": _ARM},

@@ -53,6 +53,7 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "find_object": lambda given: f"look for {_the(given['object'])}",
     "pick_up": lambda given: f"pick up {_the(given['object'])}",
     "place": lambda given: f"put it {given['relation']} {_the(given['destination'])}",
+    "hand_over": lambda given: "hand it over",
     "open_gripper": lambda given: f"open my {_hand(given)}",
     "close_gripper": lambda given: f"close my {_hand(given)}",
     "move_arm": lambda given: f"bring my arms to the pose {given['pose']}",

@@ -274,6 +274,11 @@ class RobotLink:
         self._commands.publish(command | {"motion_id": motion_id})
         return motion_id
 
+    def cancel(self, motion_id: int) -> None:
+        """End a motion that this executor started."""
+        self._commands.publish({"kind": "cancel", "motion_id": motion_id})
+        self._active.pop(motion_id, None)
+
     def ended(self, motion_id: int) -> MotionResult | None:
         """Return how a motion ended, once, or None while it runs."""
         return self._ended.pop(motion_id, None)
@@ -281,15 +286,13 @@ class RobotLink:
     def halt(self) -> None:
         """Cancel every motion that this executor started and bring the base to rest."""
         for motion_id in sorted(self._active):
-            self._commands.publish({"kind": "cancel", "motion_id": motion_id})
-        self._active.clear()
+            self.cancel(motion_id)
         self.rest_base()
 
     def halt_actor(self, actor: str) -> None:
         """Cancel the motions of one action, and bring the base to rest if it drives."""
         for motion_id in sorted(one for one, whose in self._active.items() if whose == actor):
-            self._commands.publish({"kind": "cancel", "motion_id": motion_id})
-            del self._active[motion_id]
+            self.cancel(motion_id)
         if self._driver == actor:
             self.drive(AT_REST)
 

@@ -82,6 +82,32 @@ def follow_joints(
     yield from _finish(context, motion_id, f"moving {_named(joints)}")
 
 
+def stay(
+    context: SkillContext,
+    joints: Sequence[str],
+    duration_s: float,
+    contact_ratio: float,
+    done: Callable[[], bool],
+) -> Skill:
+    """Keep joints where control holds them for a while, or until `done()`, and feel.
+
+    Raises:
+        Touched: something pushes or pulls at them by more than that share of the contact limits.
+        TryAgain: control refused or cancelled it, or a stop that ends by itself ended it.
+        RobotNotReady: another stop ended it.
+    """
+    columns = [context.robot.joint_index[name] for name in joints]
+    here = context.link.setpoints[columns]
+    motion_id = context.link.send_trajectory(
+        joints, np.array([0.0, duration_s]), np.stack([here, here]), contact_ratio
+    )
+    for _ in _finish(context, motion_id, f"holding {_named(joints)}"):
+        if done():
+            context.link.cancel(motion_id)
+            return
+        yield
+
+
 def minimum_jerk(
     waypoints: NDArray[np.float64],
     velocity_limits: NDArray[np.float64],

@@ -7,6 +7,7 @@ from vla_deploy.skills.context import SkillFunction
 from vla_deploy.skills.drive import move, turn
 from vla_deploy.skills.find import find_object
 from vla_deploy.skills.gaze import look_at
+from vla_deploy.skills.hand_over import hand_over
 from vla_deploy.skills.navigate import navigate_to
 from vla_deploy.skills.pick import pick_up
 from vla_deploy.skills.place import place
@@ -21,6 +22,7 @@ SKILL_FUNCTIONS: MappingProxyType[str, SkillFunction] = MappingProxyType(
         "find_object": find_object,
         "pick_up": pick_up,
         "place": place,
+        "hand_over": hand_over,
         "open_gripper": open_gripper,
         "close_gripper": close_gripper,
         "move_arm": move_arm,

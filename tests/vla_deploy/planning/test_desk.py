@@ -155,11 +155,11 @@ class TestQuestions:
 
     def test_an_answer_by_another_thing_is_planned_with_the_command(self, open_desk, model):
         desk = open_desk(model)
-        desk.give(text="hand that cup over")
+        desk.give(text="wheel that cup round")
         desk.answers()
         desk.give(command_id="c2", text="the one next to the book")
         assert events(desk.answers())[:2] == [("c2", "answered"), ("c1", "planning")]
-        assert model.asked[1].text == "hand that cup next to the book over"
+        assert model.asked[1].text == "wheel that cup next to the book round"
 
     def test_a_question_that_nobody_answers_is_left_politely(self, desk):
         within_s = desk.answers()[-1]["answer_within_s"]

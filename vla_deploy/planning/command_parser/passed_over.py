@@ -63,8 +63,8 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         _IF,
         r"\bas soon as (?!possible|you)|\b(?:until|till) (?!i |eye |you\b)|\bwhenever (?!you\b)",
         r"\b(?:unless|in case|as long as|provided)\b",
-        rf"\b(?:when|once|while) (?:{_PERSON}|the|it|it's)\b",
-        rf"\b(?:after|before) (?:{_PERSON}|dinner|lunch|breakfast)\b",
+        rf"\b(?:when|once) (?:{_PERSON}|the|it|it's)\b",
+        rf"\bafter (?:{_PERSON}|dinner|lunch|breakfast)\b",
         r"(?<!\blook )(?<!\bgo )\b(?:after|before) ~$",
         r"\bevery (?:night|day|morning|evening|week|hour|time)\b",
         r"\b(?:tomorrow|tonight|someday|remind|reminder|twice|thrice|times)\b",
@@ -92,18 +92,25 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         rf"{_BEGIN}how (?:do|did|can|would|will) (?:you|i|we) {_DO}",
         rf"{_BEGIN}(?:do you want|are you allowed) to {_DO}",
         rf"{_BEGIN}(?:should|does|did|was|were) (?:the\b|my\b|our\b|~)",
-        r"\b(?:has|have|had) (?:\w+ )?been\b|\bshould have (?:gone|been)\b",
-        r"\b(?:was|were|got|is|are|will be) (?:put|taken|brought|moved|placed|carried)\b",
+        r"\bshould have (?:gone|been)\b",
         rf"{_BEGIN}(?:are you|you are|you're|you were) {_DOING}",
         rf"{_BEGIN}(?:i|we|he|she|they)(?: have| had| did| just)? {_DONE}",
         rf"{_BEGIN}(?:i|he|she|they)(?: will| shall)? {_DO}",
         rf"{_BEGIN}{_WHO_IS} (?:just |only |not )?(?:{_DO}|{_DOING}|{_DONE})",
         r"^(?:i'm|i am|we're|we are) (?:in|at|on) (?:the )?~$",
         r"~ (?:went|fell) (?:in|on|to|into|onto)\b",
-        r"\b(?:he|she|they|wife|husband|mother|father|mom|dad|boss) (?:told|asked|said|wants)\b",
+        r"\b(?:he|she|they|wife|husband|mother|father|mom|dad|boss) (?:told|asked|said)\b",
         rf"{_BEGIN}(?:tell|ask) (?!me\b|us\b|yourself\b)\w+ to\b",
     ),
 }
+# What mostly tells why, beside a command: its answer is read back.
+_ASKED: Final = (
+    r"\b(?:has|have|had) (?:\w+ )?been\b",
+    r"\b(?:was|were|got|is|are|will be) (?:put|taken|brought|moved|placed|carried)\b",
+    r"\b(?:he|she|they|wife|husband|mother|father|mom|dad|boss) wants\b",
+    rf"\bwhile (?:{_PERSON}|the|it|it's)\b",
+    rf"\bbefore (?:{_PERSON}|dinner|lunch|breakfast)\b",
+)
 _NOT_WHERE: Final = r"(?<!\bi )\b(?:leave|leaving|exit|vacate|away from|out of|clear of)"
 # The same for some steps alone: "leave the cup on the table" puts it there.
 _SAID_OF: Final = (
@@ -133,6 +140,15 @@ _RULES: Final = (
     *(_Rule("", why, re.compile(one)) for why, patterns in _SAID.items() for one in patterns),
     *(_Rule(step, why, re.compile(one)) for step, why, one in _SAID_OF),
 )
+
+
+_DOUBTS: Final = re.compile("|".join(_ASKED))
+
+
+def is_doubtful(steps: Sequence[Step], command: Sequence[str]) -> bool:
+    """Tell whether an answer that moves something passes over what may tell of it instead."""
+    is_moving = any(step["do"] not in _HARMLESS for step in steps)
+    return is_moving and _DOUBTS.search(_rest(steps, command)) is not None
 
 
 def refuse_passed_over(steps: Sequence[Step], command: Sequence[str]) -> None:

@@ -194,7 +194,7 @@ def _delivered(steps: Steps, step: Step, back: list[Skill]) -> list[Skill]:
 
 
 def _give(_steps: Steps, _step: Step) -> list[Skill]:
-    return [("speak", {"text": "Take it, then tell me to open my hand."})]
+    return [("hand_over", {})]
 
 
 def _find(steps: Steps, step: Step) -> list[Skill]:

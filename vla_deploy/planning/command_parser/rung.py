@@ -24,7 +24,7 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.passed_over import refuse_passed_over
+from vla_deploy.planning.command_parser.passed_over import is_doubtful, refuse_passed_over
 from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
 from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
@@ -41,6 +41,7 @@ from vla_deploy.planning.understanding.purposes import without_purpose
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
 MOST_FOREIGN: Final = 0.2
+_DOUBT: Final = 0.01
 # A model that nobody has measured is asked back about everything.
 UNMEASURED: Final = Certainty(
     bias=0.0, least=0.0, mean=0.0, strange=0.0, read_back_below=1.0, decline_below=0.0
@@ -101,7 +102,7 @@ class CommandParser:
             actions=actions,
         )
         sureness = Sureness(
-            confidence=parsed.confidence,
+            confidence=self._confidence(parsed),
             question=asked,
             read_back_below=self._weights.read_back_below,
             decline_below=self._weights.decline_below,
@@ -109,11 +110,17 @@ class CommandParser:
         proposal = Proposal(
             plan=plan,
             rung=self.name,
-            confidence=parsed.confidence,
+            confidence=sureness.confidence,
             is_momentary=are_of_the_moment(parsed.steps),
             sureness=sureness,
         )
         return proposal.as_heard(request.heard_confidence)
+
+    def _confidence(self, parsed: Parsed) -> float:
+        """Return how sure an answer is: never sure enough to go unasked where it is doubtful."""
+        if not is_doubtful(parsed.steps, parsed.words):
+            return parsed.confidence
+        return min(parsed.confidence, self._weights.read_back_below - _DOUBT)
 
     def parse(self, text: str, deadline: Deadline) -> Parsed:
         """Return the steps that a text means, and how sure that is.

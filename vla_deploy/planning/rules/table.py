@@ -3,7 +3,15 @@
 import re
 from typing import Final
 
-from vla_deploy.planning.rules import building, cleaning, moving, placing, questions, returning
+from vla_deploy.planning.rules import (
+    building,
+    cleaning,
+    giving,
+    moving,
+    placing,
+    questions,
+    returning,
+)
 from vla_deploy.planning.rules.intents import Intent
 from vla_deploy.planning.rules.pattern_parts import (
     ANGLE,
@@ -25,6 +33,7 @@ from vla_deploy.planning.rules.pattern_parts import (
 
 _ROWS: Final[tuple[Row, ...]] = (
     *questions.ROWS,
+    *giving.ROWS,
     # --- bring
     (Intent.MANIPULATION, r"(?:bring|fetch|get|give|hand|pass|run|grab|lend) (?:me|us)"
      rf"(?: back| over| in| up| down| out)? {OBJECT}",
@@ -107,9 +116,7 @@ _ROWS: Final[tuple[Row, ...]] = (
     (Intent.MANIPULATION, rf"(?:put|set|lay|place) {OBJECT} (?:back )?down|"
      r"(?:put|set|lay|place|pop) down (?P<object2>.+?)",
      placing.put_down),
-    (Intent.MANIPULATION, r"(?:let go(?: of)?|drop|release|let loose)(?: of)?(?: (?P<object>it|"
-     r"that|this|them))?", placing.put_down),
-    (Intent.MANIPULATION, rf"(?:let go of|release|let loose of) {OBJECT}", placing.put_down),
+    (Intent.MANIPULATION, r"drop(?: (?P<object>it|that|this|them))?", placing.put_down),
     (Intent.MANIPULATION, r"(?:free|empty) (?:(?:both )?your|both) hands(?: here)?",
      placing.empty_hands),
     (Intent.MANIPULATION, rf"(?:free|empty) {HAND}", placing.empty_hand),

@@ -204,7 +204,7 @@ def opens_empty(state: State, setting: Setting) -> Answer:
     held = state.holding(str(setting.parameters.get("arm", "")))
     if not held:
         return MET
-    return f"it would drop what is held ({held[0]}); place it instead"
+    return f"it would drop what is held ({held[0]}); place it, or hand it over instead"
 
 
 def may_go_there(state: State, setting: Setting) -> Answer:

@@ -75,6 +75,11 @@ LOGIC: Final[Mapping[str, Logic]] = MappingProxyType(
             effect=effects.puts,
             leaves=("object at destination", "hand free"),
         ),
+        "hand_over": Logic(
+            needs={HOLDING: conditions.holds_something, WHICH_HAND: conditions.knows_which},
+            effect=effects.lets_go,
+            leaves=("hand free",),
+        ),
         "open_gripper": Logic(
             needs={"nothing dropped": conditions.opens_empty},
             effect=effects.lets_go,

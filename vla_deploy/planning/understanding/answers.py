@@ -113,7 +113,7 @@ _SURPRISE: Final = re.compile(
 )
 # What is told beside an answer, and picks nothing.
 _REMARK: Final = re.compile(
-    r"(?:and |but |because |since )?(?:it|they|that|those|he|she|there|i|we|you|my \w+)"
+    r"(?:and |but |because |since |where )?(?:it|they|that|those|he|she|there|i|we|you|my \w+)"
     r"(?:'\w+)?\b.*"
 )
 _NEGATES: Final = re.compile(
@@ -207,15 +207,16 @@ def _guessed(question: Question, text: str) -> Candidate | None:
 
 
 def _beside_remarks(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
-    """Let the one piece of an answer count that picks something, if the others only tell."""
+    """Let what some pieces of an answer pick count, if the others only tell."""
     pieces = [piece for piece in _PIECE.split(text) if piece]
     judged = [(piece, *_judged(candidates, piece)) for piece in pieces]
-    picks = [(piece, chosen) for piece, verdict, chosen in judged if verdict is Verdict.CHOSEN]
-    if len(picks) != 1 or not all(
-        _REMARK.fullmatch(piece) for piece in pieces if piece != picks[0][0]
-    ):
+    picked = [chosen for _, verdict, chosen in judged if verdict is Verdict.CHOSEN]
+    beside = [piece for piece, verdict, _ in judged if verdict is not Verdict.CHOSEN]
+    if not picked or any(one != picked[0] for one in picked):
         return Verdict.ANEW, None
-    return Verdict.CHOSEN, picks[0][1]
+    if not all(map(_REMARK.fullmatch, beside)):
+        return Verdict.ANEW, None
+    return Verdict.CHOSEN, picked[0]
 
 
 def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:

@@ -160,6 +160,21 @@ def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[S
         yield "place", {**put, **destination, **hand}
 
 
+def _hand_over(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
+    """Give what is held; what is not is fetched before, to where it was asked for."""
+    if not isinstance(given.get("object"), str):
+        yield "hand_over", given
+        return
+    for thing in resolver.things(given["object"], Use.PUT):
+        if _held(thing, state(), resolver) is None:
+            yield from _on_furniture(thing)
+            yield "pick_up", {"object": thing.name, **_arm(given)}
+            yield "navigate_to", _here("here", resolver)
+        held = _held(thing, state(), resolver)
+        several = held is not None and held.hand and len(state().held) > 1
+        yield "hand_over", {"arm": held.hand} if held is not None and several else _arm(given)
+
+
 def _has_put(thing: Referent, destination: Parameters, state: State, resolver: Resolver) -> bool:
     """Tell whether the plan has put a thing there already: "take it to the box, drop it in"."""
     scene = resolver.setting.request.scene
@@ -273,4 +288,5 @@ _HANDLERS: Final[Mapping[str, Callable[[Parameters, Resolver, GetState], Iterato
     "look_at": _see("look_at"),
     "pick_up": _pick,
     "place": _place,
+    "hand_over": _hand_over,
 }

@@ -3,7 +3,7 @@
 import pytest
 
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.command_parser.passed_over import refuse_passed_over
+from vla_deploy.planning.command_parser.passed_over import is_doubtful, refuse_passed_over
 from vla_deploy.planning.errors import CannotBeDone
 
 GO: Step = {"do": "go", "where": "kitchen"}
@@ -90,6 +90,25 @@ def test_what_turns_a_command_round_is_refused(said: str, step: Step) -> None:
 )
 def test_what_only_asks_nicely_passes(said: str, step: Step) -> None:
     refuse_passed_over([step], said.split())
+
+
+@pytest.mark.parametrize(
+    ("said", "step"),
+    [
+        ("the cup has been there for days put the cup in the box", PUT),
+        ("my wife wants the cup so pick up the cup", PICK),
+        ("pick up the cup before she comes", PICK),
+        ("bring me the cup while i sit here", BRING),
+        ("the cup was put in the box", PUT),
+    ],
+)
+def test_what_may_tell_of_it_is_asked(said: str, step: Step) -> None:
+    refuse_passed_over([step], said.split())
+    assert is_doubtful([step], said.split())
+
+
+def test_a_plain_command_is_not_doubted() -> None:
+    assert not is_doubtful([PUT], ["put", "the", "cup", "in", "the", "box"])
 
 
 def test_what_is_said_aloud_may_say_anything() -> None:

@@ -105,6 +105,14 @@ def test_not_everything_has_room_beside_it(butler: World, rests: Rest, why: str)
             'action "a1": place breaks "something held": no hand holds anything',
         ),
         (
+            [("hand_over", {})],
+            'action "a1": hand_over breaks "something held": no hand holds anything',
+        ),
+        (
+            [*FETCH, ("hand_over", {}), ("hand_over", {})],
+            'action "a5": hand_over breaks "something held": no hand holds anything',
+        ),
+        (
             [*FETCH, ("place", {"destination": "cup_1", "relation": "on"})],
             'action "a4": place breaks "not onto itself": a hand holds the cup_1 itself',
         ),

@@ -133,6 +133,11 @@ def test_places_units_and_hands_get_the_catalogues_form(
     assert steps_of(grounded(home, given, scene=("box_1",))) == steps
 
 
+def test_what_is_handed_over_is_fetched_to_who_asked_for_it(home: "Home") -> None:
+    found = steps_of(grounded(home, ("hand_over", {"object": "the red cup"}), scene=("cup_1",)))
+    assert [skill for skill, _ in found][-3:] == ["pick_up", "navigate_to", "hand_over"]
+
+
 @pytest.mark.parametrize(
     ("destination", "expected"),
     [

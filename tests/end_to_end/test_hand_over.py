@@ -1,0 +1,48 @@
+"""Somebody takes a cup out of the robot's hand: it lets go when it is pulled at, and not before."""
+
+import numpy as np
+import pytest
+
+from sim_twin.stack import LockstepStack
+
+pytestmark = pytest.mark.gl
+
+CUP = "red_cup"
+STEP_S = 0.02
+PULL_N_S, MOST_N = 15.0, 8.0
+"""How fast a person takes a light thing, and how hard."""
+
+
+def _pull(stack: LockstepStack, direction: tuple[float, float, float]) -> bool:
+    """Pull at the cup ever harder; return whether the hand has let go of it."""
+    engine = stack.lockstep.twin.engine
+    body = engine.model.body(CUP).id
+    for step in range(100):
+        force_n = min(MOST_N, PULL_N_S * STEP_S * step)
+        engine.data.xfrc_applied[body, :3] = force_n * np.array(direction)
+        stack.lockstep.run_for(STEP_S)
+        if CUP not in stack.lockstep.truth()["held"]:
+            break
+    engine.data.xfrc_applied[body] = 0.0
+    return CUP not in stack.lockstep.truth()["held"]
+
+
+@pytest.mark.timeout(240)
+def test_a_cup_is_kept_until_somebody_pulls_at_it(stack: LockstepStack) -> None:
+    assert stack.say("pick up the red cup")["success"]
+
+    kept = stack.say("hand me the cup")
+    assert not kept["success"]
+    assert "nobody took the cup" in kept["error"]
+    assert CUP in stack.lockstep.truth()["held"]
+
+    command = stack.give(text="hand it over")
+    stack.lockstep.run_for(8.0)
+    assert stack.outcome(command) is None
+    assert CUP in stack.lockstep.truth()["held"]
+    assert _pull(stack, (0.8, -0.6, 0.0))
+    assert stack.lockstep.run_until(lambda: stack.outcome(command) is not None, 30.0)
+    outcome = stack.outcome(command)
+    assert outcome is not None
+    assert outcome["success"], outcome["error"]
+    assert stack.status()["state"] == "armed"
