@@ -72,7 +72,7 @@ def _evaluate(arguments: argparse.Namespace, _settings: Settings) -> None:
 def _card(arguments: argparse.Namespace, settings: Settings) -> None:
     from training.planner.card import describe
 
-    describe(arguments.out / MODELS, settings, arguments.chatter is not None)
+    describe(arguments.out / MODELS, settings, arguments.chatter is not None, arguments.start_from)
 
 
 def _ship(arguments: argparse.Namespace, _settings: Settings) -> None:

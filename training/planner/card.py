@@ -9,6 +9,7 @@ from training.planner.clause import load_groups
 from training.planner.evaluation import MOST_TOKENS
 from training.planner.files import CARD, GRAPH, METRICS, NAME, PARTS
 from training.planner.settings import Settings
+from training.planner.telling import AFTER, BEFORE, KEPT_BACK_OF, load_remarks, load_told
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Certainty, Language, Manifest, ModelFile, Use
 from vla_deploy.inference.manifest_file import write_manifest
@@ -22,14 +23,17 @@ _TITLES: Final = {
 }
 
 
-def describe(models: Path, settings: Settings, has_chatter: bool) -> None:
+def describe(
+    models: Path, settings: Settings, has_chatter: bool, start_from: Path | None = None
+) -> None:
     """Write `card.md` and `model.toml` beside the files that they describe.
 
     Raises:
         FileNotFoundError: the model or its metrics are not there.
     """
     metrics = json.loads((models / METRICS).read_text(encoding="utf-8"))
-    (models / CARD).write_text(card(metrics, models, settings, has_chatter), encoding="utf-8")
+    text = card(metrics, models, settings, has_chatter, is_begun=start_from is not None)
+    (models / CARD).write_text(text, encoding="utf-8")
     write_manifest(models, manifest(metrics, models))
 
 
@@ -50,7 +54,14 @@ def manifest(metrics: dict[str, Any], models: Path) -> Manifest:
     )
 
 
-def card(metrics: dict[str, Any], models: Path, settings: Settings, has_chatter: bool) -> str:
+def card(
+    metrics: dict[str, Any],
+    models: Path,
+    settings: Settings,
+    has_chatter: bool,
+    *,
+    is_begun: bool = False,
+) -> str:
     """Return the model card."""
     shape = settings.shape
     values = {
@@ -62,12 +73,17 @@ def card(metrics: dict[str, Any], models: Path, settings: Settings, has_chatter:
         "vocabulary": shape.vocabulary,
         "phrases": _count(held_out=False),
         "kept_back": _count(held_out=True),
+        "told": len(load_told(held_out=False)),
+        "remarks": sum(len(load_remarks(one, held_out=False)) for one in (BEFORE, AFTER)),
+        "kept_back_of": KEPT_BACK_OF,
         "other_talk": _TALK if has_chatter else "The other talk is that of the same lists.",
         "read_back_below": metrics["certainty"]["read_back_below"],
         "decline_below": metrics["certainty"]["decline_below"],
         "p50_ms": f"{1000 * metrics['took_p50_s']:.0f}",
         "p95_ms": f"{1000 * metrics['took_p95_s']:.0f}",
         "size": settings.name,
+        "more": " --start-from EARLIER" if is_begun else "",
+        "began": f" {_BEGAN}" if is_begun else "",
         "seed": settings.seed,
     }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
@@ -89,6 +105,7 @@ def _count(held_out: bool) -> int:
     return sum(len(one.imperative) + len(one.free) for one in groups)
 
 
+_BEGAN: Final = "It began with the weights of an earlier training."
 _TALK: Final = (
     "Sixty percent of the other talk are sentences of CLINC150 (Larson et al., 2019, CC BY 3.0), "
     "without those near a command."

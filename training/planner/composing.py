@@ -14,6 +14,7 @@ from training.planner.openings import OPENINGS, REASONS
 from training.planner.slips import CLAUSE_SLIPS, FILLERS, JOINTS
 from training.planner.telling import AFTER, BEFORE, load_remarks, load_told
 from vla_deploy.planning.command_parser.grammar import answer_text
+from vla_deploy.planning.command_parser.wording import MOST_COMMAND_WORDS
 
 # How often each kind of step is drawn, of those that may stand among others.
 WEIGHTS: Final[Mapping[str, float]] = {
@@ -64,8 +65,10 @@ class Composer:
 
     def example(self, random: Random) -> Example:
         """Return one command with its answer."""
-        clauses, sentence = self._drawn(random)
-        sentence = _with_fillers(misheard(sentence, random), random)
+        sentence: list[Said] = []
+        while not 0 < len(sentence) <= MOST_COMMAND_WORDS:
+            clauses, sentence = self._drawn(random)
+            sentence = _with_fillers(misheard(sentence, random), random)
         return Example(_text(sentence), _answer(clauses, sentence))
 
     def spoken(self, random: Random) -> str:
