@@ -11,6 +11,7 @@ from benchmarks import planner_corpus
 from benchmarks.planner_corpus import (
     COMMAND_CORPORA,
     PLAN,
+    UNSEEN,
     CorpusUnreadable,
     attacks,
     command_kinds,
@@ -49,7 +50,7 @@ def test_nothing_was_tuned_to_the_corpora() -> None:
         if path.suffix in {".py", ".md", ".toml", ".txt", ".jsonl"}
     ]
     written = "\n".join(path.read_text(encoding="utf-8", errors="ignore") for path in files).lower()
-    unseen = [*commands(), *commands(corpus="strangers"), *commands(corpus="visitors")]
+    unseen = [one for name in UNSEEN for one in commands(corpus=name)]
     said = [turn.say for case in unseen for turn in case.turns] + other_talk()
     sentences = {text.lower().strip(".?! ") for text in said if len(text.split()) >= TELLING_WORDS}
     assert sorted(text for text in sentences if text in written) == []

@@ -22,7 +22,7 @@ WEIGHTS: Final[Mapping[str, float]] = {
     "turn": 7, "open": 4, "close": 3, "pose": 3, "say": 6, "wait": 5, "stop": 2, "give": 1.5,
     "tidy": 1.5, "ask": 2.5,
 }  # fmt: skip
-_TOLD: Final = 45
+_TOLD: Final = 80
 """Of sentences that were written out whole, to 100 of all others."""
 _REMARKED: Final = 0.15
 """Share of commands with a remark before, and of those with one behind."""

@@ -72,7 +72,11 @@ def load_told(held_out: bool) -> tuple[Frame, ...]:
     Raises:
         PatternInvalid: a line is none.
     """
-    return tuple(read_frame(line) for line in _lines(TOLD, "*", held_out))
+    told = {repr(frame): frame for frame in map(read_frame, _lines(TOLD, "*", held_out=False))}
+    if not held_out:
+        return tuple(told.values())
+    kept = {repr(frame): frame for frame in map(read_frame, _lines(TOLD, "*", held_out=True))}
+    return tuple(frame for name, frame in kept.items() if name not in told)
 
 
 def load_remarks(where: str, held_out: bool) -> tuple[tuple[str, ...], ...]:

@@ -36,6 +36,10 @@ _TO_SEE: Final = (
     "happy", "grateful", "tell me", "nice", "great", "good", "kind", "helpful", "lovely", "mind",
     "chance",
 )  # fmt: skip
+_TELLS: Final = "it tells or asks of something, instead of telling me to do it"
+_ELSE: Final = "it is somebody else's words"
+MOST_TELLING: Final = 9
+"""In a sentence of more words a command may stand behind what tells, and is asked for."""
 _IF: Final = "".join(rf"(?<!\b{word} )" for word in _TO_SEE) + (
     r"\bif (?!you\b|that's\b|it's (?:not|no)\b|i may\b|.*\bpossible\b)"
 )
@@ -50,7 +54,7 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"(?! (?:forget|hesitate|worry|rush|hurry|drop|spill|break)\b)",
         rf"{_BEGIN}no \w+ing\b",
         r"\bwithout (?:\w+ing )?(?:through |into |near )?(?:(?:the|a|an|my|your|our)\b|~)",
-        r"\b(?:stop|quit|cease) \w+ing\b|\bbut (?:stop|wait|halt)\b",
+        r"(?<!\bi )(?<!\bwe )\b(?:stop|quit|cease) \w+ing\b|\bbut (?:stop|wait|halt)\b",
         r"\bleave (?:\w+ )*~(?: ~)* (?:where|alone|as)\b",
         r"\bcan't let\b|\b(?:wrong|terrible|stupid|bad|sad|annoyed|dangerous|pity|shame|"
         r"disaster)\b.*\bif you\b",
@@ -61,31 +65,32 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "I do things at once, not later, again and again, or under a condition": (
         _IF,
-        r"\bas soon as (?!possible|you)|\b(?:until|till) (?!i |eye |you\b)|\bwhenever (?!you\b)",
-        r"\b(?:unless|in case|as long as|provided)\b",
-        rf"\b(?:when|once) (?:{_PERSON}|the|it|it's)\b",
+        r"\bas soon as (?!possible|you)|\bwhenever (?!you\b)",
+        r"\b(?:unless|as long as|provided)\b",
+        rf"{_BEGIN}(?:when|once|in case) (?:{_PERSON}|the|it|it's)\b",
         rf"\bafter (?:{_PERSON}|dinner|lunch|breakfast)\b",
         r"(?<!\blook )(?<!\bgo )\b(?:after|before) ~$",
         r"\bevery (?:night|day|morning|evening|week|hour|time)\b",
-        r"\b(?:tomorrow|tonight|someday|remind|reminder|twice|thrice|times)\b",
+        r"\b(?:tomorrow|someday|remind|reminder|twice|thrice|times)\b|^tonight\b|\btonight$",
         r"^(?!.*\bso (?:that )?(?:i|we)\b).*\blater(?: today)?$",
         r"\b(?:in|after|within|every) (?:\w+ ){0,3}(?:minutes?|seconds?|hours?|days?)$",
         r"\b(?:in|after|every) (?:\w+ ){1,2}(?:minutes?|seconds?|hours?|days?)\b",
         rf"\bat (?:half past |quarter (?:past|to) )?{_HOUR}(?: o'clock)?$",
     ),
-    "it is taken back, or somebody else's words": (
+    "it is taken back": (
         r"^(?!.*\bback\b).*\bchanged my mind\b",
-        r"\b(?:joking|kidding|didn't mean|i(?:'ve)? found it|"
-        r"i'll do (?:it|that)|can wait|(?:he|she|they|mum|dad|boss) (?:says?|said|tells?|goes|"
-        r"shouts?|shouted)|"
-        r"i told|talking to you)\b",
+        r"\b(?:joking|kidding|didn't mean|i(?:'ve)? found it|i'll do (?:it|that)|can wait|"
+        r"talking to you)\b",
+    ),
+    _ELSE: (
+        r"\b(?:he|she|they|mum|dad|boss) (?:says?|said|tells?|goes|shouts?|shouted)\b|\bi told\b",
     ),
     "it says what not to do as well": (
         r"\b(?:but|and) (?:please )?(?:do not|don't|dont|never) "
         r"(?!drop|spill|break|bump|forget|worry|hurry|rush|lose|wake|hit|crash|fall|run|be)\w+",
     ),
     "I choose my speed myself": (r"\bper (?:second|minute|hour)\b",),
-    "it tells or asks of something, instead of telling me to do it": (
+    _TELLS: (
         rf"{_BEGIN}(?:have|has|had) (?:you|i|we|he|she|they) (?!seen|noticed|found)",
         rf"{_BEGIN}(?:did|was|were) (?:you|i|we|he|she|they) (?!see|notice|find)",
         rf"{_BEGIN}(?:when (?:will|would|do|did|are)|why|what if|what happens)\b",
@@ -108,7 +113,8 @@ _ASKED: Final = (
     r"\b(?:has|have|had) (?:\w+ )?been\b",
     r"\b(?:was|were|got|is|are|will be) (?:put|taken|brought|moved|placed|carried)\b",
     r"\b(?:he|she|they|wife|husband|mother|father|mom|dad|boss) wants\b",
-    rf"\bwhile (?:{_PERSON}|the|it|it's)\b",
+    rf"\b(?:while|when|once|in case) (?:{_PERSON}|the|it|it's)\b",
+    r"\b(?:until|till) (?!i |eye |you\b)|\btonight\b",
     rf"\bbefore (?:{_PERSON}|dinner|lunch|breakfast)\b",
 )
 _NOT_WHERE: Final = r"(?<!\bi )\b(?:leave|leaving|exit|vacate|away from|out of|clear of)"
@@ -142,13 +148,17 @@ _RULES: Final = (
 )
 
 
+_MAY_STAND_BEFORE: Final = frozenset({_TELLS, _ELSE})
 _DOUBTS: Final = re.compile("|".join(_ASKED))
 
 
 def is_doubtful(steps: Sequence[Step], command: Sequence[str]) -> bool:
     """Tell whether an answer that moves something passes over what may tell of it instead."""
-    is_moving = any(step["do"] not in _HARMLESS for step in steps)
-    return is_moving and _DOUBTS.search(_rest(steps, command)) is not None
+    rest = _rest(steps, command)
+    return any(step["do"] not in _HARMLESS for step in steps) and (
+        _DOUBTS.search(rest) is not None
+        or any(rule.said.search(rest) for rule in _RULES if rule.why in _MAY_STAND_BEFORE)
+    )
 
 
 def refuse_passed_over(steps: Sequence[Step], command: Sequence[str]) -> None:
@@ -161,6 +171,8 @@ def refuse_passed_over(steps: Sequence[Step], command: Sequence[str]) -> None:
     moving, rest = named - _HARMLESS, _rest(steps, command)
     for rule in _RULES:
         concerned = rule.step in named if rule.step else bool(moving)
+        if len(command) > MOST_TELLING and rule.why in _MAY_STAND_BEFORE:
+            continue  # it is asked for
         found = rule.said.search(rest) if concerned else None
         if found:
             said = _shown(found, rest, command)

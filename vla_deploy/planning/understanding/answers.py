@@ -116,6 +116,15 @@ _REMARK: Final = re.compile(
     r"(?:and |but |because |since |where )?(?:it|they|that|those|he|she|there|i|we|you|my \w+)"
     r"(?:'\w+)?\b.*"
 )
+# The same of another candidate: "the little one won't go round".
+_TELLS: Final = re.compile(
+    r"(?:and |but |because |since )?(?:the|that|this) .+?(?:'s|n't| is| are| was| has| will| can| "
+    r"goes| stays| belongs)\b.+"
+)
+_MEANT: Final = re.compile(
+    r"(?:'s| is| was) (?:what|the one|which one)(?: that)? i(?:'m| am| was)? (?:mean|meant|want|"
+    r"wanted|need|needed|after|had in mind|thinking of|talking about)\b.*"
+)
 _NEGATES: Final = re.compile(
     r"\b(?:not|no|never|neither|nor|but|except|what|where|why|how|who|avoid|beside|besides|instead|"
     r"without|hardly|forget|hate|dislike|wrong|out|if|when|later|tomorrow|do you|are "
@@ -208,15 +217,16 @@ def _guessed(question: Question, text: str) -> Candidate | None:
 
 def _beside_remarks(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
     """Let what some pieces of an answer pick count, if the others only tell."""
-    pieces = [piece for piece in _PIECE.split(text) if piece]
-    judged = [(piece, *_judged(candidates, piece)) for piece in pieces]
-    picked = [chosen for _, verdict, chosen in judged if verdict is Verdict.CHOSEN]
-    beside = [piece for piece, verdict, _ in judged if verdict is not Verdict.CHOSEN]
-    if not picked or any(one != picked[0] for one in picked):
+    pieces = [_MEANT.sub("", piece) for piece in _PIECE.split(text) if piece]
+    judged = {piece: _judged(candidates, piece)[1] for piece in pieces}
+    picks = [piece for piece, chosen in judged.items() if chosen is not None]
+    picks = [piece for piece in picks if not _TELLS.fullmatch(piece)] or picks
+    chosen = {one.name: one for piece in picks if (one := judged[piece]) is not None}
+    beside = [piece for piece in pieces if piece not in picks]
+    is_clear = all(_REMARK.fullmatch(one) or _TELLS.fullmatch(one) for one in beside)
+    if len(chosen) != 1 or not is_clear:
         return Verdict.ANEW, None
-    if not all(map(_REMARK.fullmatch, beside)):
-        return Verdict.ANEW, None
-    return Verdict.CHOSEN, picked[0]
+    return Verdict.CHOSEN, next(iter(chosen.values()))
 
 
 def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
