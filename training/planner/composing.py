@@ -84,7 +84,7 @@ class Composer:
     def _whole(self, random: Random) -> tuple[list[Clause], list[Said]]:
         clauses, sentence = random.choice(self._told).drawn(random)
         called = _words(CALLS, random) if random.random() < 0.1 else []
-        return clauses, self._remarked([*called, *sentence], random)
+        return clauses, self._remarked([*called, *sentence], clauses, random)
 
     def _alone(self, kind: str, random: Random) -> tuple[list[Clause], list[Said]]:
         if kind == "unknown" and self._before and random.random() < _ONLY_REMARKS:
@@ -112,7 +112,7 @@ class Composer:
             sentence += _words(JOINTS, random) if number else []
             sentence += self._polite(clause, number, random, 0.55 if number == 0 else 0.12)
             clauses.append(clause)
-        return clauses, self._remarked(self._surrounded(sentence, random), random)
+        return clauses, self._remarked(self._surrounded(sentence, random), clauses, random)
 
     def _surrounded(self, sentence: list[Said], random: Random) -> list[Said]:
         """Put a slip or a remark before a command, which change nothing."""
@@ -130,10 +130,11 @@ class Composer:
             return [*sentence, *_unowned(never), *_plain(dropped)]
         return [*sentence, *_words(REASONS, random)] if chance < 0.11 else sentence
 
-    def _remarked(self, sentence: list[Said], random: Random) -> list[Said]:
-        """Put what people say beside a command around it."""
+    def _remarked(self, sentence: list[Said], clauses: list[Clause], random: Random) -> list[Said]:
+        """Put what people say beside a command around it; behind what is to be said nothing."""
         before = self._before if random.random() < _REMARKED else ()
         after = self._after if random.random() < _REMARKED else ()
+        after = () if clauses[-1].step["do"] == "say" else after
         return [*_one_of(before, random), *sentence, *_one_of(after, random)]
 
     def _remarks(self, random: Random) -> list[Said]:

@@ -151,7 +151,8 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="give a person what a hand holds: it opens when it feels a pull",
             parameters={"arm": _ARM},
             resources=("base", "arms", "speaker"),
-            estimated_duration_s=8.0,
+            timeout_s=MANIPULATION_TIMEOUT_S,
+            estimated_duration_s=15.0,
         ),
         "open_gripper": SkillSpec(
             summary="open a gripper, letting go of what it holds",

@@ -9,7 +9,7 @@ from vla_deploy.planning.command_parser.grammar import Step
 _PATTERNS: Final[Mapping[str, tuple[str, ...]]] = {
     "go": ("go to", "where"),
     "pick": ("pick up", "what", "from:from", "with:arm"),
-    "put": ("put", "what", "how", "where"),
+    "put": ("put", "what", "from:from", "how", "where"),
     "bring": ("bring", "what", "from:from", "to:to"),
     "give": ("give you what I hold",),
     "find": ("look for", "what", "at:from"),

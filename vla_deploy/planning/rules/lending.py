@@ -54,7 +54,8 @@ _MEET: Final = re.compile(
 )
 # "The larger" of the balls that were spoken of.
 _OF_A_KIND: Final = re.compile(
-    rf"\b(?:the|that) (?P<which>(?:\w+(?:er|est)|{'|'.join(COLOURS)}))(?: one)?$"
+    rf"\b(?:the|that) (?P<which>(?:\w+(?:er|est)|{'|'.join(COLOURS)}|left|right|middle|centre|"
+    r"center|first|second|third|last|leftmost|rightmost))(?: one)?$"
 )
 _SEVERAL: Final = re.compile(
     r"(?:there(?:'s| are| is)|i (?:can )?see|you(?:'ve| have)(?: got)?|we(?:'ve| have)(?: got)?|"

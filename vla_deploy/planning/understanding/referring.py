@@ -169,7 +169,8 @@ def _hand_over(given: Parameters, resolver: Resolver, state: GetState) -> Iterat
         if _held(thing, state(), resolver) is None:
             yield from _on_furniture(thing)
             yield "pick_up", {"object": thing.name, **_arm(given)}
-            yield "navigate_to", _here("here", resolver)
+            if resolver.setting.request.here is not None:
+                yield "navigate_to", _here("here", resolver)
         held = _held(thing, state(), resolver)
         several = held is not None and held.hand and len(state().held) > 1
         yield "hand_over", {"arm": held.hand} if held is not None and several else _arm(given)

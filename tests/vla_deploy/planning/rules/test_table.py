@@ -254,8 +254,36 @@ def test_of_two_things_the_hand_with_the_one_meant_gives(does: Does) -> None:
     assert does("hand me the bottle", holding=holding) == "hand_over right"
 
 
-def test_what_is_not_held_is_brought(does: Does) -> None:
-    assert does("hand me the ball", holding={"left": "cup"}).startswith("pick_up")
+@pytest.mark.parametrize("said", ["hand me the ball", "give me another cup", "give me both cups"])
+def test_what_is_not_held_is_brought(does: Does, said: str) -> None:
+    assert "hand_over" not in does(said, holding={"left": "cup"})
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "let go of me",
+        "release the brake",
+        "you can let go of the idea",
+        "I can take the ball",
+        "let me take the ball",
+        "I'll grab the ball",
+        "let go of the ball",
+    ],
+)
+def test_what_is_not_in_a_hand_is_not_let_go(does: Does, said: str) -> None:
+    with pytest.raises(PlanningError):
+        does(said, holding={"left": "cup"})
+
+
+def test_what_is_taken_before_is_not_what_is_held(does: Does) -> None:
+    told = does("pick up the ball and give it to me", holding={"left": "cup"})
+    assert told.startswith("pick_up ball")
+
+
+def test_in_a_longer_command_letting_go_is_putting_down(does: Does) -> None:
+    told = does("let go of that and then drive over to the kitchen", holding={"left": "cup"})
+    assert told.startswith("place coffee_table on")
 
 
 def test_what_is_held_is_put_down_and_never_dropped(does: Does) -> None:
