@@ -20,6 +20,7 @@ SYNONYMS: Final[Mapping[str, str]] = MappingProxyType({
     "novel": "book", "notebook": "book", "paperback": "book", "textbook": "book",
     "flask": "bottle",
     "smartphone": "phone", "mobile": "phone", "telephone": "phone", "cellphone": "phone",
+    "cell": "phone",
     "tin": "can",
     "key": "keys", "keyring": "keys",
     "controller": "remote", "zapper": "remote", "clicker": "remote",

@@ -80,6 +80,16 @@ def amount_of(words: Sequence[str], units: Mapping[str, float], bare: str = "") 
     return None if alone is None else value * alone
 
 
+def amount_words(words: Sequence[str], units: Mapping[str, float]) -> list[str]:
+    """Return those of some words that an amount may be made of."""
+    return [word for word in words if _is_number(word) or _unit(word, units) is not None]
+
+
+def is_silent(words: Sequence[str]) -> bool:
+    """Tell whether words beside an amount are all there is: "about", "right around"."""
+    return all(word in _SILENT for word in words)
+
+
 def _unit(word: str, units: Mapping[str, float]) -> float | None:
     """Return what a unit is in SI units, also in the plural or as "a hand's width"."""
     return next(

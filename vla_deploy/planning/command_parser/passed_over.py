@@ -41,7 +41,8 @@ _ELSE: Final = "it is somebody else's words"
 MOST_TELLING: Final = 9
 """In a sentence of more words a command may stand behind what tells, and is asked for."""
 _IF: Final = "".join(rf"(?<!\b{word} )" for word in _TO_SEE) + (
-    r"\bif (?!you\b|that's\b|it's (?:not|no)\b|i may\b|.*\bpossible\b)"
+    r"\bif (?!(?:i|we|he|she|they|it)\b.*\bso\b|you\b|"
+    r"that's\b|it's (?:not|no)\b|i may\b|.*\bpossible\b)"
 )
 _SAID: Final[Mapping[str, tuple[str, ...]]] = {
     "it leaves something out": (
@@ -114,7 +115,7 @@ _ASKED: Final = (
     r"\b(?:was|were|got|is|are|will be) (?:put|taken|brought|moved|placed|carried)\b",
     r"\b(?:he|she|they|wife|husband|mother|father|mom|dad|boss) wants\b",
     rf"\b(?:while|when|once|in case) (?:{_PERSON}|the|it|it's)\b",
-    r"\b(?:until|till) (?!i |eye |you\b)|\btonight\b",
+    r"\b(?:until|till) (?!i |eye |you\b)|\btonight\b|\bif (?:i|we|he|she|they|it)\b",
     rf"\bbefore (?:{_PERSON}|dinner|lunch|breakfast)\b",
 )
 _NOT_WHERE: Final = r"(?<!\bi )\b(?:leave|leaving|exit|vacate|away from|out of|clear of)"

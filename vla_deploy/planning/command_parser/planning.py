@@ -10,7 +10,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.command_parser.amounts import METRES, RADIANS, SECONDS, amount_of
+from vla_deploy.planning.command_parser.amounts import (
+    METRES,
+    RADIANS,
+    SECONDS,
+    amount_of,
+    amount_words,
+    is_silent,
+)
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.lending import kind_lent
 from vla_deploy.planning.command_parser.spans import find_span
@@ -117,7 +124,12 @@ class Steps:
         """
         if "by" not in step:
             return default
-        value = amount_of(step["by"].split(), units, bare)
+        words = step["by"].split()
+        value = amount_of(words, units, bare)
+        if value is None and (told := amount_words(words, units)):
+            value = amount_of(told, units, bare)  # more was copied than the amount
+        if value is None and is_silent(words):
+            return default
         if value is None:
             raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
         return value
@@ -134,7 +146,8 @@ def _go(steps: Steps, step: Step) -> list[Skill]:
         return [("navigate_to", {"place": "here"})]
     if where == "back":
         return [_back(steps.request)]
-    return building.go({"place": steps.spoken(step, "where")}, steps.request)
+    place = re.sub(r" with (?:it|them|that|this)$", "", steps.spoken(step, "where"))
+    return building.go({"place": place}, steps.request)
 
 
 def _back(request: Request) -> Skill:

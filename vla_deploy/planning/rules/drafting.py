@@ -25,6 +25,7 @@ from vla_deploy.planning.rules.exchanging import continued, corrected
 from vla_deploy.planning.rules.fits import HANDS, Fit, fit_of, is_whole, known_fit, names_hand
 from vla_deploy.planning.rules.intents import PRIORITIES, Intent
 from vla_deploy.planning.rules.ordering import in_order
+from vla_deploy.planning.rules.pointing_back import pointing_alone
 from vla_deploy.planning.rules.recalling import is_again, last_words, leans, recalled, same_with
 from vla_deploy.planning.rules.refusals import refuse_unable
 from vla_deploy.planning.rules.statements import begins_with_statement, statements_off
@@ -73,7 +74,7 @@ def draft_plan(request: Request) -> Plan:
     """
     if len(request.text) > MOST_LETTERS:
         raise NotUnderstood(f"{request.text[:60]}...")
-    full = recalled(courtesy_off(request.text), request)
+    full = recalled(pointing_alone(courtesy_off(request.text), request), request)
     draft = _drafted(request if full is None else replace(request, text=full))
     goal = ", then ".join(draft.said) if draft.is_short else draft.request.text.strip()
     return Plan(goal=goal, summary=_summary(draft.steps), actions=_chain(draft.steps))

@@ -7,6 +7,7 @@ import re
 from typing import Final
 
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.catalogue import ARMS
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
 from vla_deploy.planning.rules import building, placing
 from vla_deploy.planning.rules.building import Groups, Step, arm_in, parts_of
@@ -55,6 +56,17 @@ def let_go(groups: Groups, request: Request) -> list[Step]:
     return [("hand_over", {**_named(said, request), **arm_in(groups)})]
 
 
+def change_hands(groups: Groups, request: Request) -> list[Step]:
+    """Put down what one hand holds, and take it with the other: in the air it might fall."""
+    full = [hand for hand, kind in request.world.holding.items() if kind]
+    free = [hand for hand in request.world.holding if hand not in full]
+    arm = groups["hand"] if groups["hand"] in ARMS else next(iter(free), "")
+    if not arm or not _is_in_hand(groups["object"], request):
+        raise NotUnderstood(request.text)
+    thing = {"object": groups["object"]}
+    return [("place", thing), ("pick_up", {**thing, "arm": arm})]
+
+
 def _named(said: str, request: Request) -> dict[str, str]:
     """Return what tells which thing is given; with nothing else about, its name tells no more."""
     return {} if len(_held(request)) == 1 and not _others(request) else {"object": said}
@@ -93,7 +105,13 @@ def _is_plain(read: Expression) -> bool:
     return is_one and not compares and read.query == Query(kind=read.query.kind)
 
 
+_FROM_HAND: Final = (
+    r"(?: from (?:your|the) (?:left|right)(?: (?:hand|one|gripper))?)?(?: over| across)?"
+)
 ROWS: Final[tuple[Row, ...]] = (
+    (Intent.MANIPULATION, rf"(?:swap|pass|change|move|put|take|switch|transfer|shift|hand) {OBJECT}"
+     rf"(?: over| across)?{_FROM_HAND} (?:in)?to (?:your|the) (?P<hand>left|right|other)"
+     r"(?: (?:hand|one|gripper|claw))?", change_hands),
     (Intent.MANIPULATION, rf"(?:give|hand|pass|lend) (?:me|us)(?: back| over)? {OBJECT}"
      rf"{_FROM_YOU}", give),
     (Intent.MANIPULATION, rf"(?:hand|pass|give) {OBJECT} (?:(?:over|across|here|back)(?: here)?"

@@ -26,8 +26,9 @@ NAMED: Final = re.compile(
 )
 _WHERE: Final = re.compile(
     r"(?:'s|'re| is| are| was| were| must be| should be|)"
-    r"(?: (?:lying|sitting|standing|still|over|just|that is|that's|back|up|down))* "
-    r"(?P<where>(?:on|in|at|by|inside|under|next to|beside|near|nearest|closest to) .+)"
+    r"(?: (?:lying|sitting|standing|stood|sat|still|over|just|that is|that's|back|up|down))* "
+    r"(?P<where>(?:on|in|at|by|inside|under|next to|beside|near|nearest|closest to|nearer to|"
+    r"closer to) .+)"
 )
 _AT_SOMETHING: Final = re.compile(
     r"(?:on|in|at|inside|under|behind) (?P<noun>(?:the|my|our|a|an) (?!way\b|"
@@ -35,7 +36,8 @@ _AT_SOMETHING: Final = re.compile(
 )
 _ONE_OF: Final = re.compile(
     r"\b(?:the|that) (?P<which>(?!other\b|only\b|first\b)[\w-]+ )?one(?: (?:over|out|down|up|"
-    r"back))?(?P<where> (?:in|on|at|by|next to|beside|near) .+?)?(?='s\b| is\b| i\b| was\b|$)"
+    r"back))?(?P<where> (?:in|on|at|by|next to|beside|near|nearer to|closer to|nearest to|closest "
+    r"to) .+?)?(?='s\b| is\b| i\b| was\b|$)"
 )
 # Somebody who is somewhere: that is where things go that are for them.
 _SOMEBODY_AT: Final = re.compile(
@@ -61,6 +63,11 @@ _SEVERAL: Final = re.compile(
     r"(?:there(?:'s| are| is)|i (?:can )?see|you(?:'ve| have)(?: got)?|we(?:'ve| have)(?: got)?|"
     r"(?:can|do) you see) (?:two|three|four|some|a (?:couple|few|pair) (?:of )?|several|both|"
     rf"those|the) (?:\w+ ){{0,2}}?(?P<kind>{KIND_WORDS})e?s?\b.*"
+)
+_OF_SEVERAL: Final = re.compile(
+    r"\b(?:of|there(?:'s| are| is)) (?:the|these|those|my|our|both|two|three|four)"
+    r"(?: two| three| four)? "
+    rf"(?:\w+ )?(?P<kind>{KIND_WORDS})(?:e?s)?\b"
 )
 # What stays as it is; nothing that the rest is about.
 _LEFT_ALONE: Final = re.compile(
@@ -117,7 +124,8 @@ def things_told(told: Sequence[str], request: Request) -> list[str]:
 
     Of "there are two cups, the left one is empty" it is the left cup alone.
     """
-    kinds = kinds_told(told)
+    kinds = {single(found["kind"]) for part in told for found in _OF_SEVERAL.finditer(part)}
+    kinds = kinds or kinds_told(told)
     ones = [found for part in told for found in _ONE_OF.finditer(part)] if len(kinds) == 1 else []
     if ones:
         kind = next(iter(kinds))

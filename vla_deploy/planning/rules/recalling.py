@@ -16,7 +16,8 @@ _AGAIN: Final = re.compile(
     r"(?:and )?(?:(?:do|try|say|make|repeat) (?:it|that|this|so|the same(?: thing)?) )?"
     r"(?:(?:once )?again|once more|one more time|(?:yet )?another time|one more|another one)|"
     r"(?:please )?repeat(?: (?:it|that|this))?|(?:do )?(?:just )?the (?:very |exact )?same(?: "
-    r"thing)?(?: again)?|(?:the )?same again|(?:do|try) (?:it|that) again"
+    r"thing)?(?: again)?|(?:once (?:more|again) )?(?:the )?same(?: again)?|"
+    r"(?:do|try) (?:it|that) again"
 )
 # How much "a bit more" is of the distance, angle or time that was last given outright.
 RATIOS: Final[Mapping[str, float]] = {

@@ -40,7 +40,7 @@ _PRAISE: Final = (
     r"favou?rite|trusty|lovely|nice|good|beautiful|precious|usual|fancy|cute|damn|damned|bloody|"
     r"blasted|silly|poor|dear|own|proper|pretty|"
     # What it is for, which is nothing to see.
-    r"cereal|breakfast|soup|salad|fruit|coffee|tea|beer|soda|coke|cola|water|juice|wine|milk|tennis|"
+    r"pop|cereal|breakfast|soup|salad|fruit|coffee|tea|beer|soda|coke|cola|water|juice|wine|milk|tennis|"
     r"toy|bouncy|rubber|car|house|door|office|telly|tv|television|cook|reading|story|school|library|"
     r"ceramic|plastic|wooden|metal|glass|paper|cardboard|shiny|empty|full"
 )

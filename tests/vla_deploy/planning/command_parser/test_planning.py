@@ -89,6 +89,13 @@ def test_back_is_where_the_command_before_was_told() -> None:
         ({"do": "move", "way": "forward"}, "move", "distance_m", 0.5),
         ({"do": "turn", "way": "right", "by": "ninety degrees"}, "turn", "angle_rad", -math.pi / 2),
         ({"do": "turn", "way": "around"}, "turn", "angle_rad", math.pi),
+        ({"do": "turn", "way": "around", "by": "about"}, "turn", "angle_rad", math.pi),
+        (
+            {"do": "turn", "way": "left", "by": "a quarter of glare"},
+            "turn",
+            "angle_rad",
+            math.pi / 2,
+        ),
         ({"do": "wait", "by": "half a minute"}, "wait", "duration_s", 30.0),
     ],
 )

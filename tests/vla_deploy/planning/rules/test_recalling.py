@@ -17,6 +17,8 @@ LEFT = "turn 1.5707963267948966"
 TALKS = {
     "again": {
         "rotate to the left >> do that once more": LEFT,
+        "rotate to the left >> once again the same, please": LEFT,
+        "rotate to the left >> Hmm, your face is still in the sun. Do that again.": LEFT,
         "rotate to the left >> again >> and again": LEFT,
         "go to the bedroom >> repeat that please": "navigate_to bedroom",
         "drive backwards 20 cm >> same again": "move -0.2",

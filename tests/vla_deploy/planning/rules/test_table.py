@@ -249,6 +249,16 @@ def test_what_is_held_is_handed_over(does: Does, said: str) -> None:
     assert does(said, holding={"left": "cup"}) == "hand_over"
 
 
+@pytest.mark.parametrize(
+    "said",
+    ["pass the bottle over to your right hand", "swap it from your left hand to your right",
+     "move the bottle into your other hand"],
+)  # fmt: skip
+def test_a_thing_changes_hands_by_being_put_down(does: Does, said: str) -> None:
+    told = does(said, holding={"left": "bottle", "right": None})
+    assert told.startswith("place coffee_table on") and told.endswith("right")
+
+
 def test_of_two_things_the_hand_with_the_one_meant_gives(does: Does) -> None:
     holding = {"left": "cup", "right": "bottle"}
     assert does("hand me the bottle", holding=holding) == "hand_over right"
