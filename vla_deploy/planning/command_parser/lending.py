@@ -16,7 +16,7 @@ _WHERE: Final = (
 _SEVERAL_AND_ONE: Final = re.compile(
     r"(?:(?:all|both|the|those|these|my|our|of|two|three|four|a|couple|pair|few) )*"
     rf"(?P<kind>{KIND_WORDS})(?:e?s)?(?P<several>{_WHERE})?"
-    rf" (?:(?:the )?(?P<which>(?!other |same |the )[\w-]+ )one|the one(?P<one>{_WHERE}))"
+    rf"(?: of)? (?:(?:the )?(?P<which>(?!other |same |the )[\w-]+ )one|the one(?P<one>{_WHERE}))"
 )
 
 

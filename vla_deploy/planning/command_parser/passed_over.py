@@ -37,6 +37,7 @@ _TO_SEE: Final = (
     "chance",
 )  # fmt: skip
 _TELLS: Final = "it tells or asks of something, instead of telling me to do it"
+_WHEN: Final = "I do things at once, not at another time"
 _ELSE: Final = "it is somebody else's words"
 MOST_TELLING: Final = 9
 """In a sentence of more words a command may stand behind what tells, and is asked for."""
@@ -69,14 +70,16 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"\bas soon as (?!possible|you)|\bwhenever (?!you\b)",
         r"\b(?:unless|as long as|provided)\b",
         rf"{_BEGIN}(?:when|once|in case) (?:{_PERSON}|the|it|it's)\b",
-        rf"\bafter (?:{_PERSON}|dinner|lunch|breakfast)\b",
         r"(?<!\blook )(?<!\bgo )\b(?:after|before) ~$",
-        r"\bevery (?:night|day|morning|evening|week|hour|time)\b",
-        r"\b(?:tomorrow|someday|remind|reminder|twice|thrice|times)\b|^tonight\b|\btonight$",
+        r"\b(?:tomorrow|someday|remind|reminder|twice|thrice|times)\b|^tonight\b",
         r"^(?!.*\bso (?:that )?(?:i|we)\b).*\blater(?: today)?$",
         r"\b(?:in|after|within|every) (?:\w+ ){0,3}(?:minutes?|seconds?|hours?|days?)$",
         r"\b(?:in|after|every) (?:\w+ ){1,2}(?:minutes?|seconds?|hours?|days?)\b",
         rf"\bat (?:half past |quarter (?:past|to) )?{_HOUR}(?: o'clock)?$",
+    ),
+    _WHEN: (
+        rf"\bafter (?:{_PERSON}|dinner|lunch|breakfast)\b|\btonight$",
+        r"\bevery (?:single )?(?:night|day|morning|evening|week|hour|time)\b",
     ),
     "it is taken back": (
         r"^(?!.*\bback\b).*\bchanged my mind\b",
@@ -149,7 +152,7 @@ _RULES: Final = (
 )
 
 
-_MAY_STAND_BEFORE: Final = frozenset({_TELLS, _ELSE})
+_MAY_STAND_BEFORE: Final = frozenset({_TELLS, _WHEN, _ELSE})
 _DOUBTS: Final = re.compile("|".join(_ASKED))
 
 

@@ -40,6 +40,9 @@ _POSES: Final[Mapping[str, str]] = {
     "carrying": "tuck", "resting": "rest", "relax": "rest", "lower": "rest", "sleep": "rest",
 }  # fmt: skip
 _CAN_PUT: Final = frozenset({"in", "on", "to", "next to", "near"})
+_POSSESSIVES: Final = re.compile(r"\b(?:his|her|their|its)\b")
+# What was copied beside a thing: "(get) a grip of (the red book)", "(what became) of the phone".
+_BESIDE: Final = re.compile(r"^(?:(?:an? )?(?:grip|hold|grasp|ahold|rid) )?(?:of|about) ")
 # These are answered from what is seen, held, or remembered when they are planned.
 _OF_THE_MOMENT: Final = frozenset({"where", "ask", "tidy"})
 Handler = Callable[["Steps", Step], list[Skill]]
@@ -88,6 +91,7 @@ class Steps:
         words = step[field].split()
         span = find_span(words, self._command)
         text = " ".join(words if span is None else span.spoken)
+        text = _BESIDE.sub("", _POSSESSIVES.sub("the", text))
         return re.sub(
             r"\b(on|to|at|in) (left|right|middle|back|front)\b(?! of)", r"\1 the \2", text
         )

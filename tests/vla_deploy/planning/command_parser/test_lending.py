@@ -14,6 +14,7 @@ from vla_deploy.planning.command_parser.lending import kind_lent
         ("those boxes the one on the left", "the box on the left"),
         ("cups in the kitchen the one in the bedroom", "the cup in the bedroom"),
         ("the three books the middle one", "the middle book"),
+        ("books of the middle one", "the middle book"),
     ],
 )
 def test_the_one_is_of_the_kind_that_was_named(copied: str, means: str) -> None:

@@ -68,6 +68,20 @@ def test_furniture_to_take_it_from_tells_which_one_is_meant() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("command", "what"),
+    [
+        ("get a grip of the cup", "grip cup"),
+        ("get a grip of the cup", "a grip of the cup"),
+        ("what has become of the cup take it", "cup"),
+        ("the cup is his cup so take it", "his cup"),
+    ],
+)
+def test_what_was_copied_beside_a_thing_is_left_out(command: str, what: str) -> None:
+    (found,) = planned(command, {"do": "pick", "what": what})
+    assert found == ("pick_up", {"object": "the cup"})
+
+
 def test_bringing_goes_back_to_who_asked() -> None:
     found = planned("bring me the bottle", {"do": "bring", "what": "bottle"})
     assert [skill for skill, _ in found] == ["pick_up", "navigate_to", "speak"]
