@@ -1,0 +1,90 @@
+"""Read what the fields of an answer say, in the words of the command that they were copied from."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.command_parser.amounts import amount_of, amount_words, is_silent
+from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.lending import kind_lent
+from vla_deploy.planning.command_parser.spans import find_span
+from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.rules import building
+from vla_deploy.planning.understanding.insertions import is_surface
+from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
+
+Skill = building.Step
+_POSSESSIVES: Final = re.compile(r"\b(?:his|her|their|its)\b")
+# What was copied beside a thing: "(get) a grip of (the red book)", "(what became) of the phone".
+_BESIDE: Final = re.compile(r"^(?:(?:an? )?(?:grip|hold|grasp|ahold|rid) )?(?:of|about) ")
+
+
+class Spoken:
+    """Hold a command, and read what steps that answer it refer to."""
+
+    def __init__(self, command: Sequence[str], request: Request) -> None:
+        self._command = command
+        self._request = request
+
+    @property
+    def request(self) -> Request:
+        """Return what the command came with."""
+        return self._request
+
+    def says(self, word: str) -> bool:
+        """Tell whether a word was said."""
+        return word in self._command
+
+    def spoken(self, step: Step, field: str) -> str:
+        """Return the words of a field, with the articles that were said among them."""
+        words = step[field].split()
+        span = find_span(words, self._command)
+        text = " ".join(words if span is None else span.spoken)
+        text = _BESIDE.sub("", _POSSESSIVES.sub("the", text))
+        return re.sub(
+            r"\b(on|to|at|in) (left|right|middle|back|front)\b(?! of)", r"\1 the \2", text
+        )
+
+    def source(self, step: Step) -> tuple[list[Skill], str]:
+        """Return the way to the room where things are, or words that say what they are on or in."""
+        where = self._where_from(step)
+        if not where:
+            return [], ""
+        world = self._request.world
+        place = match_place(where, world.places)
+        if place is not None and not is_surface(place, world):
+            return [("navigate_to", {"place": place})], ""
+        kinds = {SYNONYMS.get(word, word) for word in where.split()}
+        return [], f" {'in' if kinds & CONTAINERS else 'on'} {where}"
+
+    def things(self, step: Step) -> str:
+        """Return what a step is about, each thing with where it is to be taken from."""
+        _, behind = self.source(step)
+        spoken, _, _ = kind_lent(self.spoken(step, "what")).partition(" from ")
+        return " and ".join(part + behind for part in building.parts_of(spoken))
+
+    def _where_from(self, step: Step) -> str:
+        """Return "the kitchen" of "the cup from the kitchen", or of a field of its own."""
+        if "from" in step:
+            return self.spoken(step, "from")
+        return self.spoken(step, "what").partition(" from ")[2] if "what" in step else ""
+
+    def amount(self, step: Step, units: Mapping[str, float], default: float, bare: str) -> float:
+        """Return the amount of a step in SI units.
+
+        Raises:
+            PlanInvalid: its words are no amount.
+        """
+        if "by" not in step:
+            return default
+        words = step["by"].split()
+        value = amount_of(words, units, bare)
+        if value is None and (told := amount_words(words, units)):
+            value = amount_of(told, units, bare)  # more was copied than the amount
+        if value is None and is_silent(words):
+            return default
+        if value is None:
+            raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
+        return value
