@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
+from vla_deploy.planning.understanding.answer_remarks import picked_beside
 from vla_deploy.planning.understanding.conversation import Candidate, Conversation, Question
 from vla_deploy.planning.understanding.known_words import known_words
 from vla_deploy.planning.understanding.phrases import (
@@ -111,20 +112,6 @@ _SURPRISE: Final = re.compile(
     r"(?:(?:oh|ah|well|hm|good (?:question|point)|fair (?:enough|point)|my mistake|right|sorry)"
     r"\b ?)+"
 )
-# What is told beside an answer, and picks nothing.
-_REMARK: Final = re.compile(
-    r"(?:and |but |because |since |where )?(?:it|they|that|those|he|she|there|i|we|you|my \w+)"
-    r"(?:'\w+)?\b.*"
-)
-# The same of another candidate: "the little one won't go round".
-_TELLS: Final = re.compile(
-    r"(?:and |but |because |since )?(?:the|that|this) .+?(?:'s|n't| is| are| was| has| will| can| "
-    r"goes| stays| belongs)\b.+"
-)
-_MEANT: Final = re.compile(
-    r"(?:'s| is| was) (?:what|the one|which one)(?: that)? i(?:'m| am| was)? (?:mean|meant|want|"
-    r"wanted|need|needed|after|had in mind|thinking of|talking about)\b.*"
-)
 _NEGATES: Final = re.compile(
     r"\b(?:not|no|never|neither|nor|but|except|what|where|why|how|who|avoid|beside|besides|instead|"
     r"without|hardly|forget|hate|dislike|wrong|out|if|when|later|tomorrow|do you|are "
@@ -217,16 +204,8 @@ def _guessed(question: Question, text: str) -> Candidate | None:
 
 def _beside_remarks(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
     """Let what some pieces of an answer pick count, if the others only tell."""
-    pieces = [_MEANT.sub("", piece) for piece in _PIECE.split(text) if piece]
-    judged = {piece: _judged(candidates, piece)[1] for piece in pieces}
-    picks = [piece for piece, chosen in judged.items() if chosen is not None]
-    picks = [piece for piece in picks if not _TELLS.fullmatch(piece)] or picks
-    chosen = {one.name: one for piece in picks if (one := judged[piece]) is not None}
-    beside = [piece for piece in pieces if piece not in picks]
-    is_clear = all(_REMARK.fullmatch(one) or _TELLS.fullmatch(one) for one in beside)
-    if len(chosen) != 1 or not is_clear:
-        return Verdict.ANEW, None
-    return Verdict.CHOSEN, next(iter(chosen.values()))
+    chosen = picked_beside(_PIECE.split(text), lambda piece: _judged(candidates, piece)[1])
+    return (Verdict.ANEW if chosen is None else Verdict.CHOSEN), chosen
 
 
 def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
