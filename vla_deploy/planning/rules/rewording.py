@@ -18,6 +18,11 @@ _COLOUR: Final = "|".join(COLOURS)
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("help me look$", "look for it"),
     (
+        r"(what(?:ever)?(?:'s| is| you have| you've got)) in (?:the|your) (left|right)"
+        r"(?: one| arm)?(?! hand| gripper| box| bowl)\b",
+        r"\1 in your \2 hand",
+    ),
+    (
         "(?:turn|spin)(?: right| all the way| yourself)? (?:a?round|about),?"
         "(?: and| to| so(?: that)?)?"
         "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)",

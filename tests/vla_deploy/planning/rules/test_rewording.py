@@ -25,6 +25,7 @@ from vla_deploy.planning.rules.rewording import reworded
         ("red can goes in the box", "the red can goes in the box"),
         ("you're needed at the entrance", "go to the entrance"),
         ("turn about ninety degrees", "turn ninety degrees"),
+        ("put down what's in the left one", "put down what's in your left hand"),
     ],
 )
 def test_a_roundabout_command_is_put_plainly(said: str, plain: str) -> None:
