@@ -76,11 +76,11 @@ def evaluate(models: Path, count: int, chatter: Sequence[str]) -> None:
 def examples(seed: str, count: int, chatter: Sequence[str]) -> list[Example]:
     """Return what the doubt is fitted on: phrases learnt and kept back alike, and other talk.
 
-    What people say lies between the two: most of it is like something that was learnt.
+    What people say is mostly like what was kept back: nobody says just what was learnt.
     """
     talk = [Example(text, "") for text in chatter[: count // 3]]
-    learnt = _of(Composer(), count, seed)
-    return [*learnt, *_of(Composer(held_out=True), count // 2, seed), *talk]
+    learnt = _of(Composer(), count // 2, seed)
+    return [*learnt, *_of(Composer(held_out=True), 3 * count // 2, seed), *talk]
 
 
 def figures(told: Sequence[Told], weights: Certainty) -> dict[str, Any]:

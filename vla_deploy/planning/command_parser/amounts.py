@@ -81,8 +81,10 @@ def amount_of(words: Sequence[str], units: Mapping[str, float], bare: str = "") 
 
 
 def amount_words(words: Sequence[str], units: Mapping[str, float]) -> list[str]:
-    """Return those of some words that an amount may be made of."""
-    return [word for word in words if _is_number(word) or _unit(word, units) is not None]
+    """Return those of some words that an amount may be made of; none where others have digits."""
+    own = [word for word in words if _is_number(word) or _unit(word, units) is not None]
+    others = (word for word in words if word not in own)
+    return [] if any(one.isdigit() for word in others for one in word) else own
 
 
 def is_silent(words: Sequence[str]) -> bool:

@@ -112,7 +112,7 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         rf"{_BEGIN}(?:tell|ask) (?!me\b|us\b|yourself\b)\w+ to\b",
     ),
 }
-# What mostly tells why, beside a command: its answer is read back.
+# What mostly tells why, or speaks to somebody else, beside a command: its answer is read back.
 _ASKED: Final = (
     r"\b(?:has|have|had) (?:\w+ )?been\b",
     r"\b(?:was|were|got|is|are|will be) (?:put|taken|brought|moved|placed|carried)\b",
@@ -120,6 +120,7 @@ _ASKED: Final = (
     rf"\b(?:while|when|once|in case) (?:{_PERSON}|the|it|it's)\b",
     r"\b(?:until|till) (?!i |eye |you\b)|\btonight\b|\bif (?:i|we|he|she|they|it)\b",
     rf"\bbefore (?:{_PERSON}|dinner|lunch|breakfast)\b",
+    r"\b(?:son|sonny|kids|children|guys|girls|boys|sit|(?:good|here|bad) (?:dog|boy|girl))\b",
 )
 _NOT_WHERE: Final = r"(?<!\bi )\b(?:leave|leaving|exit|vacate|away from|out of|clear of)"
 # The same for some steps alone: "leave the cup on the table" puts it there.

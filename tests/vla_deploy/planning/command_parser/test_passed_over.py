@@ -100,6 +100,8 @@ def test_what_only_asks_nicely_passes(said: str, step: Step) -> None:
         ("pick up the cup before she comes", PICK),
         ("bring me the cup while i sit here", BRING),
         ("the cup was put in the box", PUT),
+        ("pick up the cup son", PICK),
+        ("go to the kitchen good dog", GO),
     ],
 )
 def test_what_may_tell_of_it_is_asked(said: str, step: Step) -> None:

@@ -129,6 +129,7 @@ def test_amounts_become_numbers(step: Step, skill: str, name: str, value: float)
         ({"do": "bring", "what": "cup", "to": "anna"}, UnknownPlace),
         ({"do": "go", "where": "back"}, UnknownPlace),
         ({"do": "wait", "by": "blue"}, PlanInvalid),
+        ({"do": "move", "way": "forward", "by": "1 e9 metres"}, PlanInvalid),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_its_reason(step: Step, error: type[Exception]) -> None:
