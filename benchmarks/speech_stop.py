@@ -39,6 +39,7 @@ from vla_deploy.speech.verdict import Verdict
 from vla_deploy.state_dir import user_base
 
 SNRS_DB: Final[Mapping[str, float | None]] = {"clean": None, "20db": 20.0, "10db": 10.0, "5db": 5.0}
+_TALK_SNRS: Final = ("clean", "clean", "20db", "10db")
 BLOCK: Final = RATE_HZ // 50
 """The node steps so often."""
 TOO_LATE_S: Final = 1.0
@@ -199,24 +200,30 @@ def _around(clip: Clip, snr_db: float | None, random: np.random.Generator) -> Wa
 
 def _talk(voices: Voices, ear: Ear, hours: float, random: np.random.Generator) -> dict[str, Any]:
     """Let people talk of other things, half of the time in noise at 20 or 10 dB."""
-    alarms: list[str] = []
-    talked_s = 0.0
+    alarms: dict[str, list[str]] = {name: [] for name in _TALK_SNRS}
+    talked_h = dict.fromkeys(_TALK_SNRS, 1e-9)
     for clip in other_talk(voices, random):
-        if talked_s >= 3600.0 * hours:
+        if sum(talked_h.values()) >= hours:
             break
-        alarms += _alarms(ear, clip, random)
-        talked_s += clip.duration_s
+        name = _drawn(random)
+        alarms[name] += _alarms(ear, clip, SNRS_DB[name], random)
+        talked_h[name] += clip.duration_s / 3600.0
+    count, talked = sum(map(len, alarms.values())), sum(talked_h.values())
     return {
-        "stop_talk_hours": talked_s / 3600.0,
-        "stop_false_alarms_per_hour": len(alarms) / max(talked_s / 3600.0, 1e-9),
-        "stop_false_alarms": alarms,
+        "stop_talk_hours": talked,
+        "stop_false_alarms_per_hour": count / talked,
+        **{
+            f"stop_false_alarms_per_hour_{name}": len(alarms[name]) / talked_h[name]
+            for name in alarms
+        },
+        "stop_false_alarms": [f"{name}: {one}" for name, some in alarms.items() for one in some],
     }
 
 
 def _alike(voices: Voices, ear: Ear, count: int, random: np.random.Generator) -> dict[str, Any]:
     """Let people say what was made to sound like a stop word, in the same noise."""
     clips = islice(words_alike(voices, random), count)
-    alarms = [_alarms(ear, clip, random) for clip in clips]
+    alarms = [_alarms(ear, clip, SNRS_DB[_drawn(random)], random) for clip in clips]
     return {
         "stop_alike_sentences": count,
         "stop_alike_alarmed_ratio": float(np.mean([bool(found) for found in alarms])),
@@ -224,8 +231,11 @@ def _alike(voices: Voices, ear: Ear, count: int, random: np.random.Generator) ->
     }
 
 
-def _alarms(ear: Ear, clip: Clip, random: np.random.Generator) -> list[str]:
-    snr_db = (None, None, 20.0, 10.0)[int(random.integers(4))]
+def _drawn(random: np.random.Generator) -> str:
+    return _TALK_SNRS[int(random.integers(len(_TALK_SNRS)))]
+
+
+def _alarms(ear: Ear, clip: Clip, snr_db: float | None, random: np.random.Generator) -> list[str]:
     found = ear.alarms(_around(clip, snr_db, random)[: -RATE_HZ // 2])
     return [f"{one.word} by {one.by}, {clip.engine} {clip.voice}: {clip.text}" for one in found]
 

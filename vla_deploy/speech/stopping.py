@@ -41,8 +41,9 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.2, share=0.1),
+    _Enough(surety=0.4, share=0.1),
     _Enough(surety=0.7, suspicion=0.4, most_confidence=0.3),
+    _Enough(surety=0.95, suspicion=0.3, most_confidence=0.5),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.

@@ -44,9 +44,11 @@ def test_three_witnesses_stop_together_what_no_words_would(
 
 
 def test_words_that_were_read_for_sure_outweigh_the_head() -> None:
-    reading = heard("which cup", surety=0.95)
+    reading, surer = heard("which cup", surety=0.9), heard("which cup", surety=0.96)
     assert stops(reading, 0.3, 0.5)
     assert not stops(reading, 0.4, 0.5)
+    assert stops(surer, 0.4, 0.5)
+    assert not stops(surer, 0.6, 0.5)
 
 
 def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
