@@ -3,7 +3,8 @@
 A recogniser that is unsure has several readings; the one with a plan in this room and this moment
 is the likeliest. It is read back before anything moves. Each is tried without its commas, too: a
 pause may be a thought's end, or only a breath; and with words apart that were run into one. A plan
-about things that nobody has seen gives way to one about things that are there.
+about things that nobody has seen gives way to one about things that are there, and what the command
+parser makes of unsure words to other words that the rules know.
 """
 
 import re
@@ -14,6 +15,7 @@ from typing import Final
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.gist_rung import GistRung
 from vla_deploy.planning.glued import parted
 from vla_deploy.planning.inbox import READ_BACK, Command
@@ -65,8 +67,8 @@ class Rehearing:
         first = self._of(command)
         makes_sense = answer.is_final if first is None else answer.plan is not None
         makes_sense = makes_sense and not _is_gist(answer)
-        seeks_unseen = _is_unsure(command) and _seeks_unseen(answer, request)
-        if makes_sense and not seeks_unseen:
+        gives_way = _is_unsure(command) and _gives_way(answer, request)
+        if makes_sense and not gives_way:
             return None
         if first is None:
             first = self._first = Heard(command=command, request=request, answer=answer)
@@ -80,7 +82,7 @@ class Rehearing:
         """Return what is to be concluded: of readings without a plan the first."""
         first, self._first = self._of(command), None
         makes_sense = answer.plan is not None and not _is_gist(answer)
-        if first is None or (makes_sense and not _seeks_unseen(answer, request)):
+        if first is None or (makes_sense and not _gives_way(answer, request)):
             return Heard(command=command, request=request, answer=answer)
         return first
 
@@ -93,6 +95,15 @@ class Rehearing:
 def _is_gist(answer: Answer) -> bool:
     """Tell whether words were left out for a plan: others may make sense as a whole."""
     return answer.proposal is not None and answer.proposal.rung == GistRung.name
+
+
+def _gives_way(answer: Answer, request: Request) -> bool:
+    """Tell whether other words may make more sense: of things that are there, or to the rules.
+
+    The command parser makes something of misheard words, too.
+    """
+    is_parsed = answer.proposal is not None and answer.proposal.rung == COMMAND_PARSER
+    return is_parsed or _seeks_unseen(answer, request)
 
 
 def _seeks_unseen(answer: Answer, request: Request) -> bool:

@@ -173,3 +173,17 @@ def test_a_thing_that_is_there_is_likelier_meant_than_one_that_nobody_saw(
     assert plan["plan"]["actions"][0]["parameters"]["object"] == sought
     asked = "asked" in [event for event, _ in events(told)]
     assert asked is (sought == "red cup")
+
+
+@pytest.mark.parametrize(("confidence", "place"), [(0.65, "bedroom"), (0.9, "kitchen")])
+def test_what_the_parser_makes_of_unsure_words_gives_way_to_words_that_the_rules_know(
+    open_desk, rung, propose, confidence, place
+):
+    parser = rung("command_parser", propose(GO, rung="command_parser"))
+    desk = open_desk(parser)
+    desk.give(**spoken("go where one cooks", ("go to the bedroom", 0.5), confidence=confidence))
+    desk.answers()
+    desk.give(command_id="c2", text="yes", source="voice")
+    desk.answers()
+    plan = desk.plans()[0]
+    assert plan["plan"]["actions"][0]["parameters"]["place"] == place

@@ -81,10 +81,13 @@ def amount_of(words: Sequence[str], units: Mapping[str, float], bare: str = "") 
 
 
 def amount_words(words: Sequence[str], units: Mapping[str, float]) -> list[str]:
-    """Return those of some words that an amount may be made of; none where others have digits."""
+    """Return those of some words that an amount may be made of.
+
+    None are, where others have digits, or where nothing says how many.
+    """
     own = [word for word in words if _is_number(word) or _unit(word, units) is not None]
-    others = (word for word in words if word not in own)
-    return [] if any(one.isdigit() for word in others for one in word) else own
+    is_odd = any(one.isdigit() for word in words if word not in own for one in word)
+    return own if any(map(_is_number, own)) and not is_odd else []
 
 
 def is_silent(words: Sequence[str]) -> bool:

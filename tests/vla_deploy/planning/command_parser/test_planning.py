@@ -130,6 +130,7 @@ def test_amounts_become_numbers(step: Step, skill: str, name: str, value: float)
         ({"do": "go", "where": "back"}, UnknownPlace),
         ({"do": "wait", "by": "blue"}, PlanInvalid),
         ({"do": "move", "way": "forward", "by": "1 e9 metres"}, PlanInvalid),
+        ({"do": "turn", "way": "left", "by": "kitchen degrees"}, PlanInvalid),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_its_reason(step: Step, error: type[Exception]) -> None:
