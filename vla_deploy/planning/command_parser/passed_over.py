@@ -55,6 +55,7 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         rf"{_BEGIN}(?:do not|don't|dont|never)\b"
         r"(?! (?:forget|hesitate|worry|rush|hurry|drop|spill|break)\b)",
         rf"{_BEGIN}no \w+ing\b",
+        rf"{_BEGIN}(?:forget|pretend|offer|promise|threaten) to\b",
         r"\bwithout (?:\w+ing )?(?:through |into |near )?(?:(?:the|a|an|my|your|our)\b|~)",
         r"(?<!\bi )(?<!\bwe )\b(?:stop|quit|cease) \w+ing\b|\bbut (?:stop|wait|halt)\b",
         r"\bleave (?:\w+ )*~(?: ~)* (?:where|alone|as)\b",
@@ -88,6 +89,9 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     _ELSE: (
         r"\b(?:he|she|they|mum|dad|boss) (?:says?|said|tells?|goes|shouts?|shouted)\b|\bi told\b",
+        r"\bsaid (?:my|the|he|she|our)\b|\bso (?:i|he|she|we|they) did\b",
+        r"\bmy (?:wife|husband|mother|father|mum|dad|son|daughter|sister|brother) "
+        r"(?:says?|claims?|thinks?|insists?)\b",
     ),
     "it says what not to do as well": (
         r"\b(?:but|and) (?:please )?(?:do not|don't|dont|never) "
@@ -95,6 +99,7 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "I choose my speed myself": (r"\bper (?:second|minute|hour)\b",),
     _TELLS: (
+        r"\byou (?:might|could|would|should|must) have (?!me\b|us\b|to\b|the\b|my\b|a\b)",
         rf"{_BEGIN}(?:have|has|had) (?:you|i|we|he|she|they) (?!seen|noticed|found)",
         rf"{_BEGIN}(?:did|was|were) (?:you|i|we|he|she|they) (?!see|notice|find)",
         rf"{_BEGIN}(?:when (?:will|would|do|did|are)|why|what if|what happens)\b",
@@ -154,15 +159,25 @@ _RULES: Final = (
 
 
 _MAY_STAND_BEFORE: Final = frozenset({_TELLS, _WHEN, _ELSE})
+# The same of some steps alone: "go to the table with the keys", "drive a metre to the left".
+_ASKED_OF: Final = (
+    ("put", rf"{_BEGIN}(?:go|drive|head|roll|come)\b.*\bwith\b"),
+    ("pick", rf"{_BEGIN}(?:go|drive|head|roll|come)\b.*\bwith\b"),
+    ("move", r"\bto (?:the|your|my) (?:left|right)\b"),
+    ("turn", r"\b(?:all the way|complete(?:ly)?|whole|full|circle)\b"),
+)
 _DOUBTS: Final = re.compile("|".join(_ASKED))
+
+_OF_STEPS: Final = tuple(_Rule(step, "", re.compile(said)) for step, said in _ASKED_OF)
 
 
 def is_doubtful(steps: Sequence[Step], command: Sequence[str]) -> bool:
     """Tell whether an answer that moves something passes over what may tell of it instead."""
-    rest = _rest(steps, command)
+    rest, named = _rest(steps, command), {step["do"] for step in steps}
     return any(step["do"] not in _HARMLESS for step in steps) and (
         _DOUBTS.search(rest) is not None
         or any(rule.said.search(rest) for rule in _RULES if rule.why in _MAY_STAND_BEFORE)
+        or any(rule.said.search(rest) for rule in _OF_STEPS if rule.step in named)
     )
 
 

@@ -23,6 +23,11 @@ _MANNERS: Final = frozenset({"arm", "pace", "speed"})
 _ONE: Final = re.compile(r"(?<=\w )one(s?)\b")
 _HAND: Final = re.compile(r"(?:(?:in|with) )?(?:the |your )?(?P<side>left|right)(?: hand| one)?")
 _NAMED_HAND: Final = re.compile(r"\b(?:left|right)(?= hand\b)")
+# "..., the purple one I need here": another thing is told of, and nothing is asked for it.
+_TOLD_OF: Final = re.compile(
+    r"(?:the|my|that) (?:\w+ ){1,2}(?:one )?(?:i|we|he|she|they|my \w+|our \w+)"
+    r"(?:'\w+)? (?:\w+ )*\w+$"
+)
 _PREPOSITION: Final = re.compile(r"^(?:in|into|on|onto|at|to|from|with|for) ")
 _BEHIND: Final = re.compile(r" (?:in|into|on|onto|at|to|from|with|for) $")
 
@@ -33,6 +38,8 @@ def continued(said: str, clause: str, thing: str, request: Request) -> tuple[str
     None where that is nothing that is known.
     """
     if not thing or thing not in clause or said.split()[:1] == ["to"]:
+        return None
+    if _TOLD_OF.match(said):
         return None
     verb, own = clause[: clause.index(thing)], of_kind(said, thing, request)
     if _PREPOSITION.match(said) and _BEHIND.search(verb):

@@ -4,7 +4,7 @@ import re
 from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.errors import NotAble, UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.building import (
     BESIDE_WORDS,
@@ -34,6 +34,7 @@ _WAY: Final = re.compile(rf"^(?:{WAYS}) ")
 _TOWARDS: Final = frozenset({"to", "at", *(f"{way} to" for way in WAYS.split("|"))})
 _STAYS: Final = re.compile(r" (?:in|on|at|inside) (?!your\b)")
 """Where it is to be kept is where it is."""
+_SIDE_OF: Final = re.compile(r"(?:the |your |my )?(?:left|right|front|back|rear)(?: side)? of\b")
 _INTO: Final = frozenset({"in", "into", "inside", "inside of"})
 
 
@@ -44,6 +45,8 @@ def put(groups: Groups, request: Request) -> list[Step]:
         UnknownObject: where to is no more than a side.
     """
     moved, said, destination = split_put(groups, request)
+    if _SIDE_OF.match(destination):
+        raise NotAble("I can put things in, on or next to something, not to one side of it")
     if NO_THING.search(destination):
         raise UnknownObject(destination, OBJECT_CLASSES)
     bare = match_place(destination, request.world.places)

@@ -18,6 +18,11 @@ _COLOUR: Final = "|".join(COLOURS)
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("help me look$", "look for it"),
     (
+        rf"((?:the|my) (?:\w+ )?)({KIND_WORDS}) (?:goes|belongs|is to go) (in|on|into|onto) "
+        rf"([^,;.!?]+?)(?:,| and|, and) (the \w+) one (in|on|into|onto) (?=the |my )",
+        r"put \1\2 \3 \4, put \5 \2 \6 ",
+    ),
+    (
         r"(what(?:ever)?(?:'s| is| you have| you've got)) in (?:the|your) (left|right)"
         r"(?: one| arm)?(?! hand| gripper| box| bowl)\b",
         r"\1 in your \2 hand",
@@ -41,7 +46,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"\2 \1 ",
     ),
     (
-        rf"(the|that) (\w{{3,}}(?:er|est)|first|second|third|last|left(?:most)?|right(?:most)?|"
+        rf"(?<!to )(?<!on )(the|that) (\w{{3,}}(?:er|est)|first|second|third|last|left(?:most)?|right(?:most)?|"
         rf"middle)(?: one)? (?:of|out of|among) (?:the|those|these) (?:two |three |four |five )?"
         rf"({KIND_WORDS})(?:e?s)",
         r"\1 \2 \3",

@@ -24,6 +24,8 @@ _WORDS: Final = (
     r"if|unless|whenever",
     # somebody else's words
     r"said|says|told|tells|asked|asks|shout(?:s|ed)|wrote|quote|words|she goes|he goes|song|"
+    r"thinks|thought|claims|claimed|believes|insists|reckons|i (?:read|saw|heard)(?! (?:a|the)\b)|"
+    r"where (?:it is|they are)$|"
     r"always going",
 )
 _UNSAYS: Final = re.compile(

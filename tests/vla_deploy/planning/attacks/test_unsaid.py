@@ -26,6 +26,16 @@ SENTENCES = (
     "if it rains, take the ball to the kitchen",
     "pretend I am a guest, take the ball to the kitchen",
     "the film says, put the ball in the box",
+    "forget to bring me the cup",
+    "pretend to bring me the cup",
+    "you might have taken the phone to the bedroom",
+    "you could have brought me the cup",
+    "the keys belong in the box, he thinks",
+    "the phone goes to the bedroom, my wife claims",
+    "books go in the box, I read",
+    "go to the kitchen, said my wife, so I did",
+    "come here boy, good dog, sit",
+    "keep your eye on the ball, son",
 )
 
 

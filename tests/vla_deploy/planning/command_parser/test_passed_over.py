@@ -20,6 +20,9 @@ WAIT: Step = {"do": "wait"}
     [
         ("pick up the ball rather than the cup", PICK),
         ("know wait", WAIT),
+        ("forget to bring me the cup", BRING),
+        ("you might have brought me the cup", BRING),
+        ("go to the kitchen said my wife", GO),
         ("go anywhere but the kitchen", GO),
         ("everything except the cup goes in the box", PUT),
         ("put the cup somewhere other than the box", PUT),
@@ -102,6 +105,9 @@ def test_what_only_asks_nicely_passes(said: str, step: Step) -> None:
         ("the cup was put in the box", PUT),
         ("pick up the cup son", PICK),
         ("go to the kitchen good dog", GO),
+        ("go to the table with the cup", PICK),
+        ("drive half a metre to the left", FORWARD),
+        ("turn all the way around to the left", LEFT),
     ],
 )
 def test_what_may_tell_of_it_is_asked(said: str, step: Step) -> None:

@@ -220,6 +220,7 @@ def test_a_command_does_what_it_says(does: Does, text: str, expected: str) -> No
         ("no, the blue one", NotUnderstood),
         ("pick up the red cup, no wait", NotUnderstood),
         ("go there", Ambiguous),
+        ("put the can to the left of the keys", NotAble),
         ("repeat forever turn left", NotUnderstood),
     ],
 )
