@@ -46,8 +46,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
         r"\2 \1 ",
     ),
     (
-        rf"(?<!to )(?<!on )(the|that) (\w{{3,}}(?:er|est)|first|second|third|last|left(?:most)?|right(?:most)?|"
-        rf"middle)(?: one)? (?:of|out of|among) (?:the|those|these) (?:two |three |four |five )?"
+        rf"(?<!to )(?<!on )(the|that) (\w{{3,}}(?:er|est)|first|second|third|last|left(?:most)?|"
+        rf"right(?:most)?|middle)(?: one)? (?:of|out of|among) (?:the|those|these) (?:two |three |four |five )?"
         rf"({KIND_WORDS})(?:e?s)",
         r"\1 \2 \3",
     ),
