@@ -47,7 +47,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     ),
     (
         rf"(?<!to )(?<!on )(the|that) (\w{{3,}}(?:er|est)|first|second|third|last|left(?:most)?|"
-        rf"right(?:most)?|middle)(?: one)? (?:of|out of|among) (?:the|those|these) (?:two |three |four |five )?"
+        rf"right(?:most)?|middle)(?: one)? (?:of|out of|among) (?:the|those|these) "
+        rf"(?:two |three |four |five )?"
         rf"({KIND_WORDS})(?:e?s)",
         r"\1 \2 \3",
     ),
