@@ -21,7 +21,7 @@ from vla_deploy.planning.rules.clauses import (
     repaired,
     segments,
 )
-from vla_deploy.planning.rules.exchanging import continued, corrected
+from vla_deploy.planning.rules.exchanging import continued, corrected, tells_of_another
 from vla_deploy.planning.rules.fits import HANDS, Fit, fit_of, is_whole, known_fit, names_hand
 from vla_deploy.planning.rules.intents import PRIORITIES, Intent
 from vla_deploy.planning.rules.ordering import in_order
@@ -101,7 +101,7 @@ def _take_clause(parts: Sequence[str], draft: _Draft) -> int:
     """Build the longest clause that the parts begin with; return how many parts it took."""
     for count in range(len(parts), 1, -1):
         clause = " and ".join(parts[:count])
-        if len(HANDS.findall(clause)) > 1:
+        if len(HANDS.findall(clause)) > 1 or any(map(tells_of_another, parts[1:count])):
             continue
         fit = fit_of(clause, draft.request)
         if fit is not None and is_whole(fit, draft.request):

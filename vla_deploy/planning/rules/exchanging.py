@@ -39,7 +39,7 @@ def continued(said: str, clause: str, thing: str, request: Request) -> tuple[str
     """
     if not thing or thing not in clause or said.split()[:1] == ["to"]:
         return None
-    if _TOLD_OF.match(said):
+    if tells_of_another(said):
         return None
     verb, own = clause[: clause.index(thing)], of_kind(said, thing, request)
     if _PREPOSITION.match(said) and _BEHIND.search(verb):
@@ -52,6 +52,11 @@ def continued(said: str, clause: str, thing: str, request: Request) -> tuple[str
     # "Take the cup to the table, and the ball" takes the ball to the table, too.
     full = [one for one in found if one[1].groups.keys() >= said_before]
     return next(iter(full or found), None)
+
+
+def tells_of_another(part: str) -> bool:
+    """Tell whether a part tells of another thing: "the purple one I need here"."""
+    return _TOLD_OF.match(part) is not None
 
 
 def corrected(said: str, clause: str, request: Request) -> str:

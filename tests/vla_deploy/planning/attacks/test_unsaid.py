@@ -48,6 +48,21 @@ def test_it_does_not_move_at_once(sentence: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "sentence",
+    [
+        "bring me the rightmost book, the purple one I have read",
+        "bring me the red book, the green one my sister gave me",
+        "take the red book to the bedroom, the purple one I need here",
+    ],
+)
+def test_another_thing_that_is_told_of_is_not_taken_at_once(sentence: str) -> None:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["row"].world(home()))
+        answer = desk.say(sentence)[1]
+    assert answer.outcome != "plan", answer
+
+
+@pytest.mark.parametrize(
     "answer",
     [
         "avoid the red",
