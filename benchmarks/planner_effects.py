@@ -178,13 +178,12 @@ def _must_be_near(world: World, thing: Thing) -> None:
 
 def _give(world: World, given: Parameters) -> None:
     """Let the person take what is held, who stands before the robot."""
-    full = [hand for hand in _hands(given) if world.held_in(hand) is not None]
-    if len(full) != 1:
-        raise ActionFails(f"{len(full)} hands hold something, expected one that it is taken from")
-    held = world.held_in(full[0])
-    if held is not None:
-        world.things[held.thing_id] = replace(held, held_by="", rests=("with", "speaker"))
-    world.open_hands[full[0]] = True
+    held = [thing for hand in _hands(given) if (thing := world.held_in(hand)) is not None]
+    if len(held) != 1:
+        raise ActionFails(f"{len(held)} hands hold something, expected one that it is taken from")
+    (given_away,) = held
+    world.open_hands[given_away.held_by] = True
+    world.things[given_away.thing_id] = replace(given_away, held_by="", rests=("with", "speaker"))
 
 
 def _open(world: World, given: Parameters) -> None:

@@ -157,28 +157,28 @@ _RULES: Final = (
     *(_Rule(step, why, re.compile(one)) for step, why, one in _SAID_OF),
 )
 
-
 _MAY_STAND_BEFORE: Final = frozenset({_TELLS, _WHEN, _ELSE})
-# The same of some steps alone: "go to the table with the keys", "drive a metre to the left".
+# What is read back of some steps alone: "go to the table with the keys", "drive to the left".
 _ASKED_OF: Final = (
     ("put", rf"{_BEGIN}(?:go|drive|head|roll|come)\b.*\bwith\b"),
     ("pick", rf"{_BEGIN}(?:go|drive|head|roll|come)\b.*\bwith\b"),
     ("move", r"\bto (?:the|your|my) (?:left|right)\b"),
     ("turn", r"\b(?:all the way|complete(?:ly)?|whole|full|circle)\b"),
 )
-_DOUBTS: Final = re.compile("|".join(_ASKED))
-
-_OF_STEPS: Final = tuple(_Rule(step, "", re.compile(said)) for step, said in _ASKED_OF)
+_DOUBTS: Final = (
+    *(_Rule("", "", re.compile(one)) for one in _ASKED),
+    *(_Rule(step, "", re.compile(one)) for step, one in _ASKED_OF),
+    *(rule for rule in _RULES if rule.why in _MAY_STAND_BEFORE),
+)
 
 
 def is_doubtful(steps: Sequence[Step], command: Sequence[str]) -> bool:
     """Tell whether an answer that moves something passes over what may tell of it instead."""
-    rest, named = _rest(steps, command), {step["do"] for step in steps}
-    return any(step["do"] not in _HARMLESS for step in steps) and (
-        _DOUBTS.search(rest) is not None
-        or any(rule.said.search(rest) for rule in _RULES if rule.why in _MAY_STAND_BEFORE)
-        or any(rule.said.search(rest) for rule in _OF_STEPS if rule.step in named)
-    )
+    named = {step["do"] for step in steps}
+    if named <= _HARMLESS:
+        return False
+    rest = _rest(steps, command)
+    return any(rule.said.search(rest) for rule in _DOUBTS if rule.step in ("", *named))
 
 
 def refuse_passed_over(steps: Sequence[Step], command: Sequence[str]) -> None:

@@ -12,7 +12,6 @@ from typing import Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.amounts import METRES, RADIANS, SECONDS
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.command_parser.lending import kind_lent
 from vla_deploy.planning.command_parser.spoken import Spoken
 from vla_deploy.planning.errors import CannotBeDone, Declined, UnknownPlace
 from vla_deploy.planning.plan import Action
@@ -109,9 +108,8 @@ def _put_down(groups: building.Groups, _: Request) -> list[Skill]:
 
 def _bring(spoken: Spoken, step: Step) -> list[Skill]:
     way, behind = spoken.source(step)
-    parts = building.parts_of(kind_lent(spoken.spoken(step, "what")).partition(" from ")[0])
     brought: list[Skill] = []
-    for part in parts:
+    for part in spoken.parts(step):
         picked, *back = building.bring({"object": part}, spoken.request)
         brought += [*way, (picked[0], {"object": part + behind}), *_delivered(spoken, step, back)]
     return brought

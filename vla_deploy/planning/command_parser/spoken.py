@@ -62,8 +62,12 @@ class Spoken:
     def things(self, step: Step) -> str:
         """Return what a step is about, each thing with where it is to be taken from."""
         _, behind = self.source(step)
+        return " and ".join(part + behind for part in self.parts(step))
+
+    def parts(self, step: Step) -> list[str]:
+        """Return each thing that a step is about, without where it is to be taken from."""
         spoken, _, _ = kind_lent(self.spoken(step, "what")).partition(" from ")
-        return " and ".join(part + behind for part in building.parts_of(spoken))
+        return building.parts_of(spoken)
 
     def _where_from(self, step: Step) -> str:
         """Return "the kitchen" of "the cup from the kitchen", or of a field of its own."""

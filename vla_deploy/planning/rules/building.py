@@ -58,6 +58,11 @@ def parts_of(text: str) -> list[str]:
     return [part for part in _AND.split(text) if part]
 
 
+def held_kinds(request: Request) -> list[str]:
+    """Return the kind of what each full hand holds."""
+    return [kind for kind in request.world.holding.values() if kind]
+
+
 def go(groups: Groups, request: Request) -> list[Step]:
     """Drive to each place or thing in turn; "near the box" is where the box can be reached."""
     named = (_NEAR.sub("", part) for part in parts_of(groups["place"]))

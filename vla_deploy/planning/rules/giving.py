@@ -10,7 +10,7 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import ARMS
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
 from vla_deploy.planning.rules import building, placing
-from vla_deploy.planning.rules.building import Groups, Step, arm_in, parts_of
+from vla_deploy.planning.rules.building import Groups, Step, arm_in, held_kinds, parts_of
 from vla_deploy.planning.rules.intents import Intent
 from vla_deploy.planning.rules.lending import kinds_told
 from vla_deploy.planning.rules.pattern_parts import OBJECT, Row
@@ -58,9 +58,8 @@ def let_go(groups: Groups, request: Request) -> list[Step]:
 
 def change_hands(groups: Groups, request: Request) -> list[Step]:
     """Put down what one hand holds, and take it with the other: in the air it might fall."""
-    full = [hand for hand, kind in request.world.holding.items() if kind]
-    free = [hand for hand in request.world.holding if hand not in full]
-    arm = groups["hand"] if groups["hand"] in ARMS else next(iter(free), "")
+    free = (hand for hand, kind in request.world.holding.items() if not kind)
+    arm = groups["hand"] if groups["hand"] in ARMS else next(free, "")
     if not arm or not _is_in_hand(groups["object"], request):
         raise NotUnderstood(request.text)
     thing = {"object": groups["object"]}
@@ -69,22 +68,18 @@ def change_hands(groups: Groups, request: Request) -> list[Step]:
 
 def _named(said: str, request: Request) -> dict[str, str]:
     """Return what tells which thing is given; with nothing else about, its name tells no more."""
-    return {} if len(_held(request)) == 1 and not _others(request) else {"object": said}
+    return {} if len(held_kinds(request)) == 1 and not _others(request) else {"object": said}
 
 
 def _others(request: Request) -> set[str]:
     """Return the kinds of things that a command names and no hand holds."""
-    return kinds_told([_CAN.sub("", request.text.lower())]) - {*_held(request)}
-
-
-def _held(request: Request) -> list[str]:
-    return [kind for kind in request.world.holding.values() if kind]
+    return kinds_told([_CAN.sub("", request.text.lower())]) - {*held_kinds(request)}
 
 
 def _is_in_hand(text: str, request: Request) -> bool:
     """Tell whether a text means something that is held, before anything else is done."""
     if PRONOUNS.get(text) == IT:
-        return bool(_held(request)) and not _others(request)
+        return bool(held_kinds(request)) and not _others(request)
     setting = Setting(request)
     try:
         read = read_expression(text, setting.furniture)
@@ -94,7 +89,7 @@ def _is_in_hand(text: str, request: Request) -> bool:
     if read.pronoun == HELD:
         return any(kind for hand, kind in request.world.holding.items() if read.hand in ("", hand))
     if _is_plain(read):
-        return read.query.kind in _held(request) or any(one.held_by for one in found)
+        return read.query.kind in held_kinds(request) or any(one.held_by for one in found)
     return bool(found) and read.scope is Scope.ONE and all(one.held_by for one in found)
 
 

@@ -14,6 +14,7 @@ from vla_deploy.planning.rules.building import (
     Step,
     arm_in,
     bring,
+    held_kinds,
     is_seen,
     parts_of,
     pick,
@@ -92,8 +93,7 @@ def put_down(groups: Groups, request: Request) -> list[Step]:
     said = groups.get("object", "it")
     if said in ("everything", "all", "both", "both of them"):
         said = "everything you are holding"
-    held = [kind for kind in request.world.holding.values() if kind]
-    named = {"object": said} if len(held) > 1 or PRONOUNS.get(said) != IT else {}
+    named = {"object": said} if len(held_kinds(request)) > 1 or PRONOUNS.get(said) != IT else {}
     return [("place", {**named, **arm_in(groups)})]
 
 
