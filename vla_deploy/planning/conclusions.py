@@ -8,6 +8,7 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.dialogue import Dialogue
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
+from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.gist_rung import GistRung
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
@@ -126,6 +127,8 @@ _BY_RULES: Final = frozenset({RulesRung.name, GistRung.name})
 
 
 def _in_full(plan: Plan, answer: Answer) -> str:
-    """Return the words that rules have put in the place of a command; others sum it up freely."""
-    proposal = answer.proposal
-    return plan.goal if proposal is not None and proposal.rung in _BY_RULES else ""
+    """Return the words that stand for a command, as rules read them; a model sums it up freely."""
+    rung = answer.proposal.rung if answer.proposal is not None else ""
+    if rung == COMMAND_PARSER:
+        return plan.summary
+    return plan.goal if rung in _BY_RULES else ""

@@ -223,7 +223,9 @@ class Desk:
     def _is_answer(self, command: Command, waiting: Waiting) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
         said = self.dialogue.read(command.text)
-        if command.plan is None and said.verdict is not Verdict.ANEW:
+        full = described(waiting.question, command.text)
+        is_reply = command.plan is None and said.verdict is not Verdict.ANEW
+        if is_reply and not (full and said.verdict is Verdict.UNCLEAR):
             self._telling.answered(command, waiting.command)
             self._go_on(waiting, said)
         elif waiting.is_open and not self._is_command(command):
@@ -232,7 +234,7 @@ class Desk:
         elif plan := corrected_by(waiting.plan, command.text):
             self._telling.answered(command, waiting.command)
             self._correct(waiting, plan)
-        elif full := described(waiting.question, command.text):
+        elif full:
             self._telling.answered(command, waiting.command)
             self.dialogue.settle()
             self._queue.appendleft(replace(waiting.command, text=full))

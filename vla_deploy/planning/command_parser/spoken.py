@@ -55,6 +55,9 @@ class Spoken:
         world = self._request.world
         place = match_place(where, world.places)
         if place is not None and not is_surface(place, world):
+            there = f" in {where}"
+            if self._is_seen(step, there):
+                return [], there
             return [("navigate_to", {"place": place})], ""
         kinds = {SYNONYMS.get(word, word) for word in where.split()}
         return [], f" {'in' if kinds & CONTAINERS else 'on'} {where}"
@@ -68,6 +71,11 @@ class Spoken:
         """Return each thing that a step is about, without where it is to be taken from."""
         spoken, _, _ = kind_lent(self.spoken(step, "what")).partition(" from ")
         return building.parts_of(spoken)
+
+    def _is_seen(self, step: Step, there: str) -> bool:
+        """Tell whether each thing of a step is known to be at a place."""
+        parts = self.parts(step) if "what" in step else []
+        return bool(parts) and all(building.is_seen(one + there, self._request) for one in parts)
 
     def _where_from(self, step: Step) -> str:
         """Return "the kitchen" of "the cup from the kitchen", or of a field of its own."""

@@ -16,9 +16,16 @@ from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.clauses import polite_off
 from vla_deploy.planning.understanding.expressions import Expression, read_expression
-from vla_deploy.planning.understanding.phrases import ORDINALS
+from vla_deploy.planning.understanding.phrases import HELD, ORDINALS
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world.vocabulary import ANY_CLASS, ARTICLES, KIND_WORDS, OBJECT_CLASSES, SYNONYMS
+from vla_deploy.world.vocabulary import (
+    ANY_CLASS,
+    ARTICLES,
+    COLOURS,
+    KIND_WORDS,
+    OBJECT_CLASSES,
+    SYNONYMS,
+)
 
 _COMMA: Final = re.compile(r"\s*(?:[,;:]|\s[-\u2013\u2014]+\s|[.!?](?=\s))\s*")
 _ABOUT: Final = re.compile(r"^(?:as for|concerning|regarding|you see) (?=\w)")
@@ -31,12 +38,19 @@ _NOT: Final = re.compile(
     r"(?:(?:but |just |only )?not|(?:any(?:thing)? )?(?:but|except|other than)) "
     r"(?P<not>(?:the|that|those|these) .+)"
 )
+_OR: Final = re.compile(r" (?:or|nor) (?:not )?")
+_COLOURED: Final = re.compile(rf"(?:the|that) (?:{'|'.join(COLOURS)})$")
 _OTHER: Final = re.compile(r"(?:but )?(?:rather )?(?:the|that) other(?: one)?")
 # "It", where it is no word before another thing: "that one", but not "that cup".
 _PRONOUN: Final = re.compile(
     r"\b(?:it|them both|them all|both of them|them|both|that one|this one|those|these|that|this)\b"
     r"(?=$|[.!?]| (?:up|down|in|into|inside|on|onto|to|over|away|here|back|for|with|from|out|off|"
     r"please|now|there)\b)"
+)
+# "The black one, you put on the table."
+_YOU_DO: Final = re.compile(
+    r"^you (?:can |should |must |have to |need to )?(?P<do>put|take|bring|leave|place|set) "
+    r"(?=(?:on|in|to|onto|into|next|away|down|up|back|over)\b)"
 )
 _IN_THERE: Final = re.compile(r"\b(?:in|into|inside) there\b")
 _THERE: Final = re.compile(r"\b(?:over )?there\b(?=$|[.!?]| please\b)")
@@ -84,7 +98,8 @@ def _left_out(pieces: Pieces, request: Request) -> Pieces:
     """
     for at in range(1, len(pieces)):
         found = _NOT.fullmatch(polite_off(pieces[at]))
-        read = _read(found["not"], request) if found else None
+        others = _each_one(found["not"]) if found else ""
+        read = _read(others.partition(" or ")[0], request) if found else None
         end = _end_of_noun(read, pieces[at - 1]) if read else None
         if found is None or end is None:
             continue
@@ -93,9 +108,14 @@ def _left_out(pieces: Pieces, request: Request) -> Pieces:
             pieces = _without(at + 1, pieces)
         elif _is_thing(following, request):
             return _without(at, _with(at + 1, f"i mean {following}", pieces))
-        told = _behind(pieces[at - 1], end, f"but not {found['not']}")
+        told = _behind(pieces[at - 1], end, f"but not {others}")
         return _without(at, _with(at - 1, told, pieces))
     return pieces
+
+
+def _each_one(others: str) -> str:
+    """Return "the red one or the purple one" for "the red or the purple one"."""
+    return " or ".join(_COLOURED.sub(r"\g<0> one", one) for one in _OR.split(others))
 
 
 def _named_twice(pieces: Pieces, request: Request) -> Pieces:
@@ -133,6 +153,7 @@ def _topic(pieces: Pieces, request: Request) -> Pieces:
     if not count:
         return pieces
     topic, rest = " and ".join(map(_told_from_place, about[:count])), pieces[count]
+    rest = _YOU_DO.sub(r"\g<do> it ", rest)
     for pattern, before in ((_IN_THERE, "in "), (_PRONOUN, ""), (_THERE, "to ")):
         found = pattern.search(rest)
         # "Take the ball and put it away": "it" is the ball.
@@ -181,8 +202,9 @@ def _is_one_thing(text: str, request: Request) -> bool:
     if match_place(text, request.world.places):
         return True
     read = _read(text, request)
-    is_named = read is not None and (read.query.is_named or text.split()[0] in ARTICLES)
-    return is_named and read is not None and not read.pronoun
+    if read is None or read.pronoun:
+        return read is not None and read.pronoun == HELD
+    return read.query.is_named or text.split()[0] in ARTICLES
 
 
 def _read(text: str, request: Request) -> Expression | None:

@@ -127,7 +127,7 @@ _COURTESY: Final = re.compile(
 _OPENING: Final = re.compile(r"right(?: then)?|look")
 # Before these the speaker has changed his mind about what he has just said.
 _REPAIR: Final = re.compile(
-    r"(?:no,? wait|wait,? no|oh no|no|sorry|i (?:mean|meant|said)|or rather|rather|"
+    r"(?:no,? wait|wait,? no|(?:oh|ah|um|er|well),? no|no|sorry|i (?:mean|meant|said)|or rather|rather|"
     r"actually(?:,? no)?|correction|make (?:that|it)|that is)\b"
 )
 

@@ -28,6 +28,7 @@ from vla_deploy.planning.rules.ordering import in_order
 from vla_deploy.planning.rules.pointing_back import pointing_alone
 from vla_deploy.planning.rules.recalling import is_again, last_words, leans, recalled, same_with
 from vla_deploy.planning.rules.refusals import refuse_unable
+from vla_deploy.planning.rules.second_thoughts import outright, thought_again
 from vla_deploy.planning.rules.statements import begins_with_statement, statements_off
 from vla_deploy.planning.understanding.conversation import Conversation
 from vla_deploy.planning.understanding.phrases import PRONOUNS
@@ -74,7 +75,11 @@ def draft_plan(request: Request) -> Plan:
     """
     if len(request.text) > MOST_LETTERS:
         raise NotUnderstood(f"{request.text[:60]}...")
-    full = recalled(pointing_alone(courtesy_off(request.text), request), request)
+    said = courtesy_off(request.text)
+    meant = thought_again(said)
+    full = recalled(pointing_alone(meant, request), request)
+    if full is None and meant != said:
+        full = meant
     draft = _drafted(request if full is None else replace(request, text=full))
     goal = ", then ".join(draft.said) if draft.is_short else draft.request.text.strip()
     return Plan(goal=goal, summary=_summary(draft.steps), actions=_chain(draft.steps))
@@ -184,6 +189,7 @@ def _take_back(parts: Sequence[str], draft: _Draft) -> int:
         said = part if instead is None else instead
         if said:
             break
+    said = outright(said)
     if not said:
         raise NotUnderstood(parts[0])
     if not draft.clause:

@@ -11,6 +11,7 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("gimme", "give me"),
     (r"(i|he|she|they)(?:'ve|'s| have| has) (?:gone|been) and ", r"\1 have "),
     ("lemme have", "give me"),
+    (r"(?<=[a-z] )(?:only|just) (?=(?:the|my|that|those|these)\b)", ""),
     ("wanna", "want to"),
     ("gotta", "have to"),
     ("gonna", "going to"),

@@ -108,10 +108,10 @@ _ROWS: Final[tuple[Row, ...]] = (
      placing.put_into_that),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay|take|bring|return|carry|leave) {OBJECT} "
      r"(?:back )?(?:to )?where (?:it|they|that|you) (?:(?:was|were|came from|belongs?|had been)"
-     r"(?: before)?|(?:found|got|took|had) (?:it|them)(?: from)?)", returning.put_back),
+     r"(?: (?:before|earlier))?|(?:found|got|took|had) (?:it|them)(?: from)?)", returning.put_back),
     (Intent.MANIPULATION, rf"(?:put|set|place|lay) back {OBJECT} {INTO} (?P<destination>.+)",
      placing.put),
-    (Intent.MANIPULATION, rf"(?:put|set|place|lay) {OBJECT} back(?: again)?|"
+    (Intent.MANIPULATION, rf"(?:put|set|place|lay|take) {OBJECT} back(?: again)?|"
      r"(?:put|set|place|lay) back (?P<object2>.+)", returning.put_back),
     (Intent.MANIPULATION, rf"(?:put|set|lay|place) {OBJECT} (?:back )?down|"
      r"(?:put|set|lay|place|pop) down (?P<object2>.+?)",

@@ -7,13 +7,14 @@ from vla_deploy.planning.understanding.answers import WORD
 from vla_deploy.planning.understanding.conversation import Question
 
 _WHERE: Final = re.compile(
-    r"(?:(?:no|yes|well|um|uh|oh|ah|sorry|pet|love|dear|mate|i (?:mean|meant|want|said)|it(?:'s| "
-    r"is)|take|make it|use) )*"
-    r"(?:the|that) (?:one|(?P<noun>[a-z]+)) (?:(?:that|which)(?:'s| is) )?(?P<where>(?:right )?"
+    r"(?:(?:no|yes|well|um|uh|oh|ah|sorry|pet|love|dear|mate|good question|i (?:mean|meant|want|said)|"
+    r"it(?:'s| is)|take|make it|use) )*"
+    r"(?:the|that) (?P<which>[a-z]+ )??(?:one|(?P<noun>[a-z]+)) (?:(?:that|which)(?:'s| is) )?"
+    r"(?P<where>(?:(?:right|just) )?(?:(?:up|over|down) )?"
     r"(?:next to|close to|beside|behind|in front of|near|nearer to|closer to|nearest(?: to)?|"
     r"closest to|by|between|"
     r"under|beneath|on top of|left of|right of|to the (?:left|right) of|opposite|inside|in|on)"
-    r" .+?)(?:,? (?:please|then|thanks|thank you|i think|i guess))*"
+    r" .+?)(?: (?:please|then|thanks|thank you|i think|i guess)| so (?:that )?(?:i|we) can .*)*"
 )
 
 
@@ -32,5 +33,6 @@ def described(question: Question, text: str) -> str | None:
     named = list(re.finditer(rf"\b{re.escape(expression)}\b", command, re.IGNORECASE))
     if len(named) != 1:
         return None
-    end = named[0].end()
-    return f"{command[:end]} {found['where']}{command[end:]}"
+    start, end = named[0].span()
+    which = found["which"] or ""
+    return f"{command[:start]}{which}{command[start:end]} {found['where']}{command[end:]}"

@@ -99,7 +99,7 @@ _FROM: Final = ((re.compile(r"\b(?:from|off(?: of)?) (?!me\b)"), "on "),
 _IN_HAND: Final = re.compile(
     r"(?:what|whatever|the thing|the one|the object|everything)(?: that)?"
     r"(?: you (?:(?:are|re) (?:holding|carrying)|hold|have|have got|ve|ve got|got|carry)"
-    r"(?: in your(?: (?P<hand2>left|right))? hands?)?"
+    r"(?: in (?:your|the)(?: (?P<hand2>left|right))? hands?)?"
     r"|(?: is|s| you have)? in (?:your|the) (?:(?P<hand>left|right) )?hands?)"
 )
 _WHERE_IT_IS: Final = re.compile(r"^where (.+) (?:is|are|stands?|lies?)$")
@@ -143,11 +143,12 @@ def _read(text: str, named: tuple[tuple[str, str], ...]) -> Expression | None:
     pronoun = phrases.PRONOUNS.get(said) or phrases.PRONOUNS.get(key, "")
     if pronoun:
         return Expression(said=key, query=Query(), pronoun=pronoun)
-    in_hand = _IN_HAND.fullmatch(said)
+    plainly = " ".join(_TOKEN.findall(_plain(reworded(text, furniture))))
+    in_hand = _IN_HAND.fullmatch(said) or _IN_HAND.fullmatch(plainly)
     if in_hand:
         hand = in_hand["hand"] or in_hand["hand2"] or ""
         return Expression(said=key, query=Query(), pronoun=phrases.HELD, hand=hand)
-    said, to_me = _order_by_whom(" ".join(_TOKEN.findall(_plain(reworded(text, furniture)))))
+    said, to_me = _order_by_whom(plainly)
     parts = parted(_WHERE_IT_IS.sub(r"\1", said))
     read = _description(parts, key, by_speaker or to_me, furniture)
     return None if read is None else _compared(read, parts, named)

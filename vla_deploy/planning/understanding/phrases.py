@@ -35,6 +35,7 @@ EXTREMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "biggest": "big", "largest": "big", "bigger": "big", "larger": "big",
         "smallest": "small", "littlest": "small", "tiniest": "small", "smaller": "small",
+        "littler": "small", "tinier": "small",
         "tallest": "tall", "taller": "tall",
         "shortest": "short", "shorter": "short",
         "longest": "long", "longer": "long",

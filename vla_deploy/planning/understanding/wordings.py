@@ -16,8 +16,13 @@ _COLOUR: Final = rf"(?P<colour>{'|'.join((*COLOURS, 'gray', 'violet'))})"
 # Parts that give a thing its colour; a lid or a handle may have another one.
 _HULL: Final = r"(?:cover|jacket|binding|shell|casing|skin|surface|outside)"
 _HERE: Final = r"(?:from|than|to) (?:here|where (?:you|we) (?:are|stand))"
+_YOU_HOLD: Final = (
+    r"(?:(?:is )|(?:you(?:'ve got| have got| have|'re holding| are holding| hold| are carrying) ?))?"
+)
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r",? ?\bplease\b", ""),
+    (r"\bmore (small|tall|long|short|high|low)\b", r"\1er"),
+    (r"\bmore (?:big|large)\b", "bigger"),
     (r"\b(is|are)n'?t\b", r"\1 not"),
     (r"\b(that|which|who|one)'s\b", r"\1 is"),
     (r"\b(is|are) neither (?=.+ nor )", r"\1 not "),
@@ -30,6 +35,17 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"^(?:whichever|whatever|any) (\w+) (?:that )?you (?:can )?(?:find|see|like|come across)"
      r"(?: lying| standing)?(?: (?:about|around|in) (?=the ))?", r"any \1 in "),
     (r" in $", ""),
+    (r"^(?:whichever|whatever) (?=[a-z]+ (?:that )?(?:is|isn't)\b)", "the "),
+    (r"^(the [a-z]+) (is|isn't) (?=(?:not )?(?:on|in|inside|under|next to|behind|beside)\b)",
+     r"\1 that \2 "),
+    (r"^something (?:(?:that )?is )?(?:lying |standing |sitting )?"
+     r"(?=(?:on|in|inside|under|next to|behind|beside)\b)", "the thing "),
+    # --- what a hand holds
+    (rf"^(?:the |that )?(?:{_COLOUR} )?(?:thing|one|object|item) (?:that |which )?"
+     rf"{_YOU_HOLD}(?P<hand>in (?:the|your) (?:left|right) hand)$", r"what you have \g<hand>"),
+    (rf"^(.+?)(?: that| which)? (?=you\b){_YOU_HOLD}(?:in (?:the|your) (?:(?:left|right) )?hands?)?$",
+     r"\1"),
+    (r"^(?:the |my |that )?(?!what\b)(.+?) (?:from|in) your (?:(?:left|right) )?hand$", r"the \1"),
     (r"^anything (?=but|except|other than|apart from)", "any object "),
     (rf"\bnon[- ]?{_COLOUR} (.+)", r"\2 that is not \g<colour>"),
     (rf"\b{_COLOUR}(?:[- ]colou?red| in colou?r)\b", r"\g<colour>"),
