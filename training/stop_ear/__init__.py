@@ -1,1 +1,1 @@
-"""Teach the recogniser's encoder to tell stop words by a head of its own."""
+"""Teach a copy of the recogniser's encoder to listen for stop words alone."""

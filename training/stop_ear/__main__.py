@@ -1,4 +1,4 @@
-"""Run one step, or all: python -m training.stop_head all --out /data/stop_head.
+"""Run one step, or all: python -m training.stop_ear all --out /data/stop_ear.
 
 `speak` says the clips that `training.stop_words` learns from; those that are there already stay.
 """
@@ -20,10 +20,10 @@ def main() -> None:
     # Threads that wait for each other at barriers cost more than they bring on a busy computer.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     parser = argparse.ArgumentParser(
-        prog="python -m training.stop_head",
+        prog="python -m training.stop_ear",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example: nice python -m training.stop_head all --out /data/stop_head",
+        epilog="example: nice python -m training.stop_ear all --out /data/stop_ear",
     )
     parser.add_argument("step", choices=[*STEPS, "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for clips and weights")
@@ -51,11 +51,11 @@ def _run(step: str, given: argparse.Namespace) -> None:
 
         speak(clips, given.seed, given.scale)
     elif step == "train":
-        from training.stop_head.training import train
+        from training.stop_ear.training import train
 
         train(clips, given.talk, given.recogniser, given.out, given.minutes, given.seed)
     else:
-        from training.stop_head.export import ship
+        from training.stop_ear.export import ship
 
         ship(given.out, given.recogniser)
 

@@ -1,5 +1,6 @@
 """Make batches of clips, spoilt and at times cut off, with what each state is to say."""
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,15 +29,23 @@ SETTLED_S: Final = 0.08
 """How long after its end a state is to tell it still."""
 UNSETTLED_S: Final = 0.2
 """How long around a word a state may say what it likes."""
+ROUND: Final = 16_000
+"""Clips that are drawn at a time."""
+HARD: Final = 5000
+"""As many of those that were taken for something else last come again with them."""
 Random = np.random.Generator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """Hold frames (clip, mel, time) and the class that each state is to say, or IGNORED."""
+    """Hold frames (clip, mel, time) and the class that each state is to say, or IGNORED.
+
+    `numbers` are those of the clips in their corpus.
+    """
 
     frames: Tensor
     targets: Tensor
+    numbers: tuple[int, ...]
 
 
 class Talk:
@@ -74,24 +83,31 @@ class Corpus:
         others = self._parts[1]
         talkers = [others[int(n)].wave for n in random.integers(len(others), size=TALKERS)]
         self._spoiler = Spoiler(talkers, random)
+        self._hard: deque[int] = deque(maxlen=HARD)
 
     def __len__(self) -> int:
         return len(self._places)
 
-    def batches(self) -> Iterator[Batch]:
-        """Yield all clips once, in groups of like length."""
-        lengths_s = np.array([len(part[n].samples) / RATE_HZ for part, n in self._places])
-        for group in in_groups(lengths_s, BATCH_S, self._random):
-            places = (self._places[number] for number in group)
-            yield self._batch([part[n] for part, n in places])
+    def remember(self, numbers: Sequence[int]) -> None:
+        """Let these clips come again with the next round."""
+        self._hard.extend(numbers)
 
-    def _batch(self, clips: Sequence[Said]) -> Batch:
+    def batches(self) -> Iterator[Batch]:
+        """Yield a round of clips, in groups of like length."""
+        drawn = self._random.choice(len(self), min(ROUND, len(self)), replace=False)
+        numbers = [*map(int, drawn), *self._hard]
+        clips = [part[n] for part, n in (self._places[number] for number in numbers)]
+        lengths_s = np.array([len(clip.samples) / RATE_HZ for clip in clips])
+        for group in in_groups(lengths_s, BATCH_S, self._random):
+            yield self._batch([clips[k] for k in group], tuple(numbers[k] for k in group))
+
+    def _batch(self, clips: Sequence[Said], numbers: tuple[int, ...]) -> Batch:
         hop = draw_hop(self._random)
         waves, events = zip(*map(self._spoilt, clips), strict=True)
         made = padded(framed(waves, hop, self._random), self._random)
         count, state_s = made.shape[2] // FRAMES_PER_STATE, FRAMES_PER_STATE * hop / RATE_HZ
         targets = np.stack([_targets(each, count, state_s) for each in events])
-        return Batch(frames=made, targets=torch.from_numpy(targets))
+        return Batch(frames=made, targets=torch.from_numpy(targets), numbers=numbers)
 
     def _spoilt(self, clip: Said) -> tuple[Wave, NDArray[np.float32]]:
         """Return one clip's sound, spoilt, and its words in seconds from its beginning."""

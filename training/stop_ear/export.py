@@ -1,28 +1,76 @@
-"""Write the head as the robot reads it, and enter it in the recogniser's manifest."""
+"""Write the ear as the robot runs it, in eight bits, and enter it in the recogniser's manifest."""
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
-import numpy as np
 import torch
+from onnxruntime.quantization import QuantType, quantize_dynamic
+from torch import Tensor, nn
 
-from training.stop_head.training import WEIGHTS
+from training.speech.network import MELS, Encoder
+from training.stop_ear.network import SIZE, StopEar
+from training.stop_ear.training import WEIGHTS
 from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import ModelFile
 from vla_deploy.inference.manifest_file import read_manifest, write_manifest
-from vla_deploy.speech.stop_head import FILE, TENSORS
+from vla_deploy.speech.stop_ear import FILE, FRAMES, SCORES
+
+OPSET: Final = 17
+LONGEST_STATES: Final = 800
+"""Of 40 ms: more than a phrase may last, and half as many places as the encoder has."""
+
+
+class _Scores(nn.Module):
+    def __init__(self, ear: StopEar) -> None:
+        super().__init__()
+        self.ear = ear
+
+    def forward(self, frames: Tensor) -> Tensor:
+        return torch.softmax(self.ear(frames), dim=2)
 
 
 def ship(out: Path, recogniser: Path) -> None:
-    """Put the head that was learnt beside the recogniser that it was learnt for.
+    """Put the ear that was learnt beside the recogniser whose frames it hears.
 
     Raises:
         FileNotFoundError: nothing was learnt yet.
         ManifestInvalid: there is no recogniser.
     """
-    weights = torch.load(out / WEIGHTS, weights_only=True)
     path, manifest = recogniser / FILE, read_manifest(recogniser)
-    np.savez(path, **{name: weights[name].numpy().astype(np.float32) for name in TENSORS})
+    export(learnt(out), path)
     others = (part for part in manifest.parts if part.path != FILE)
     parts = (*others, ModelFile(path=FILE, sha256=sha256_of(path)))
     write_manifest(recogniser, replace(manifest, parts=parts))
+
+
+def learnt(out: Path) -> StopEar:
+    """Return the ear with the weights of a training.
+
+    Raises:
+        FileNotFoundError: nothing was learnt yet.
+    """
+    ear = StopEar(Encoder(SIZE))
+    ear.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
+    return ear.eval()
+
+
+def export(ear: StopEar, path: Path) -> None:
+    """Write an ear as ONNX: weights of eight bits, all else of 32."""
+    places = ear.encoder.embed_positions
+    places.weight = nn.Parameter(places.weight[:LONGEST_STATES].clone(), requires_grad=False)
+    whole = path.with_suffix(".fp32")
+    torch.onnx.export(
+        _Scores(ear),
+        (torch.zeros(1, MELS, 120),),
+        str(whole),
+        input_names=[FRAMES],
+        output_names=[SCORES],
+        dynamic_axes={FRAMES: {2: "frame"}, SCORES: {1: "time"}},
+        opset_version=OPSET,
+        dynamo=False,
+    )
+    quantize_dynamic(
+        whole, path, op_types_to_quantize=["MatMul"], per_channel=True, weight_type=QuantType.QInt8
+    )
+    whole.unlink()

@@ -1,4 +1,4 @@
-"""Teach the head by the clock; the encoder stays as it was shipped."""
+"""Teach the ear by the clock; what it takes for something else comes again soon."""
 
 import logging
 import time
@@ -11,64 +11,73 @@ from torch import Tensor
 from torch.nn import functional
 
 from training.speech.network import Encoder
-from training.speech.sizes import SIZES, Size
 from training.speech.warm_start import NotReadable, weights_of
-from training.stop_head.batches import IGNORED, Batch, Corpus
-from training.stop_head.network import StopHead
+from training.stop_ear.batches import IGNORED, Batch, Corpus
+from training.stop_ear.network import SIZE, StopEar
 
-WEIGHTS: Final = "stop_head.pt"
+WEIGHTS: Final = "stop_ear.pt"
 ENCODER: Final = "encoder."
-RATE: Final = 2e-3
+RATE: Final = 4e-4
 DECAY: Final = 0.02
-WARM_STEPS: Final = 100
+MAX_GRADIENT: Final = 1.0
+WARM_STEPS: Final = 200
 WORD_WEIGHT: Final = 3.0
 """Of a state that tells a word, against one that tells none: there are fifty times as many."""
+WRONG: Final = 1.0
+"""The loss of the worst state of a clip from which on it comes again."""
 TELL_EVERY_STEPS: Final = 50
+SAVE_EVERY_STEPS: Final = 500
 _LOG = logging.getLogger(__name__)
 
 
 def train(
     clips: Path, talk: Path | None, recogniser: Path, out: Path, minutes: float, seed: int
 ) -> None:
-    """Learn for that long from the clips, and write the head's weights.
+    """Learn for that long from the clips, and write the weights.
 
     `talk` are clips that the recogniser has learnt from. Where weights are already, it goes on from
-    them.
+    them, else from the recogniser's.
 
     Raises:
         FileNotFoundError: there are no clips.
         NotReadable: the folder `recogniser` is none that `training.speech` made.
     """
     torch.manual_seed(seed)
+    torch.set_num_threads(1)
+    out.mkdir(parents=True, exist_ok=True)
     corpus = Corpus(clips, talk, np.random.default_rng([seed, 1]))
-    encoder, head = encoder_of(recogniser, SIZES["full"]), StopHead(SIZES["full"].width)
+    ear = StopEar(encoder_of(recogniser)).train()
     if (out / WEIGHTS).exists():
-        head.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
-    optimiser = torch.optim.AdamW(head.parameters(), weight_decay=DECAY)
-    began_s, steps, progress = time.monotonic(), 0, 0.0
+        ear.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
+    learnt = [values for values in ear.parameters() if values.requires_grad]
+    optimiser = torch.optim.AdamW(learnt, weight_decay=DECAY)
+    began_s, steps, progress, told = time.monotonic(), 0, 0.0, np.zeros(2)
     while progress < 1.0:
         for batch in corpus.batches():
             progress = (time.monotonic() - began_s) / (60.0 * minutes)
             if progress >= 1.0:
                 break
-            rise = min(1.0, (steps + 1) / WARM_STEPS)
             for group in optimiser.param_groups:
-                group["lr"] = RATE * rise * 0.5 * (1.0 + np.cos(np.pi * progress))
-            loss = _step(encoder, head, optimiser, batch)
-            steps += 1
+                group["lr"] = _rate(steps, progress)
+            loss, wrong = _step(ear, optimiser, batch)
+            corpus.remember(wrong)
+            steps, told = steps + 1, told + np.array((loss, len(wrong) / len(batch.numbers)))
             if steps % TELL_EVERY_STEPS == 0:
-                _LOG.info("step %d, %.3f: loss %.4f", steps, progress, loss)
-    out.mkdir(parents=True, exist_ok=True)
-    torch.save(head.state_dict(), out / WEIGHTS)
+                mean = told / TELL_EVERY_STEPS
+                _LOG.info("step %d, %.3f: loss %.4f, wrong %.3f", steps, progress, *mean)
+                told[:] = 0.0
+            if steps % SAVE_EVERY_STEPS == 0:
+                torch.save(ear.state_dict(), out / WEIGHTS)
+    torch.save(ear.state_dict(), out / WEIGHTS)
 
 
-def encoder_of(folder: Path, size: Size) -> Encoder:
+def encoder_of(folder: Path) -> Encoder:
     """Return the encoder of a shipped recogniser.
 
     Raises:
         NotReadable: its weights are of another size, or none.
     """
-    path, encoder = folder / "model.bin", Encoder(size)
+    path, encoder = folder / "model.bin", Encoder(SIZE)
     values = {
         name.removeprefix(ENCODER): torch.from_numpy(rows)
         for name, rows in weights_of(path).items()
@@ -77,24 +86,31 @@ def encoder_of(folder: Path, size: Size) -> Encoder:
     missing, unknown = encoder.load_state_dict(values, strict=False)
     if unknown or set(missing) - {"embed_positions.weight"}:
         raise NotReadable(f"{path}: missing {missing}, unknown {unknown}; is it of this size?")
-    return encoder.eval()
+    return encoder
 
 
-def _step(
-    encoder: Encoder, head: StopHead, optimiser: torch.optim.Optimizer, batch: Batch
-) -> float:
-    with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
-        states = encoder(batch.frames).float()
-    loss = _loss(head(states), batch.targets)
+def _rate(steps: int, progress: float) -> float:
+    """Rise over the first steps, then fall along a cosine."""
+    rise = min(1.0, (steps + 1) / WARM_STEPS)
+    return float(RATE * rise * 0.5 * (1.0 + np.cos(np.pi * progress)))
+
+
+def _step(ear: StopEar, optimiser: torch.optim.Optimizer, batch: Batch) -> tuple[float, list[int]]:
+    """Learn from a batch; return its loss, and the clips in which a state went wrong."""
+    with torch.autocast("cpu", torch.bfloat16):
+        logits = ear(batch.frames).float()
+    loss, worst = _losses(logits, batch.targets)
     optimiser.zero_grad(set_to_none=True)
     loss.backward()  # type: ignore[no-untyped-call]
+    torch.nn.utils.clip_grad_norm_(ear.parameters(), MAX_GRADIENT)
     optimiser.step()
-    return float(loss.detach())
+    return float(loss.detach()), [batch.numbers[int(k)] for k in (worst > WRONG).nonzero()]
 
 
-def _loss(logits: Tensor, targets: Tensor) -> Tensor:
-    weights = torch.full((logits.shape[2],), WORD_WEIGHT)
-    weights[0] = 1.0
-    return functional.cross_entropy(
-        logits.flatten(0, 1), targets.flatten(), weight=weights, ignore_index=IGNORED
+def _losses(logits: Tensor, targets: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the mean loss, and of each clip that of its worst state."""
+    weights = torch.where(targets > 0, WORD_WEIGHT, (targets == 0).float())
+    each = functional.cross_entropy(
+        logits.transpose(1, 2), targets, ignore_index=IGNORED, reduction="none"
     )
+    return (weights * each).sum() / weights.sum(), each.detach().amax(1)

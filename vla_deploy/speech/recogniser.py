@@ -20,7 +20,7 @@ from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import SpeechMissing
 from vla_deploy.speech.sound import RATE_HZ, Sound
-from vla_deploy.speech.stop_head import open_stop_head
+from vla_deploy.speech.stop_ear import open_stop_ear
 
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
@@ -51,7 +51,7 @@ class Alternative:
 class Reading:
     """Hold what a model read in a phrase, and what speaks for it.
 
-    `stop_surety` is how surely a stop word is in it by the head for them, nought without one.
+    `stop_surety` is how surely a stop word is in it by the ear for them, nought without one.
     `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
     `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
     as far as the model knows several. `others` is what may have been said instead, the likeliest
@@ -89,8 +89,8 @@ class Recogniser:
         self._whisper: Any = whisper
         self._clock = clock
         self._beam = beam
-        self._stop_head = open_stop_head(model)
-        whisper.keeps_states = self._stop_head is not None
+        self._stop_ear = open_stop_ear(model)
+        whisper.keeps_frames = self._stop_ear is not None
 
     def read(self, samples: Sound, hot_words: str = "") -> Reading:
         """Return what is said in a phrase of at most 29 s.
@@ -103,6 +103,7 @@ class Recogniser:
         started_ns = self._clock.now_ns()
         try:
             segments, info = self._transcribe(samples, hot_words)
+            stop_surety = self._stop_surety()
         except _model_errors() as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
@@ -118,7 +119,7 @@ class Recogniser:
             duration_s=len(samples) / RATE_HZ,
             took_s=took_ns / NS_PER_S,
             others=others_of(self._whisper.hypotheses),
-            stop_surety=self._stop_surety(),
+            stop_surety=stop_surety,
         )
 
     def document(self) -> dict[str, Any]:
@@ -139,17 +140,19 @@ class Recogniser:
         """Release the memory; closing twice is allowed."""
         if self._whisper is not None:
             self._whisper.model.unload_model()
+            if self._stop_ear is not None:
+                self._stop_ear.close()
         self._whisper = None
         self.claim.release()
 
     def _stop_surety(self) -> float:
-        head = self._stop_head
-        return max(map(head.surety, self._whisper.states), default=0.0) if head else 0.0
+        ear = self._stop_ear
+        return max(map(ear.surety, self._whisper.frames), default=0.0) if ear else 0.0
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper
         whisper.hypotheses.clear()
-        whisper.states.clear()
+        whisper.frames.clear()
         if self.declared.context == Context.TRIMMED:
             whisper.content_frames = len(samples) // whisper.feature_extractor.hop_length
         seconds = len(samples) / RATE_HZ

@@ -32,23 +32,21 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
     """Keep what else the search found beside what it read, which the library drops.
 
     `hypotheses` are those of each window of sound: texts with the logarithm of their probability,
-    the best first; where `keeps_states` says so, `states` are what the encoder made of each, (time,
-    width). Whoever reads empties both before.
+    the best first; where `keeps_frames` says so, `frames` are what the encoder was given of each,
+    (mel, frame). Whoever reads empties both before.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.hypotheses: list[list[tuple[str, float]]] = []
-        self.keeps_states = False
-        self.states: list[NDArray[np.float32]] = []
+        self.keeps_frames = False
+        self.frames: list[NDArray[np.float32]] = []
 
     def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
         """Return what the encoder makes of features, (mel bands, frames)."""
-        encoded = super().encode(features)
-        if self.keeps_states:
-            here = encoded.to_device(ctranslate2.Device.cpu).to(ctranslate2.DataType.float32)
-            self.states.append(np.array(here)[0])
-        return encoded
+        if self.keeps_frames:
+            self.frames.append(features.reshape(features.shape[-2:]))
+        return super().encode(features)
 
     def generate_with_fallback(
         self, encoder_output: ctranslate2.StorageView, prompt: list[int], tokenizer: Any, how: Any

@@ -50,7 +50,7 @@ def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: 
 @pytest.mark.parametrize(
     ("text", "is_stop"), [*((text, False) for text in COMMANDS[:2]), ("stop", True), ("halt", True)]
 )
-def test_the_head_tells_stop_words_from_commands_in_noise(
+def test_the_ear_tells_stop_words_from_commands_in_noise(
     recogniser: Recogniser, text: str, is_stop: bool
 ) -> None:
     try:

@@ -1,5 +1,6 @@
-"""What the head learns is what the robot reads; each state is asked for what it can know."""
+"""What the ear learns is what the robot runs; each state is asked for what it can know."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -8,36 +9,74 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from training.speech.framing import IGNORED  # noqa: E402
+from training.speech.network import MELS, Encoder  # noqa: E402
 from training.speech.shipping import SHIPPED  # noqa: E402
-from training.stop_head.batches import _targets  # noqa: E402
-from training.stop_head.export import ship  # noqa: E402
-from training.stop_head.network import StopHead  # noqa: E402
-from training.stop_head.training import WEIGHTS  # noqa: E402
+from training.stop_ear.batches import Corpus, _targets  # noqa: E402
+from training.stop_ear.export import ship  # noqa: E402
+from training.stop_ear.network import SIZE, StopEar  # noqa: E402
+from training.stop_ear.training import WEIGHTS, encoder_of  # noqa: E402
+from training.stop_words.corpus import Said, _write  # noqa: E402
 from vla_deploy.inference.manifest_file import read_manifest  # noqa: E402
 from vla_deploy.inference.store import Model  # noqa: E402
-from vla_deploy.speech.stop_head import FILE, SETTLING, open_stop_head  # noqa: E402
-
-WIDTH = 256
+from vla_deploy.speech.stop_ear import FILE, SETTLING, open_stop_ear  # noqa: E402
 
 
-def test_the_robot_reads_what_was_learnt(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # torch's own exporter
+def test_the_robot_runs_what_was_learnt(tmp_path: Path) -> None:
     torch.manual_seed(0)
-    head = StopHead(WIDTH).eval()
-    torch.save(head.state_dict(), tmp_path / WEIGHTS)
-    (tmp_path / "commands-whisper").mkdir()
-    manifest = SHIPPED / "model.toml"
-    (tmp_path / "commands-whisper" / "model.toml").write_text(manifest.read_text())
-    for _ in range(2):
-        ship(tmp_path, tmp_path / "commands-whisper")
-    entered = read_manifest(tmp_path / "commands-whisper")
-    assert [part.path for part in entered.parts].count(FILE) == 1
+    ear = StopEar(Encoder(SIZE)).eval()
+    torch.save(ear.state_dict(), tmp_path / WEIGHTS)
     folder = tmp_path / "commands-whisper"
-    read = open_stop_head(Model(manifest=entered, folder=folder, is_embedded=False))
-    assert read is not None
-    states = torch.randn(1, 50, WIDTH)
-    chances = head(states).softmax(2)[0, :, 1:].detach().numpy()
+    folder.mkdir()
+    (folder / "model.toml").write_text((SHIPPED / "model.toml").read_text())
+    for _ in range(2):
+        ship(tmp_path, folder)
+    entered = read_manifest(folder)
+    assert [part.path for part in entered.parts].count(FILE) == 1
+    assert {one.name for one in folder.iterdir()} == {"model.toml", FILE}
+    run = open_stop_ear(Model(manifest=entered, folder=folder, is_embedded=False))
+    assert run is not None
+    frames = torch.randn(1, MELS, 90)
+    chances = ear(frames).softmax(2)[0, :, 1:].detach().numpy()
     runs = np.lib.stride_tricks.sliding_window_view(chances, SETTLING, axis=0)
-    assert read.surety(states[0].numpy()) == pytest.approx(runs.mean(axis=2).max(), abs=1e-5)
+    # The weights have eight bits.
+    assert run.surety(frames[0].numpy()) == pytest.approx(runs.mean(axis=2).max(), abs=0.03)
+
+
+def test_it_begins_as_the_recogniser_that_is_shipped() -> None:
+    encoder = encoder_of(SHIPPED)
+    assert float(encoder.layer_norm.weight.detach().std()) > 0.0
+
+
+@pytest.fixture
+def corpus(tmp_path: Path) -> Iterator[Corpus]:
+    random = np.random.default_rng(0)
+    for kind, events in (("stops", [[1, 0.2, 0.5]]), ("others", [])):
+        clips = [
+            Said(
+                samples=(8000 * random.standard_normal(12_000)).astype(np.int16),
+                voice="espeak/en",
+                events=np.array(events, np.float32).reshape(-1, 3),
+                phones=np.zeros((0, 2), np.float32),
+            )
+            for _ in range(6)
+        ]
+        _write(tmp_path / f"train-{kind}-espeak.npy", clips)
+    yield Corpus(tmp_path, None, random)
+
+
+def test_a_clip_that_was_taken_for_something_else_comes_again(corpus: Corpus) -> None:
+    first = [number for batch in corpus.batches() for number in batch.numbers]
+    assert sorted(first) == list(range(12))
+    corpus.remember([3, 7])
+    second = [number for batch in corpus.batches() for number in batch.numbers]
+    assert sorted(second) == sorted([*range(12), 3, 7])
+
+
+def test_a_batch_asks_for_words_only_where_one_was_said(corpus: Corpus) -> None:
+    for batch in corpus.batches():
+        for number, targets in zip(batch.numbers, batch.targets, strict=True):
+            assert bool((targets > 0).any()) is (number < 6)
 
 
 def test_a_state_is_to_tell_a_word_once_half_of_it_was_said_and_a_moment_longer() -> None:

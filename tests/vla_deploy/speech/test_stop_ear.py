@@ -1,55 +1,31 @@
-"""The head for stop words tells them from states alone, and a spoiled file of one is told."""
+"""The ear for stop words tells them from frames alone, and a spoiled file of one is told."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from onnx import TensorProto, helper, save
 
-from vla_deploy.inference.errors import ModelFileSpoiled
+from vla_deploy.inference.errors import ModelFileSpoiled, RunFailed
 from vla_deploy.inference.manifest import ModelFile
 from vla_deploy.inference.store import Model
-from vla_deploy.speech.stop_head import FILE, StopHead, open_stop_head
+from vla_deploy.speech.stop_ear import FILE, FRAMES, SCORES, StopEar, open_stop_ear
 
-WIDTH, CHANNELS, WORDS = 3, 2, 3
-
-
-def weights() -> dict[str, Any]:
-    """Return a head for which the second word is where the first channel of a state is high."""
-    near, far = np.zeros((CHANNELS, WIDTH, 3)), np.zeros((CHANNELS, CHANNELS, 5))
-    near[0, 0, 1] = far[0, 0, 2] = 1.0
-    last = np.zeros((1 + WORDS, CHANNELS))
-    last[2, 0] = 10.0
-    biases = {"near.bias": np.zeros(2), "far.bias": np.zeros(2), "last.bias": [5.0, 0, 0, 0]}
-    tensors = {"near.weight": near, "far.weight": far, "last.weight": last, **biases}
-    return {name: np.asarray(values, np.float32) for name, values in tensors.items()}
+CLASSES = 4
 
 
-def states(*high: int) -> np.ndarray:
-    made = np.zeros((30, WIDTH), np.float32)
-    made[list(high), 0] = 1.0
-    return made
-
-
-def test_a_word_is_told_by_states_in_a_row_and_one_alone_may_be_chance() -> None:
-    head = StopHead(weights())
-    assert head.surety(states(12, 13)) > 0.95
-    assert 0.4 < head.surety(states(12)) < 0.6
-    assert head.surety(states()) < 0.05
-
-
-@pytest.mark.parametrize("count", [0, 1])
-def test_next_to_no_sound_holds_no_word(count: int) -> None:
-    assert StopHead(weights()).surety(np.ones((count, WIDTH), np.float32)) == 0.0
-
-
-def test_a_convolution_looks_both_ways_as_far_as_it_reaches() -> None:
-    made = weights()
-    made["near.weight"][0, 0, :] = 0.0
-    made["near.weight"][0, 0, 2] = 1.0
-    earlier = StopHead(made)
-    assert earlier.surety(states(0)) < 0.05, "nothing is before the first state"
-    assert earlier.surety(states(1, 2)) > 0.95
+def write_graph(path: Path, given: str = FRAMES, rank: int = 3) -> None:
+    """Write a graph that says of each frame what stands in it, a class in each band."""
+    shape: list[Any] = [1, CLASSES, "frame"][:rank]
+    turned = [0, 2, 1] if rank == 3 else [1, 0]
+    graph = helper.make_graph(
+        [helper.make_node("Transpose", [given], [SCORES], perm=turned)],
+        "ear",
+        [helper.make_tensor_value_info(given, TensorProto.FLOAT, shape)],
+        [helper.make_tensor_value_info(SCORES, TensorProto.FLOAT, [None] * rank)],
+    )
+    save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), path)
 
 
 def model(folder: Path, *parts: str) -> Model:
@@ -58,34 +34,63 @@ def model(folder: Path, *parts: str) -> Model:
     return Model(manifest=manifest, folder=folder, is_embedded=False)
 
 
-def test_a_recogniser_without_a_head_has_none(tmp_path: Path) -> None:
-    assert open_stop_head(model(tmp_path, "model.bin")) is None
+@pytest.fixture
+def ear(tmp_path: Path) -> StopEar:
+    write_graph(tmp_path / FILE)
+    opened = open_stop_ear(model(tmp_path, "model.bin", FILE))
+    assert opened is not None
+    return opened
 
 
-def test_a_head_is_read_from_its_file(tmp_path: Path) -> None:
-    np.savez(tmp_path / FILE, **weights())
-    head = open_stop_head(model(tmp_path, "model.bin", FILE))
-    assert head is not None
-    assert head.surety(states(3, 4)) > 0.95
+def frames(*high: int, count: int = 30) -> np.ndarray:
+    """Return frames of no word, but for those in which the second word is certain."""
+    made = np.zeros((CLASSES, count), np.float32)
+    made[0] = 1.0
+    made[:, list(high)] = np.array([[0.0], [0.0], [1.0], [0.0]])
+    return made
+
+
+def test_a_word_is_told_by_scores_in_a_row_and_one_alone_may_be_chance(ear: StopEar) -> None:
+    assert ear.surety(frames(12, 13)) == 1.0
+    assert ear.surety(frames(12)) == 0.5
+    assert ear.surety(frames()) == 0.0
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_next_to_no_sound_holds_no_word(ear: StopEar, count: int) -> None:
+    assert ear.surety(frames(count=count)) == 0.0
+
+
+def test_frames_of_other_bands_are_refused(ear: StopEar) -> None:
+    with pytest.raises(RunFailed, match=FILE):
+        ear.surety(np.zeros((CLASSES + 1, 20), np.float32))
+
+
+def test_a_closed_ear_hears_nothing(ear: StopEar) -> None:
+    ear.close()
+    with pytest.raises(RunFailed, match="closed"):
+        ear.surety(frames(1))
+
+
+def test_a_recogniser_without_an_ear_has_none(tmp_path: Path) -> None:
+    assert open_stop_ear(model(tmp_path, "model.bin")) is None
 
 
 def _cut_off(path: Path) -> None:
-    np.savez(path, **weights())
-    path.write_bytes(path.read_bytes()[:-400])
-
-
-def _other_shapes(path: Path) -> None:
-    np.savez(path, **{**weights(), "far.weight": np.zeros((2, 7, 5), np.float32)})
-
-
-def _lacking(path: Path) -> None:
-    np.savez(path, **{"near.weight": np.zeros((2, 3, 3), np.float32)})
+    write_graph(path)
+    path.write_bytes(path.read_bytes()[:-20])
 
 
 @pytest.mark.parametrize(
-    "spoil", [_cut_off, _other_shapes, _lacking, lambda path: path.write_text("no head")]
+    "spoil",
+    [
+        _cut_off,
+        lambda path: path.write_text("no ear"),
+        lambda path: write_graph(path, given="sound"),
+        lambda path: write_graph(path, rank=2),
+    ],
 )
-def test_a_spoiled_head_is_told(tmp_path: Path, spoil: Any) -> None:
+def test_a_spoiled_ear_is_told(tmp_path: Path, spoil: Any) -> None:
     spoil(tmp_path / FILE)
-    with pytest.raises(ModelFileSpoiled, match=r"no head for stop words: .*training\.stop_head"):
-        open_stop_head(model(tmp_path, FILE))
+    with pytest.raises(ModelFileSpoiled, match=FILE):
+        open_stop_ear(model(tmp_path, FILE))

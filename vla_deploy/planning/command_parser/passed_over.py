@@ -20,6 +20,9 @@ _HARMLESS: Final = frozenset(
 _COPIED: Final = "~"
 _BEGIN: Final = r"^(?:(?:please|butler|robot|hey|ok|okay|well|so|and|but|oh|no|sorry) )*"
 _HOUR: Final = r"(?:one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|noon|\d+)"
+_SOME: Final = (
+    rf"(?:an?|about|another|half|few|some|couple|the|{_HOUR}|fifteen|twenty|thirty|forty) "
+)
 _PERSON: Final = r"(?:i|we|he|she|they|someone|somebody|anyone|anybody|everyone|everybody|people)"
 _WHO_IS: Final = (
     r"(?:i'm|i am|i was|i'll|i've|we're|we are|we were|we'll|we've|he's|he is|he was|she's|she is|"
@@ -75,7 +78,7 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"\b(?:tomorrow|someday|remind|reminder|twice|thrice|times)\b|^tonight\b",
         r"^(?!.*\bso (?:that )?(?:i|we)\b).*\blater(?: today)?$",
         r"\b(?:in|after|within|every) (?:\w+ ){0,3}(?:minutes?|seconds?|hours?|days?)$",
-        r"\b(?:in|after|every) (?:\w+ ){1,2}(?:minutes?|seconds?|hours?|days?)\b",
+        rf"\b(?:in|after|every) {_SOME}(?:\w+ ){{0,1}}(?:minutes?|seconds?|hours?|days?)\b",
         rf"\bat (?:half past |quarter (?:past|to) )?{_HOUR}(?: o'clock)?$",
     ),
     _WHEN: (

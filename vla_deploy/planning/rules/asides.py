@@ -40,6 +40,7 @@ _NOT: Final = re.compile(
 )
 _OR: Final = re.compile(r" (?:or|nor) (?:not )?")
 _COLOURED: Final = re.compile(rf"(?:the|that) (?:{'|'.join(COLOURS)})$")
+_STANDS: Final = re.compile(r"one (?:on|in|by|near|next to|beside|behind|under|closest|nearest)\b")
 _OTHER: Final = re.compile(r"(?:but )?(?:rather )?(?:the|that) other(?: one)?")
 # "It", where it is no word before another thing: "that one", but not "that cup".
 _PRONOUN: Final = re.compile(
@@ -140,6 +141,8 @@ def _told_once(first: str, second: Sequence[str], read: Expression) -> str:
     if generic and len(second) == 1 and read.query.kind != ANY_CLASS:
         return f"{first[: generic.start()]}{second[0]}{first[generic.end() :]}"
     plain = list(_PLAIN.finditer(first))
+    if len(plain) == 1 and len(_KIND.findall(first)) == 1 and _STANDS.match(" ".join(second)):
+        return _behind(first, plain[0].end(), " ".join(second[1:]))
     if len(plain) == 1 and len(_KIND.findall(first)) == 1 and second[-1] == "one" != second[0]:
         words = " ".join([*second[:-1], plain[0]["kind"]])
         return f"{first[: plain[0].start()]}the {words}{first[plain[0].end() :]}"

@@ -120,6 +120,8 @@ _COURTESY: Final = re.compile(
     r"is|aren't|are|can't|can|won't) (?:you|i|we|it|they)|not (?:a bit|any|one step|an inch|"
     r"much)? ?(?:further|farther|more)|(?:my )?(?:dear|love|mate|darling|pet|buddy|pal|friend|lad|"
     r"son|sweetheart)|(?:and )?stay (?:there|near me|with me|put|close(?: by)?|where you are)|"
+    r"(?:and |but |please )*leave (?:it|them|that|(?:the|my) \w+(?: \w+)?) "
+    r"(?:right |just |exactly )?(?:where|as) (?:it|they) (?:is|are)|"
     r"(?:keep|leave) your (?:wheels|base|feet|body) (?:where they are|where it is|still)|"
     r"where(?:ver)? (?:it|they) (?:is|are|may be|might be)"
 )
@@ -127,8 +129,8 @@ _COURTESY: Final = re.compile(
 _OPENING: Final = re.compile(r"right(?: then)?|look")
 # Before these the speaker has changed his mind about what he has just said.
 _REPAIR: Final = re.compile(
-    r"(?:no,? wait|wait,? no|(?:oh|ah|um|er|well),? no|no|sorry|i (?:mean|meant|said)|or rather|rather|"
-    r"actually(?:,? no)?|correction|make (?:that|it)|that is)\b"
+    r"(?:no,? wait|wait,? no|(?:oh|ah|um|er|well),? no|no|sorry|i (?:mean|meant|said)|"
+    r"or rather|rather|actually(?:,? no)?|correction|make (?:that|it)|that is)\b"
 )
 
 

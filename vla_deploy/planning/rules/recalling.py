@@ -48,6 +48,12 @@ _BACK: Final = re.compile(
     r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?|"
     r"(?:turn|move|drive|go|come|step|roll) back again)"
 )
+# After a look these are for the head.
+_AHEAD: Final = re.compile(
+    r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?(?: to the (?:middle|cent(?:re|er)))?|"
+    r"(?:back |look )*(?:straight )?(?:ahead|forwards?|in front(?: of you)?|to the middle)"
+    r"(?: again)?)"
+)
 _REVERSE: Final = re.compile(r"(?:and )?(?:now )?the other way(?: (?:round|around))?")
 # What a command begins or ends with that leans on the one before it.
 _LEANING: Final = re.compile(
@@ -105,6 +111,8 @@ def recalled(text: str, request: Request) -> str | None:
         return _more(ratio, request)
     if _REVERSE.fullmatch(text):
         return _reverse(request)
+    if _AHEAD.fullmatch(text) and _has_looked(request):
+        return "look ahead"
     return (_reverse(request) or "go back") if _BACK.fullmatch(text) else None
 
 
@@ -204,6 +212,12 @@ def _reverse(request: Request) -> str | None:
 
 
 _OPPOSITE: Final = {"left": "right", "right": "left", "up": "down", "down": "up"}
+
+
+def _has_looked(request: Request) -> bool:
+    turns = request.conversation.turns
+    plan = turns[-1].plan if turns else None
+    return plan is not None and bool(_looked(plan.actions[-1]))
 
 
 def _looked(action: Action) -> str:

@@ -7,19 +7,22 @@ import re
 from typing import Final
 
 _OPENING: Final = (
-    r"(?:(?:oh|ah|um|well|no|actually|wait|sorry|hm+|and|so|but|you know what|hang on|hold on)"
-    r"[, ]+)*"
+    r"(?:(?:oh|ah|aw|um|shoot|well|no|nah|actually|wait|sorry|hm+|and|so|but|you know what|"
+    r"hang on|hold on|thanks|thank you|ta|right|okay|ok|great|lovely)[,. ]+)*"
 )
 _DOING: Final = (
     r"(?:put|place|set|take|bring|return|leave|give|get|grab|fetch|pick|go|come|drive|move|find)"
 )
 _THOUGHT_AGAIN: Final = re.compile(
     rf"{_OPENING}(?:never ?mind(?: (?:that|it))?|forget (?:it|that)|"
-    r"(?:i|we)(?:'ve| have)? changed (?:my|our) minds?|on (?:reflection|second thoughts?)|"
-    r"(?:i|we) (?:don't|do not|won't) (?:actually |really )?(?:need|want) (?:it|them|that|this)"
+    r"(?:i|we|he|she|they|(?:my|the) \w+)(?:'ve|'s| have| has)? changed (?:my|our|his|her|their) "
+    r"minds?(?: about (?:it|that|them|this)(?: one)?)?|"
+    r"on (?:reflection|second thoughts?)|"
+    r"(?:i|we) (?:don't|do not|won't|will not) (?:actually |really )?(?:be )?(?:need|want)(?:ing)? "
+    r"(?:it|them|that|this)"
     r"(?: any ?more| after all| now| then)*)"
     rf"(?:\s*[,.;!]+\s*|\s+(?={_DOING}\b))"
-    r"(?:(?:and|so|but|just|please|then)[, ]+)*(?P<rest>.+)"
+    r"(?:(?:and|so|but|just|please|then|you can|you could)[, ]+)*(?P<rest>.+)"
 )
 _SAME_PLACE: Final = re.compile(
     r"(?P<said>.+?),? (?:(?:in|into|to|at|on) )?(?:the |that )?(?:very |exact )?same "

@@ -11,6 +11,22 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("gimme", "give me"),
     (r"(i|he|she|they)(?:'ve|'s| have| has) (?:gone|been) and ", r"\1 have "),
     ("lemme have", "give me"),
+    (
+        r"(?:have|take) a (?:good |quick |proper )?look (?:a?round|about|through) "
+        r"(?:(?:the|my|our) )?(?:whole )?(?:place|flat|house|home|apartment|rooms?) for (?=\w)",
+        "look for ",
+    ),
+    (r"(bring|get|fetch) (me|us) ((?:the|my) \w+(?: \w+)?) back(?=$|[,.!?]| and\b)", r"\1 \2 \3"),
+    (
+        r"(?:get|take|bring|move|park|haul|drag|shift) yourself "
+        r"(?:(?:back|over|on|up|down|out|off) )*(?:to|on|onto|in|into|at|by|next to|near) "
+        r"(?=(?:the|that|your|my)\b)",
+        "go to ",
+    ),
+    (r"(?:wants?|needs?|has|have|ought) to go (?=(?:in|into|on|onto|back)\b)", "should go "),
+    (r"both them (?=[a-z]+s\b)", "both the "),
+    (r" where (?:i|we)(?:'ll| will| can) (?:see|find|reach) (?:it|them)(?=$|[,.!?]| and\b)", ""),
+    (r"nah,? (?=[a-z])", "no, "),
     (r"(?<=[a-z] )(?:only|just) (?=(?:the|my|that|those|these)\b)", ""),
     ("wanna", "want to"),
     ("gotta", "have to"),

@@ -7,8 +7,8 @@ from vla_deploy.planning.understanding.answers import WORD
 from vla_deploy.planning.understanding.conversation import Question
 
 _WHERE: Final = re.compile(
-    r"(?:(?:no|yes|well|um|uh|oh|ah|sorry|pet|love|dear|mate|good question|i (?:mean|meant|want|said)|"
-    r"it(?:'s| is)|take|make it|use) )*"
+    r"(?:(?:no|yes|well|um|uh|oh|ah|sorry|pet|love|dear|mate|good question|it(?:'s| is)|"
+    r"i (?:mean|meant|want|said)|take|make it|use) )*"
     r"(?:the|that) (?P<which>[a-z]+ )??(?:one|(?P<noun>[a-z]+)) (?:(?:that|which)(?:'s| is) )?"
     r"(?P<where>(?:(?:right|just) )?(?:(?:up|over|down) )?"
     r"(?:next to|close to|beside|behind|in front of|near|nearer to|closer to|nearest(?: to)?|"

@@ -30,9 +30,10 @@ from vla_deploy.world.vocabulary import ANY_CLASS, OBJECT_CLASSES
 
 
 class Use(StrEnum):
-    """Say what a command wants of a thing: to see it, take it, put it, put something onto it."""
+    """Say what a command wants of a thing: see, reach, take or put it, or put onto it."""
 
     SEE = "see"
+    REACH = "reach"
     TAKE = "take"
     PUT = "put"
     ONTO = "onto"
@@ -213,7 +214,7 @@ def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
             return may_move and (not thing.held_by or bool(query.thing_id))
         case Use.PUT:
             return may_move
-        case Use.SEE:
+        case Use.SEE | Use.REACH:
             return True
 
 

@@ -57,7 +57,7 @@ def _navigate(given: Parameters, resolver: Resolver, state: GetState) -> Iterato
     if phrases.PRONOUNS.get(_spoken(goal)) == phrases.HERE:
         yield "navigate_to", {**_here(goal, resolver), **rest}
         return
-    thing = _thing_unless_place(goal, resolver, Use.SEE)
+    thing = _thing_unless_place(goal, resolver, Use.REACH)
     if thing is None:
         yield "navigate_to", {"place": resolve_place(goal, resolver), **rest}
         return

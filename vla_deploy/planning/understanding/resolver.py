@@ -5,6 +5,7 @@ goes by its id where only the moment of the command singles it out: a side, an o
 answer. What nothing singles out is asked back.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -27,6 +28,8 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 # How surely words mean what they were taken for.
 MISSPELT: Final = 0.85
 BY_SPEAKER: Final = 0.6
+TOGETHER_M: Final = 1.2
+"""As far as things on one table are from one another."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +136,8 @@ class Resolver:
         if len(found) == 1:
             of = f" of {len(among)}" if len(among) > 1 else ""
             return (self._seen(read, found[0], use, f"the only one{of} that fits", among),)
-        if use is Use.SEE and not _needs_id(read):
+        is_any = use is Use.SEE or (use is Use.REACH and _are_together(found))
+        if is_any and not _needs_id(read):
             return (self._seen(read, found[0], use, "any of them will do", found),)
         chosen, why = self._preferred(read, found, use)
         if chosen is None:
@@ -315,6 +319,12 @@ class Resolver:
         )
 
 
+def _are_together(things: Sequence[Thing]) -> bool:
+    """Tell whether whoever stands before one of them stands before all."""
+    first = things[0].xy_m
+    return all(math.dist(first, one.xy_m) <= TOGETHER_M for one in things)
+
+
 def _needs_id(read: Expression) -> bool:
     """Tell whether words alone would not find the same thing later, elsewhere."""
     query = read.query
@@ -331,4 +341,4 @@ def _needs_id(read: Expression) -> bool:
 
 
 def _can_move(one: Mention, use: Use) -> bool:
-    return use is Use.SEE or one.kind in GRASPABLE_CLASSES
+    return use in (Use.SEE, Use.REACH) or one.kind in GRASPABLE_CLASSES

@@ -17,7 +17,7 @@ _COLOUR: Final = rf"(?P<colour>{'|'.join((*COLOURS, 'gray', 'violet'))})"
 _HULL: Final = r"(?:cover|jacket|binding|shell|casing|skin|surface|outside)"
 _HERE: Final = r"(?:from|than|to) (?:here|where (?:you|we) (?:are|stand))"
 _YOU_HOLD: Final = (
-    r"(?:(?:is )|(?:you(?:'ve got| have got| have|'re holding| are holding| hold| are carrying) ?))?"
+    r"(?:is |(?:you(?:'ve got| have got| have|'re holding| are holding| hold| are carrying) ?))?"
 )
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r",? ?\bplease\b", ""),
@@ -40,11 +40,13 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
      r"\1 that \2 "),
     (r"^something (?:(?:that )?is )?(?:lying |standing |sitting )?"
      r"(?=(?:on|in|inside|under|next to|behind|beside)\b)", "the thing "),
+    (r"^((?:the |that |a |my )?(?:[a-z]+ )?(?:box|bowl)) with (?:the|my|your|his|her|our|their) "
+     r"[a-z]+(?: [a-z]+)?$", r"\1"),
     # --- what a hand holds
     (rf"^(?:the |that )?(?:{_COLOUR} )?(?:thing|one|object|item) (?:that |which )?"
      rf"{_YOU_HOLD}(?P<hand>in (?:the|your) (?:left|right) hand)$", r"what you have \g<hand>"),
-    (rf"^(.+?)(?: that| which)? (?=you\b){_YOU_HOLD}(?:in (?:the|your) (?:(?:left|right) )?hands?)?$",
-     r"\1"),
+    (rf"^(?!what)(.+?)(?: that| which)? (?=you\b){_YOU_HOLD}"
+     r"(?:in (?:the|your) (?:(?:left|right) )?hands?)?$", r"\1"),
     (r"^(?:the |my |that )?(?!what\b)(.+?) (?:from|in) your (?:(?:left|right) )?hand$", r"the \1"),
     (r"^anything (?=but|except|other than|apart from)", "any object "),
     (rf"\bnon[- ]?{_COLOUR} (.+)", r"\2 that is not \g<colour>"),

@@ -185,6 +185,12 @@ def test_what_an_answer_rules_out_is_not_asked_for_again() -> None:
         ("the one next to the book", "pick up the cup next to the book now"),
         ("I mean the one that's behind the box, please", "pick up the cup behind the box now"),
         ("the cup on the shelf", "pick up the cup on the shelf now"),
+        ("the left one on the shelf", "pick up the left cup on the shelf now"),
+        (
+            "good question, the red one on the desk so I can see it",
+            "pick up the red cup on the desk now",
+        ),
+        ("the one right up next to the book", "pick up the cup right up next to the book now"),
         ("the ball on the shelf", None),
         ("put it next to the book", None),
         ("the one", None),

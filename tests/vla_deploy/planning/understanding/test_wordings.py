@@ -32,6 +32,13 @@ FURNITURE = {"desk": "desk", "side table": "side_table", "book shelf": "shelf"}
         ("that remote on the desk there", "that remote on the desk"),
         ("this bowl over here", "this bowl"),
         ("the keys back out of the box", "the keys out of the box"),
+        ("the bottle that is more small", "the bottle that is smaller"),
+        ("whichever cup isn't on the desk", "the cup that is not on the desk"),
+        ("something lying on the desk", "the thing on the desk"),
+        ("the black thing you have in your left hand", "what you have in your left hand"),
+        ("the phone that you're holding in your hand", "the phone"),
+        ("the phone in your right hand", "the phone"),
+        ("the box with the keys", "the box"),
     ],
 )
 def test_roundabout_words_become_plain(said: str, plain: str) -> None:
