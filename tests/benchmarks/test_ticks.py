@@ -27,6 +27,7 @@ def test_the_bare_loop_counts_how_often_the_machine_wakes_it_too_late() -> None:
     assert ticks.late_ticks == 9
 
 
+@pytest.mark.slow
 @pytest.mark.stack
 @pytest.mark.timeout(180)
 def test_the_report_holds_each_combination_beside_a_loop_that_only_sleeps(

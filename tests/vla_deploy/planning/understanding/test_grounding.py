@@ -160,6 +160,15 @@ def test_things_are_put_on_furniture(home: "Home", destination: str | None, expe
     ]
 
 
+def test_which_thing_to_go_to_is_asked_unless_they_stand_together(home: "Home") -> None:
+    way = ("navigate_to", {"object": "the cup"})
+    found = grounded(home, way, scene=("cup_1", "cup_2"))
+    assert steps_of(found)[-1][0] == "navigate_to"
+    far = replace(home.things["cup_2"], position_m=(6.0, 4.2, 0.8))
+    with pytest.raises(Ambiguous):
+        grounded(home, way, scene=("cup_1", far))
+
+
 def test_an_unseen_thing_is_looked_for_where_it_was_said_to_be(home: "Home") -> None:
     found = grounded(home, ("pick_up", {"object": "the bottle on the kitchen table"}))
     assert steps_of(found)[:2] == [

@@ -110,6 +110,11 @@ def test_of_several_things_that_are_told_none_is_it(talk) -> None:
     assert talk("pick it up").startswith("asked: Which one")
 
 
+def test_an_unclear_answer_may_say_where_it_is(talk) -> None:
+    assert talk("pick up the cup").startswith("asked: Which cup")
+    assert talk("the left one on the coffee table") == "pick_up cup_2"
+
+
 def test_a_place_may_be_answered_with_the_way_there(talk) -> None:
     assert talk("go there") == "asked: Where do you mean?"
     assert talk("over in the kitchen") == "navigate_to kitchen"
