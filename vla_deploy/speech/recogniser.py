@@ -51,7 +51,7 @@ class Alternative:
 class Reading:
     """Hold what a model read in a phrase, and what speaks for it.
 
-    `stop_surety` is how surely a stop word is in it by the ear for them, nought without one.
+    `stop_surety` is how surely a stop word is in it by the ear for them, None without one.
     `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
     `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
     as far as the model knows several. `others` is what may have been said instead, the likeliest
@@ -66,7 +66,7 @@ class Reading:
     duration_s: float
     took_s: float
     others: tuple[Alternative, ...] = ()
-    stop_surety: float = 0.0
+    stop_surety: float | None = None
 
 
 class Recogniser:
@@ -145,9 +145,9 @@ class Recogniser:
         self._whisper = None
         self.claim.release()
 
-    def _stop_surety(self) -> float:
+    def _stop_surety(self) -> float | None:
         ear = self._stop_ear
-        return max(map(ear.surety, self._whisper.frames), default=0.0) if ear else 0.0
+        return None if ear is None else max(map(ear.surety, self._whisper.frames), default=0.0)
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper

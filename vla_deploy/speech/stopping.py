@@ -13,6 +13,8 @@ from vla_deploy.speech.words import holds_form_of_stop, holds_stop, is_stop
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 STOP_WITHIN_CONFIDENCE: Final = 0.85
+LEAST_SURETY: Final = 0.05
+"""Words that are less sure than the first are no stop where the ear, if there is one, hears none."""
 STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
@@ -30,8 +32,8 @@ within others, beside a stop that may have been read instead, and beside any wor
 class _Enough:
     """Bound what three witnesses must say of a stop word in a phrase, each from 0 to 1.
 
-    They are the head in the recogniser's encoder, the share of what may have been said in which a
-    stop word is, and the spotter. Words read by more than `most_confidence` outweigh them.
+    They are the ear for stop words, the share of what may have been said in which one is, and the
+    spotter. Words read by more than `most_confidence` outweigh them.
     """
 
     surety: float
@@ -41,9 +43,9 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.4, share=0.1),
-    _Enough(surety=0.7, suspicion=0.4, most_confidence=0.3),
-    _Enough(surety=0.95, suspicion=0.3, most_confidence=0.5),
+    _Enough(surety=0.5, share=0.1),
+    _Enough(surety=0.6, suspicion=0.3, most_confidence=0.5),
+    _Enough(surety=0.8, most_confidence=0.6),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
@@ -59,26 +61,31 @@ def stops(
     the more the spotter must suspect one; then what may have been said instead counts, too.
     """
     likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
-    if suspicion >= STRONG_SUSPICION and any(map(holds_stop, (reading.text, *likely))):
+    is_read = holds_stop(reading.text, is_all=is_all)
+    if is_read and confidence >= STOP_WITHIN_CONFIDENCE:
+        return True
+    if reading.stop_surety is not None and reading.stop_surety < LEAST_SURETY:
+        return False
+    possible = (reading.text, *(likely if is_all else ()))
+    if suspicion >= STRONG_SUSPICION and any(map(holds_stop, possible)):
         return True
     if is_all and suspicion >= SUSPICION and any(map(is_stop, likely)):
         return True
     if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
         return True
-    suspected = suspicion >= SLIGHT_SUSPICION
-    least = STOP_SUSPECTED_CONFIDENCE if suspected else STOP_WITHIN_CONFIDENCE
-    if confidence >= least and holds_stop(reading.text, is_all=is_all):
+    if is_read and suspicion >= SLIGHT_SUSPICION and confidence >= STOP_SUSPECTED_CONFIDENCE:
         return True
     return is_all and _is_witnessed(reading, confidence, suspicion)
 
 
 def _is_witnessed(reading: Reading, confidence: float, suspicion: float) -> bool:
     """Tell whether other witnesses than the words that were read say enough of a stop."""
-    if holds_form_of_stop(reading.text):
+    surety = reading.stop_surety
+    if surety is None or holds_form_of_stop(reading.text):
         return False
     share = _stop_share(reading)
     return any(
-        reading.stop_surety >= row.surety
+        surety >= row.surety
         and share >= row.share
         and suspicion >= row.suspicion
         and confidence <= row.most_confidence

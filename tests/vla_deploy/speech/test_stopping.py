@@ -19,7 +19,7 @@ READING = Reading(
 )
 
 
-def heard(text: str, *others: tuple[str, float], surety: float, **told: Any) -> Reading:
+def heard(text: str, *others: tuple[str, float], surety: float | None, **told: Any) -> Reading:
     alternatives = tuple(Alternative(one, odds) for one, odds in others)
     return replace(READING, text=text, others=alternatives, stop_surety=surety, **told)
 
@@ -27,13 +27,15 @@ def heard(text: str, *others: tuple[str, float], surety: float, **told: Any) -> 
 @pytest.mark.parametrize(
     ("reading", "suspicion", "is_stop"),
     [
-        (heard("you should hold", surety=0.99), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.5), 0.0, True),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.1), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.04), surety=0.5), 0.0, False),
-        (heard("please, please", surety=0.8), 0.45, True),
-        (heard("please, please", surety=0.8), 0.35, False),
-        (heard("please, please", surety=0.6), 0.45, False),
+        (heard("you should hold", surety=0.9), 0.0, True),
+        (heard("you should hold", surety=0.7), 0.0, False),
+        (heard("you should hold", ("you should halt", 0.3), surety=0.55), 0.0, True),
+        (heard("you should hold", ("you should halt", 0.3), surety=0.4), 0.0, False),
+        (heard("you should hold", ("you should halt", 0.04), surety=0.55), 0.0, False),
+        (heard("please, please", surety=0.65), 0.35, True),
+        (heard("please, please", surety=0.65), 0.25, False),
+        (heard("please, please", surety=0.55), 0.35, False),
+        (heard("please, please", surety=None), 0.6, False),
         (heard("he stopped at the shop", ("he stop at the shop", 0.9), surety=0.99), 0.6, False),
     ],
 )
@@ -43,12 +45,26 @@ def test_three_witnesses_stop_together_what_no_words_would(
     assert stops(reading, 0.3, suspicion) is is_stop
 
 
-def test_words_that_were_read_for_sure_outweigh_the_head() -> None:
-    reading, surer = heard("which cup", surety=0.9), heard("which cup", surety=0.96)
-    assert stops(reading, 0.3, 0.5)
-    assert not stops(reading, 0.4, 0.5)
-    assert stops(surer, 0.4, 0.5)
-    assert not stops(surer, 0.6, 0.5)
+def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
+    reading, surer = heard("which cup", surety=0.7), heard("which cup", surety=0.9)
+    assert stops(reading, 0.5, 0.5)
+    assert not stops(reading, 0.55, 0.5)
+    assert stops(surer, 0.55, 0.5)
+    assert not stops(surer, 0.65, 0.5)
+
+
+@pytest.mark.parametrize("suspicion", [0.0, 0.9])
+@pytest.mark.parametrize("text", ["halt", "the red freeze"])
+def test_unsure_words_are_no_stop_where_the_ear_hears_none(text: str, suspicion: float) -> None:
+    assert not stops(heard(text, surety=0.02), 0.6, suspicion)
+    assert stops(heard(text, surety=0.02), 0.9, suspicion)
+    assert stops(heard("halt", surety=None), 0.6, suspicion)
+
+
+def test_while_somebody_speaks_only_what_was_read_helps_a_strong_suspicion() -> None:
+    reading = heard("start by", ("stop by", 0.5), surety=0.9)
+    assert stops(reading, 0.2, 0.75)
+    assert not stops(reading, 0.2, 0.75, is_all=False)
 
 
 def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
