@@ -23,7 +23,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m training.planner", description=__doc__, epilog=_EXAMPLE
     )
-    parser.add_argument("step", choices=[*STEPS, "ship", "all"])
+    parser.add_argument("step", choices=[*STEPS, *OTHERS, "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for states and models")
     parser.add_argument("--size", choices=SIZES, default="full")
     parser.add_argument("--threads", type=int, default=1, help="of the training (default: 1)")
@@ -33,10 +33,15 @@ def main() -> None:
     parser.add_argument(
         "--start-from", type=Path, metavar="OUT", help="folder of a training to go on from"
     )
+    parser.add_argument(
+        "--mean-into", type=Path, metavar="NEW", help="of `mean`: the folder for the mean of both"
+    )
     arguments = parser.parse_args()
+    if arguments.step == "mean" and None in (arguments.start_from, arguments.mean_into):
+        parser.error("mean: expected --start-from EARLIER and --mean-into NEW")
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     for name in STEPS if arguments.step == "all" else [arguments.step]:
-        {**STEPS, "ship": _ship}[name](arguments, SIZES[arguments.size])
+        {**STEPS, **OTHERS}[name](arguments, SIZES[arguments.size])
 
 
 def _talk(arguments: argparse.Namespace) -> tuple[str, ...]:
@@ -81,6 +86,12 @@ def _ship(arguments: argparse.Namespace, _settings: Settings) -> None:
     ship(arguments.out / MODELS)
 
 
+def _mean(arguments: argparse.Namespace, _settings: Settings) -> None:
+    from training.planner.mean import mean
+
+    mean(arguments.out, arguments.start_from, arguments.mean_into)
+
+
 STEPS: dict[str, Step] = {
     "train": _train,
     "export": _export,
@@ -88,6 +99,7 @@ STEPS: dict[str, Step] = {
     "card": _card,
 }
 """What `all` does, in this order; shipping is a decision of its own."""
+OTHERS: dict[str, Step] = {"mean": _mean, "ship": _ship}
 
 if __name__ == "__main__":
     main()

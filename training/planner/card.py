@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from training.planner.clause import load_groups
 from training.planner.evaluation import MOST_TOKENS
-from training.planner.files import CARD, GRAPH, METRICS, NAME, PARTS
+from training.planner.files import CARD, GRAPH, MEAN_OF, METRICS, NAME, PARTS
 from training.planner.settings import Settings
 from training.planner.telling import AFTER, BEFORE, KEPT_BACK_OF, load_remarks, load_told
 from vla_deploy.inference.file_check import sha256_of
@@ -83,10 +83,14 @@ def card(
         "p95_ms": f"{1000 * metrics['took_p95_s']:.0f}",
         "size": settings.name,
         "more": " --start-from EARLIER" if is_begun else "",
-        "began": f" {_BEGAN}" if is_begun else "",
+        "began": (f" {_BEGAN}" if is_begun else "") + _mean_of(models.parent / MEAN_OF),
         "seed": settings.seed,
     }
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(values)
+
+
+def _mean_of(told: Path) -> str:
+    return f" {told.read_text(encoding='utf-8')}" if told.exists() else ""
 
 
 def table(metrics: dict[str, Any]) -> str:

@@ -12,4 +12,6 @@ PARTS: Final = (GRAPH, CONFIG, TOKENIZER, TOKENIZER_CONFIG, KNOWN_WORDS)
 MANIFEST: Final = "model.toml"
 METRICS: Final = "metrics.json"
 CARD: Final = "card.md"
+MEAN_OF: Final = "mean_of.txt"
+"""Beside weights that are a mean: a sentence on it, for the card."""
 NAME: Final = "command_parser"

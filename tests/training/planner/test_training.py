@@ -11,6 +11,8 @@ torch = pytest.importorskip("torch")
 
 from training.planner.composing import Composer  # noqa: E402
 from training.planner.export import export  # noqa: E402
+from training.planner.files import MEAN_OF, TOKENIZER  # noqa: E402
+from training.planner.mean import NEW_SHARE, mean  # noqa: E402
 from training.planner.settings import SIZES  # noqa: E402
 from training.planner.training import train  # noqa: E402
 from vla_deploy.inference.manifest import Language, Use  # noqa: E402
@@ -34,3 +36,24 @@ def test_a_short_training_gives_a_model_whose_graph_tells_what_the_network_tells
     longer = dataclasses.replace(settings, budget_s=2.0)
     train(tmp_path, longer)
     assert torch.load(tmp_path / "state.pt", weights_only=True)["spent_s"] >= 1.5
+
+
+def _trained(folder: Path, value: float, tokenizer: str = "{}") -> Path:
+    folder.mkdir()
+    (folder / TOKENIZER).write_text(tokenizer)
+    torch.save({"embedding.weight": torch.full((2, 2), value)}, folder / "weights.pt")
+    return folder
+
+
+def test_the_mean_lies_between_a_training_and_the_one_before_it(tmp_path: Path) -> None:
+    new, old, into = _trained(tmp_path / "new", 1.0), _trained(tmp_path / "old", 0.0), tmp_path / "m"
+    mean(new, old, into)
+    taken = torch.load(into / "weights.pt", weights_only=True)["embedding.weight"]
+    assert torch.allclose(taken, torch.full((2, 2), NEW_SHARE))
+    assert "mean of both" in (into / MEAN_OF).read_text()
+
+
+def test_of_trainings_with_other_tokenizers_there_is_no_mean(tmp_path: Path) -> None:
+    new, old = _trained(tmp_path / "new", 1.0), _trained(tmp_path / "old", 0.0, '{"a": 1}')
+    with pytest.raises(ValueError, match=TOKENIZER):
+        mean(new, old, tmp_path / "m")
