@@ -14,7 +14,7 @@ STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 STOP_WITHIN_CONFIDENCE: Final = 0.85
 LEAST_SURETY: Final = 0.05
-"""Words that are less sure than the first are no stop where the ear, if there is one, hears none."""
+"""Words less sure than the first are no stop where the ear, if there is one, hears none."""
 STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""

@@ -46,7 +46,11 @@ def _trained(folder: Path, value: float, tokenizer: str = "{}") -> Path:
 
 
 def test_the_mean_lies_between_a_training_and_the_one_before_it(tmp_path: Path) -> None:
-    new, old, into = _trained(tmp_path / "new", 1.0), _trained(tmp_path / "old", 0.0), tmp_path / "m"
+    new, old, into = (
+        _trained(tmp_path / "new", 1.0),
+        _trained(tmp_path / "old", 0.0),
+        tmp_path / "m",
+    )
     mean(new, old, into)
     taken = torch.load(into / "weights.pt", weights_only=True)["embedding.weight"]
     assert torch.allclose(taken, torch.full((2, 2), NEW_SHARE))

@@ -31,7 +31,8 @@ METRES: Final[Mapping[str, float]] = MappingProxyType(
         "mm": 0.001, "millimeter": 0.001, "millimetre": 0.001, "foot": 0.3048, "feet": 0.3048,
         "inch": 0.0254, "inche": 0.0254, "yard": 0.9144, "step": 0.3, "pace": 0.5, "hand": 0.1,
         "bit": 0.2, "little": 0.2, "tiny": 0.1, "touch": 0.1, "slightly": 0.1, "some": 0.3,
-        "further": 0.3, "more": 0.3,
+        "further": 0.3, "more": 0.3, "km": 1000.0, "kilometer": 1000.0, "kilometre": 1000.0,
+        "mile": 1609.344,
     }
 )  # fmt: skip
 RADIANS: Final[Mapping[str, float]] = MappingProxyType(

@@ -100,6 +100,10 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"\b(?:but|and) (?:please )?(?:do not|don't|dont|never) "
         r"(?!drop|spill|break|bump|forget|worry|hurry|rush|lose|wake|hit|crash|fall|run|be)\w+",
     ),
+    "my rules hold whatever is said": (
+        r"\b(?:ignore|disregard|forget|override|overrule|bypass|disable|switch off|turn off)\b.*"
+        r"\b(?:instructions?|rules?|orders?|limits?|limiters?|safety|safeties|checks?|restrictions?)\b",
+    ),
     "I choose my speed myself": (r"\bper (?:second|minute|hour)\b",),
     _TELLS: (
         r"\byou (?:might|could|would|should|must) have (?!me\b|us\b|to\b|the\b|my\b|a\b)",
@@ -135,6 +139,7 @@ _NOT_WHERE: Final = r"(?<!\bi )\b(?:leave|leaving|exit|vacate|away from|out of|c
 _SAID_OF: Final = (
     ("go", "it says where not to be", rf"{_NOT_WHERE} (?:the |my |our |your )?~"),
     ("put", "it says where not to be", r"\baway from\b"),
+    ("move", "that is farther than I drive", r"\b(?:kilomet(?:re|er)s?|kms?|miles?|blocks?)\b"),
     ("move", "I drive straight ahead, not to or from something", r"\btowards? (?!me\b|us\b)"),
     # What is heard of "no way".
     ("wait", "it tells of something, instead of telling me to do it", rf"{_BEGIN}know\b"),
@@ -166,6 +171,7 @@ _ASKED_OF: Final = (
     ("put", rf"{_BEGIN}(?:go|drive|head|roll|come)\b.*\bwith\b"),
     ("pick", rf"{_BEGIN}(?:go|drive|head|roll|come)\b.*\bwith\b"),
     ("move", r"\bto (?:the|your|my) (?:left|right)\b"),
+    ("open", r"\b(?:over|above)\b"),
     ("turn", r"\b(?:all the way|complete(?:ly)?|whole|full|circle)\b"),
 )
 _DOUBTS: Final = (
