@@ -13,11 +13,11 @@ from vla_deploy.speech.words import holds_form_of_stop, holds_stop, is_stop
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
 STOP_WITHIN_CONFIDENCE: Final = 0.85
-LEAST_SURETY: Final = 0.05
-"""Words less sure than the first are no stop where the ear, if there is one, hears none."""
 STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
+LEAST_SURETY: Final = 0.05
+"""Words less sure than that are no stop where the ear, if there is one, hears none."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
@@ -43,9 +43,9 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.5, share=0.1),
+    _Enough(surety=0.6, share=0.1),
     _Enough(surety=0.6, suspicion=0.3, most_confidence=0.5),
-    _Enough(surety=0.8, most_confidence=0.6),
+    _Enough(surety=0.9, most_confidence=0.6),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
@@ -64,9 +64,11 @@ def stops(
     is_read = holds_stop(reading.text, is_all=is_all)
     if is_read and confidence >= STOP_WITHIN_CONFIDENCE:
         return True
-    if reading.stop_surety is not None and reading.stop_surety < LEAST_SURETY:
+    surety = reading.stop_surety
+    if surety is not None and surety < LEAST_SURETY:
         return False
-    possible = (reading.text, *(likely if is_all else ()))
+    # The ear knows better than the guesses of a glance, as soon as the word has ended.
+    possible = (reading.text, *(likely if is_all or surety is None else ()))
     if suspicion >= STRONG_SUSPICION and any(map(holds_stop, possible)):
         return True
     if is_all and suspicion >= SUSPICION and any(map(is_stop, likely)):

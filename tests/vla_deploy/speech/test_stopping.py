@@ -27,11 +27,11 @@ def heard(text: str, *others: tuple[str, float], surety: float | None, **told: A
 @pytest.mark.parametrize(
     ("reading", "suspicion", "is_stop"),
     [
-        (heard("you should hold", surety=0.9), 0.0, True),
+        (heard("you should hold", surety=0.95), 0.0, True),
         (heard("you should hold", surety=0.7), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.55), 0.0, True),
+        (heard("you should hold", ("you should halt", 0.3), surety=0.65), 0.0, True),
         (heard("you should hold", ("you should halt", 0.3), surety=0.4), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.04), surety=0.55), 0.0, False),
+        (heard("you should hold", ("you should halt", 0.04), surety=0.65), 0.0, False),
         (heard("please, please", surety=0.65), 0.35, True),
         (heard("please, please", surety=0.65), 0.25, False),
         (heard("please, please", surety=0.55), 0.35, False),
@@ -46,7 +46,7 @@ def test_three_witnesses_stop_together_what_no_words_would(
 
 
 def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
-    reading, surer = heard("which cup", surety=0.7), heard("which cup", surety=0.9)
+    reading, surer = heard("which cup", surety=0.7), heard("which cup", surety=0.95)
     assert stops(reading, 0.5, 0.5)
     assert not stops(reading, 0.55, 0.5)
     assert stops(surer, 0.55, 0.5)
