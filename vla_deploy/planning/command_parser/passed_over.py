@@ -92,6 +92,7 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     _ELSE: (
         r"\b(?:he|she|they|mum|dad|boss) (?:says?|said|tells?|goes|shouts?|shouted)\b|\bi told\b",
+        r"\b(?:he|she|they) (?:thinks?|thought|claims?|believes?|insists?|reckons?)\b",
         r"\bsaid (?:my|the|he|she|our)\b|\bso (?:i|he|she|we|they) did\b",
         r"\bmy (?:wife|husband|mother|father|mum|dad|son|daughter|sister|brother) "
         r"(?:says?|claims?|thinks?|insists?)\b",
