@@ -16,7 +16,7 @@ STOP_WITHIN_CONFIDENCE: Final = 0.85
 STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
-LEAST_SURETY: Final = 0.1
+LEAST_SURETY: Final = 0.05
 """Words less sure than that are no stop where the ear, if there is one, hears none."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
@@ -43,8 +43,9 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.8, share=0.1),
-    _Enough(surety=0.7, suspicion=0.4, most_confidence=0.5),
+    _Enough(surety=0.5, share=0.1),
+    _Enough(surety=0.6, suspicion=0.3, most_confidence=0.5),
+    _Enough(surety=0.8, most_confidence=0.6),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.

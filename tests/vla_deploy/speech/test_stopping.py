@@ -27,13 +27,14 @@ def heard(text: str, *others: tuple[str, float], surety: float | None, **told: A
 @pytest.mark.parametrize(
     ("reading", "suspicion", "is_stop"),
     [
-        (heard("you should hold", surety=0.99), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.85), 0.0, True),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.7), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.04), surety=0.85), 0.0, False),
-        (heard("please, please", surety=0.75), 0.45, True),
-        (heard("please, please", surety=0.75), 0.35, False),
-        (heard("please, please", surety=0.65), 0.45, False),
+        (heard("you should hold", surety=0.9), 0.0, True),
+        (heard("you should hold", surety=0.7), 0.0, False),
+        (heard("you should hold", ("you should halt", 0.3), surety=0.55), 0.0, True),
+        (heard("you should hold", ("you should halt", 0.3), surety=0.4), 0.0, False),
+        (heard("you should hold", ("you should halt", 0.04), surety=0.55), 0.0, False),
+        (heard("please, please", surety=0.65), 0.35, True),
+        (heard("please, please", surety=0.65), 0.25, False),
+        (heard("please, please", surety=0.55), 0.35, False),
         (heard("please, please", surety=None), 0.6, False),
         (heard("he stopped at the shop", ("he stop at the shop", 0.9), surety=0.99), 0.6, False),
     ],
@@ -45,9 +46,11 @@ def test_three_witnesses_stop_together_what_no_words_would(
 
 
 def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
-    reading = heard("which cup", surety=0.9)
+    reading, surer = heard("which cup", surety=0.7), heard("which cup", surety=0.9)
     assert stops(reading, 0.5, 0.5)
     assert not stops(reading, 0.55, 0.5)
+    assert stops(surer, 0.55, 0.5)
+    assert not stops(surer, 0.65, 0.5)
 
 
 @pytest.mark.parametrize("suspicion", [0.0, 0.9])

@@ -17,7 +17,7 @@ from vla_deploy.speech.sound import SoundBlock
 from vla_deploy.speech.stop_words.errors import StopWordsError
 from vla_deploy.speech.stop_words.own_voice import OwnVoice
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
-from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
+from vla_deploy.speech.stop_words.suspicions import Suspicions
 
 OFF: Final = "off"
 OFF_WHY: Final = "switched off by the profile: speech.stop_words"
@@ -31,21 +31,15 @@ OpenSpotter = Callable[[], tuple[Spotter, Mapping[str, float]]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ear:
-    """Name where a listener listens: in `speech_status`, as a source of stops, and in the log.
-
-    `is_read` tells that the recogniser reads along, and so a word need not be told by it alone.
-    """
+    """Name where a listener listens: in `speech_status`, as a source of stops, and in the log."""
 
     name: str
     source: str
     how: str
-    is_read: bool = True
 
 
 ROOM: Final = Ear(name="stop_words", source="voice", how="by voice")
-PAGE: Final = Ear(
-    name="page_stop_words", source="page_voice", how="by voice into the page", is_read=False
-)
+PAGE: Final = Ear(name="page_stop_words", source="page_voice", how="by voice into the page")
 
 
 class State(StrEnum):
@@ -118,12 +112,10 @@ class StopWords:
             self._spotter.reset()
             self._suspicions.clear()
         own = self._own.sounds(block.end_ns)
-        sensitivity = "own_voice" if own else self._sensitivity
-        threshold = self._thresholds[sensitivity]
+        threshold = self._thresholds["own_voice" if own else self._sensitivity]
         runs = self._spotter.runs
         try:
-            enough = alone(sensitivity, threshold) if self._ear.is_read else threshold
-            spotted = self._spotter.feed(block.samples, block.end_ns, enough)
+            spotted = self._spotter.feed(block.samples, block.end_ns, threshold)
         except RunFailed as error:
             self._counts["failed_runs"] += 1
             self._break(str(error))
