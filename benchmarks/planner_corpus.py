@@ -20,7 +20,7 @@ UNSEEN: Final = (COMMANDS, "strangers", "visitors")
 """Of commands: what the planner is measured by, and what others said once; nothing may be learnt
 from them."""
 COMMAND_CORPORA: Final = (*UNSEEN, "everyday", "neighbours", "guests", "lodgers", "boarders")
-"""Those, and four that rules were written from."""
+"""Those, and five that rules were written from."""
 PLAN, ASK, REFUSE, STOP = "plan", "ask", "refuse", "stop"
 MUSTS: Final = (PLAN, ASK, REFUSE, STOP)
 _ID: Final = re.compile(r"[a-z]+_\d+")

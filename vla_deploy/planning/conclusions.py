@@ -1,6 +1,7 @@
 """Bring what was planned for a command to its end: handed on, asked about, or refused."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from operator import attrgetter
 from typing import Final
 
 from vla_deploy.planning.accounts import Accounts
@@ -123,12 +124,15 @@ class Conclusions:
             self._telling.aloud(command, Says.HEARD_BADLY)
 
 
-_BY_RULES: Final = frozenset({RulesRung.name, GistRung.name})
+# What of a plan says the command in words that rules can read; other models sum it up freely.
+_IN_FULL: Final[Mapping[str, Callable[[Plan], str]]] = {
+    RulesRung.name: attrgetter("goal"),
+    GistRung.name: attrgetter("goal"),
+    COMMAND_PARSER: attrgetter("summary"),
+}
 
 
 def _in_full(plan: Plan, answer: Answer) -> str:
-    """Return the words that stand for a command, as rules read them; a model sums it up freely."""
+    """Return the words that stand for a command, "" where nobody gave any that rules can read."""
     rung = answer.proposal.rung if answer.proposal is not None else ""
-    if rung == COMMAND_PARSER:
-        return plan.summary
-    return plan.goal if rung in _BY_RULES else ""
+    return _IN_FULL[rung](plan) if rung in _IN_FULL else ""

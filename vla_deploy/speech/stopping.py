@@ -17,7 +17,7 @@ STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
 LEAST_SURETY: Final = 0.05
-"""Words less sure than that are no stop where the ear, if there is one, hears none."""
+"""Less sure words than STOP_WITHIN_CONFIDENCE are no stop where the ear, if any, hears none."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3

@@ -78,7 +78,7 @@ _SAID: Final[Mapping[str, tuple[str, ...]]] = {
         r"\b(?:tomorrow|someday|remind|reminder|twice|thrice|times)\b|^tonight\b",
         r"^(?!.*\bso (?:that )?(?:i|we)\b).*\blater(?: today)?$",
         r"\b(?:in|after|within|every) (?:\w+ ){0,3}(?:minutes?|seconds?|hours?|days?)$",
-        rf"\b(?:in|after|every) {_SOME}(?:\w+ ){{0,1}}(?:minutes?|seconds?|hours?|days?)\b",
+        rf"\b(?:in|after|every) {_SOME}(?:\w+ )?(?:minutes?|seconds?|hours?|days?)\b",
         rf"\bat (?:half past |quarter (?:past|to) )?{_HOUR}(?: o'clock)?$",
     ),
     _WHEN: (

@@ -84,16 +84,15 @@ def _back(request: Request) -> Skill:
 
 
 def _pick(spoken: Spoken, step: Step) -> list[Skill]:
-    way, _ = spoken.source(step)
-    return way + building.pick({"object": spoken.things(step), **_arm(step)}, spoken.request)
+    way, things = spoken.things(step)
+    return way + building.pick({"object": things, **_arm(step)}, spoken.request)
 
 
 def _put(spoken: Spoken, step: Step) -> list[Skill]:
     relation = step.get("how", "to")
     if relation not in _CAN_PUT:
         raise CannotBeDone(f"I can put things in, on or next to something, not {relation} it")
-    way, _ = spoken.source(step)
-    things = spoken.things(step)
+    way, things = spoken.things(step)
     if "where" not in step:
         down = placing.put_away if spoken.says("away") else _put_down
         return way + down({"object": things}, spoken.request)
@@ -134,8 +133,8 @@ def _give(_spoken: Spoken, _step: Step) -> list[Skill]:
 
 
 def _find(spoken: Spoken, step: Step) -> list[Skill]:
-    way, _ = spoken.source(step)
-    return way + building.find({"object": spoken.things(step)}, spoken.request)
+    way, things = spoken.things(step)
+    return way + building.find({"object": things}, spoken.request)
 
 
 def _where(spoken: Spoken, step: Step) -> list[Skill]:

@@ -62,10 +62,10 @@ class Spoken:
         kinds = {SYNONYMS.get(word, word) for word in where.split()}
         return [], f" {'in' if kinds & CONTAINERS else 'on'} {where}"
 
-    def things(self, step: Step) -> str:
-        """Return what a step is about, each thing with where it is to be taken from."""
-        _, behind = self.source(step)
-        return " and ".join(part + behind for part in self.parts(step))
+    def things(self, step: Step) -> tuple[list[Skill], str]:
+        """Return the way to what a step is about, and that, with where it is to be taken from."""
+        way, behind = self.source(step)
+        return way, " and ".join(part + behind for part in self.parts(step))
 
     def parts(self, step: Step) -> list[str]:
         """Return each thing that a step is about, without where it is to be taken from."""
@@ -74,7 +74,7 @@ class Spoken:
 
     def _is_seen(self, step: Step, there: str) -> bool:
         """Tell whether each thing of a step is known to be at a place."""
-        parts = self.parts(step) if "what" in step else []
+        parts = self.parts(step)
         return bool(parts) and all(building.is_seen(one + there, self._request) for one in parts)
 
     def _where_from(self, step: Step) -> str:

@@ -141,9 +141,11 @@ def _told_once(first: str, second: Sequence[str], read: Expression) -> str:
     if generic and len(second) == 1 and read.query.kind != ANY_CLASS:
         return f"{first[: generic.start()]}{second[0]}{first[generic.end() :]}"
     plain = list(_PLAIN.finditer(first))
-    if len(plain) == 1 and len(_KIND.findall(first)) == 1 and _STANDS.match(" ".join(second)):
+    if len(plain) != 1 or len(_KIND.findall(first)) != 1:
+        return ""
+    if _STANDS.match(" ".join(second)):
         return _behind(first, plain[0].end(), " ".join(second[1:]))
-    if len(plain) == 1 and len(_KIND.findall(first)) == 1 and second[-1] == "one" != second[0]:
+    if second[-1] == "one" != second[0]:
         words = " ".join([*second[:-1], plain[0]["kind"]])
         return f"{first[: plain[0].start()]}the {words}{first[plain[0].end() :]}"
     return ""
@@ -205,8 +207,10 @@ def _is_one_thing(text: str, request: Request) -> bool:
     if match_place(text, request.world.places):
         return True
     read = _read(text, request)
-    if read is None or read.pronoun:
-        return read is not None and read.pronoun == HELD
+    if read is None:
+        return False
+    if read.pronoun:
+        return read.pronoun == HELD
     return read.query.is_named or text.split()[0] in ARTICLES
 
 

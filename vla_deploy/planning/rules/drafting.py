@@ -78,9 +78,8 @@ def draft_plan(request: Request) -> Plan:
     said = courtesy_off(request.text)
     meant = thought_again(said)
     full = recalled(pointing_alone(meant, request), request)
-    if full is None and meant != said:
-        full = meant
-    draft = _drafted(request if full is None else replace(request, text=full))
+    own = request.text if meant == said else meant
+    draft = _drafted(replace(request, text=full or own))
     goal = ", then ".join(draft.said) if draft.is_short else draft.request.text.strip()
     return Plan(goal=goal, summary=_summary(draft.steps), actions=_chain(draft.steps))
 

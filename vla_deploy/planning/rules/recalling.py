@@ -9,7 +9,6 @@ from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NothingBefore
-from vla_deploy.planning.plan import Action
 from vla_deploy.planning.understanding.conversation import Outcome, Turn
 
 _AGAIN: Final = re.compile(
@@ -44,13 +43,14 @@ _MORE: Final[tuple[tuple[re.Pattern[str], float], ...]] = tuple(
         *_SHARES.items(),
     )
 )
+_ALL_BACK: Final = r"(?:all the way )?back(?: again)?"
 _BACK: Final = re.compile(
-    r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?|"
+    rf"(?:and )?(?:now )?(?:{_ALL_BACK}|"
     r"(?:turn|move|drive|go|come|step|roll) back again)"
 )
 # After a look these are for the head.
 _AHEAD: Final = re.compile(
-    r"(?:and )?(?:now )?(?:(?:all the way )?back(?: again)?(?: to the (?:middle|cent(?:re|er)))?|"
+    rf"(?:and )?(?:now )?(?:{_ALL_BACK}(?: to the (?:middle|cent(?:re|er)))?|"
     r"(?:back |look )*(?:straight )?(?:ahead|forwards?|in front(?: of you)?|to the middle)"
     r"(?: again)?)"
 )
@@ -111,7 +111,7 @@ def recalled(text: str, request: Request) -> str | None:
         return _more(ratio, request)
     if _REVERSE.fullmatch(text):
         return _reverse(request)
-    if _AHEAD.fullmatch(text) and _has_looked(request):
+    if _AHEAD.fullmatch(text) and any(map(_looked, request.conversation.turns[-1:])):
         return "look ahead"
     return (_reverse(request) or "go back") if _BACK.fullmatch(text) else None
 
@@ -202,7 +202,7 @@ def _amount(turn: Turn) -> tuple[str, float] | None:
 def _reverse(request: Request) -> str | None:
     """Return the last straight way, turn or look in the other direction, None for other things."""
     last = _last(request)
-    if last.plan is not None and (way := _looked(last.plan.actions[-1])):
+    if way := _looked(last):
         return f"look {_OPPOSITE[way]}"
     amount = _amount(last)
     if amount is None or amount[0] == "wait":
@@ -214,14 +214,11 @@ def _reverse(request: Request) -> str | None:
 _OPPOSITE: Final = {"left": "right", "right": "left", "up": "down", "down": "up"}
 
 
-def _has_looked(request: Request) -> bool:
-    turns = request.conversation.turns
-    plan = turns[-1].plan if turns else None
-    return plan is not None and bool(_looked(plan.actions[-1]))
-
-
-def _looked(action: Action) -> str:
-    """Return the side to which an action turned the head, "" for none."""
+def _looked(turn: Turn) -> str:
+    """Return the side to which a turn's last action turned the head, "" for none."""
+    if turn.plan is None:
+        return ""
+    action = turn.plan.actions[-1]
     way = str(action.parameters.get("direction", ""))
     return way if action.skill == "look_at" and way in _OPPOSITE else ""
 

@@ -16,9 +16,7 @@ _COLOUR: Final = rf"(?P<colour>{'|'.join((*COLOURS, 'gray', 'violet'))})"
 # Parts that give a thing its colour; a lid or a handle may have another one.
 _HULL: Final = r"(?:cover|jacket|binding|shell|casing|skin|surface|outside)"
 _HERE: Final = r"(?:from|than|to) (?:here|where (?:you|we) (?:are|stand))"
-_YOU_HOLD: Final = (
-    r"(?:is |(?:you(?:'ve got| have got| have|'re holding| are holding| hold| are carrying) ?))?"
-)
+_YOU_HOLD: Final = r"you(?:'ve got| have got| have|'re holding| are holding| hold| are carrying) ?"
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r",? ?\bplease\b", ""),
     (r"\bmore (small|tall|long|short|high|low)\b", r"\1er"),
@@ -44,8 +42,9 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
      r"[a-z]+(?: [a-z]+)?$", r"\1"),
     # --- what a hand holds
     (rf"^(?:the |that )?(?:{_COLOUR} )?(?:thing|one|object|item) (?:that |which )?"
-     rf"{_YOU_HOLD}(?P<hand>in (?:the|your) (?:left|right) hand)$", r"what you have \g<hand>"),
-    (rf"^(?!what)(.+?)(?: that| which)? (?=you\b){_YOU_HOLD}"
+     rf"(?:is |{_YOU_HOLD})?(?P<hand>in (?:the|your) (?:left|right) hand)$",
+     r"what you have \g<hand>"),
+    (rf"^(?!what)(.+?)(?: that| which)? {_YOU_HOLD}"
      r"(?:in (?:the|your) (?:(?:left|right) )?hands?)?$", r"\1"),
     (r"^(?:the |my |that )?(?!what\b)(.+?) (?:from|in) your (?:(?:left|right) )?hand$", r"the \1"),
     (r"^anything (?=but|except|other than|apart from)", "any object "),
