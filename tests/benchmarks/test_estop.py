@@ -11,6 +11,7 @@ def test_a_resting_robot_stands_at_once_and_a_driving_one_soon() -> None:
     assert resting_s < driving_s < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.stack
 @pytest.mark.timeout(180)
 def test_each_request_reaches_the_wire_and_each_phase_comes_to_rest(

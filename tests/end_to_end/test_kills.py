@@ -17,8 +17,8 @@ def failures(chosen: list[Injection]) -> list[str]:
 
 
 @pytest.mark.timeout(1800)
-def test_two_kills_at_random_moments_leave_the_robot_safe() -> None:
-    assert failures(injections(2, 0, EARLY_S)) == []
+def test_a_kill_at_a_random_moment_leaves_the_robot_safe() -> None:
+    assert failures(injections(1, 0, EARLY_S)) == []
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 import pydoc_data.topics
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -192,13 +193,15 @@ def stop_phrases(word: str) -> tuple[tuple[str, bool], ...]:
 
 def other_talk(count: int, random: np.random.Generator, lexicon: Sequence[str]) -> list[str]:
     """Return texts of all kinds that hold no stop word; `lexicon` gives any words of English."""
-    running = _running_talk()
+    running, at_home = _running_talk(), _talk_at_home()
     kinds = (
         lambda: _carried(CONFUSABLE, random),
         lambda: _carried(CONFUSABLE, random),
         lambda: _filled(_COMMANDS, random),
         lambda: _filled(_TALK, random),
-        lambda: running[int(random.integers(len(running)))],
+        lambda: _pick(running, random),
+        lambda: _pick(at_home, random),
+        lambda: _pick(at_home, random),
         lambda: " ".join(_pick(lexicon, random) for _ in range(int(random.integers(1, 7)))),
         lambda: " ".join(_made_up(random) for _ in range(int(random.integers(1, 5)))),
     )
@@ -209,6 +212,11 @@ def other_talk(count: int, random: np.random.Generator, lexicon: Sequence[str]) 
 def _running_talk() -> list[str]:
     """Return sentences of running English that every Python carries."""
     return [s for topic in pydoc_data.topics.topics.values() for s in _SENTENCE.findall(topic)]
+
+
+def _talk_at_home() -> list[str]:
+    lines = Path(__file__).with_name("talk.txt").read_text(encoding="utf-8").splitlines()
+    return [line for line in lines if not line.startswith("#")]
 
 
 def _carried(words: Sequence[str], random: np.random.Generator) -> str:

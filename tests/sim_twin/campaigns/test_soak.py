@@ -89,6 +89,7 @@ def test_a_robot_that_is_stuck_fails_and_one_that_misses_a_job_does_not() -> Non
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_stop_costs_one_job_and_not_all_that_follow(tmp_path: Path) -> None:
     soak = Soak(tmp_path, seed=0)
