@@ -19,7 +19,16 @@ COMMANDS: Final = "commands"
 UNSEEN: Final = (COMMANDS, "strangers", "visitors")
 """Of commands: what the planner is measured by, and what others said once; nothing may be learnt
 from them."""
-COMMAND_CORPORA: Final = (*UNSEEN, "everyday", "neighbours", "guests", "lodgers", "boarders")
+COMMAND_CORPORA: Final = (
+    *UNSEEN,
+    "everyday",
+    "neighbours",
+    "guests",
+    "lodgers",
+    "boarders",
+    "tenants",
+    "roommates",
+)
 """Those, and five that rules were written from."""
 PLAN, ASK, REFUSE, STOP = "plan", "ask", "refuse", "stop"
 MUSTS: Final = (PLAN, ASK, REFUSE, STOP)

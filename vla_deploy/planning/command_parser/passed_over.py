@@ -35,9 +35,9 @@ _DOING: Final = (
 _DONE: Final = r"(?:went|drove|moved|brought|picked|took|put|found|placed|grabbed|carried|been)\b"
 # What may stand before an "if" that asks to see whether something is so, or is polite.
 _TO_SEE: Final = (
-    "see", "check", "look", "know", "wonder", "wondering", "appreciate it", "appreciate", "glad",
-    "happy", "grateful", "tell me", "nice", "great", "good", "kind", "helpful", "lovely", "mind",
-    "chance",
+    "see", "check", "hear", "test", "look", "know", "wonder", "wondering", "appreciate it",
+    "appreciate", "glad", "happy", "grateful", "tell me", "nice", "great", "good", "kind",
+    "helpful", "lovely", "mind", "chance",
 )  # fmt: skip
 _TELLS: Final = "it tells or asks of something, instead of telling me to do it"
 _WHEN: Final = "I do things at once, not at another time"

@@ -57,6 +57,7 @@ _IN_THERE: Final = re.compile(r"\b(?:in|into|inside) there\b")
 _THERE: Final = re.compile(r"\b(?:over )?there\b(?=$|[.!?]| please\b)")
 _RESTING: Final = re.compile(r"(?<! is)(?<! are)(?<! not) (?:on|in|inside) (?!the (?:left|right))")
 _POINTED: Final = re.compile(r" (?:over |right )?(?:there|here)$")
+_TAKEN: Final = re.compile(r"(?:pick up|take|grab|get|lift|fetch|hold) ")
 _NEXT: Final = re.compile(r"\b(?:and|then)\b")
 # What is wanted too is another thing.
 _TOO: Final = re.compile(r"\b(?:too|also|as well)\b")
@@ -129,7 +130,9 @@ def _named_twice(pieces: Pieces, request: Request) -> Pieces:
         goes_on = at + 1 < len(pieces) and pieces[at + 1].startswith(("the ", "and the "))
         if read is None or read.pronoun or goes_on:
             continue
-        told = _told_once(pieces[at - 1], second.split()[1:], read)
+        first = pieces[at - 1]
+        first = _POINTED.sub("", first) if _TAKEN.match(first) else first
+        told = _told_once(first, second.split()[1:], read)
         if told:
             return _without(at, _with(at - 1, told, pieces))
     return pieces
@@ -155,7 +158,8 @@ def _topic(pieces: Pieces, request: Request) -> Pieces:
     """Put what the sentence begins with in the place of the pronoun that takes it up."""
     about = [_ABOUT.sub("", polite_off(piece)) for piece in pieces]
     count = next((at for at, one in enumerate(about) if not _is_thing(one, request)), 0)
-    if not count:
+    # "The red can in the orange box, then the green one": that is done first.
+    if not count or pieces[count].startswith("then "):
         return pieces
     topic, rest = " and ".join(map(_told_from_place, about[:count])), pieces[count]
     rest = _YOU_DO.sub(r"\g<do> it ", rest)
@@ -164,8 +168,13 @@ def _topic(pieces: Pieces, request: Request) -> Pieces:
         # "Take the ball and put it away": "it" is the ball.
         if found and not _names_another(rest[: found.start()]):
             told = f"{rest[: found.start()]}{before}{topic}{rest[found.end() :]}"
-            return [told, *pieces[count + 1 :]]
+            return [told, *_topic(_others_on(pieces[count + 1 :]), request)]
     return pieces
+
+
+def _others_on(pieces: Pieces) -> Pieces:
+    """Return what follows so that it may begin with a topic of its own: "and the ball, take it"."""
+    return [pieces[0].removeprefix("and "), *pieces[1:]] if len(pieces) > 1 else pieces
 
 
 def _named_after(pieces: Pieces, request: Request) -> Pieces:

@@ -27,7 +27,8 @@ STOP_WORDS: Final = frozenset(
     }
 )  # fmt: skip
 _POLITE_BEFORE: Final = re.compile(
-    r"^(?:please|yo|(?:would|do) you mind|could you|can you|would you|will you|mind|robot|butler|"
+    r"^(?:please|yo|ooh|yay|(?:would|do) you mind|could you|can you|would you|will you|mind|robot|"
+    r"butler|"
     r"hey butler|hey robot|can(?= (?:go|come)\b)|"
     r"(?:then )?use (?:it|that|your (?:free|other) hand) to|"
     r"okay butler|ok butler|hello butler|hi butler|hey|ok|okay|now|just|kindly|i want you to|"
@@ -54,6 +55,7 @@ _POLITE_BEFORE: Final = re.compile(
     r"ever(?= \w)|you(?:'ll| will) have to|you (?:may|might)|"
     r"why don't you|go on then|i(?:'d| would) be obliged if you(?:'d| would)|i wonder whether "
     r"you (?:could|would)|"
+    r"only(?= (?:look|turn|move|open|close|lift|take|put|drive|tilt)\b)|"
     r"already(?= \w)|it's time to|time to|away and|plus|if you(?:'d| would| could)(?= "
     r"(?:just|please|kindly)\b)|but(?= don't (?:drop|let go|put down)\b))\b[, ]*"
 )
@@ -85,7 +87,9 @@ _ECHO: Final = re.compile(
     r"[, ]*\b(?:again|too|also|as well|likewise|once more|(?<!the )first|next|after that)$"
 )
 _SPLIT: Final = re.compile(
-    r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|after that|afterwards|then|"
+    r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|"
+    r"after that(?! (?:long |awful |big )?(?:night|shift|day|walk|meal|trip|call|film|game)\b)|"
+    r"afterwards|then|"
     r"(?<!\bgo )(?<!\btry )and|(?<=\bgo )and(?= (?:come|go|then|drive|return)\b)|"
     r"but(?= (?:then|hang|hold|keep|leave|bring|take|put|pick|come)\b))\b|[,;]|[.!?]\s)\s*"
 )
@@ -212,7 +216,8 @@ _REASON: Final = re.compile(
     r"^(?:i|we|you|there|they|he|she|somebody|someone|my \w+)"
     r"(?:'[a-z]+| am| is| are| will| have| has| need| want| got| had)? "
     r"(?!.*\b(?:if|when|until|unless)\b).+?,? so "
-    rf"(?=(?:please |just |can you |could you )?(?:{_VERBS})\b)"
+    rf"(?=(?:please |just |first |now |can you |could you )?(?:{_VERBS})\b|"
+    r"(?:the|my|that) (?:\w+ ){1,2}(?:goes|belongs) (?:in|on|to)\b)"
     rf"(?!(?:(?!\b(?:{'|'.join(OBJECT_CLASSES)})s?\b).)*\b(?:it|them|there|those|that)\b)"
 )
 """What is said before a command to say why; conditions are none."""

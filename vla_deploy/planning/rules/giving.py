@@ -109,8 +109,9 @@ ROWS: Final[tuple[Row, ...]] = (
      r"(?: (?:hand|one|gripper|claw))?", change_hands),
     (Intent.MANIPULATION, rf"(?:give|hand|pass|lend) (?:me|us)(?: back| over)? {OBJECT}"
      rf"{_FROM_YOU}", give),
-    (Intent.MANIPULATION, rf"(?:hand|pass|give) {OBJECT} (?:(?:over|across|here|back)(?: here)?"
-     r"(?: to (?:me|us))?|to (?:me|us))|(?:hand|pass|give) over (?P<object2>.+)", give),
+    (Intent.MANIPULATION, rf"(?:hand|pass|give) over (?P<object2>.+?)(?: to (?:me|us))?|"
+     rf"(?:hand|pass|give) {OBJECT} (?:(?:over|across|here|back)(?: here)?(?: to (?:me|us))?|"
+     r"to (?:me|us))", give),
     (Intent.MANIPULATION, rf"i(?:'ll| will) (?:take|have) {OBJECT}{_FROM_YOU}|"
      rf"(?:can|could|may|might) i (?:please |just )*(?:have|get) (?P<object2>.+?){_FROM_YOU}",
      give),
@@ -119,7 +120,8 @@ ROWS: Final[tuple[Row, ...]] = (
      r"hands?))(?: back| now| then| here)*|let (?:me|us) (?:take|have|grab) (?P<object2>it|that)"
      r"(?: now| then| here)*", let_take),
     (Intent.MANIPULATION, r"(?:you (?:can|may) )?(?:let go(?: of)?|release|let loose(?: of)?)"
-     r"(?: (?P<object>it|that|this|them))?", let_go),
+     r"(?: (?P<object>it|that|this|them))?|(?:you (?:can|may) )?let (?P<object2>it|that|this|them) "
+     r"(?:go|loose)", let_go),
     (Intent.MANIPULATION, rf"(?:you (?:can|may) )?(?:let go of|release|let loose of) {OBJECT}",
      let_go),
 )  # fmt: skip

@@ -15,7 +15,8 @@ _TELLS: Final = re.compile(
     r"(?:and |but |because |since )?"
     r"(?:it|that|this|these|they|he|she|we|i|you|there|your|my|our|the)"
     r"(?:'\w+)? .+|(?:still |not |very |nearly |almost )*(?:quite|nearly|almost|there|enough|good|"
-    r"nice|lovely|perfect|encore|yet|closer|better)(?: \w+){0,2}|(?:hm+|ah|oh|no|ta|thanks)"
+    r"nice|lovely|perfect|encore|yet|closer|better)(?: \w+){0,2}|(?:a bit |way |much )?too \w+|"
+    r"(?:hm+|ah|oh|no|nah|ta|thanks)"
 )
 _DENIES: Final = re.compile(r"\b(?:not|never|no|nothing|stay|stop|enough)\b|n't\b")
 

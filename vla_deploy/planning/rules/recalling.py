@@ -30,6 +30,7 @@ _FURTHER: Final = (
     r"(?:more|further|farther|longer)(?: (?:on|ahead|round))?"
     r"(?: than that|,? (?:the same|that) way|,? in (?:the same|that) direction)?"
 )
+_LESS: Final = r"(?:back(?: again)?(?:,? the other way)?|the other way|less)"
 _SHARES: Final[Mapping[str, float]] = {
     r"half (?:that|as (?:much|far|long)|the (?:way|distance))(?: again)?": 0.5,
     r"(?:as much|the same amount|that much)(?: again)?": 1.0,
@@ -40,6 +41,7 @@ _MORE: Final[tuple[tuple[re.Pattern[str], float], ...]] = tuple(
     (re.compile(rf"{_GO}(?:{words})"), ratio)
     for words, ratio in (
         *((rf"(?:{bit}) {_FURTHER}" if bit else _FURTHER, ratio) for bit, ratio in RATIOS.items()),
+        *((rf"(?:{bit}) {_LESS}", -ratio) for bit, ratio in RATIOS.items() if bit),
         *_SHARES.items(),
     )
 )
@@ -54,7 +56,11 @@ _AHEAD: Final = re.compile(
     r"(?:back |look )*(?:straight )?(?:ahead|forwards?|in front(?: of you)?|to the middle)"
     r"(?: again)?)"
 )
-_REVERSE: Final = re.compile(r"(?:and )?(?:now )?the other way(?: (?:round|around))?")
+_REVERSE: Final = re.compile(
+    r"(?:and )?(?:now )?(?:to )?the other (?:way(?: (?:round|around))?|side|direction)|"
+    r"(?:and )?(?:now )?(?:the )?same (?:distance|amount|way|thing)?(?: ?again)?,? "
+    r"(?:but |only |just )?(?:backwards?|in reverse|the other way|in the other direction)"
+)
 # What a command begins or ends with that leans on the one before it.
 _LEANING: Final = re.compile(
     r"(?:(?:ok|okay|oh|ah|yes|yeah|great|good|fine|lovely|perfect|brilliant|thanks|thank you|"
@@ -64,7 +70,8 @@ _LEANING: Final = re.compile(
 )
 # These ask or close: "and where is the book", "and that's it".
 _ASKING: Final = re.compile(
-    r"\b(?:where|what|which|who|whose|how|why|is|are|was|will|do|does|did|that'?s|it'?s)\b"
+    r"\b(?:where|what(?! about)|which|who|whose|how(?! about)|why|is|are|was|will|do|does|did|"
+    r"that'?s|it'?s)\b"
 )
 _SAME: Final = re.compile(
     r"(?:(?:do |try |make )?(?:exactly |just )?(?:the )?same(?: thing)?(?: again)? "

@@ -24,7 +24,10 @@ REFUSALS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
          "I cannot open or close that: my hands only take things from above"),
         (r"(?:pour|cook|bake|boil|fry|chop|cut|stir|make (?:me )?(?:a |some )?(?:coffee|tea|food|"
          r"dinner|lunch|breakfast|sandwich))\b.*", "I cannot prepare food or pour"),
-        (r"(?:throw|toss|fling|hurl|chuck|lob|sling|bung|kick|smash|break|crush|hit|punch|push|shove|stab|attack)\b.*"
+        (r"(?!(?:throw|toss|chuck|sling|bung|lob|fling) [^,;.!?]+? (?:in|into) (?:the|my|that) "
+         r"(?:\w+ )?(?:box|bowl)(?: for (?:me|us|him|her))?$)"
+         r"(?:throw|toss|fling|hurl|chuck|lob|sling|bung|kick|smash|break|crush|hit|punch|"
+         r"push|shove|stab|attack)\b.*"
          r"(?:\bat\b|\bout\b|\boff\b|\baway\b|\bdown the\b|\bme\b|\bhim\b|\bher\b|\bsomeone\b|"
          r"\bperson\b|\bpeople\b|\bdog\b|\bcat\b|\bchild\b|\bbaby\b|\bwall\b|\bwindow\b).*",
          "I do not throw or hit; I can put it somewhere"),

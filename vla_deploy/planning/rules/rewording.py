@@ -30,10 +30,10 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (
         "(?:turn|spin)(?: right| all the way| yourself)? (?:a?round|about),?"
         "(?: and| to| so(?: that)?)?"
-        "(?: you(?:'re| are)?)? fac(?:e|ing) the other (?:way|side|direction)",
+        "(?: you(?:'re| are)?)? fac(?:e|ing) the (?:other|opposite) (?:way|side|direction)",
         "turn around",
     ),
-    ("face the other (?:way|side|direction)", "turn around"),
+    ("face the (?:other|opposite) (?:way|side|direction)", "turn around"),
     (
         r"((?:take|get|fetch|pick|grab|find)\b[^,;.!?]*?),? (?:and )?"
         r"once you(?:'ve| have) got (?:it|them)",
@@ -179,7 +179,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"you(?:'re| are) (?:needed|wanted) (?:over )?(?:at|in|by) ", "go to "),
     (r"i(?: want|'d like| need| would like) you over (?:at|in|by) (?=(?:the|my|your)\b)", "go to "),
     (
-        r",? after (?:which|that|this),? (?:i want you to |you should |you can |please )?(?=[a-z])",
+        r",? after (?:which|that|this)(?! (?:long |awful |big )?(?:night|shift|day|walk|meal|trip|"
+        r"call|film|game)\b),? (?:i want you to |you should |you can |please )?(?=[a-z])",
         ", then ",
     ),
     (r"let(?:'s| us) (?:begin|start) with ([^,]+), which (?=goes|belongs|should)", r"\1 "),

@@ -21,12 +21,12 @@ _THOUGHT_AGAIN: Final = re.compile(
     r"(?:i|we) (?:don't|do not|won't|will not) (?:actually |really )?(?:be )?(?:need|want)(?:ing)? "
     r"(?:it|them|that|this)"
     r"(?: any ?more| after all| now| then)*)"
-    rf"(?:\s*[,.;!]+\s*|\s+(?={_DOING}\b))"
+    rf"(?:\s*[,.;!]+\s*|\s+(?={_DOING}\b)|\s+(?=(?:i|we)(?:'ve| have|'m| am) [^.!?]+[.!?] ))"
     r"(?:(?:and|so|but|just|please|then|you can|you could)[, ]+)*(?P<rest>.+)"
 )
 _SAME_PLACE: Final = re.compile(
     r"(?P<said>.+?),? (?:(?:in|into|to|at|on) )?(?:the |that )?(?:very |exact )?same "
-    r"(?:place|spot|way)(?: (?:too|as well|again))?"
+    r"(?:place|spot|way|box|table|bowl)(?: (?:too|as well|again))?"
 )
 _COMMANDS: Final = re.compile(rf"(?:(?:and|now|then|also|next) )*{_DOING}\b")
 _BETTER: Final = re.compile(
@@ -49,7 +49,7 @@ def _as_before(text: str) -> str:
     if found is None:
         return text
     said = found["said"]
-    return f"{said} there" if _COMMANDS.match(said) else f"{said} too"
+    return f"{said} there" if _COMMANDS.match(said) else f"{said.removesuffix(' too')} too"
 
 
 def outright(said: str) -> str:

@@ -5,7 +5,9 @@ gimme the keys   where on earth are me keys   that can go in the box   about a f
 
 from typing import Final
 
-from vla_deploy.world.vocabulary import KIND_WORDS
+from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
+
+_COLOUR: Final = "|".join(COLOURS)
 
 ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("gimme", "give me"),
@@ -70,13 +72,139 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
         "",
     ),
     (r"(?:and )?while you(?:'re| are) (?:at it|there|up),? ", ""),
-    (r" for (?:tonight|today|the night|the moment|the time being|now)(?=$|[,.!?]| and\b)", ""),
+    (r",? for (?:tonight|today|the night|the moment|the time being|now)(?=$|[,.!?]| and\b)", ""),
     (
         r"(?:about|roughly|approximately|around|some) (?=(?:\d|one|two|three|four|five|ten|fifteen|"
         r"twenty|thirty|forty|fifty|sixty|ninety|half a|a (?:half|quarter|foot|metre|meter))\b"
         r"[^,]*\b(?:degrees?|m|met(?:er|re)s?|cm|centimet(?:er|re)s?|feet|foot|inch(?:es)?|steps?)\b)",
         "",
     ),
+    (r"^(?:listen,? )?(?:service|attention|listen|(?:new |next )?(?:job|task|order)s?): ", ""),
+    (r",? (?:like )?all the way (?:a?round)(?=$|[.!?,])", ""),
+    (r"for my (?:video|photo|picture|story|channel)", ""),
+    (r"(?:^|(?<=, )|(?<=and ))they go (?=(?:in|on|into|onto|back)\b)", "put them "),
+    (r"(leave|put|set|pop) me (?=(?:the|my|that|this)\b)", r"\1 "),
+    (r"turn right (?:a?round|about)(?=$|[,.!?]| and\b)", "turn around"),
+    (r"(?:to )?wherever ((?:the|my|that) [^,;.!?]+?) (?:is|are)(?=$|[,.!?]| and\b)", r"to \1"),
+    (r",? or (?:nah|not|no|what)(?=$|[?!.])", ""),
+    (r"^wait,? (?=(?:is|are|where|where's|what|do|did|have)\b)", ""),
+    (r",? i (?:guess|suppose|reckon)(?=$|[.!?,])", ""),
+    (r"(?:too|as well),? (?=(?:with|in|using) your (?:left|right)\b)", ""),
+    (
+        r"(?: anywhere| somewhere)? in (?:this|the|our|my) (?:apartment|flat|house|home|place)"
+        r"(?=$|[,.!?])",
+        "",
+    ),
+    (r",? and if (?:we|you|so)(?: do| have(?: one)?)?,? where(?: is it)?(?=$|[?.!])", ""),
+    (r",? and (?:try to )?look (?:useful|busy|smart|nice|pretty|happy|cheerful)", ""),
+    (
+        r"keep (?!.*\b(?:until|till|while|when|if|for|where)\b)"
+        r"(?=(?:the|my|this|that|our) (?:(?!\b(?:in|on)\b)[^,;.!?])+ (?:in|on|inside) "
+        r"(?:the|my|our)\b(?! (?:left|right|other|same|hand)))",
+        "put ",
+    ),
+    (
+        r"((?:on|in|to) the (?:[a-z]+ )?(?:table|box|shelf|bowl)) with the "
+        r"(?:[a-z]+s|rest|other (?:one|[a-z]+s))(?=$|[,.!?])",
+        r"\1",
+    ),
+    (
+        r"(?:on|onto|to) (?:the|that) (?:table|one|desk|shelf) where ((?:the|my) [^,;.!?]+?) "
+        r"(?:is|are|stands?|lies?)(?=$|[,.!?])",
+        r"next to \1",
+    ),
+    (r"do (?=(?:the|that|my) (?:other|[a-z]+ one)\b)", ""),
+    (
+        rf"(?:^|(?<=, )|(?<=: ))((?:(?:{_COLOUR}) )?(?:{KIND_WORDS})) (?=(?:in|into|on|onto) "
+        rf"(?:the|my|that) (?!left|right)[^,;.!?]+?(?:,|,? and|,? then) (?:and |then )*"
+        rf"(?:(?:(?:{_COLOUR}) )?(?:{KIND_WORDS})|you|put|the|my)\b)",
+        r"put the \1 ",
+    ),
+    (
+        r"^i need (?:one|two|three|a few|a couple of|some) (?:things|jobs) (?:doing|done)"
+        r"[^:,;.!?]*[:,.] ",
+        "",
+    ),
+    (r"get (?:a )?(?:good )?(?:hold|grip) of (?=(?:the|my|that|this|your)\b)", "pick up "),
+    (r"take up (?=(?:the|my|that|this)\b)", "pick up "),
+    (rf"them (?=(?:\w+ )?(?:{KIND_WORDS})s?\b)", "those "),
+    (r"(?:right|just|directly|immediately) (?=(?:beside|next to|behind|near)\b)", ""),
+    (r"^here,? (?=(?:give|take|hand|have|hold)\b)", ""),
+    (r"^i mean (?=(?:the|that|my) [^.;!?]+, )", ""),
+    (
+        r"(?:^|(?<=, )|(?<=and ))(the|that|my) ([a-z ]+?) you (?:can |may |should |could )?"
+        r"(give|hand|pass)(?: over)? (?:to )?me",
+        r"give me \1 \2",
+    ),
+    (
+        r"(?:^|(?<=, )|(?<=and )|(?<=but ))(the|that|my) ([a-z ]+?) you "
+        r"(?:can |may |should |could )?keep(?=$|[,.!?])",
+        r"keep \1 \2",
+    ),
+    (
+        r"^with ([^,;.!?]+?),? (?:please |then |now )*do (?:exactly )?(?:the same|that|so)",
+        r"do the same with \1",
+    ),
+    (
+        r"i(?:'d| would)? (?:like|want) (the [^,;.!?]+?) (?:in |on )?there (?=(?:too|as well)\b)",
+        r"put \1 there ",
+    ),
+    (
+        r"((?:bring|fetch|get|give) (?:me|us) [^,;.!?]+?) here (?:in|into|to) (?:the|my) "
+        r"[^,;.!?]+",
+        r"\1",
+    ),
+    (r"go (?:a?round|over|past|out|back) by (?=the\b)", "go to "),
+    (
+        rf"(?:^|(?<=, )|(?<=and ))({KIND_WORDS}) (down|over|back) (?=(?:on|in|to|into|onto) "
+        r"(?:the|this|that|my)\b)",
+        r"put the \1 \2 ",
+    ),
+    (r"(?:and|then) (the [^,;.!?]+?) (?:in|into) after (?:it|them|that)", r"then put \1 in there"),
+    (r"it comes (?=(?:in|into|on|onto|back (?:in|on|to))\b)", "it goes "),
+    (
+        r"i(?:'ve| have)(?: got)? (?:a (?:good )?(?:grip|hold) (?:of|on) |hold of )?"
+        r"((?:the|that|my) [a-z]+(?: [a-z]+)?),? (?:so |and )?(?:you (?:can |may ))?"
+        r"let (?:it |that )?go(?: of it)?",
+        r"let go of \1",
+    ),
+    (
+        r"(?:the|my|our) (?:baby|kid|child|boy|girl|wife|husband|mother|mum|mom|father|dad|"
+        rf"grandma|grandpa|sister|brother|guest)'s (?=(?:[a-z]+ )?(?:{KIND_WORDS})\b)",
+        "the ",
+    ),
+    (r"outermost ([a-z]+) on the (left|right)", r"\2most \1"),
+    (
+        r"(?:clear|put|tidy) away ([^,;.!?]+?), (?:it|that|this) (?:goes|belongs) "
+        r"(?=(?:in|on|into|onto)\b)",
+        r"put \1 ",
+    ),
+    (r"(?:^|(?<=^right, )|(?<=^okay, ))tidy[- ]up time[,.!]* ", ""),
+    (
+        r"fire (?=(?:the|my|that|those|this|it|them)\b[^,;.!?]* (?:in|into|on|onto) "
+        r"(?:the|my|that)\b)",
+        "put ",
+    ),
+    (r"in on (?=(?:the|my|that)\b)", "on "),
+    (r"(?:away|off|over) on charge", "go to your charging station"),
+    (
+        r"(?:finish|end)(?: up)? back (?:here|where you (?:are|were|started)(?: from)?(?: now)?)",
+        "come back here",
+    ),
+    (r"here (?=into (?:the|my)\b)", ""),
+    (
+        r"look (?:a?round|all over|through) (?:the|my|our) (?:whole )?"
+        r"(?:place|flat|house|home|apartment|rooms?) for (?=\w)",
+        "look for ",
+    ),
+    (
+        r"(?:see|check|look) is ((?:the|my) \w+(?: \w+)?) (?:inside |over |still )?"
+        r"(?=(?:in|on|at)\b)",
+        r"see if \1 is ",
+    ),
+    (r"look down (?:to|at|on) the (?:floor|ground)(?: once| for once)?", "look down"),
+    (r"look up (?:to|at) the ceiling(?: once| for once)?", "look up"),
+    (r"(small|tiny|wee) little", r"\1"),
     (r"(half|quarter)-(?=turn|circle|spin)", r"\1 "),
     (
         rf"(?<!bring )(?<!give )(?<!get )(?<!fetch )(?<!hand )(?<!pass )(?<!find )(?<!show )"

@@ -78,7 +78,10 @@ _BESIDE: Final = re.compile(
     r"taking care\b.*|(?:be|being) careful\b.*|mind (?:you don't|it doesn't)\b.*|"
     r"without (?:spilling|dropping|breaking|waking)\b.*|"
     r"not (?:lying|sitting|standing|left|hanging)\b.*|"
-    r"i (?:need|want) to (?:read|drink|leave|call|go)\b.*)"
+    r"i (?:need|want) to (?:read|drink|leave|call|go)\b.*|"
+    r"i (?:don't|do not) (?:care|like|want|wish) to be\b.*|"
+    r"(?:i (?:want|would like)|let's|let me) (?:to )?(?:see|hear|check|test|watch|know) "
+    r"(?:if|whether|how)\b.*)"
 )
 _IT_IS_AT: Final = re.compile(
     r"(?:it|they)(?:'s|'re|'ll be| is| are| will be| should be| must be| might be| may be)"

@@ -13,8 +13,8 @@ _REMARK: Final = re.compile(
 )
 # The same of another candidate: "the little one won't go round".
 _TELLS: Final = re.compile(
-    r"(?:and |but |because |since )?(?:the|that|this) .+?(?:'s|n't| is| are| was| has| will| can| "
-    r"goes| stays| belongs)\b.+"
+    r"(?:and |but |because |since )?(?:the|that|this|t'?other) ?.+?(?:'s|n't| is| are| was| has| "
+    r"will| can| goes| stays| belongs)\b.+"
 )
 _MEANT: Final = re.compile(
     r"(?:'s| is| was) (?:what|the one|which one)(?: that)? i(?:'m| am| was)? (?:mean|meant|want|"

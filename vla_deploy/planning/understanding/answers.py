@@ -100,7 +100,7 @@ _PIECE: Final = re.compile(r"\s*(?:[,;.!?]|\s-+\s)\s*")
 _NOT: Final = re.compile(
     r"(?:no )?(?P<any>(?:any|either|anything|whichever)(?: one| of them)? )?(?:the one )?"
     r"(?:but not|but|not|except|other than|apart from|(?:that |which )?is(?:n'?t| not)|"
-    r"(?:you can )?leave|"
+    r"(?:you can )?(?:leave|keep|hang on to|hold on to)|"
     r"i (?:don'?t|do not) (?:want|mean)) (?P<not>.+?)(?: alone| where it is)?(?: but (?P<rest>.+))?"
 )
 # What people say when they are asked, before they answer.

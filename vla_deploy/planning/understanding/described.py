@@ -5,6 +5,7 @@ from typing import Final
 
 from vla_deploy.planning.understanding.answers import WORD
 from vla_deploy.planning.understanding.conversation import Question
+from vla_deploy.world.vocabulary import KIND_WORDS
 
 _WHERE: Final = re.compile(
     r"(?:(?:no|yes|well|um|uh|oh|ah|sorry|pet|love|dear|mate|good question|it(?:'s| is)|"
@@ -16,6 +17,8 @@ _WHERE: Final = re.compile(
     r"under|beneath|on top of|left of|right of|to the (?:left|right) of|opposite|inside|in|on)"
     r" .+?)(?: (?:please|then|thanks|thank you|i think|i guess)| so (?:that )?(?:i|we) can .*)*"
 )
+
+_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})\b")
 
 
 def described(question: Question, text: str) -> str | None:
@@ -30,7 +33,11 @@ def described(question: Question, text: str) -> str | None:
         return None
     if found["noun"] and found["noun"] not in expression.split():
         return None
-    named = list(re.finditer(rf"\b{re.escape(expression)}\b", command, re.IGNORECASE))
+    noun = _KIND.search(expression)
+    # "The ball from the table" may have been said as "lift the ball up off the table".
+    spelt = (expression, *(() if noun is None else (f"the {noun[0]}",)))
+    found_in = [list(re.finditer(rf"\b{re.escape(it)}\b", command, re.IGNORECASE)) for it in spelt]
+    named = next((one for one in found_in if one), [])
     if len(named) != 1:
         return None
     start, end = named[0].span()

@@ -19,7 +19,8 @@ _HARM: Final = (
     r"(?:(?:gets?|is|are|'s|'re) (?:lost|broken|wet|dirty|stolen|trodden|crushed|cold)|"
     r"does|do|sits?|steps?|treads?|trips?|falls?|rolls?|breaks?|spills?|drops?|knocks?|kicks?|"
     r"grabs?|takes?|loses?|forgets?|ruins?|spoils?|gets? (?:it|them|there|to it|hold)|finds?|"
-    r"eats?|wakes?|notices?)"
+    r"eats?|wakes?|notices?|goes (?:missing|down|off|cold|under|behind|everywhere)|"
+    r"starts?|begins?|comes?|gets?|heads?|arrives?|leaves?|sees?)"
 )
 _REST: Final = (
     r"(?:(?!\b(?:if|when|whenever|until|till|unless|after|before|once|only|but|not yet|later|"

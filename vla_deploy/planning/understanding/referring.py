@@ -132,10 +132,22 @@ def _pick(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[St
     if not isinstance(given.get("object"), str):
         yield "pick_up", given
         return
-    for thing in resolver.things(given["object"], Use.TAKE):
+    things = resolver.things(given["object"], Use.TAKE)
+    for thing in _not_put_yet(given["object"], things, state(), resolver):
         if _held(thing, state(), resolver) is None:
             yield from _on_furniture(thing)
             yield "pick_up", {**given, "object": thing.name}
+
+
+def _not_put_yet(
+    text: str, things: tuple[Referent, ...], state: State, resolver: Resolver
+) -> tuple[Referent, ...]:
+    """Leave out of "them" what the plan has put somewhere: "put the cups down, get the keys"."""
+    if phrases.PRONOUNS.get(_spoken(text)) != phrases.THEM:
+        return things
+    scene = resolver.setting.request.scene
+    others = [one for one in things if subject_of(one.name, scene).key not in state.rests]
+    return tuple(others) or things
 
 
 def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:

@@ -13,6 +13,7 @@ from typing import Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotThere, UnknownObject
+from vla_deploy.planning.references import words_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.absence import not_as_many, not_there
 from vla_deploy.planning.understanding.conversation import Mention, Role
@@ -28,6 +29,7 @@ from vla_deploy.world.vocabulary import OBJECT_CLASSES
 # How surely words mean what they were taken for.
 MISSPELT: Final = 0.85
 BY_SPEAKER: Final = 0.6
+_ONE_THING: Final = frozenset({"thing", "one", "object", "item"})
 TOGETHER_M: Final = 1.2
 """As far as things on one table are from one another."""
 
@@ -253,6 +255,8 @@ class Resolver:
             NotThere: nothing; the message says what the other hand holds.
         """
         holding = {hand: one for hand, one in self.setting.holding() if read.hand in ("", hand)}
+        if len(holding) > 1 and not _ONE_THING.isdisjoint(words_of(read.said)):
+            raise which_hand({hand: one.said for hand, one in holding.items()}, read.said)
         if not holding:
             others = [
                 f"the {hand} one holds the {one.said}" for hand, one in self.setting.holding()

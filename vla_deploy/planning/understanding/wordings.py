@@ -56,6 +56,11 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"^(?:those|these) (?!two\b|three\b|four\b|\d)(?=(?:[a-z]+ ){0,2}[a-z]+s\b)", "all the "),
     # --- how far
     (r"\b(?:far|very|extreme) (?=(?:left|right)\b)", ""),
+    (r"\b(?:that|which) (?:stands?|lies?|sits?|is (?:standing|lying|sitting)) (?=(?:on|in|to|next|"
+     r"beside|near|by|left|right|at)\b)", "that is "),
+    (r"\bon the (left|right) of (?=(?:the|my|that)\b)", r"to the \1 of "),
+    (r"^(the|that) ((?:[a-z]+ )?[a-z]+) (?:at|on) the (left|right)(?: hand)? (?:end|side|edge) of "
+     r"(?=the )", r"\1 \3most \2 on "),
     (r"\b(?:farthest|furthest|most) (?:to|on) (?:the|your|my) (?=(?:left|right)\b)", "on the "),
     (r"\bmost distant\b", "farthest"),
     (r"\bfa(?:rthest|rther)\b|\bfurthe(?:st|r)\b", "farthest"),

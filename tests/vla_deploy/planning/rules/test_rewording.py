@@ -26,6 +26,23 @@ from vla_deploy.planning.rules.rewording import reworded
         ("you're needed at the entrance", "go to the entrance"),
         ("turn about ninety degrees", "turn ninety degrees"),
         ("put down what's in the left one", "put down what's in your left hand"),
+        ("the phone you can give to me, the can you keep", "give me the phone, keep the can"),
+        ("with the other one please do the same", "do the same with the other one"),
+        ("i'd like the red one there as well", "put the red one there as well"),
+        (
+            "phone down on this table, can over to the desk",
+            "put the phone down on this table, put the can over to the desk",
+        ),
+        (
+            "clear away the outermost book on the left, it comes on the desk",
+            "put the leftmost book on the desk",
+        ),
+        ("i've got a grip of the cup, you can let it go", "let go of the cup"),
+        ("fetch me the cup here into the kitchen", "fetch me the cup"),
+        ("keep the can in the box", "put the can in the box"),
+        ("drive up to wherever the can is", "drive up to the can"),
+        ("put it on the table where the red can is", "put it next to the red can"),
+        ("fire them keys in the box", "put those keys in the box"),
     ],
 )
 def test_a_roundabout_command_is_put_plainly(said: str, plain: str) -> None:
@@ -42,6 +59,11 @@ def test_a_roundabout_command_is_put_plainly(said: str, plain: str) -> None:
         "say that can is red",
         "put the cup next to the book",
         "take the ball to the kitchen",
+        "ball in the box",
+        "take the cup and keep the can",
+        "keep the cup in your left hand",
+        "keep the can in the box until i come",
+        "drive into the cat's basket",
     ],
 )
 def test_a_plain_command_stays_as_it_is(said: str) -> None:

@@ -27,6 +27,13 @@ TALKS = {
     "pick up the book >> on second thoughts put it in the box": "pick_up book_1; place box in",
     "look to the right >> now straight ahead again": "look_at ahead",
     "look to the right >> and back again": "look_at ahead",
+    "look to the right >> and now to the other side": "look_at left",
+    "bring me the ball >> and what about the book?":
+        "pick_up book; navigate_to 2.15 2.05 -1.571; speak Here is the book.",
+    "put the red cup in the box >> with the blue one please do the same":
+        "pick_up blue cup; place box in",
+    "put the ball in the box >> i would like the book there as well":
+        "pick_up book; place box_1 in",
 }  # fmt: skip
 
 
@@ -64,6 +71,12 @@ def test_what_would_be_better_is_said_outright() -> None:
 def test_nothing_is_done_for_what_names_nothing_to_do(goes_on: GoesOn, talk: str) -> None:
     with pytest.raises(PlanningError):
         goes_on(talk)
+
+
+def test_too_far_is_a_bit_back(flat: "Flat") -> None:
+    before = flat.after("turn left forty degrees")
+    plan = flat.plan("nah, too far. a bit back the other way.", conversation=before)
+    assert plan.actions[0].parameters["angle_rad"] == pytest.approx(-0.1745, abs=1e-3)
 
 
 def test_straight_ahead_without_a_look_before_is_no_look(flat: "Flat") -> None:

@@ -37,6 +37,8 @@ SURE = Question(text="Shall I?", asked_ns=0, command_text="throw the cup away")
         ("Right of you to check. The blue one is what I meant.", Verdict.ANEW, None),
         ("I see. The blue one is what I meant.", Verdict.CHOSEN, BLUE),
         ("The red one, the blue one won't do.", Verdict.CHOSEN, RED),
+        ("Red. Keep the blue one.", Verdict.CHOSEN, RED),
+        ("Hang on to the red one", Verdict.CHOSEN, BLUE),
         ("Red, the blue one's only mine.", Verdict.CHOSEN, RED),
         ("The red one, where I keep my tea.", Verdict.CHOSEN, RED),
         ("The red one, the one on the left.", Verdict.CHOSEN, RED),
