@@ -15,16 +15,21 @@ $(STAMP): pyproject.toml requirements-dev.lock scripts/install
 	scripts/install $(VENV) $(PYTHON)
 	touch $@
 
-demo: $(STAMP)
-	scripts/system-packages
+# Python's packages and the system's come at the same time.
+.PHONY: set-up system-packages
+set-up:
+	@$(MAKE) --no-print-directory -j2 $(STAMP) system-packages
+
+system-packages:
+	@scripts/system-packages
+
+demo: set-up
 	$(VENV)/bin/vla-deploy demo
 
-test: $(STAMP)
-	scripts/system-packages
+test: set-up
 	scripts/check
 
-campaign: $(STAMP)
-	scripts/system-packages
+campaign: set-up
 	$(VENV)/bin/python -m pytest -m "slow and not nightly" --timeout 3600
 
 mutation: $(STAMP)
