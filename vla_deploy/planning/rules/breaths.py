@@ -28,7 +28,8 @@ _ROWS: Final = (
     r"\b(?P<own>left|right),+ ?(?=(?:hand|arm|gripper)\b)",
     r"\b(?P<own>(?:after|once|when) you),+ ?(?=[a-z])",
     r"\b(?P<own>no|wait|sorry),+ ?(?=(?:no|wait|sorry)\b)",
-    r"(?P<own>),+ ?(?=(?:in|into|inside|on|onto|from|out of|off|with|next to|through) "
+    r"(?P<own>),+ ?(?=(?:in|into|inside|on|onto|from|out of|off|with|next to|beside|near|"
+    r"through) "
     r"(?:the|my|your|a|that)\b)",
     r"(?P<own>),+ ?(?=(?:that|which) (?:is|are|was)\b)",
     r"(?<=[a-z])(?P<own>),(?=[a-z])",

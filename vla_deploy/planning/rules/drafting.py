@@ -25,7 +25,7 @@ from vla_deploy.planning.rules.exchanging import continued, corrected, tells_of_
 from vla_deploy.planning.rules.fits import HANDS, Fit, fit_of, is_whole, known_fit, names_hand
 from vla_deploy.planning.rules.intents import PRIORITIES, Intent
 from vla_deploy.planning.rules.ordering import in_order
-from vla_deploy.planning.rules.pointing_back import pointing_alone
+from vla_deploy.planning.rules.pointing_back import by_another, pointing_alone
 from vla_deploy.planning.rules.recalling import is_again, last_words, leans, recalled, same_with
 from vla_deploy.planning.rules.refusals import refuse_unable
 from vla_deploy.planning.rules.second_thoughts import outright, thought_again
@@ -76,7 +76,7 @@ def draft_plan(request: Request) -> Plan:
     if len(request.text) > MOST_LETTERS:
         raise NotUnderstood(f"{request.text[:60]}...")
     said = courtesy_off(request.text)
-    meant = thought_again(said)
+    meant = by_another(thought_again(said), request)
     full = recalled(pointing_alone(meant, request), request)
     own = request.text if meant == said else meant
     draft = _drafted(replace(request, text=full or own))

@@ -8,6 +8,8 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.rules.fits import known_fit
+from vla_deploy.planning.understanding.conversation import Mention, Role
+from vla_deploy.world.vocabulary import KIND_WORDS
 from vla_deploy.planning.rules.recalling import points_back
 
 _PIECE: Final = re.compile(r"\s*[,;.!?]+\s*")
@@ -19,6 +21,37 @@ _TELLS: Final = re.compile(
     r"(?:hm+|ah|oh|no|nah|ta|thanks)"
 )
 _DENIES: Final = re.compile(r"\b(?:not|never|no|nothing|stay|stop|enough)\b|n't\b")
+
+# "The cup that is on it", "the one next to it"; "put the cup on it" says where to.
+_BY_IT: Final = re.compile(
+    rf"\b(?P<thing>(?:the|that|my) (?:[a-z]+ )?(?:{KIND_WORDS}|one|thing))"
+    r"(?: that is| that's| which is| standing| lying| sitting)? "
+    r"(?P<where>on|in|next to|beside|near|by|left of|right of) it(?=$|[,.!?])"
+)
+_PUTS: Final = re.compile(
+    r"\b(?:put|place|set|drop|pop|stick|leave|lay|move|carry|goes|go|belongs?)\b"
+)
+_RESTING: Final = ("on", "in")
+
+
+def by_another(text: str, request: Request) -> str:
+    """Return "the cup on the kitchen table" for "the cup on it", after "go to the kitchen table".
+
+    What "it" is next to is the thing that was spoken of last.
+    """
+    found = _BY_IT.search(text)
+    before = "" if found is None else text[: found.start()]
+    if found is None or _PUTS.search(before):
+        return text
+    roles = (Role.PLACE, Role.DESTINATION) if found["where"] in _RESTING else (Role.OBJECT,)
+    spoken = next((one for one in request.conversation.mentions() if one.role in roles), None)
+    is_told_here = _PIECE.search(before) is not None or " and " in before
+    told = "" if spoken is None or is_told_here else f" {found['where']} the {_words(spoken)}"
+    return f"{before}{found['thing']}{told}{text[found.end() :]}"
+
+
+def _words(spoken: Mention) -> str:
+    return spoken.means.replace("_", " ") if spoken.role is Role.PLACE else spoken.means
 
 
 def pointing_alone(text: str, request: Request) -> str:

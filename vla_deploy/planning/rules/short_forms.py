@@ -57,7 +57,7 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
     ),
     (r"where'd\b", "where did"),
     (r"both of (?:those|these)(?=$|[,.!?]| (?:on|in|to|away|down|up|into|over)\b)", "both of them"),
-    (r"that(?:'s| is) (?:lying |standing |sitting )?on (?:it|there)", ""),
+    (r"that(?:'s| is) (?:lying |standing |sitting )?on (?:it|there)", "on it"),
     (r"like (?=(?:an? (?:foot|metre|meter|step)|\d|two|three)\b)", ""),
     (r"(?:about|roughly|around) (?=an? (?:foot|metre|meter|step)\b)", ""),
     (r"on the ((?:\w+ )table) in front of (?:you|me|us)", r"on the \1"),
@@ -84,6 +84,26 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"for my (?:video|photo|picture|story|channel)", ""),
     (r"(?:^|(?<=, )|(?<=and ))they go (?=(?:in|on|into|onto|back)\b)", "put them "),
     (r"(leave|put|set|pop) me (?=(?:the|my|that|this)\b)", r"\1 "),
+    (
+        r"^(the|my|that) ([a-z ]+?),? (?:also|too),? you (?:can |may |should |could )?"
+        r"(leave|put|set|drop) (there|here|down)(?=$|[,.!?])",
+        r"\3 \1 \2 \4 too",
+    ),
+    (
+        r"(bring|give|get|fetch|hand) (?:grandma|granny|gran|nana|mum|mom|dad|daddy|grandpa|"
+        rf"grandad) (?:the|her|his) (?=(?:[a-z]+ )?(?:{KIND_WORDS})\b)",
+        r"\1 me the ",
+    ),
+    (
+        r"^(?:there(?:'s| is) )?something(?: is|'s)? (?:lying|standing|sitting) (on(?: top of)?|in|"
+        r"under|next to|beside) ((?:the|my) [^.!?,]+)[.!?,]+ ([^.!?]*?)\b(?:that|it)(?=$|[,.!?])",
+        r"\3the thing \1 \2",
+    ),
+    (
+        r"(put|set|place|drop|pop) ([a-z ]+?) in (?:there |the same (?:box|place) )?with "
+        rf"(?=(?:the|my) (?:[a-z]+ )?(?:{KIND_WORDS})\b)",
+        r"\1 \2 next to ",
+    ),
     (r"turn right (?:a?round|about)(?=$|[,.!?]| and\b)", "turn around"),
     (r"(?:to )?wherever ((?:the|my|that) [^,;.!?]+?) (?:is|are)(?=$|[,.!?]| and\b)", r"to \1"),
     (r",? or (?:nah|not|no|what)(?=$|[?!.])", ""),

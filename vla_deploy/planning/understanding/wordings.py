@@ -61,6 +61,7 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"\bon the (left|right) of (?=(?:the|my|that)\b)", r"to the \1 of "),
     (r"^(the|that) ((?:[a-z]+ )?[a-z]+) (?:at|on) the (left|right)(?: hand)? (?:end|side|edge) of "
      r"(?=the )", r"\1 \3most \2 on "),
+    (r"\b(?:at|on) the (left|right)(?: hand)? end$", r"on the \1"),
     (r"\b(?:farthest|furthest|most) (?:to|on) (?:the|your|my) (?=(?:left|right)\b)", "on the "),
     (r"\bmost distant\b", "farthest"),
     (r"\bfa(?:rthest|rther)\b|\bfurthe(?:st|r)\b", "farthest"),
