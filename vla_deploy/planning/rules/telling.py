@@ -71,17 +71,18 @@ def tell_or_find(groups: Groups, request: Request) -> list[Step]:
     found = _known(groups["object"], request)
     if not found or request.scene is None:
         return [*_remembered(groups["object"], request), *find(groups, request)]
-    sites = request.world.sites.values()
-    places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
-    told = [_where(one, place_of(one, places), request) for one in found[:MOST_TOLD]]
-    return _say(" ".join(told))
+    return _say(_places_of(found, request))
 
 
 def tell_whether(groups: Groups, request: Request) -> list[Step]:
     """Say whether a thing is in sight."""
     found = _known(groups["object"], request)
+    unsure = "" if found else _of_room(groups["object"], request)
+    if unsure:
+        elsewhere = _known(_IN_ROOM.sub("", groups["object"]), request)
+        return _say(_places_of(elsewhere, request) or unsure)
     if not found:
-        return _say(_of_room(groups["object"], request) or "No, I do not see that.")
+        return _say("No, I do not see that.")
     return _say(f"Yes, I see {listed(found)}.")
 
 
@@ -103,6 +104,13 @@ def listed(things: Sequence[Thing]) -> str:
     words = [_a(str(one)) for one in things[:MOST_TOLD]]
     more = len(things) - len(words)
     return _and([*words, f"{more} more"] if more > 0 else words)
+
+
+def _places_of(things: Sequence[Thing], request: Request) -> str:
+    """Return where things are, a sentence each."""
+    sites = request.world.sites.values()
+    places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
+    return " ".join(_where(one, place_of(one, places), request) for one in things[:MOST_TOLD])
 
 
 def _known(text: str, request: Request) -> list[Thing]:
