@@ -8,9 +8,9 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.rules.fits import known_fit
+from vla_deploy.planning.rules.recalling import points_back
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.world.vocabulary import KIND_WORDS
-from vla_deploy.planning.rules.recalling import points_back
 
 _PIECE: Final = re.compile(r"\s*[,;.!?]+\s*")
 _TELLS: Final = re.compile(

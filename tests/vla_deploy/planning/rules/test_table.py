@@ -138,7 +138,8 @@ COMMANDS = {
                             "an orange box.",
         "what is on the side table": "speak I see an orange box on the side table.",
         "is the ball on the table?": "speak Yes, I see a green ball.",
-        "is the ball in the kitchen or not?": "speak The green ball is on the coffee table, in view.",
+        "is the ball in the kitchen or not?":
+            "speak The green ball is on the coffee table, in view.",
         "is there a bottle?": "speak No, I do not see that.",
         "is there a bottle in the kitchen?": (
             "speak I know what I see on furniture, not all that is in the kitchen; "
