@@ -34,7 +34,7 @@ from vla_deploy.speech.recording import StreamClock, open_hearing
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.stop_words.opening import open_spotter
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
-from vla_deploy.speech.stop_words.suspicions import Suspicions
+from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
 from vla_deploy.speech.verdict import Verdict
 from vla_deploy.state_dir import user_base
 
@@ -68,6 +68,7 @@ class Ear:
         self.spotter: Spotter
         self.spotter, thresholds = open_spotter(shelf, profile)
         self.threshold = thresholds[profile.speech.stop_words]
+        self._alone = alone(profile.speech.stop_words, self.threshold)
         self._clock = StreamClock()
         ears = ears_of(shelf, profile, 0)
         self.why_no_words = ears.why
@@ -103,7 +104,7 @@ class Ear:
                     yield Alarm(word=word, by=by, at_s=at_s, computed_s=took_s)
 
     def _spot(self, block: SoundBlock) -> str:
-        spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self.threshold)
+        spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self._alone)
         self._suspicions.note(block.end_ns, self.spotter.score, self.threshold)
         return "" if spotted is None else spotted.word
 

@@ -36,8 +36,11 @@ class StreamListener(Protocol):
         """Open topics and models."""
         ...
 
-    def feed(self, block: SoundBlock) -> None:
-        """Take the next block; one that does not follow the last one begins anew."""
+    def feed(self, block: SoundBlock, *, is_read: bool) -> None:
+        """Take the next block; one that does not follow the last one begins anew.
+
+        `is_read` tells that the recogniser reads what is said in it.
+        """
         ...
 
     def refuses(self, began_ns: int, ended_ns: int) -> str:

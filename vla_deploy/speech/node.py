@@ -194,15 +194,19 @@ class SpeechNode:
 
     def _hear(self, block: SoundBlock) -> None:
         """Hear the room; while a person speaks into the page, only the listeners do."""
+        hearing = self._hearing
+        is_open = hearing is not None and hearing.readings.recogniser is not None
+        is_read = is_open and not self._page.is_open
         for listener in self._room_listeners:
-            listener.feed(block)
+            listener.feed(block, is_read=is_read)
         if not self._page.is_open:
             self._understand(block, self._playing(), in_page=False)
 
     def _hear_page(self, block: SoundBlock) -> None:
         """Hear a person who holds the page's button: the robot falls silent for them."""
+        # Who lets the button go at once leaves the recogniser no pause to read in.
         for listener in self._page_listeners:
-            listener.feed(block)
+            listener.feed(block, is_read=False)
         if not self._opened_ears:
             self._open_ears()
         if not self._in_page and self._voice is not None and self._playing() is not None:

@@ -103,7 +103,7 @@ class Recogniser:
         started_ns = self._clock.now_ns()
         try:
             segments, info = self._transcribe(samples, hot_words)
-            stop_surety = self._stop_surety()
+            stop_surety = self._stop_surety(samples)
         except _model_errors() as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
@@ -145,9 +145,11 @@ class Recogniser:
         self._whisper = None
         self.claim.release()
 
-    def _stop_surety(self) -> float | None:
-        ear = self._stop_ear
-        return None if ear is None else max(map(ear.surety, self._whisper.frames), default=0.0)
+    def _stop_surety(self, samples: Sound) -> float | None:
+        ear, whisper = self._stop_ear, self._whisper
+        if ear is None:
+            return None
+        return ear.surety_of(samples, whisper.frames, whisper.frames_of)
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper

@@ -6,6 +6,7 @@ hears the very frames that the recogniser does; `training/stop_ear` makes it for
 is shipped, another Whisper has none.
 """
 
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -15,13 +16,20 @@ from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.inference.graph_session import GraphSession
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import Model
+from vla_deploy.speech.sound import RATE_HZ, Sound
 
 FILE: Final = "stop_ear.onnx"
 FRAMES, SCORES = "frames", "scores"
 SETTLING: Final = 2
 """So many scores in a row tell a word, 40 ms each: one alone may be chance."""
+HEARD_AGAIN_FROM: Final = 0.02
+"""From that surety on a phrase is heard again: what is only chance seldom stays."""
+LATER_S: Final = (-0.01, 0.03)
+PACES: Final = (0.89, 0.94, 1.06, 1.12)
+"""As what it is heard again: as if it had begun so much earlier or later, or was spoken so fast."""
 _RANK: Final = 3
 Array = NDArray[np.float32]
+FramesOf = Callable[[Sound], Array]
 
 
 class StopEar:
@@ -54,9 +62,33 @@ class StopEar:
         runs = np.lib.stride_tricks.sliding_window_view(scores[:, 1:], SETTLING, axis=0)
         return float(runs.mean(axis=2).max())
 
+    def surety_of(self, sound: Sound, frames: Sequence[Array], frames_of: FramesOf) -> float:
+        """Return the mean surety of a phrase as it is and as it might as well have been spoken.
+
+        `frames` are what the recogniser was given of it, `frames_of` what it would be given.
+
+        Raises:
+            RunFailed: the frames are not of as many mel bands as it was made for.
+        """
+        first = max(map(self.surety, frames), default=0.0)
+        if first < HEARD_AGAIN_FROM:
+            return first
+        again = [self.surety(frames_of(one)) for one in _varied(sound)]
+        return float(np.mean([first, *again]))
+
     def close(self) -> None:
         """Release the memory."""
         self._graph.close()
+
+
+def _varied(sound: Sound) -> Iterator[Sound]:
+    """Yield a phrase a moment earlier and later, slower and faster."""
+    for later_s in LATER_S:
+        count = round(RATE_HZ * later_s)
+        yield np.pad(sound, (count, 0)) if count > 0 else sound[-count:]
+    for pace in PACES:
+        times = np.arange(0.0, len(sound) - 1.0, pace)
+        yield np.interp(times, np.arange(len(sound)), sound).astype(np.float32)
 
 
 def open_stop_ear(model: Model) -> StopEar | None:

@@ -17,6 +17,7 @@ os.environ["KMP_BLOCKTIME"] = "0"
 import ctranslate2
 import faster_whisper
 import numpy as np
+from faster_whisper.audio import pad_or_trim
 from faster_whisper.transcribe import get_compression_ratio
 from numpy.typing import NDArray
 
@@ -47,6 +48,11 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
         if self.keeps_frames:
             self.frames.append(features.reshape(features.shape[-2:]))
         return super().encode(features)
+
+    def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return what the encoder would be given of a phrase, (mel, frame)."""
+        frames: NDArray[np.float32] = pad_or_trim(self.feature_extractor(samples))
+        return frames
 
     def generate_with_fallback(
         self, encoder_output: ctranslate2.StorageView, prompt: list[int], tokenizer: Any, how: Any
@@ -94,13 +100,22 @@ class TrimmedWhisper(Whisper):
 
     def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
         """Return what the encoder makes of features, (mel bands, frames)."""
-        kept = self.content_frames + _MARGIN_FRAMES
-        kept += kept % _FRAMES_PER_STATE
-        # CTranslate2 takes what has as many rows as there are mel bands for features, and would
-        # encode its own states once more (`WhisperEncoder::is_encoded`).
-        if kept // _FRAMES_PER_STATE == features.shape[-2]:
-            kept += _FRAMES_PER_STATE
-        return super().encode(np.ascontiguousarray(features[..., :kept]))
+        return super().encode(_trimmed(features, self.content_frames))
+
+    def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return what the encoder would be given of a phrase, (mel, frame)."""
+        content_frames = len(samples) // self.feature_extractor.hop_length
+        return _trimmed(super().frames_of(samples), content_frames)
+
+
+def _trimmed(features: NDArray[np.float32], content_frames: int) -> NDArray[np.float32]:
+    kept = content_frames + _MARGIN_FRAMES
+    kept += kept % _FRAMES_PER_STATE
+    # CTranslate2 takes what has as many rows as there are mel bands for features, and would
+    # encode its own states once more (`WhisperEncoder::is_encoded`).
+    if kept // _FRAMES_PER_STATE == features.shape[-2]:
+        kept += _FRAMES_PER_STATE
+    return np.ascontiguousarray(features[..., :kept])
 
 
 def cuda_devices() -> int:

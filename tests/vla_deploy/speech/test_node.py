@@ -36,14 +36,16 @@ class Listener:
 
     def __init__(self) -> None:
         self.blocks: list[SoundBlock] = []
+        self.is_read = False
         self.closed = 0
         self.refusal = ""
 
     def start(self, space: SharedSpace) -> None:
         self.space = space
 
-    def feed(self, block: SoundBlock) -> None:
+    def feed(self, block: SoundBlock, *, is_read: bool) -> None:
         self.blocks.append(block)
+        self.is_read = is_read
 
     def refuses(self, began_ns: int, ended_ns: int) -> str:
         return self.refusal
@@ -213,6 +215,7 @@ def test_a_listener_hears_every_block_in_time_at_16_khz(bench: MakeBench, tone: 
     assert blocks[-1].end_ns == pytest.approx(rig.clock.ns, abs=5_000_000)
     assert rig.status()["state"] == "listening"
     assert rig.status()["stop_words"]["blocks"] > 0
+    assert rig.listener.is_read
 
 
 def test_a_microphone_that_is_unplugged_is_told_and_heard_again_when_it_is_back(
@@ -458,6 +461,7 @@ def test_while_a_person_speaks_into_the_page_the_room_is_heard_for_stop_words_on
         rig.say(TEXT)
     assert rig.told("heard") == []
     assert len(rig.listener.blocks) - heard > 100
+    assert not rig.listener.is_read, "nobody reads the room meanwhile"
 
 
 def test_the_robot_falls_silent_for_whoever_holds_the_button(bench: MakeBench) -> None:

@@ -34,7 +34,7 @@ class Raw:
     def start(self, space: SharedSpace) -> None:
         """Open nothing."""
 
-    def feed(self, block: SoundBlock) -> None:
+    def feed(self, block: SoundBlock, *, is_read: bool) -> None:
         self.seconds += len(block.samples) / RATE_HZ
 
     def refuses(self, began_ns: int, ended_ns: int) -> str:

@@ -94,3 +94,18 @@ def test_a_spoiled_ear_is_told(tmp_path: Path, spoil: Any) -> None:
     spoil(tmp_path / FILE)
     with pytest.raises(ModelFileSpoiled, match=FILE):
         open_stop_ear(model(tmp_path, FILE))
+
+
+def test_a_phrase_that_may_hold_a_word_is_heard_again_and_the_mean_tells(ear: StopEar) -> None:
+    heard: list[int] = []
+
+    def frames_of(sound: np.ndarray) -> np.ndarray:
+        heard.append(len(sound))
+        return frames(12, 13) if len(heard) <= 3 else frames()
+
+    sound = np.zeros(16_000, np.float32)
+    assert ear.surety_of(sound, [frames()], frames_of) == 0.0
+    assert heard == []
+    assert ear.surety_of(sound, [frames(12, 13)], frames_of) == pytest.approx(4 / 7)
+    assert heard[:2] == [15_840, 16_480]
+    assert [round(16_000 / count, 2) for count in heard[2:]] == [0.89, 0.94, 1.06, 1.12]

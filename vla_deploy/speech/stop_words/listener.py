@@ -17,7 +17,7 @@ from vla_deploy.speech.sound import SoundBlock
 from vla_deploy.speech.stop_words.errors import StopWordsError
 from vla_deploy.speech.stop_words.own_voice import OwnVoice
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
-from vla_deploy.speech.stop_words.suspicions import Suspicions
+from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
 
 OFF: Final = "off"
 OFF_WHY: Final = "switched off by the profile: speech.stop_words"
@@ -103,8 +103,11 @@ class StopWords:
         if changed:
             self._warn_if_off()
 
-    def feed(self, block: SoundBlock) -> None:
-        """Take the next block, and press the button where a stop word was heard in it."""
+    def feed(self, block: SoundBlock, *, is_read: bool) -> None:
+        """Take the next block, and press the button where a stop word was heard in it.
+
+        `is_read` tells that the recogniser reads it too: then a word alone must be clear.
+        """
         self._own.follow(self._playing(), self._clock.now_ns())
         if self._spotter is None or self._sensitivity == OFF:
             return
@@ -112,10 +115,12 @@ class StopWords:
             self._spotter.reset()
             self._suspicions.clear()
         own = self._own.sounds(block.end_ns)
-        threshold = self._thresholds["own_voice" if own else self._sensitivity]
+        sensitivity = "own_voice" if own else self._sensitivity
+        threshold = self._thresholds[sensitivity]
         runs = self._spotter.runs
         try:
-            spotted = self._spotter.feed(block.samples, block.end_ns, threshold)
+            enough = alone(sensitivity, threshold) if is_read else threshold
+            spotted = self._spotter.feed(block.samples, block.end_ns, enough)
         except RunFailed as error:
             self._counts["failed_runs"] += 1
             self._break(str(error))

@@ -1,6 +1,7 @@
 """Remember where a stop word may have been said, though too unsurely to stop for it alone."""
 
 from collections import deque
+from collections.abc import Mapping
 from typing import Final
 
 from drivers.clock import NS_PER_S
@@ -8,6 +9,15 @@ from drivers.clock import NS_PER_S
 KEPT_NS: Final = 12 * NS_PER_S
 SETTLES_NS: Final = 6 * NS_PER_S // 10
 """A word that ends a phrase is settled so long after it at most."""
+
+ALONE_SHARE: Final[Mapping[str, float]] = {"low": 0.45}
+"""How far above its threshold a word must come to stop the robot by itself, as a share of what is
+left to certainty, by sensitivity: at "low" the recogniser judges what is less sure."""
+
+
+def alone(sensitivity: str, threshold: float) -> float:
+    """Return the score from which on a word stops the robot whatever the recogniser reads."""
+    return threshold + ALONE_SHARE.get(sensitivity, 0.0) * (1.0 - threshold)
 
 
 class Suspicions:

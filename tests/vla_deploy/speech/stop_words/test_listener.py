@@ -36,6 +36,7 @@ class Ear:
         self.acts = self.space.ring_reader("operator", from_start=True)
         self.heard = self.space.ring_reader("heard", from_start=True)
         self._open_spotter = open_spotter
+        self.is_read = False
 
     def listen(self, sensitivity: str = "normal") -> StopWords:
         self.listener = StopWords(
@@ -50,7 +51,7 @@ class Ear:
             samples = random.normal(0.0, level, BLOCK).astype(np.float32)
             block = SoundBlock(stamp_ns=self.clock.ns, samples=samples, follows=follows)
             self.clock.ns += duration_ns(BLOCK)
-            self.listener.feed(block)
+            self.listener.feed(block, is_read=self.is_read)
 
     def word(self) -> None:
         self.hear(0.3, 0.3)
@@ -82,6 +83,20 @@ def test_quiet_and_a_sensitivity_that_is_too_low_press_nothing(ear: Ear) -> None
     ear.listen("normal")
     ear.hear(3.0, 0.0)
     assert ear.presses() == []
+
+
+@pytest.mark.parametrize("is_read", [True, False])
+def test_at_low_a_word_must_be_clear_only_where_the_recogniser_reads_along(
+    tmp_path: Path, clock: ManualClock, spotter: Spotter, is_read: bool
+) -> None:
+    ear = Ear(tmp_path, clock, lambda: (spotter, {**THRESHOLDS, "low": 0.94}))
+    ear.is_read = is_read
+    ear.listen("low")
+    ear.word()
+    assert bool(ear.presses()) is not is_read
+    assert ear.listener.suspicion(0, ear.clock.ns) >= 1.0
+    ear.listener.close()
+    ear.space.close()
 
 
 def test_the_phrase_that_held_the_word_is_known_afterwards(ear: Ear) -> None:

@@ -147,8 +147,10 @@ def test_two_listeners_keep_their_states_apart(
     in_room, in_page = listeners
     sound = (loud(0.4)[: 10 * 512] / 32_768).astype(np.float32)
     for at in range(0, len(sound), 512):
-        in_room.feed(SoundBlock(stamp_ns=clock.ns, samples=sound[at : at + 512]))
-        in_page.feed(SoundBlock(stamp_ns=clock.ns, samples=np.zeros(512, np.float32)))
+        in_room.feed(SoundBlock(stamp_ns=clock.ns, samples=sound[at : at + 512]), is_read=False)
+        in_page.feed(
+            SoundBlock(stamp_ns=clock.ns, samples=np.zeros(512, np.float32)), is_read=False
+        )
         clock.ns += duration_ns(512)
     assert (in_room.document()["spotted"], in_page.document()["spotted"]) == (1, 0)
     assert room[0].runs == page[0].runs > 0
