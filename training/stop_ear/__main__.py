@@ -1,6 +1,8 @@
 """Run one step, or all: python -m training.stop_ear all --out /data/stop_ear.
 
 `speak` says the clips that `training.stop_words` learns from; those that are there already stay.
+`mean` makes one of two that have gone on from the same weights with other seeds: it is better than
+either.
 """
 
 import argparse
@@ -25,7 +27,7 @@ def main() -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="example: nice python -m training.stop_ear all --out /data/stop_ear",
     )
-    parser.add_argument("step", choices=[*STEPS, "all"])
+    parser.add_argument("step", choices=[*STEPS, "mean", "all"])
     parser.add_argument("--out", type=Path, required=True, help="folder for clips and weights")
     parser.add_argument(
         "--talk", type=Path, help="clips of `training.speech data`, as more of other talk"
@@ -37,7 +39,11 @@ def main() -> None:
         "--recogniser", type=Path, default=SHIPPED,
         help="folder of the recogniser that it is for (default: the one that is shipped)",
     )  # fmt: skip
+    parser.add_argument("--with", dest="other", type=Path, help="of `mean`: the other training")
+    parser.add_argument("--into", type=Path, help="of `mean`: the folder for the mean of both")
     given = parser.parse_args()
+    if given.step == "mean" and None in (given.other, given.into):
+        parser.error("mean: expected --with OTHER and --into NEW")
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     for step in STEPS if given.step == "all" else (given.step,):
         _run(step, given)
@@ -54,6 +60,10 @@ def _run(step: str, given: argparse.Namespace) -> None:
         from training.stop_ear.training import train
 
         train(clips, given.talk, given.recogniser, given.out, given.minutes, given.seed)
+    elif step == "mean":
+        from training.stop_ear.training import mean
+
+        mean(given.out, given.other, given.into)
     else:
         from training.stop_ear.export import ship
 

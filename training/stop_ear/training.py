@@ -71,6 +71,22 @@ def train(
     torch.save(ear.state_dict(), out / WEIGHTS)
 
 
+def mean(out: Path, other: Path, into: Path) -> None:
+    """Write the mean of the weights under `out` and `other`, which began from the same, `into`.
+
+    Raises:
+        FileNotFoundError: one of them has not been trained.
+        ValueError: they are not of one shape.
+    """
+    one, two = (torch.load(folder / WEIGHTS, weights_only=True) for folder in (out, other))
+    if {name: values.shape for name, values in one.items()} != {
+        name: values.shape for name, values in two.items()
+    }:
+        raise ValueError(f"{out} and {other} are not of one shape")
+    into.mkdir(parents=True, exist_ok=True)
+    torch.save({name: (one[name] + two[name]) / 2 for name in one}, into / WEIGHTS)
+
+
 def encoder_of(folder: Path) -> Encoder:
     """Return the encoder of a shipped recogniser.
 

@@ -14,7 +14,7 @@ from training.speech.shipping import SHIPPED  # noqa: E402
 from training.stop_ear.batches import Corpus, _targets  # noqa: E402
 from training.stop_ear.export import ship  # noqa: E402
 from training.stop_ear.network import SIZE, StopEar  # noqa: E402
-from training.stop_ear.training import WEIGHTS, encoder_of  # noqa: E402
+from training.stop_ear.training import WEIGHTS, encoder_of, mean  # noqa: E402
 from training.stop_words.corpus import Said, _write  # noqa: E402
 from vla_deploy.inference.manifest_file import read_manifest  # noqa: E402
 from vla_deploy.inference.store import Model  # noqa: E402
@@ -41,6 +41,17 @@ def test_the_robot_runs_what_was_learnt(tmp_path: Path) -> None:
     runs = np.lib.stride_tricks.sliding_window_view(chances, SETTLING, axis=0)
     # The weights have eight bits.
     assert run.surety(frames[0].numpy()) == pytest.approx(runs.mean(axis=2).max(), abs=0.03)
+
+
+def test_the_mean_of_two_trainings_is_half_of_each(tmp_path: Path) -> None:
+    for name, value in (("one", 1.0), ("two", 3.0)):
+        (tmp_path / name).mkdir()
+        torch.save({"w": torch.full((2, 2), value)}, tmp_path / name / WEIGHTS)
+    mean(tmp_path / "one", tmp_path / "two", tmp_path / "both")
+    assert torch.load(tmp_path / "both" / WEIGHTS)["w"].tolist() == [[2.0, 2.0], [2.0, 2.0]]
+    torch.save({"w": torch.zeros(3)}, tmp_path / "two" / WEIGHTS)
+    with pytest.raises(ValueError, match="one shape"):
+        mean(tmp_path / "one", tmp_path / "two", tmp_path / "both")
 
 
 def test_it_begins_as_the_recogniser_that_is_shipped() -> None:
