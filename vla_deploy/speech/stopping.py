@@ -16,8 +16,10 @@ STOP_WITHIN_CONFIDENCE: Final = 0.85
 STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
+STOP_HEARD_TWICE_CONFIDENCE: Final = 0.6
 LEAST_SURETY: Final = 0.05
-"""Less sure words than STOP_WITHIN_CONFIDENCE are no stop where the ear, if any, hears none."""
+"""Less sure words than STOP_WITHIN_CONFIDENCE, or than the first of these where the spotter
+suspects one as well, are no stop where the ear, if any, hears none."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
@@ -43,9 +45,10 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.5, share=0.1),
+    _Enough(surety=0.2, suspicion=0.7),
+    _Enough(surety=0.5, share=0.3),
     _Enough(surety=0.6, suspicion=0.3, most_confidence=0.5),
-    _Enough(surety=0.8, most_confidence=0.6),
+    _Enough(surety=0.95, most_confidence=0.6),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
@@ -62,7 +65,7 @@ def stops(
     """
     likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
     is_read = holds_stop(reading.text, is_all=is_all)
-    if is_read and confidence >= STOP_WITHIN_CONFIDENCE:
+    if is_read and confidence >= _enough_of_words(suspicion):
         return True
     surety = reading.stop_surety
     if surety is not None and surety < LEAST_SURETY:
@@ -78,6 +81,12 @@ def stops(
     if is_read and suspicion >= SLIGHT_SUSPICION and confidence >= STOP_SUSPECTED_CONFIDENCE:
         return True
     return is_all and _is_witnessed(reading, confidence, suspicion)
+
+
+def _enough_of_words(suspicion: float) -> float:
+    """Return by which confidence words stop the robot whatever the ear hears."""
+    is_heard_twice = suspicion >= SLIGHT_SUSPICION
+    return STOP_HEARD_TWICE_CONFIDENCE if is_heard_twice else STOP_WITHIN_CONFIDENCE
 
 
 def _is_witnessed(reading: Reading, confidence: float, suspicion: float) -> bool:

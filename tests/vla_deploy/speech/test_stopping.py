@@ -27,11 +27,13 @@ def heard(text: str, *others: tuple[str, float], surety: float | None, **told: A
 @pytest.mark.parametrize(
     ("reading", "suspicion", "is_stop"),
     [
-        (heard("you should hold", surety=0.9), 0.0, True),
+        (heard("you should hold", surety=0.97), 0.0, True),
+        (heard("up", surety=0.25), 0.8, True),
+        (heard("up", surety=0.25), 0.6, False),
         (heard("you should hold", surety=0.7), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.55), 0.0, True),
-        (heard("you should hold", ("you should halt", 0.3), surety=0.4), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.04), surety=0.55), 0.0, False),
+        (heard("you should hold", ("you should halt", 0.6), surety=0.55), 0.0, True),
+        (heard("you should hold", ("you should halt", 0.6), surety=0.4), 0.0, False),
+        (heard("you should hold", ("you should halt", 0.2), surety=0.55), 0.0, False),
         (heard("please, please", surety=0.65), 0.35, True),
         (heard("please, please", surety=0.65), 0.25, False),
         (heard("please, please", surety=0.55), 0.35, False),
@@ -46,19 +48,27 @@ def test_three_witnesses_stop_together_what_no_words_would(
 
 
 def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
-    reading, surer = heard("which cup", surety=0.7), heard("which cup", surety=0.9)
+    reading, surer = heard("which cup", surety=0.7), heard("which cup", surety=0.97)
     assert stops(reading, 0.5, 0.5)
     assert not stops(reading, 0.55, 0.5)
     assert stops(surer, 0.55, 0.5)
     assert not stops(surer, 0.65, 0.5)
 
 
-@pytest.mark.parametrize("suspicion", [0.0, 0.9])
+@pytest.mark.parametrize(("suspicion", "confidence"), [(0.0, 0.7), (0.9, 0.55)])
 @pytest.mark.parametrize("text", ["halt", "the red freeze"])
-def test_unsure_words_are_no_stop_where_the_ear_hears_none(text: str, suspicion: float) -> None:
-    assert not stops(heard(text, surety=0.02), 0.6, suspicion)
+def test_unsure_words_are_no_stop_where_the_ear_hears_none(
+    text: str, suspicion: float, confidence: float
+) -> None:
+    assert not stops(heard(text, surety=0.02), confidence, suspicion)
     assert stops(heard(text, surety=0.02), 0.9, suspicion)
     assert stops(heard("halt", surety=None), 0.6, suspicion)
+
+
+def test_words_that_the_spotter_suspects_too_need_no_ear() -> None:
+    reading = heard("stop before you hit the chair", surety=0.0)
+    assert stops(reading, 0.65, 0.35)
+    assert not stops(reading, 0.65, 0.25)
 
 
 def test_while_somebody_speaks_only_what_was_read_helps_a_strong_suspicion() -> None:
