@@ -16,9 +16,10 @@ signal.signal(signal.SIGTERM, lambda number, _: stopping.append(number))
 kept = bytearray()
 while not stopping:
     wanted = json.loads(wish.read_text()).get(name, {})
-    size = wanted.get("memory_mb", 0) * 1_000_000
-    if len(kept) != size:
-        kept = bytearray(os.urandom(4096)) * (size // 4096) if size else bytearray()
+    pages = wanted.get("memory_mb", 0) * 1_000_000 // 4096
+    if len(kept) != pages * 4096:
+        del kept  # both together would be more than was wished for
+        kept = bytearray(os.urandom(4096)) * pages
     for line in range(wanted.get("lines", 0)):
         logging.warning("line %d of a talkative process", line)
     busy_until_ns = time.monotonic_ns() + (20_000_000 if wanted.get("busy") else 0)
