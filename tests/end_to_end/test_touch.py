@@ -39,6 +39,7 @@ def _nudge(stack: LockstepStack) -> None:
     engine.place(CUP, x_m + NUDGE_M * across[0], y_m + NUDGE_M * across[1], z_m, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_a_cup_that_is_nudged_under_the_hand_is_taken_all_the_same(stack: LockstepStack) -> None:
     command = stack.give(text="pick up the red cup")

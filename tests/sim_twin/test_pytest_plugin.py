@@ -92,6 +92,7 @@ def devices_dir(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 @pytest.mark.stack
 @pytest.mark.timeout(240)
 def test_naming_a_robot_runs_the_contracts_on_its_devices(
