@@ -29,7 +29,7 @@ COMMAND_CORPORA: Final = (
     "tenants",
     "roommates",
 )
-"""Those, and five that rules were written from."""
+"""Those, and seven that rules were written from."""
 PLAN, ASK, REFUSE, STOP = "plan", "ask", "refuse", "stop"
 MUSTS: Final = (PLAN, ASK, REFUSE, STOP)
 _ID: Final = re.compile(r"[a-z]+_\d+")

@@ -10,6 +10,7 @@ from typing import Final
 
 import torch
 
+from training.mean_weights import mean_of
 from training.planner.files import MEAN_OF, TOKENIZER
 from training.planner.training import WEIGHTS
 
@@ -25,12 +26,9 @@ def mean(out: Path, earlier: Path, into: Path) -> None:
     """
     if (out / TOKENIZER).read_bytes() != (earlier / TOKENIZER).read_bytes():
         raise ValueError(f"{out} and {earlier} have not the same {TOKENIZER}: none began from one")
-    new, old = (torch.load(one / WEIGHTS, weights_only=True) for one in (out, earlier))
-    shapes = [{name: values.shape for name, values in one.items()} for one in (new, old)]
-    if shapes[0] != shapes[1]:
-        raise ValueError(f"{out} and {earlier} are not of one shape")
+    weights = mean_of(earlier / WEIGHTS, out / WEIGHTS, NEW_SHARE)
     into.mkdir(parents=True, exist_ok=True)
     shutil.copy(out / TOKENIZER, into / TOKENIZER)
-    torch.save({name: torch.lerp(old[name], new[name], NEW_SHARE) for name in new}, into / WEIGHTS)
+    torch.save(weights, into / WEIGHTS)
     told = f"Its weights are the mean of both, by {NEW_SHARE:.0%} the later (step `mean`)."
     (into / MEAN_OF).write_text(told, encoding="utf-8")

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from training.mean_weights import mean_of
 from training.speech.network import Encoder
 from training.speech.warm_start import NotReadable, weights_of
 from training.stop_ear.batches import IGNORED, Batch, Corpus
@@ -78,13 +79,9 @@ def mean(out: Path, other: Path, into: Path) -> None:
         FileNotFoundError: one of them has not been trained.
         ValueError: they are not of one shape.
     """
-    one, two = (torch.load(folder / WEIGHTS, weights_only=True) for folder in (out, other))
-    if {name: values.shape for name, values in one.items()} != {
-        name: values.shape for name, values in two.items()
-    }:
-        raise ValueError(f"{out} and {other} are not of one shape")
+    weights = mean_of(other / WEIGHTS, out / WEIGHTS, 0.5)
     into.mkdir(parents=True, exist_ok=True)
-    torch.save({name: (one[name] + two[name]) / 2 for name in one}, into / WEIGHTS)
+    torch.save(weights, into / WEIGHTS)
 
 
 def encoder_of(folder: Path) -> Encoder:

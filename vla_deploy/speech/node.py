@@ -195,8 +195,8 @@ class SpeechNode:
     def _hear(self, block: SoundBlock) -> None:
         """Hear the room; while a person speaks into the page, only the listeners do."""
         hearing = self._hearing
-        is_open = hearing is not None and hearing.readings.recogniser is not None
-        is_read = is_open and not self._page.is_open
+        reads = hearing is not None and hearing.readings.recogniser is not None
+        is_read = reads and not self._page.is_open
         for listener in self._room_listeners:
             listener.feed(block, is_read=is_read)
         if not self._page.is_open:

@@ -7,7 +7,7 @@ from typing import Final
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.rules.breaths import without_breaths
 from vla_deploy.planning.rules.figures import in_figures
-from vla_deploy.planning.rules.rewording import reworded
+from vla_deploy.planning.rules.rewording import NO_OCCASION, reworded
 from vla_deploy.planning.rules.run_together import with_commas
 from vla_deploy.planning.rules.verbs import DOING, any_verb
 from vla_deploy.planning.understanding.purposes import without_purpose
@@ -88,7 +88,7 @@ _ECHO: Final = re.compile(
 )
 _SPLIT: Final = re.compile(
     r"\s*(?:[,;.!?]?\s*\b(?:and then|and after that|"
-    r"after that(?! (?:long |awful |big )?(?:night|shift|day|walk|meal|trip|call|film|game)\b)|"
+    rf"after that{NO_OCCASION}|"
     r"afterwards|then|"
     r"(?<!\bgo )(?<!\btry )and|(?<=\bgo )and(?= (?:come|go|then|drive|return)\b)|"
     r"but(?= (?:then|hang|hold|keep|leave|bring|take|put|pick|come)\b))\b|[,;]|[.!?]\s)\s*"

@@ -15,6 +15,10 @@ from vla_deploy.planning.rules.short_forms import ROWS as SHORT_FORMS
 from vla_deploy.world.vocabulary import COLOURS, CONTAINERS, KIND_WORDS
 
 _COLOUR: Final = "|".join(COLOURS)
+NO_OCCASION: Final = (
+    r"(?! (?:long |awful |big )?(?:night|shift|day|walk|meal|trip|call|film|game)\b)"
+)
+"""Behind "after that": "after that night shift" is no order of things."""
 _ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("help me look$", "look for it"),
     (
@@ -179,8 +183,8 @@ _ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"you(?:'re| are) (?:needed|wanted) (?:over )?(?:at|in|by) ", "go to "),
     (r"i(?: want|'d like| need| would like) you over (?:at|in|by) (?=(?:the|my|your)\b)", "go to "),
     (
-        r",? after (?:which|that|this)(?! (?:long |awful |big )?(?:night|shift|day|walk|meal|trip|"
-        r"call|film|game)\b),? (?:i want you to |you should |you can |please )?(?=[a-z])",
+        rf",? after (?:which|that|this){NO_OCCASION},? "
+        r"(?:i want you to |you should |you can |please )?(?=[a-z])",
         ", then ",
     ),
     (r"let(?:'s| us) (?:begin|start) with ([^,]+), which (?=goes|belongs|should)", r"\1 "),

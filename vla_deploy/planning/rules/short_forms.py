@@ -8,6 +8,7 @@ from typing import Final
 from vla_deploy.world.vocabulary import COLOURS, KIND_WORDS
 
 _COLOUR: Final = "|".join(COLOURS)
+_BEGIN: Final = r"(?:^|(?<=, )|(?<=and ))"
 
 ROWS: Final[tuple[tuple[str, str], ...]] = (
     ("gimme", "give me"),
@@ -82,7 +83,7 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"^(?:listen,? )?(?:service|attention|listen|(?:new |next )?(?:job|task|order)s?): ", ""),
     (r",? (?:like )?all the way (?:a?round)(?=$|[.!?,])", ""),
     (r"for my (?:video|photo|picture|story|channel)", ""),
-    (r"(?:^|(?<=, )|(?<=and ))they go (?=(?:in|on|into|onto|back)\b)", "put them "),
+    (rf"{_BEGIN}they go (?=(?:in|on|into|onto|back)\b)", "put them "),
     (r"(leave|put|set|pop) me (?=(?:the|my|that|this)\b)", r"\1 "),
     (
         r"^(the|my|that) ([a-z ]+?),? (?:also|too),? you (?:can |may |should |could )?"
@@ -152,7 +153,7 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
     (r"^here,? (?=(?:give|take|hand|have|hold)\b)", ""),
     (r"^i mean (?=(?:the|that|my) [^.;!?]+, )", ""),
     (
-        r"(?:^|(?<=, )|(?<=and ))(the|that|my) ([a-z ]+?) you (?:can |may |should |could )?"
+        rf"{_BEGIN}(the|that|my) ([a-z ]+?) you (?:can |may |should |could )?"
         r"(give|hand|pass)(?: over)? (?:to )?me",
         r"give me \1 \2",
     ),
@@ -176,7 +177,7 @@ ROWS: Final[tuple[tuple[str, str], ...]] = (
     ),
     (r"go (?:a?round|over|past|out|back) by (?=the\b)", "go to "),
     (
-        rf"(?:^|(?<=, )|(?<=and ))({KIND_WORDS}) (down|over|back) (?=(?:on|in|to|into|onto) "
+        rf"{_BEGIN}({KIND_WORDS}) (down|over|back) (?=(?:on|in|to|into|onto) "
         r"(?:the|this|that|my)\b)",
         r"put the \1 \2 ",
     ),
