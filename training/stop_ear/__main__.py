@@ -39,6 +39,7 @@ def main() -> None:
         "--recogniser", type=Path, default=SHIPPED,
         help="folder of the recogniser that it is for (default: the one that is shipped)",
     )  # fmt: skip
+    parser.add_argument("--start-from", type=Path, help="a shipped ear to go on from")
     parser.add_argument("--with", dest="other", type=Path, help="of `mean`: the other training")
     parser.add_argument("--into", type=Path, help="of `mean`: the folder for the mean of both")
     given = parser.parse_args()
@@ -59,7 +60,10 @@ def _run(step: str, given: argparse.Namespace) -> None:
     elif step == "train":
         from training.stop_ear.training import train
 
-        train(clips, given.talk, given.recogniser, given.out, given.minutes, given.seed)
+        train(
+            clips, given.talk, given.recogniser, given.out, given.minutes, given.seed,
+            given.start_from,
+        )  # fmt: skip
     elif step == "mean":
         from training.stop_ear.training import mean
 

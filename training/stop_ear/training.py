@@ -15,6 +15,7 @@ from training.speech.network import Encoder
 from training.speech.warm_start import NotReadable, weights_of
 from training.stop_ear.batches import IGNORED, Batch, Corpus
 from training.stop_ear.network import SIZE, StopEar
+from training.stop_ear.shipped import shipped_weights
 
 WEIGHTS: Final = "stop_ear.pt"
 ENCODER: Final = "encoder."
@@ -32,16 +33,18 @@ _LOG = logging.getLogger(__name__)
 
 
 def train(
-    clips: Path, talk: Path | None, recogniser: Path, out: Path, minutes: float, seed: int
-) -> None:
+    clips: Path, talk: Path | None, recogniser: Path, out: Path, minutes: float, seed: int,
+    start_from: Path | None = None,
+) -> None:  # fmt: skip
     """Learn for that long from the clips, and write the weights.
 
     `talk` are clips that the recogniser has learnt from. Where weights are already, it goes on from
-    them, else from the recogniser's.
+    them, else from those of an ear that was shipped, else from the recogniser's.
 
     Raises:
         FileNotFoundError: there are no clips.
         NotReadable: the folder `recogniser` is none that `training.speech` made.
+        RuntimeError: `start_from` is an ear of another size.
     """
     torch.manual_seed(seed)
     torch.set_num_threads(1)
@@ -50,6 +53,8 @@ def train(
     ear = StopEar(encoder_of(recogniser)).train()
     if (out / WEIGHTS).exists():
         ear.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
+    elif start_from is not None:
+        ear.load_state_dict(ear.state_dict() | shipped_weights(start_from))
     learnt = [values for values in ear.parameters() if values.requires_grad]
     optimiser = torch.optim.AdamW(learnt, weight_decay=DECAY)
     began_s, steps, progress, told = time.monotonic(), 0, 0.0, np.zeros(2)

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.stop_words.cast import PARTS, Part, draw_style
-from training.stop_words.texts import WORDS, other_talk, stop_phrases
-from training.stop_words.timing import sounding, word_times
+from training.stop_words.examples import Examples
+from training.stop_words.stop_phrases import stop_phrases
+from training.stop_words.texts import WORDS, other_talk
+from training.stop_words.timing import can_be_timed, sounding, word_times
 from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.errors import SynthesisFailed
 from training.voices.phones import NUMBERS
@@ -127,12 +129,12 @@ def _clips(
 def _stop_texts(
     random: np.random.Generator, count: int, timed: bool
 ) -> list[tuple[str, str, bool]]:
-    """Return texts, their word, and whether it comes last: without times only such can be used."""
+    """Return texts, their word, and whether it comes last; if not `timed` few can be used."""
     phrases = {
         word: [
             (text, is_last)
             for text, is_last in stop_phrases(word)
-            if timed or (is_last and text.count(word) == 1)
+            if timed or can_be_timed(text, word, is_last=is_last)
         ]
         for word in WORDS
     }
@@ -147,7 +149,7 @@ def _stop_texts(
 
 
 def _other_texts(random: np.random.Generator, count: int) -> list[tuple[str, str, bool]]:
-    return [(text, "", False) for text in other_talk(count, random, _lexicon())]
+    return [(text, "", False) for text in other_talk(count, random, _lexicon(), Examples().draw)]
 
 
 def _lexicon() -> list[str]:

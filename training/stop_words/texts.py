@@ -1,13 +1,14 @@
-"""Say what is spoken for the training: stop words in their phrases, and all that is none."""
+"""Say what is spoken for the training besides stop words: all that holds none."""
 
 import pydoc_data.topics
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+Draw = Callable[[np.random.Generator], str]
 WORDS: Final = ("stop", "halt", "freeze")
 """The classes, in the order of the network's outputs; output 0 is none of them."""
 
@@ -16,52 +17,6 @@ _LIKE_A_WORD: Final = re.compile(
     r"\b\w*stop(?!ped|ping|per|s\b)\w*|\b\w*freeze(?!r|s\b)\w*|\bhalt\b|\bfrees\b|\bfrieze\b"
     r"|\bst(aw|ah)p|\bstopt|\bh(aw|au)lt|\bfr(ee|ea)(z|s)e?\b",
     re.IGNORECASE,
-)
-
-ALONE: Final = ("{w}", "{w}!", "{w}.", "{w}?")
-AT_THE_END: Final = (
-    "please {w}",
-    "robot {w}",
-    "robot, {w}!",
-    "hey robot {w}",
-    "now {w}",
-    "okay {w}",
-    "no, {w}",
-    "just {w}",
-    "butler {w}",
-    "you must {w}",
-    "I said {w}",
-    "robot, please {w}",
-    "all right, {w}",
-    "go on and {w}",
-    "{w}, {w}, {w}!",
-    "{w} {w}",
-)
-AT_THE_START: Final = (
-    "{w} now",
-    "{w}, please",
-    "{w} right there",
-    "{w} right now",
-    "{w} at once",
-    "{w} immediately",
-    "{w} robot",
-    "robot {w} now",
-    "please {w} right now",
-)
-STOP_AT_THE_END: Final = ("emergency {w}", "full {w}", "all {w}", "bus {w}", "do not {w}")
-ONLY_STOP: Final = (
-    "emergency {w} now",
-    "{w} it",
-    "{w} that",
-    "{w} moving",
-    "{w} the robot",
-    "{w} the arm",
-    "{w} driving",
-    "{w} everything",
-    "{w} what you are doing",
-    "robot {w} moving",
-    "would you {w} that please",
-    "you have to {w} here",
 )
 
 CONFUSABLE: Final = (
@@ -101,6 +56,11 @@ CARRIERS: Final = (
     "is that a {a} or a {b}",
     "{a}, {b}, {c}",
     "put the {a} on the {b}",
+    "out in the {a}",
+    "it was all {a} and {b}",
+    "two of these {a}",
+    "could you {a} up, please",
+    "not {a} but {b} for me",
 )
 _COMMANDS: Final = (
     "pick up the {colour} {thing}",
@@ -180,19 +140,13 @@ def is_clean(text: str) -> bool:
     return _LIKE_A_WORD.search(text) is None
 
 
-def stop_phrases(word: str) -> tuple[tuple[str, bool], ...]:
-    """Return the phrases with one word, each with whether the word comes last."""
-    is_stop = word == "stop"
-    last = (*ALONE, *AT_THE_END, *(STOP_AT_THE_END if is_stop else ()))
-    others = (*AT_THE_START, *(ONLY_STOP if is_stop else ()))
-    return (
-        *((text.format(w=word), True) for text in last),
-        *((text.format(w=word), False) for text in others),
-    )
+def other_talk(
+    count: int, random: np.random.Generator, lexicon: Sequence[str], example: Draw
+) -> list[str]:
+    """Return texts of all kinds that hold no stop word.
 
-
-def other_talk(count: int, random: np.random.Generator, lexicon: Sequence[str]) -> list[str]:
-    """Return texts of all kinds that hold no stop word; `lexicon` gives any words of English."""
+    `lexicon` gives any words of English, `example` sentences of it.
+    """
     running, at_home = _running_talk(), _talk_at_home()
     kinds = (
         lambda: _carried(CONFUSABLE, random),
@@ -202,6 +156,7 @@ def other_talk(count: int, random: np.random.Generator, lexicon: Sequence[str]) 
         lambda: _pick(running, random),
         lambda: _pick(at_home, random),
         lambda: _pick(at_home, random),
+        *(4 * [lambda: example(random)]),
         lambda: " ".join(_pick(lexicon, random) for _ in range(int(random.integers(1, 7)))),
         lambda: " ".join(_made_up(random) for _ in range(int(random.integers(1, 5)))),
     )

@@ -14,21 +14,29 @@ _SOUNDS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
 }
 _QUIET_RATIO: Final = 0.03
 _WORD_S: Final = 0.45
+_FIRST_WORD_S: Final = 0.35
+"""What comes next cuts it short."""
 
 
 def word_times(clip: Clip, word: str, *, is_last: bool) -> list[tuple[float, float]]:
     """Return start and end of each time that a word was said, in seconds; empty if unknown.
 
-    Where the engine tells no sounds, a word that comes last and once ends with the clip's sound.
+    Where the engine tells no sounds, a word that comes once begins or ends with the clip's sound.
     """
     count = clip.text.lower().count(word)
     found = list(_by_sounds(clip, word))
     if len(found) == count:
         return found
-    if clip.sounds or not is_last or count != 1:
+    if clip.sounds or not can_be_timed(clip.text, word, is_last=is_last):
         return []
-    end_s = sounding(clip.samples)[1] / RATE_HZ
-    return [(max(0.0, end_s - _WORD_S), end_s)]
+    start_s, end_s = (edge / RATE_HZ for edge in sounding(clip.samples))
+    return [(max(0.0, end_s - _WORD_S), end_s) if is_last else (start_s, start_s + _FIRST_WORD_S)]
+
+
+def can_be_timed(text: str, word: str, *, is_last: bool) -> bool:
+    """Tell whether a word can be found by where a clip falls silent: it comes once, at an end."""
+    said = text.lower()
+    return said.count(word) == 1 and (is_last or said.startswith(word))
 
 
 def sounding(samples: Wave) -> tuple[int, int]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
+ort = pytest.importorskip("onnxruntime")
 
 from training.speech.framing import IGNORED  # noqa: E402
 from training.speech.network import MELS, Encoder  # noqa: E402
@@ -14,6 +15,7 @@ from training.speech.shipping import SHIPPED  # noqa: E402
 from training.stop_ear.batches import Corpus, _targets  # noqa: E402
 from training.stop_ear.export import ship  # noqa: E402
 from training.stop_ear.network import SIZE, StopEar  # noqa: E402
+from training.stop_ear.shipped import PLACES, shipped_weights  # noqa: E402
 from training.stop_ear.training import WEIGHTS, encoder_of, mean  # noqa: E402
 from training.stop_words.corpus import Said, _write  # noqa: E402
 from vla_deploy.inference.manifest_file import read_manifest  # noqa: E402
@@ -41,6 +43,16 @@ def test_the_robot_runs_what_was_learnt(tmp_path: Path) -> None:
     runs = np.lib.stride_tricks.sliding_window_view(chances, SETTLING, axis=0)
     # The weights have eight bits.
     assert run.surety(frames[0].numpy()) == pytest.approx(runs.mean(axis=2).max(), abs=0.03)
+
+
+def test_a_training_goes_on_from_what_was_shipped() -> None:
+    ear = StopEar(encoder_of(SHIPPED)).eval()
+    weights = shipped_weights(SHIPPED / FILE)
+    assert set(ear.state_dict()) - set(weights) == {PLACES}
+    ear.load_state_dict(ear.state_dict() | weights)
+    frames = torch.randn(1, MELS, 90)
+    run = ort.InferenceSession(str(SHIPPED / FILE)).run(None, {"frames": frames.numpy()})[0]
+    assert ear(frames).softmax(2).detach().numpy() == pytest.approx(run, abs=0.03)
 
 
 def test_the_mean_of_two_trainings_is_half_of_each(tmp_path: Path) -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from training.stop_words.texts import WORDS, is_clean, other_talk, stop_phrases
+from training.stop_words.stop_phrases import stop_phrases
+from training.stop_words.texts import WORDS, is_clean, other_talk
 
 
 @pytest.mark.parametrize(
@@ -19,8 +20,10 @@ def test_forms_of_a_stop_word_are_clean(text: str) -> None:
 
 
 def test_other_talk_is_clean_and_as_much_as_asked_for() -> None:
-    talk = other_talk(300, np.random.default_rng(0), ["apple", "doorstop", "stopgap"])
+    words = ["apple", "doorstop", "stopgap"]
+    talk = other_talk(300, np.random.default_rng(0), words, lambda _: "rein a horse")
     assert len(talk) == 300
+    assert "rein a horse" in talk
     assert all(map(is_clean, talk))
 
 

@@ -33,8 +33,13 @@ def test_sounds_that_do_not_fit_the_text_give_no_times() -> None:
 def test_without_sounds_a_last_word_ends_with_the_clip() -> None:
     ((_, end_s),) = word_times(clip("please stop"), "stop", is_last=True)
     assert end_s == pytest.approx(0.8, abs=0.02)
-    assert word_times(clip("stop it please"), "stop", is_last=False) == []
+    assert word_times(clip("just stop it"), "stop", is_last=False) == []
     assert word_times(clip("stop, stop"), "stop", is_last=True) == []
+
+
+def test_without_sounds_a_first_word_begins_with_the_clip() -> None:
+    ((start_s, end_s),) = word_times(clip("stop it please"), "stop", is_last=False)
+    assert (start_s, end_s) == pytest.approx((0.1, 0.45), abs=0.02)
 
 
 def test_silence_at_both_ends_is_no_sound() -> None:
