@@ -148,7 +148,7 @@ def other_talk(
     `lexicon` gives any words of English, `example` sentences of it.
     """
     running, at_home = _running_talk(), _talk_at_home()
-    kinds = (
+    kinds: tuple[Callable[[], str], ...] = (
         lambda: _carried(CONFUSABLE, random),
         lambda: _carried(CONFUSABLE, random),
         lambda: _filled(_COMMANDS, random),
