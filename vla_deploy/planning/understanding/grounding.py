@@ -66,17 +66,17 @@ def ground_plan(plan: Plan, request: Request) -> Grounded:
     if len(grounder.done) > MOST_ACTIONS:
         raise PlanInvalid([f"it would need {len(grounder.done)} actions, {MOST_ACTIONS} at most"])
     resolver = grounder.resolver
-    texts = (plan.reasoning, reasoning(resolver.decisions))
+    texts = (plan.reasoning, reasoning(resolver.referents.decisions))
     update = {
         "actions": in_turn(tuple(grounder.done)),
         "reasoning": "; ".join(text for text in texts if text),
     }
     return Grounded(
         plan=plan.model_copy(update=update),
-        decisions=tuple(resolver.decisions),
+        decisions=tuple(resolver.referents.decisions),
         mentions=tuple(resolver.setting.mentions),
         inserted=frozenset(grounder.inserted),
-        certainty=resolver.certainty,
+        certainty=resolver.referents.certainty,
     )
 
 
@@ -132,8 +132,8 @@ class _Grounder:
 
     def _as_sure(self, step: Action) -> Action:
         """Let a step be as feasible as its words, read since the step before, are sure."""
-        fresh = self.resolver.decisions[self._judged :]
-        self._judged = len(self.resolver.decisions)
+        fresh = self.resolver.referents.decisions[self._judged :]
+        self._judged = len(self.resolver.referents.decisions)
         sure = min((one.certainty for one in fresh), default=1.0)
         return step.model_copy(update={"feasibility_score": min(step.feasibility_score, sure)})
 

@@ -12,7 +12,8 @@ from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.names import Match, closest
 from vla_deploy.planning.understanding.questions import did_you_mean, where, which_place
-from vla_deploy.planning.understanding.resolver import MISSPELT, Resolver
+from vla_deploy.planning.understanding.referents import MISSPELT
+from vla_deploy.planning.understanding.resolver import Resolver
 
 # That near to where one stands for a place, one is there.
 AT_PLACE_M: Final = 0.8
@@ -105,6 +106,6 @@ def _one_of(text: str, key: str, named: tuple[str, ...], resolver: Resolver) -> 
 
 def _noted(resolver: Resolver, text: str, place: str, why: str, certainty: float = 1.0) -> str:
     said = text.strip()
-    resolver.note(said, Role.PLACE, place, why, certainty=certainty)
+    resolver.referents.note(said, Role.PLACE, place, why, certainty=certainty)
     resolver.setting.mentions.append(Mention(said=said, means=place, role=Role.PLACE))
     return place

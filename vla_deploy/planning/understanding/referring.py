@@ -22,7 +22,8 @@ from vla_deploy.planning.understanding.insertions import (
     surface_of,
 )
 from vla_deploy.planning.understanding.places import is_like_place, resolve_place
-from vla_deploy.planning.understanding.resolver import Referent, Resolver
+from vla_deploy.planning.understanding.referents import Referent
+from vla_deploy.planning.understanding.resolver import Resolver
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
 
@@ -70,7 +71,9 @@ def _here(text: str, resolver: Resolver) -> Parameters:
     if here is None:
         raise UnknownPlace(text, set(resolver.setting.request.world.places.values()))
     pose = pose_parameters(here)
-    resolver.note(text, Role.PLACE, f"{here[0]:.2f}, {here[1]:.2f}", "where the command was given")
+    resolver.referents.note(
+        text, Role.PLACE, f"{here[0]:.2f}, {here[1]:.2f}", "where the command was given"
+    )
     return pose
 
 
@@ -252,7 +255,7 @@ def _destination(given: Parameters, resolver: Resolver, state: GetState) -> Para
     thing = _thing_unless_place(text, resolver, Use.ONTO, into=relation == "in")
     if thing is not None:
         if relation == NEXT_TO and (container := _container_of(thing, resolver)):
-            resolver.note(text, Role.DESTINATION, container, "that is what it is in")
+            resolver.referents.note(text, Role.DESTINATION, container, "that is what it is in")
             return {"destination": container, "relation": IN}
         default = "in" if thing.kind in PUT_INTO else "on"
         return {"destination": thing.name, "relation": relation or default}
@@ -262,7 +265,7 @@ def _destination(given: Parameters, resolver: Resolver, state: GetState) -> Para
     place = resolve_place(text, resolver)
     surface = surface_of(place, world)
     if surface != place:
-        resolver.note(place, Role.DESTINATION, surface, "the furniture there")
+        resolver.referents.note(place, Role.DESTINATION, surface, "the furniture there")
     return {"destination": surface, "relation": "on"}
 
 
@@ -281,7 +284,7 @@ def _put_here(text: str, resolver: Resolver, state: State) -> Parameters:
         state.spot, (world.sites[table].pose.x_m, world.sites[table].pose.y_m)
     ) <= HERE_M  # fmt: skip
     why = "it is here" if near or state.at == table else "the nearest furniture"
-    resolver.note(text, Role.DESTINATION, table, why)
+    resolver.referents.note(text, Role.DESTINATION, table, why)
     return {"destination": table, "relation": "on"}
 
 

@@ -221,6 +221,6 @@ def test_one_of_several_is_not_one_of_many(scene: Request) -> None:
 def test_the_log_tells_among_which_things_it_was_told(scene: Request) -> None:
     resolver = Resolver(scene)
     resolver.thing("the second bottle from the left", Use.TAKE)
-    assert str(resolver.decisions[0]) == (
+    assert str(resolver.referents.decisions[0]) == (
         '"second bottle from left" is bottle_2 (white bottle) (the only one of 4 that fits)'
     )

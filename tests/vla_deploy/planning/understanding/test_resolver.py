@@ -156,11 +156,11 @@ def test_every_decision_is_logged_with_candidates_choice_and_reason(home: "Home"
     resolver = Resolver(home.ask("cup_1", "cup_2", "ball_1"))
     resolver.thing("the left cup", Use.TAKE)
     resolver.thing("the botle", Use.ONTO)
-    first, second = resolver.decisions
+    first, second = resolver.referents.decisions
     assert str(first) == '"left cup" is cup_2 (blue cup) (the only one that fits)'
     assert (second.role, second.candidates, second.certainty) == (Role.DESTINATION, (), 0.85)
     assert second.why == 'not seen yet, "botle" taken for bottle'
-    assert resolver.certainty == 0.85
+    assert resolver.referents.certainty == 0.85
 
 
 @pytest.mark.parametrize(
