@@ -16,9 +16,10 @@ from vla_deploy.planning.symbolic import LOGIC, after, state_of
 from vla_deploy.planning.symbolic.sharing import in_turn
 from vla_deploy.planning.understanding.conversation import Mention
 from vla_deploy.planning.understanding.decisions import Decision, reasoning
+from vla_deploy.planning.understanding.destinations import Parameters
 from vla_deploy.planning.understanding.insertions import missing_before
 from vla_deploy.planning.understanding.normaliser import free_id, normalised, with_unique_ids
-from vla_deploy.planning.understanding.referring import Parameters, grounded_steps
+from vla_deploy.planning.understanding.referring import grounded_steps
 from vla_deploy.planning.understanding.resolver import Resolver
 from vla_deploy.planning.validator import action_faults
 

@@ -3,34 +3,27 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
-from vla_deploy.planning.errors import NotAble, PlanInvalid, UnknownObject, UnknownPlace
+from vla_deploy.planning.errors import PlanInvalid, UnknownObject, UnknownPlace
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.references import match_place, words_of
-from vla_deploy.planning.symbolic.conditions import PUT_INTO
 from vla_deploy.planning.symbolic.state import Held, Pose, State
 from vla_deploy.planning.symbolic.subjects import subject_of
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.conversation import Mention, Role
-from vla_deploy.planning.understanding.expressions import read_expression
-from vla_deploy.planning.understanding.fitting import Use
-from vla_deploy.planning.understanding.insertions import (
-    Step,
-    is_surface,
-    nearest_furniture,
-    surface_of,
+from vla_deploy.planning.understanding.conversation import Role
+from vla_deploy.planning.understanding.destinations import (
+    GetState,
+    Parameters,
+    check_readable,
+    destination_of,
+    pronoun_of,
+    thing_unless_place,
 )
-from vla_deploy.planning.understanding.places import is_like_place, resolve_place
+from vla_deploy.planning.understanding.fitting import Use
+from vla_deploy.planning.understanding.insertions import Step
+from vla_deploy.planning.understanding.places import resolve_place
 from vla_deploy.planning.understanding.referents import Referent
 from vla_deploy.planning.understanding.resolver import Resolver
-from vla_deploy.world.relations import NEXT_TO
-from vla_deploy.world.resting import IN
-
-Parameters = Mapping[str, Any]
-GetState = Callable[[], State]
-# So near to where one stands for a table, that table is "here".
-HERE_M: Final = 1.2
 
 
 def grounded_steps(action: Action, resolver: Resolver, state: GetState) -> Iterator[Step]:
@@ -55,10 +48,10 @@ def _navigate(given: Parameters, resolver: Resolver, state: GetState) -> Iterato
     if not isinstance(goal, str) or ("place" in given and "object" in given):
         yield "navigate_to", given
         return
-    if phrases.PRONOUNS.get(_spoken(goal)) == phrases.HERE:
+    if pronoun_of(goal) == phrases.HERE:
         yield "navigate_to", {**_here(goal, resolver), **rest}
         return
-    thing = _thing_unless_place(goal, resolver, Use.REACH)
+    thing = thing_unless_place(goal, resolver, Use.REACH)
     if thing is None:
         yield "navigate_to", {"place": resolve_place(goal, resolver), **rest}
         return
@@ -83,39 +76,6 @@ def pose_parameters(pose: Pose) -> dict[str, float]:
     # Rounding must not make half a turn more than that.
     yaw_rad = min(max(round(math.remainder(yaw_rad, math.tau), 3), -3.141), 3.141)
     return {"x_m": round(x_m, 3), "y_m": round(y_m, 3), "yaw_rad": yaw_rad}
-
-
-def _spoken_there(resolver: Resolver, use: Use, *, into: bool) -> Mention | None:
-    """Return what "there" was spoken of last: not what is being moved, nor what takes nothing."""
-    setting = resolver.setting
-    for one in setting.spoken_of():
-        if use is not Use.ONTO:
-            return one
-        is_moved = one in setting.mentions and one.role is Role.OBJECT
-        if one.role is Role.PLACE and not into:
-            return one
-        if not is_moved and (one.role is Role.DESTINATION or one.kind in PUT_INTO):
-            return one
-    return None
-
-
-def _thing_unless_place(
-    text: str, resolver: Resolver, use: Use, *, into: bool = False
-) -> Referent | None:
-    """Return the thing that a text names, None where it names a place by its name or no thing."""
-    if match_place(text, resolver.setting.request.world.places):
-        return None
-    if phrases.PRONOUNS.get(_spoken(text)) == phrases.THERE:
-        latest = _spoken_there(resolver, use, into=into)
-        if latest is None or latest.role is Role.PLACE:
-            return None
-        text = latest.thing_id or latest.means
-    try:
-        return resolver.thing(text, use)
-    except UnknownObject:
-        if use is Use.ONTO and not is_like_place(text, resolver.setting.request.world.places):
-            raise
-        return None
 
 
 def _see(skill: str) -> Callable[[Parameters, Resolver, GetState], Iterator[Step]]:
@@ -146,7 +106,7 @@ def _not_put_yet(
     text: str, things: tuple[Referent, ...], state: State, resolver: Resolver
 ) -> tuple[Referent, ...]:
     """Leave out of "them" what the plan has put somewhere: "put the cups down, get the keys"."""
-    if phrases.PRONOUNS.get(_spoken(text)) != phrases.THEM:
+    if pronoun_of(text) != phrases.THEM:
         return things
     scene = resolver.setting.request.scene
     others = [one for one in things if subject_of(one.name, scene).key not in state.rests]
@@ -156,10 +116,10 @@ def _not_put_yet(
 def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
     put = {name: value for name, value in given.items() if name != "object"}
     things: tuple[Referent | None, ...] = (None,)
-    _check_readable(given.get("destination"), resolver)
+    check_readable(given.get("destination"), resolver)
     if isinstance(given.get("object"), str):
         things = resolver.things(given["object"], Use.PUT)
-    destination = _destination(given, resolver, state)
+    destination = destination_of(given, resolver, state)
     if given.get("destination") is None:
         things = _to_put_down(things, state(), resolver)
     for thing in things:
@@ -221,18 +181,6 @@ def _to_put_down(
     return held
 
 
-def _check_readable(text: Any, resolver: Resolver) -> None:
-    """Refuse an unknown destination before asking which thing shall go there.
-
-    Raises:
-        UnknownObject: it names nothing known.
-    """
-    if not isinstance(text, str) or phrases.PRONOUNS.get(_spoken(text)):
-        return
-    if not is_like_place(text, resolver.setting.request.world.places):
-        read_expression(text, resolver.setting.furniture)
-
-
 def _arm(given: Parameters) -> Parameters:
     return {"arm": given["arm"]} if "arm" in given else {}
 
@@ -244,58 +192,10 @@ def _held(thing: Referent, state: State, resolver: Resolver) -> Held | None:
     return next((one for one in called if thing.hand in ("", one.hand)), None)
 
 
-def _destination(given: Parameters, resolver: Resolver, state: GetState) -> Parameters:
-    """Return where to put it and how; without a word about it, on the nearest furniture."""
-    text = given.get("destination")
-    if text is not None and not isinstance(text, str):
-        return {}
-    relation = given.get("relation")
-    if text is None or phrases.PRONOUNS.get(_spoken(text)) == phrases.HERE:
-        return _put_here(text or "down", resolver, state())
-    thing = _thing_unless_place(text, resolver, Use.ONTO, into=relation == "in")
-    if thing is not None:
-        if relation == NEXT_TO and (container := _container_of(thing, resolver)):
-            resolver.referents.note(text, Role.DESTINATION, container, "that is what it is in")
-            return {"destination": container, "relation": IN}
-        default = "in" if thing.kind in PUT_INTO else "on"
-        return {"destination": thing.name, "relation": relation or default}
-    if relation == NEXT_TO:
-        raise NotAble(f"I put things next to things and on furniture, not next to {text}")
-    world = resolver.setting.request.world
-    place = resolve_place(text, resolver)
-    surface = surface_of(place, world)
-    if surface != place:
-        resolver.referents.note(place, Role.DESTINATION, surface, "the furniture there")
-    return {"destination": surface, "relation": "on"}
-
-
-def _container_of(thing: Referent, resolver: Resolver) -> str:
-    """Return what a thing in the scene lies in, "" for none."""
-    known = subject_of(thing.name, resolver.setting.request.scene).thing
-    return known.rests.of if known and known.rests and known.rests.relation == IN else ""
-
-
-def _put_here(text: str, resolver: Resolver, state: State) -> Parameters:
-    world = resolver.setting.request.world
-    table = state.at if is_surface(state.at, world) else nearest_furniture(state.spot, world)
-    if table is None:
-        raise UnknownPlace(text, set(world.places.values()))
-    near = state.spot is not None and math.dist(
-        state.spot, (world.sites[table].pose.x_m, world.sites[table].pose.y_m)
-    ) <= HERE_M  # fmt: skip
-    why = "it is here" if near or state.at == table else "the nearest furniture"
-    resolver.referents.note(text, Role.DESTINATION, table, why)
-    return {"destination": table, "relation": "on"}
-
-
 def _on_furniture(thing: Referent) -> Iterator[Step]:
     """Go first to the furniture on which an unseen thing was said to be."""
     if thing.look_at:
         yield "navigate_to", {"place": thing.look_at}
-
-
-def _spoken(text: str) -> str:
-    return " ".join(words_of(text)) or text.strip().lower()
 
 
 _HANDLERS: Final[Mapping[str, Callable[[Parameters, Resolver, GetState], Iterator[Step]]]] = {
