@@ -3,7 +3,7 @@
 import re
 from typing import Final
 
-from vla_deploy.planning.understanding.answers import WORD
+from vla_deploy.planning.understanding.answer_words import WORD
 from vla_deploy.planning.understanding.conversation import Question
 from vla_deploy.world.vocabulary import KIND_WORDS
 
