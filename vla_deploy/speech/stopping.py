@@ -20,6 +20,9 @@ STOP_HEARD_TWICE_CONFIDENCE: Final = 0.6
 LEAST_SURETY: Final = 0.05
 """Less sure words than STOP_WITHIN_CONFIDENCE, or than the first of these where the spotter
 suspects one as well, are no stop where the ear, if any, hears none."""
+WORDS_HEARD_SURETY: Final = 0.7
+"""An ear so sure makes up for words that are not, where the spotter suspects one as well: while
+somebody speaks, too, who has gone on after the word."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
@@ -78,8 +81,10 @@ def stops(
         return True
     if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
         return True
-    if is_read and suspicion >= SLIGHT_SUSPICION and confidence >= STOP_SUSPECTED_CONFIDENCE:
-        return True
+    if is_read and suspicion >= SLIGHT_SUSPICION:
+        is_heard = surety is not None and surety >= WORDS_HEARD_SURETY
+        if is_heard or confidence >= STOP_SUSPECTED_CONFIDENCE:
+            return True
     return is_all and _is_witnessed(reading, confidence, suspicion)
 
 

@@ -80,3 +80,11 @@ def test_while_somebody_speaks_only_what_was_read_helps_a_strong_suspicion() -> 
 def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
     assert not stops(heard("he", surety=0.99), 0.3, is_all=False)
     assert stops(heard("stop the arm", surety=0.0), 0.9, is_all=False)
+
+
+def test_an_ear_that_is_sure_makes_up_for_words_that_are_not() -> None:
+    going_on = heard("stop before you hit", surety=0.75)
+    assert stops(going_on, 0.2, 0.35, is_all=False)
+    assert not stops(going_on, 0.2, 0.25, is_all=False)
+    assert not stops(replace(going_on, stop_surety=0.65), 0.2, 0.35, is_all=False)
+    assert not stops(heard("you should stop", surety=0.75), 0.2, 0.35, is_all=False)
