@@ -23,14 +23,6 @@ BATCH_S: Final = 100.0
 TALKERS: Final = 300
 CUT_SHARE: Final = 0.3
 """Of clips that end while somebody still speaks, as phrases do that are read in a glance."""
-PIECE_SHARE: Final = 0.6
-"""Of talk with pauses in it of which one piece is taken, as the robot hears it: by the phrase."""
-PAUSED_WEIGHT: Final = 3.0
-"""So much more often such talk is drawn: a piece of it, "oh" or "please", is soon a stop word."""
-PAUSE_S: Final = 0.12
-PAUSE_RATIO: Final = 0.04
-"""A pause lasts so long, and is quieter than that share of the loudest moment."""
-PIECE_MARGIN_S: Final = 0.04
 SAID_FROM: Final = 0.5
 """Share of a word after which a state may tell it."""
 SETTLED_S: Final = 0.08
@@ -91,8 +83,6 @@ class Corpus:
         others = self._parts[1]
         talkers = [others[int(n)].wave for n in random.integers(len(others), size=TALKERS)]
         self._spoiler = Spoiler(talkers, random)
-        weights = np.array([_weight(part[n]) for part, n in self._places])
-        self._shares = weights / weights.sum()
         self._hard: deque[int] = deque(maxlen=HARD)
 
     def __len__(self) -> int:
@@ -104,8 +94,7 @@ class Corpus:
 
     def batches(self) -> Iterator[Batch]:
         """Yield a round of clips, in groups of like length."""
-        count = min(ROUND, len(self))
-        drawn = self._random.choice(len(self), count, replace=False, p=self._shares)
+        drawn = self._random.choice(len(self), min(ROUND, len(self)), replace=False)
         numbers = [*map(int, drawn), *self._hard]
         clips = [part[n] for part, n in (self._places[number] for number in numbers)]
         lengths_s = np.array([len(clip.samples) / RATE_HZ for clip in clips])
@@ -124,44 +113,12 @@ class Corpus:
         """Return one clip's sound, spoilt, and its words in seconds from its beginning."""
         random = self._random
         lead_s, tail_s = random.uniform(0.0, 0.5), random.uniform(0.0, 0.6)
-        said = clip.wave
-        if not len(clip.events) and random.random() < PIECE_SHARE:
-            said = _piece(said, random)
-        wave = self._spoiler.spoil(said, lead_s, tail_s, random)
+        wave = self._spoiler.spoil(clip.wave, lead_s, tail_s, random)
         events = clip.events + np.array((0.0, lead_s, lead_s), np.float32)
         if random.random() < CUT_SHARE:
             first_s = float(events[-1, 2]) if len(events) else lead_s + 0.2
             wave = wave[: int(RATE_HZ * max(first_s, random.uniform(0.0, len(wave) / RATE_HZ)))]
         return np.ascontiguousarray(wave, np.float32), events
-
-
-def _weight(clip: Said) -> float:
-    has_pause = not len(clip.events) and len(between_pauses(clip.wave)) > 1
-    return PAUSED_WEIGHT if has_pause else 1.0
-
-
-def _piece(wave: Wave, random: Random) -> Wave:
-    """Return what is said between two pauses, drawn from all of it."""
-    pieces = between_pauses(wave)
-    first, last = pieces[int(random.integers(len(pieces)))]
-    return wave[first:last]
-
-
-def between_pauses(wave: Wave) -> list[tuple[int, int]]:
-    """Return where sound begins and ends that no pause of PAUSE_S interrupts, in samples."""
-    step = RATE_HZ // 100
-    whole = wave[: len(wave) // step * step].reshape(-1, step)
-    level = np.sqrt(np.mean(whole**2, axis=1))
-    loud = np.flatnonzero(level > PAUSE_RATIO * level.max(initial=1e-6))
-    if not len(loud):
-        return [(0, len(wave))]
-    ends = np.flatnonzero(np.diff(loud) * step > PAUSE_S * RATE_HZ)
-    firsts, lasts = loud[np.r_[0, ends + 1]], loud[np.r_[ends, len(loud) - 1]]
-    margin = round(PIECE_MARGIN_S * RATE_HZ)
-    return [
-        (max(0, int(a) * step - margin), min(len(wave), (int(b) + 1) * step + margin))
-        for a, b in zip(firsts, lasts, strict=True)
-    ]
 
 
 def _targets(events: NDArray[np.float32], count: int, state_s: float) -> NDArray[np.int64]:

@@ -12,6 +12,9 @@ from vla_deploy.speech.words import holds_form_of_stop, holds_stop, is_stop
 
 STOP_CONFIDENCE: Final = 0.25
 """A stop is taken where another command would be asked again: a stop too many does no harm."""
+CALL_SURETY: Final = 0.2
+"""A call to stop of so unsure words needs an ear, if there is one, that is so sure: "oh" is read as
+"halt"."""
 STOP_WITHIN_CONFIDENCE: Final = 0.85
 STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
@@ -79,7 +82,8 @@ def stops(
         return True
     if is_all and suspicion >= SUSPICION and any(map(is_stop, likely)):
         return True
-    if is_all and is_stop(reading.text) and confidence >= STOP_CONFIDENCE:
+    is_call = is_all and is_stop(reading.text) and (surety is None or surety >= CALL_SURETY)
+    if is_call and confidence >= STOP_CONFIDENCE:
         return True
     if is_read and suspicion >= SLIGHT_SUSPICION:
         is_heard = surety is not None and surety >= WORDS_HEARD_SURETY

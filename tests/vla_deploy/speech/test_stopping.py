@@ -88,3 +88,10 @@ def test_an_ear_that_is_sure_makes_up_for_words_that_are_not() -> None:
     assert not stops(going_on, 0.2, 0.25, is_all=False)
     assert not stops(replace(going_on, stop_surety=0.65), 0.2, 0.35, is_all=False)
     assert not stops(heard("you should stop", surety=0.75), 0.2, 0.35, is_all=False)
+
+
+def test_an_unsure_call_to_stop_needs_an_ear_that_hears_some_of_it() -> None:
+    assert stops(heard("halt", surety=0.25), 0.4, 0.0)
+    assert stops(heard("halt", surety=None), 0.4, 0.0)
+    assert not stops(heard("halt", surety=0.15), 0.4, 0.0)
+    assert stops(heard("halt", surety=0.15), 0.9, 0.0)
