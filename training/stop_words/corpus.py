@@ -4,6 +4,7 @@ import gzip
 import json
 import logging
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
@@ -149,9 +150,16 @@ def _stop_texts(
 
 
 def _other_texts(random: np.random.Generator, count: int) -> list[tuple[str, str, bool]]:
-    return [(text, "", False) for text in other_talk(count, random, _lexicon(), Examples().draw)]
+    return [(text, "", False) for text in other_talk(count, random, _lexicon(), _examples().draw)]
 
 
+# Each engine's talk is drawn from both: they are read once.
+@cache
+def _examples() -> Examples:
+    return Examples()
+
+
+@cache
 def _lexicon() -> list[str]:
     """Return the words of English that the package of one engine can read."""
     packed = files("hibari").joinpath("assets/lexicon_us_gold.json.gz").read_bytes()
