@@ -129,10 +129,7 @@ def _place(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[S
             yield from _on_furniture(thing)
             yield "pick_up", {"object": thing.name, **_arm(given)}
         held = None if thing is None else _held(thing, state(), resolver)
-        hand = (
-            {"arm": held.hand} if held is not None and held.hand and len(state().held) > 1 else {}
-        )
-        yield "place", {**put, **destination, **hand}
+        yield "place", {**put, **destination, **_hand_of(held, state())}
 
 
 def _hand_over(given: Parameters, resolver: Resolver, state: GetState) -> Iterator[Step]:
@@ -147,8 +144,7 @@ def _hand_over(given: Parameters, resolver: Resolver, state: GetState) -> Iterat
             if resolver.setting.request.here is not None:
                 yield "navigate_to", _here("here", resolver)
         held = _held(thing, state(), resolver)
-        several = held is not None and held.hand and len(state().held) > 1
-        yield "hand_over", {"arm": held.hand} if held is not None and several else _arm(given)
+        yield "hand_over", _hand_of(held, state()) or _arm(given)
 
 
 def _has_put(thing: Referent, destination: Parameters, state: State, resolver: Resolver) -> bool:
@@ -183,6 +179,12 @@ def _to_put_down(
 
 def _arm(given: Parameters) -> Parameters:
     return {"arm": given["arm"]} if "arm" in given else {}
+
+
+def _hand_of(held: Held | None, state: State) -> Parameters:
+    """Name the hand that holds a thing where another holds something, too."""
+    is_named = held is not None and held.hand and len(state.held) > 1
+    return {"arm": held.hand} if held is not None and is_named else {}
 
 
 def _held(thing: Referent, state: State, resolver: Resolver) -> Held | None:
