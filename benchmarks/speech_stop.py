@@ -1,117 +1,41 @@
 """Measure the spoken stop: what is missed, what alarms by mistake, and how soon the button is hit.
 
-Phrases with a stop word are said by voices of every installed engine, in noise and in rooms, and
-other talk by the same voices, all into what listens on board: the spotter as the profile wants it,
-and the recogniser, whose words press the button too as soon as it has read them. A delay is from
-the end of the word to the end of the block of sound in which it was told, and what the computer
-took for that block. `latch` does it with the whole way: a person in the twin's room says it while
-an arm moves, and physics tells when all stands still.
+Phrases with a stop word are said by voices of every installed engine, in noise and in rooms, at
+10 dB also a moment after the voice has said something else; and other talk by the same voices. All
+goes into what listens on board: the spotter as the profile wants it, and the recogniser, whose
+words press the button too as soon as it has read them. A delay is from the end of the word to the
+end of the block of sound in which it was told, and what the computer took for that block. `latch`
+does it with the whole way: a person in the twin's room says it while an arm moves, and physics
+tells when all stands still.
 """
 
 import sys
-import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import Any, Final
 
 import numpy as np
 
 from benchmarks.command import parser, show
+from benchmarks.speech_stop_ear import SPOTTER, WORDS, Ear
 from benchmarks.speech_stop_latch import latch
 from benchmarks.speech_stop_talk import Voices, other_talk, phrases, words_alike
-from drivers.clock import MonotonicClock
-from platforms import load_profile
 from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.mixing import at_level, at_snr
 from training.voices.noises import KINDS, noise
 from training.voices.rooms import draw_room, in_room
-from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.speech.choosing import ears_of
-from vla_deploy.speech.hearing import Room
-from vla_deploy.speech.recording import StreamClock, open_hearing
-from vla_deploy.speech.sound import SoundBlock, duration_ns
-from vla_deploy.speech.stop_words.opening import open_spotter
-from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
-from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
-from vla_deploy.speech.verdict import Verdict
-from vla_deploy.state_dir import user_base
 
 SNRS_DB: Final[Mapping[str, float | None]] = {"clean": None, "20db": 20.0, "10db": 10.0, "5db": 5.0}
+_AFTER: Final = "_after_talk"
+AFTER_TALK: Final = "10db" + _AFTER
+CASES: Final = (*SNRS_DB, AFTER_TALK)
+_NOTHING: Final = np.zeros(0, np.float32)
 _TALK_SNRS: Final = ("clean", "clean", "20db", "10db")
-BLOCK: Final = RATE_HZ // 50
-"""The node steps so often."""
 TOO_LATE_S: Final = 1.0
-SPOTTER, WORDS = "spotter", "words"
 _LEVEL_DB: Final = -26.0
 _HISS: Final = 2e-4
 _BEFORE_S, _AFTER_S = 0.8, 1.2
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Alarm:
-    """Tell a word and who heard it, when the button is hit, and what the last block took."""
-
-    word: str
-    by: str
-    at_s: float
-    computed_s: float
-
-
-class Ear:
-    """Run over whole pieces of sound what listens on board."""
-
-    def __init__(self) -> None:
-        profile = load_profile("desktop")
-        shelf = ModelShelf.of_base(user_base(), MonotonicClock())
-        self.spotter: Spotter
-        self.spotter, thresholds = open_spotter(shelf, profile)
-        self.threshold = thresholds[profile.speech.stop_words]
-        self._alone = alone(profile.speech.stop_words, self.threshold)
-        self._clock = StreamClock()
-        ears = ears_of(shelf, profile, 0)
-        self.why_no_words = ears.why
-        self._suspicions = Suspicions()
-        self._hearing = open_hearing(
-            ears.recogniser, ears.why, profile, self._clock, suspicion=self._suspicions.highest
-        )
-        self._count = 0
-        self.busy_s = {SPOTTER: 0.0, WORDS: 0.0}
-
-    @property
-    def heard_s(self) -> float:
-        """Return how much was heard."""
-        return self._count / RATE_HZ
-
-    def alarms(self, sound: Wave) -> Iterator[Alarm]:
-        """Yield what a piece of sound sets off, heard from silence on."""
-        self.spotter.reset()
-        self._suspicions.clear()
-        self._hearing.enter(Room())
-        for at in range(0, len(sound), BLOCK):
-            samples = sound[at : at + BLOCK]
-            block = SoundBlock(stamp_ns=duration_ns(self._count), samples=samples, follows=at > 0)
-            self._count += len(samples)
-            self._clock.ns = block.end_ns
-            for by, listen in ((SPOTTER, self._spot), (WORDS, self._read)):
-                began_s, busy_s = time.perf_counter(), time.process_time()
-                word = listen(block)
-                took_s = time.perf_counter() - began_s
-                self.busy_s[by] += time.process_time() - busy_s
-                if word:
-                    at_s = (at + len(samples)) / RATE_HZ
-                    yield Alarm(word=word, by=by, at_s=at_s, computed_s=took_s)
-
-    def _spot(self, block: SoundBlock) -> str:
-        spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self._alone)
-        self._suspicions.note(block.end_ns, self.spotter.score, self.threshold)
-        return "" if spotted is None else spotted.word
-
-    def _read(self, block: SoundBlock) -> str:
-        self._hearing.feed(block, None)
-        told = list(self._hearing.heard())
-        return next((one.text for one in told if one.judgement.verdict is Verdict.STOP), "")
 
 
 def measure(
@@ -150,8 +74,12 @@ def _stops(voices: Voices, ear: Ear, clips: int, random: np.random.Generator) ->
     misses: list[str] = []
     for engine in voices.engines:
         for clip, (start_s, end_s) in phrases(voices, engine, clips, random):
-            for name, snr_db in SNRS_DB.items():
-                by = _delays_s(ear, _around(clip, snr_db, random), start_s, end_s)
+            before = voices.before(clip, random)
+            for name in CASES:
+                first = before if name == AFTER_TALK else _NOTHING
+                samples, later_s = np.concatenate((first, clip.samples)), len(first) / RATE_HZ
+                sound = _around(samples, SNRS_DB[name.removesuffix(_AFTER)], random)
+                by = _delays_s(ear, sound, later_s + start_s, later_s + end_s)
                 for group in (engine, "all"):
                     missed[name][group].append(not by)
                 for one in (SPOTTER, WORDS):
@@ -162,11 +90,11 @@ def _stops(voices: Voices, ear: Ear, clips: int, random: np.random.Generator) ->
                     misses.append(f"{name}, {engine} {clip.voice}: {clip.text}")
     return {
         "stop_phrases": len(missed["clean"]["all"]),
-        **{f"stop_missed_ratio_{name}": float(np.mean(missed[name]["all"])) for name in SNRS_DB},
+        **{f"stop_missed_ratio_{name}": float(np.mean(missed[name]["all"])) for name in CASES},
         **{
             f"stop_missed_by_{one}_ratio_{name}": float(np.mean(missed[name][one]))
             for one in (SPOTTER, WORDS)
-            for name in SNRS_DB
+            for name in CASES
         },
         "stop_missed_by_engine_10db": {
             engine: float(np.mean(missed["10db"][engine])) for engine in voices.engines
@@ -187,10 +115,10 @@ def _delays_s(ear: Ear, sound: Wave, start_s: float, end_s: float) -> dict[str, 
     return found
 
 
-def _around(clip: Clip, snr_db: float | None, random: np.random.Generator) -> Wave:
-    """Return a clip with a quiet moment at each end, in noise, every other time in a room."""
+def _around(samples: Wave, snr_db: float | None, random: np.random.Generator) -> Wave:
+    """Return speech with a quiet moment at each end, in noise, every other time in a room."""
     before, after = round(_BEFORE_S * RATE_HZ), round(_AFTER_S * RATE_HZ)
-    sound = np.pad(at_level(clip.samples, _LEVEL_DB), (before, after))
+    sound = np.pad(at_level(samples, _LEVEL_DB), (before, after))
     if random.random() < 0.5:
         sound = in_room(sound, draw_room(random))
     if snr_db is not None:
@@ -237,7 +165,7 @@ def _drawn(random: np.random.Generator) -> str:
 
 
 def _alarms(ear: Ear, clip: Clip, snr_db: float | None, random: np.random.Generator) -> list[str]:
-    found = ear.alarms(_around(clip, snr_db, random)[: -RATE_HZ // 2])
+    found = ear.alarms(_around(clip.samples, snr_db, random)[: -RATE_HZ // 2])
     return [f"{one.word} by {one.by}, {clip.engine} {clip.voice}: {clip.text}" for one in found]
 
 

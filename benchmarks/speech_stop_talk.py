@@ -14,7 +14,7 @@ import numpy as np
 from training.stop_words.cast import PARTS, Part, draw_style
 from training.stop_words.texts import is_clean
 from training.stop_words.timing import word_times
-from training.voices.clip import Clip
+from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.errors import EngineMissing, SynthesisFailed
 
 _LAST: Final = (
@@ -55,6 +55,8 @@ _NEAR: Final = (
     "stuff the sock into the box",
     "please fetch the chopped peas",
 )
+_TALKED_S: Final = 4.0
+_PAUSE_S: Final = (0.3, 1.0)
 _PAGES: Final = Path(__file__).resolve().parents[1] / "docs"
 _CORPORA: Final = Path(__file__).resolve().parent / "corpora"
 _TALK: Final = ("off_domain.txt", "overheard.txt")
@@ -98,10 +100,17 @@ class Voices:
         both = part.voices and part.held_voices
         kept = part.held_voices if both and random.random() < 0.5 else _all_voices(part)
         voice = kept[int(random.integers(len(kept)))]
-        try:
-            return part.speak(text, voice, draw_style(random))
-        except SynthesisFailed:
-            return None
+        return _spoken(part, text, voice, random)
+
+    def before(self, clip: Clip, random: np.random.Generator) -> Wave:
+        """Let the voice of a clip say something else first; return the end of it and a pause."""
+        texts = list(_overheard())
+        text = texts[int(random.integers(len(texts)))]
+        talk = _spoken(self._parts[clip.engine], text, clip.voice, random)
+        if talk is None:
+            return np.zeros(0, np.float32)
+        kept = talk.samples[-round(RATE_HZ * _TALKED_S) :]
+        return np.pad(kept, (0, round(RATE_HZ * random.uniform(*_PAUSE_S))))
 
 
 def phrases(
@@ -130,6 +139,13 @@ def other_talk(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
 def words_alike(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
     """Yield sentences made of words that sound like a stop word, without end."""
     return _endless(_NEAR, voices, random)
+
+
+def _spoken(part: Part, text: str, voice: str, random: np.random.Generator) -> Clip | None:
+    try:
+        return part.speak(text, voice, draw_style(random))
+    except SynthesisFailed:
+        return None
 
 
 def _endless(texts: Sequence[str], voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
