@@ -15,7 +15,8 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.rules.clauses import polite_off
-from vla_deploy.planning.understanding.expressions import Expression, read_expression
+from vla_deploy.planning.understanding.expression import Expression
+from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.phrases import HELD, ORDINALS
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world.vocabulary import (

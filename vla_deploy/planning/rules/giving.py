@@ -14,7 +14,8 @@ from vla_deploy.planning.rules.building import Groups, Step, arm_in, held_kinds,
 from vla_deploy.planning.rules.intents import Intent
 from vla_deploy.planning.rules.lending import kinds_told
 from vla_deploy.planning.rules.pattern_parts import OBJECT, Row
-from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
+from vla_deploy.planning.understanding.expression import Expression, Scope
+from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
 from vla_deploy.planning.understanding.phrases import HELD, IT, PRONOUNS
 from vla_deploy.planning.understanding.setting import Setting

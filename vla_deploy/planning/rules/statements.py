@@ -23,7 +23,8 @@ from vla_deploy.planning.rules.lending import (
     things_told,
 )
 from vla_deploy.planning.rules.unsaying import unsays
-from vla_deploy.planning.understanding.expressions import Scope, read_expression
+from vla_deploy.planning.understanding.expression import Scope
+from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.phrases import THEM
 from vla_deploy.planning.understanding.setting import Setting
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.errors import NotThere
-from vla_deploy.planning.understanding.expressions import Expression
+from vla_deploy.planning.understanding.expression import Expression
 from vla_deploy.world import Thing
 from vla_deploy.world.vocabulary import ANY_CLASS
 

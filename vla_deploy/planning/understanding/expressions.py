@@ -10,92 +10,30 @@ grammar (`vla_deploy.world.query`). Words that are not known are compared with t
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.known_words import (
-    is_kind,
-    known_words,
-    likely_words,
-    relation_words,
-    single,
+from vla_deploy.planning.understanding.expression import Expression, Scope
+from vla_deploy.planning.understanding.expression_words import (
+    compounds,
+    generic_support,
+    of_kinds,
+    pointing,
+    with_known_words,
 )
-from vla_deploy.planning.understanding.names import Match, closest
-from vla_deploy.planning.understanding.parting import Parted, Place, parted, side_behind
+from vla_deploy.planning.understanding.parting import Parted, parted, side_behind
 from vla_deploy.planning.understanding.wordings import reworded
 from vla_deploy.world import Query, UnknownWord, parse_query
-from vla_deploy.world.vocabulary import ANY_CLASS, ARTICLES, OBJECT_CLASSES
-
-
-class Scope(StrEnum):
-    """Say how many things an expression means: the one, any one, or all of them."""
-
-    ONE = "one"
-    ANY = "any"
-    ALL = "all"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Expression:
-    """Hold what an expression says; `said` is its words, in lower case and without articles.
-
-    `side` is left, right or middle, from the speaker's view where `by_speaker`. `support` names
-    the furniture that a generic word such as "table" stands for. `place` is where in a row it is,
-    `besides` what it is not, `near` what it is the nearest to, or the farthest from, as `order`
-    says, `between` which two things it is. `among` is of how many things it is one. `kinds` are
-    those that a word such as "round" fits, the best first. `corrections` are words taken for
-    others, `doubts` those that only sound like a known one.
-    """
-
-    said: str
-    query: Query
-    pronoun: str = ""
-    scope: Scope = Scope.ONE
-    count: int = 0
-    hand: str = ""
-    side: str = ""
-    by_speaker: bool = False
-    extreme: str = ""
-    is_other: bool = False
-    support: frozenset[str] = frozenset()
-    place: Place | None = None
-    besides: "tuple[Expression, ...]" = ()
-    near: "Expression | None" = None
-    order: str = ""
-    between: "tuple[Expression, ...]" = ()
-    among: int = 0
-    kinds: tuple[frozenset[str], ...] = ()
-    corrections: tuple[Match, ...] = ()
-    doubts: tuple[Match, ...] = ()
-    words: tuple[str, ...] = field(default=(), repr=False)
-
-    @property
-    def is_relative(self) -> bool:
-        """Tell whether only the things around tell which one it is: a row, or what it is not."""
-        return bool(self.place or self.besides or self.near or self.between or self.kinds)
-
-    @property
-    def is_bare(self) -> bool:
-        """Tell whether it is only a place in a list: "the second one"."""
-        is_counted = self.place is not None and not self.place.side
-        compared = self.besides or self.near or self.between
-        tells = self.extreme or self.kinds or compared or self.support
-        return is_counted and self.query == Query() and not (tells or self.query.is_named)
-
+from vla_deploy.world.vocabulary import ARTICLES, OBJECT_CLASSES
 
 MOST_LETTERS: Final = 200
-_ID: Final = re.compile(r"[a-z]+_\d+")
 _TOKEN: Final = re.compile(r"[a-z0-9_]+|&")
 _TO_WHOM: Final = re.compile(
     r"\b(nearest|closest|nearer|closer|farthest|furthest) to (you|yourself|robot|the robot|me)\b"
 )
-# Where one takes a thing from is where it is.
-_FROM: Final = ((re.compile(r"\b(?:from|off(?: of)?) (?!me\b)"), "on "),
-                (re.compile(r"\bout of "), "in "))  # fmt: skip
 _IN_HAND: Final = re.compile(
     r"(?:what|whatever|the thing|the one|the object|everything)(?: that)?"
     r"(?: you (?:(?:are|re) (?:holding|carrying)|hold|have|have got|ve|ve got|got|carry)"
@@ -170,14 +108,14 @@ def _description(
         place=parts.place,
         among=parts.among,
     )
-    read = _pointing(_compounds(rest).split(), read)
-    read = _generic_support(read, furniture)
-    read = _known_words(read, furniture)
+    read = pointing(compounds(rest).split(), read)
+    read = generic_support(read, furniture)
+    read = with_known_words(read, furniture)
     try:
         query = parse_query(" ".join(read.words), furniture)
     except UnknownWord:
         return None
-    fits = _of_kinds(replace(read, query=query))
+    fits = of_kinds(replace(read, query=query))
     return fits if _means_things(query, parts.own) else None
 
 
@@ -241,82 +179,3 @@ def _quantity(said: str) -> tuple[str, Scope, int]:
             count = phrases.COUNTS.get(counted[-1], 0) if counted else 0
             return found["own"], scope, count
     return said, Scope.ONE, 0
-
-
-def _compounds(rest: str) -> str:
-    for pattern, word in _FROM:
-        rest = pattern.sub(word, rest)
-    for spoken, word in phrases.COMPOUNDS.items():
-        rest = re.sub(rf"\b{spoken}\b", word, rest)
-    return rest
-
-
-def _pointing(words: list[str], read: Expression) -> Expression:
-    """Take side, extreme, "other", plural and modifiers out of the words."""
-    kept: list[str] = []
-    changes: dict[str, object] = {}
-    for at, word in enumerate(words):
-        following = " ".join(words[at + 1 : at + 2])
-        if word in phrases.SIDES and following != "of":
-            changes["side"] = phrases.SIDES[word]
-        elif word in phrases.EXTREMES:
-            changes["extreme"] = phrases.EXTREMES[word]
-        elif word in ("other", "another", "different"):
-            changes["is_other"] = True
-            changes |= {"scope": Scope.ANY} if word == "another" else {}
-        elif word == "ones":
-            changes.setdefault("scope", Scope.ALL if read.scope is Scope.ONE else read.scope)
-        elif word in phrases.FITTING_KINDS:
-            changes["kinds"] = phrases.FITTING_KINDS[word]
-            kept += ["object"] if word in phrases.KIND_NOUNS else []
-        elif word in phrases.SILENT or (word in phrases.MODIFIERS and is_kind(following)):
-            continue
-        else:
-            one = single(word)
-            if one != word and not _has_relation(kept):
-                changes.setdefault("scope", Scope.ALL if read.scope is Scope.ONE else read.scope)
-            kept.append(phrases.ORDER_WORDS.get(one, one))
-    return replace(read, words=tuple(kept), **changes)  # type: ignore[arg-type]
-
-
-def _of_kinds(read: Expression) -> Expression | None:
-    """Let "round" say nothing more of a cup; None where it is nothing that a kind can be."""
-    kind = read.query.kind
-    if not read.kinds or kind == ANY_CLASS:
-        return read
-    return replace(read, kinds=()) if any(kind in kinds for kinds in read.kinds) else None
-
-
-def _has_relation(kept: list[str]) -> bool:
-    return any(word in relation_words() for word in kept)
-
-
-def _generic_support(read: Expression, furniture: Mapping[str, str]) -> Expression:
-    """Let "on the table" mean any furniture whose name ends in "table"."""
-    words = [word for word in read.words if word not in ARTICLES]
-    for at in range(len(words) - 1, 0, -1):
-        spoken = " ".join(words[at:])
-        if words[at - 1] != "on" or spoken in furniture:
-            continue
-        named = {place for name, place in furniture.items() if name.split()[-1:] == words[at:]}
-        if named:
-            return replace(read, words=tuple(words[: at - 1]), support=frozenset(named))
-    return read
-
-
-def _known_words(read: Expression, furniture: Mapping[str, str]) -> Expression:
-    """Put known words in the place of misspelt ones; note those that only sound alike."""
-    known = known_words() | frozenset(word for name in furniture for word in name.split())
-    matches = [
-        None if word in known or _ID.fullmatch(word) else closest(word, likely_words())
-        for word in read.words
-    ]
-    return replace(
-        read,
-        words=tuple(
-            match.known[0] if match else word
-            for word, match in zip(read.words, matches, strict=True)
-        ),
-        corrections=tuple(one for one in matches if one and one.is_sure),
-        doubts=tuple(one for one in matches if one and not one.is_sure),
-    )

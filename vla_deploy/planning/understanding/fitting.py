@@ -7,7 +7,7 @@ from enum import StrEnum
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
-from vla_deploy.planning.understanding.expressions import Expression, Scope
+from vla_deploy.planning.understanding.expression import Expression, Scope
 from vla_deploy.planning.understanding.insertions import surface_of
 from vla_deploy.planning.understanding.parting import Place
 from vla_deploy.planning.understanding.selection import (

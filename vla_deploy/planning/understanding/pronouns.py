@@ -9,7 +9,7 @@ from vla_deploy.planning.errors import Ambiguous, NotThere, UnknownObject
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role
-from vla_deploy.planning.understanding.expressions import Expression
+from vla_deploy.planning.understanding.expression import Expression
 from vla_deploy.planning.understanding.fitting import Use, suits
 from vla_deploy.planning.understanding.parting import Place
 from vla_deploy.planning.understanding.questions import which_hand, which_thing

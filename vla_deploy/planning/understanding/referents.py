@@ -6,7 +6,7 @@ from typing import Final
 
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.decisions import Decision
-from vla_deploy.planning.understanding.expressions import Expression, Scope
+from vla_deploy.planning.understanding.expression import Expression, Scope
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing

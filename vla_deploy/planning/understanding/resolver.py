@@ -14,7 +14,8 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.understanding.absence import not_as_many, not_there
 from vla_deploy.planning.understanding.conversation import Role
-from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
+from vla_deploy.planning.understanding.expression import Expression, Scope
+from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, alike, fitting
 from vla_deploy.planning.understanding.pronouns import Pronouns
 from vla_deploy.planning.understanding.questions import did_you_mean, which_thing

@@ -3,7 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
+from vla_deploy.planning.understanding.expression import Expression, Scope
+from vla_deploy.planning.understanding.expressions import read_expression
 
 FURNITURE = {"coffee table": "coffee_table", "kitchen table": "kitchen_table"}
 
