@@ -14,7 +14,6 @@ from torch import Tensor
 from training.speech.framing import IGNORED, draw_hop, framed, in_groups, padded
 from training.speech.network import FRAMES_PER_STATE
 from training.speech.spoiling import Spoiler
-from training.stop_ear.preceding import Before, Preceding
 from training.stop_words.corpus import TRAIN, Clips, Said
 from training.stop_words.texts import is_clean
 from training.voices.clip import RATE_HZ, Wave
@@ -76,10 +75,12 @@ class Corpus:
             FileNotFoundError: nothing was spoken yet.
         """
         self._random = random
-        stops, others = (Clips(folder, TRAIN, kind) for kind in ("stops", "others"))
-        self._parts: list[Clips | Talk] = [stops, others, *([] if talk is None else [Talk(talk)])]
+        self._parts: list[Clips | Talk] = [
+            *(Clips(folder, TRAIN, kind) for kind in ("stops", "others")),
+            *([] if talk is None else [Talk(talk)]),
+        ]
         self._places = [(part, n) for part in self._parts for n in range(len(part))]
-        self._preceding = Preceding(others.voices, lambda number: others[number].wave)
+        others = self._parts[1]
         talkers = [others[int(n)].wave for n in random.integers(len(others), size=TALKERS)]
         self._spoiler = Spoiler(talkers, random)
         self._hard: deque[int] = deque(maxlen=HARD)
@@ -96,35 +97,26 @@ class Corpus:
         drawn = self._random.choice(len(self), min(ROUND, len(self)), replace=False)
         numbers = [*map(int, drawn), *self._hard]
         clips = [part[n] for part, n in (self._places[number] for number in numbers)]
-        before = [self._preceding.draw(clip.voice, self._random) for clip in clips]
-        lengths_s = np.array(
-            [
-                one.most_s + len(clip.samples) / RATE_HZ
-                for one, clip in zip(before, clips, strict=True)
-            ]
-        )
+        lengths_s = np.array([len(clip.samples) / RATE_HZ for clip in clips])
         for group in in_groups(lengths_s, BATCH_S, self._random):
-            said = [(clips[k], before[k]) for k in group]
-            yield self._batch(said, tuple(numbers[k] for k in group))
+            yield self._batch([clips[k] for k in group], tuple(numbers[k] for k in group))
 
-    def _batch(self, said: Sequence[tuple[Said, Before]], numbers: tuple[int, ...]) -> Batch:
+    def _batch(self, clips: Sequence[Said], numbers: tuple[int, ...]) -> Batch:
         hop = draw_hop(self._random)
-        waves, events = zip(*(self._spoilt(*one) for one in said), strict=True)
+        waves, events = zip(*map(self._spoilt, clips), strict=True)
         made = padded(framed(waves, hop, self._random), self._random)
         count, state_s = made.shape[2] // FRAMES_PER_STATE, FRAMES_PER_STATE * hop / RATE_HZ
         targets = np.stack([_targets(each, count, state_s) for each in events])
         return Batch(frames=made, targets=torch.from_numpy(targets), numbers=numbers)
 
-    def _spoilt(self, clip: Said, before: Before) -> tuple[Wave, NDArray[np.float32]]:
+    def _spoilt(self, clip: Said) -> tuple[Wave, NDArray[np.float32]]:
         """Return one clip's sound, spoilt, and its words in seconds from its beginning."""
         random = self._random
-        first = self._preceding.wave(before)
-        speech = np.concatenate((first, clip.wave))
-        wave = self._spoiler.spoil(speech, 0.0, random.uniform(0.0, 0.6), random)
-        began_s = len(first) / RATE_HZ
-        events = clip.events + np.array((0.0, began_s, began_s), np.float32)
+        lead_s, tail_s = random.uniform(0.0, 0.5), random.uniform(0.0, 0.6)
+        wave = self._spoiler.spoil(clip.wave, lead_s, tail_s, random)
+        events = clip.events + np.array((0.0, lead_s, lead_s), np.float32)
         if random.random() < CUT_SHARE:
-            first_s = float(events[-1, 2]) if len(events) else began_s + 0.2
+            first_s = float(events[-1, 2]) if len(events) else lead_s + 0.2
             wave = wave[: int(RATE_HZ * max(first_s, random.uniform(0.0, len(wave) / RATE_HZ)))]
         return np.ascontiguousarray(wave, np.float32), events
 

@@ -4,8 +4,8 @@ Pure but for what it remembers: a frame and its judgement in, what has happened 
 """
 
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
@@ -25,6 +25,8 @@ PAUSE_RATIO: Final = 0.6
 CLIPPED: Final = 0.985
 GLANCE_FRAMES: Final = round(0.4 / FRAME_S)
 """While somebody speaks, their words so far may be looked at so often."""
+EARLIER_FRAMES: Final = round(0.6 / FRAME_S)
+"""Of what was heard just before a phrase, spoken or not, so many go along with it."""
 
 
 class Step(Enum):
@@ -39,11 +41,16 @@ class Step(Enum):
     TOO_LONG = "the speaker goes on for longer than a command may take"
 
 
+def _nothing() -> Sound:
+    return np.zeros(0, np.float32)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Phrase:
     """Hold what somebody said; `number` counts phrases, `voiced_s` is without pauses at the ends.
 
     `began_ns` and `ended_ns` are those of the voice; the samples begin before and end after it.
+    `earlier` is what was heard just before them, if anything.
     `own_words` are what the robot was saying, where it may have heard itself.
     """
 
@@ -54,6 +61,7 @@ class Phrase:
     clipped_ratio: float
     voice: float
     samples: Sound
+    earlier: Sound = field(default_factory=_nothing)
     own_words: str = ""
 
 
@@ -70,6 +78,7 @@ class Phrases:
 
     def __init__(self, settings: SpeechSettings) -> None:
         self.settings = settings
+        self._earlier: deque[Frame] = deque(maxlen=EARLIER_FRAMES)
         self._before: deque[Frame] = deque()
         self._frames: list[Frame] = []
         self._voices: list[float] = []
@@ -92,6 +101,7 @@ class Phrases:
         """Forget what was begun, as at a gap in the stream."""
         self._before.clear()
         self._close()
+        self._earlier.clear()
         self._swallowing = False
 
     def feed(self, frame: Frame, voice: float, *, is_loud: bool) -> Iterator[Happening]:
@@ -110,7 +120,7 @@ class Phrases:
             self._rising = 0
         kept = round(self.settings.pre_roll_s / FRAME_S) + ONSET_FRAMES
         while len(self._before) > kept:
-            self._before.popleft()
+            self._earlier.append(self._before.popleft())
         if self._rising >= ONSET_FRAMES:
             self._open(voice)
             yield Happening(Step.BEGAN, self._phrase())
@@ -157,6 +167,7 @@ class Phrases:
         return Happening(Step.ENDED if is_word else Step.TOO_SHORT, phrase)
 
     def _close(self) -> None:
+        self._earlier.extend(self._frames)
         self._frames, self._voices = [], []
         self._silent = self._rising = 0
 
@@ -164,7 +175,7 @@ class Phrases:
         """Return the phrase so far."""
         voiced = [number for number, voice in enumerate(self._voices) if voice >= OFFSET]
         first, last = voiced[0], voiced[-1]
-        samples = np.concatenate([frame.samples for frame in self._frames])
+        samples = _joined(self._frames)
         return Phrase(
             number=self._number,
             began_ns=self._frames[first].stamp_ns,
@@ -173,4 +184,9 @@ class Phrases:
             clipped_ratio=float(np.mean(np.abs(samples) >= CLIPPED)),
             voice=float(np.mean([self._voices[number] for number in voiced])),
             samples=samples,
+            earlier=_joined(self._earlier),
         )
+
+
+def _joined(frames: Iterable[Frame]) -> Sound:
+    return np.concatenate([_nothing(), *(frame.samples for frame in frames)])

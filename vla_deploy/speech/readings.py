@@ -143,7 +143,8 @@ class Readings:
         return f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
 
     def _ask(self, recogniser: Recogniser, phrase: Phrase, hot_words: str) -> _Asked:
-        return _Asked(phrase, self._executor.submit(recogniser.read, phrase.samples, hot_words))
+        reading = self._executor.submit(recogniser.read, phrase.samples, hot_words, phrase.earlier)
+        return _Asked(phrase, reading)
 
     def _refuse(self, phrase: Phrase, trouble: str) -> None:
         self._refused.append(Answer(phrase=phrase, reading=None, trouble=trouble))

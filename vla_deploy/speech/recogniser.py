@@ -22,6 +22,7 @@ from vla_deploy.speech.errors import SpeechMissing
 from vla_deploy.speech.sound import RATE_HZ, Sound
 from vla_deploy.speech.stop_ear import open_stop_ear
 
+_NOTHING: Final = np.zeros(0, np.float32)
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
 _MOST_TOKENS: Final = 200
@@ -92,8 +93,10 @@ class Recogniser:
         self._stop_ear = open_stop_ear(model)
         whisper.keeps_frames = self._stop_ear is not None
 
-    def read(self, samples: Sound, hot_words: str = "") -> Reading:
+    def read(self, samples: Sound, hot_words: str = "", earlier: Sound = _NOTHING) -> Reading:
         """Return what is said in a phrase of at most 29 s.
+
+        `earlier` is what was heard just before: it helps the ear for stop words.
 
         Raises:
             RunFailed: the model fails, or is closed.
@@ -103,7 +106,7 @@ class Recogniser:
         started_ns = self._clock.now_ns()
         try:
             segments, info = self._transcribe(samples, hot_words)
-            stop_surety = self._stop_surety(samples)
+            stop_surety = self._stop_surety(samples, earlier)
         except _model_errors() as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
@@ -145,11 +148,11 @@ class Recogniser:
         self._whisper = None
         self.claim.release()
 
-    def _stop_surety(self, samples: Sound) -> float | None:
+    def _stop_surety(self, samples: Sound, earlier: Sound) -> float | None:
         ear, whisper = self._stop_ear, self._whisper
         if ear is None:
             return None
-        return ear.surety_of(samples, whisper.frames, whisper.frames_of)
+        return ear.surety_of(samples, earlier, whisper.frames, whisper.frames_of)
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper

@@ -6,7 +6,7 @@ hears the very frames that the recogniser does; `training/stop_ear` makes it for
 is shipped, another Whisper has none.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -24,6 +24,8 @@ SETTLING: Final = 2
 """So many scores in a row tell a word, 40 ms each: one alone may be chance."""
 HEARD_AGAIN_FROM: Final = 0.02
 """From that surety on a phrase is heard again: what is only chance seldom stays."""
+STATE_S: Final = 0.04
+"""Each score is for so much sound."""
 LATER_S: Final = (-0.01, 0.03)
 PACES: Final = (0.89, 0.94, 1.06, 1.12)
 """As what it is heard again: as if it had begun so much earlier or later, or was spoken so fast."""
@@ -49,23 +51,31 @@ class StopEar:
             )
         self._graph = graph
 
-    def surety(self, frames: NDArray[Any]) -> float:
+    def surety(self, frames: NDArray[Any], from_s: float = 0.0) -> float:
         """Return how surely one of the words is in frames (mel, frame): from 0 to 1.
+
+        One that was said before `from_s` does not count.
 
         Raises:
             RunFailed: the frames are not of as many mel bands as it was made for.
         """
         given = np.ascontiguousarray(frames[np.newaxis], np.float32)
         scores: Array = self._graph.run([SCORES], {FRAMES: given})[SCORES][0]
+        scores = scores[round(from_s / STATE_S) :]
         if len(scores) < SETTLING:
             return 0.0
         runs = np.lib.stride_tricks.sliding_window_view(scores[:, 1:], SETTLING, axis=0)
         return float(runs.mean(axis=2).max())
 
-    def surety_of(self, sound: Sound, frames: Sequence[Array], frames_of: FramesOf) -> float:
-        """Return the mean surety of a phrase as it is and as it might as well have been spoken.
+    def surety_of(
+        self, sound: Sound, earlier: Sound, frames: Sequence[Array], frames_of: FramesOf
+    ) -> float:
+        """Return how surely one is in a phrase, however it is heard: alone, and after what was.
 
-        `frames` are what the recogniser was given of it, `frames_of` what it would be given.
+        What may hold one is heard as it might as well have been spoken, too, and the mean counts;
+        the least of both, as what is taken for a word by chance is seldom one in either.
+        `frames` are what the recogniser was given of the phrase, `frames_of` what it would be
+        given; `earlier` is what was heard before.
 
         Raises:
             RunFailed: the frames are not of as many mel bands as it was made for.
@@ -73,22 +83,30 @@ class StopEar:
         first = max(map(self.surety, frames), default=0.0)
         if first < HEARD_AGAIN_FROM:
             return first
-        again = [self.surety(frames_of(one)) for one in _varied(sound)]
-        return float(np.mean([first, *again]))
+        alone = float(np.mean([first, *self._sureties(_varied(sound), frames_of)]))
+        if not len(earlier):
+            return alone
+        whole, from_s = np.concatenate((earlier, sound)), len(earlier) / RATE_HZ
+        ways = ((whole, from_s), *_varied(whole, from_s))
+        return min(alone, float(np.mean(self._sureties(ways, frames_of))))
+
+    def _sureties(self, ways: Iterable[tuple[Sound, float]], frames_of: FramesOf) -> list[float]:
+        return [self.surety(frames_of(sound), from_s) for sound, from_s in ways]
 
     def close(self) -> None:
         """Release the memory."""
         self._graph.close()
 
 
-def _varied(sound: Sound) -> Iterator[Sound]:
-    """Yield a phrase a moment earlier and later, slower and faster."""
+def _varied(sound: Sound, from_s: float = 0.0) -> Iterator[tuple[Sound, float]]:
+    """Yield sound a moment earlier and later, slower and faster, and where its phrase begins."""
     for later_s in LATER_S:
         count = round(RATE_HZ * later_s)
-        yield np.pad(sound, (count, 0)) if count > 0 else sound[-count:]
+        yield np.pad(sound, (count, 0)) if count > 0 else sound[-count:], from_s + later_s
     for pace in PACES:
         times = np.arange(0.0, len(sound) - 1.0, pace)
-        yield np.interp(times, np.arange(len(sound)), sound).astype(np.float32)
+        spoken = np.interp(times, np.arange(len(sound)), sound).astype(np.float32)
+        yield spoken, from_s / pace
 
 
 def open_stop_ear(model: Model) -> StopEar | None:

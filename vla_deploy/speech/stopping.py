@@ -21,8 +21,11 @@ STOP_SUSPECTED_CONFIDENCE: Final = 0.5
 enough where the spotter suspects one."""
 STOP_HEARD_TWICE_CONFIDENCE: Final = 0.6
 LEAST_SURETY: Final = 0.05
-"""Less sure words than STOP_WITHIN_CONFIDENCE, or than the first of these where the spotter
-suspects one as well, are no stop where the ear, if any, hears none."""
+"""Less sure words than STOP_WITHIN_CONFIDENCE are no stop where the ear, if any, hears none; but
+by STOP_HEARD_TWICE_CONFIDENCE they are where the spotter suspects one as well and nothing follows:
+a glance may see "stop it" where "stopping" is said."""
+SUSPECTED_SURETY: Final = 0.1
+"""Words that are only as sure as STOP_SUSPECTED_CONFIDENCE need an ear that is so sure."""
 WORDS_HEARD_SURETY: Final = 0.7
 """An ear so sure makes up for words that are not, where the spotter suspects one as well: while
 somebody speaks, too, who has gone on after the word."""
@@ -71,10 +74,11 @@ def stops(
     """
     likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
     is_read = holds_stop(reading.text, is_all=is_all)
-    if is_read and confidence >= _enough_of_words(suspicion):
-        return True
     surety = reading.stop_surety
-    if surety is not None and surety < LEAST_SURETY:
+    is_unheard = surety is not None and surety < LEAST_SURETY
+    if is_read and confidence >= _enough_of_words(suspicion, is_unheard and not is_all):
+        return True
+    if is_unheard:
         return False
     # The ear knows better than the guesses of a glance, as soon as the word has ended.
     possible = (reading.text, *(likely if is_all or surety is None else ()))
@@ -85,17 +89,23 @@ def stops(
     is_call = is_all and is_stop(reading.text) and (surety is None or surety >= CALL_SURETY)
     if is_call and confidence >= STOP_CONFIDENCE:
         return True
-    if is_read and suspicion >= SLIGHT_SUSPICION:
-        is_heard = surety is not None and surety >= WORDS_HEARD_SURETY
-        if is_heard or confidence >= STOP_SUSPECTED_CONFIDENCE:
-            return True
+    if is_read and suspicion >= SLIGHT_SUSPICION and _is_heard_too(surety, confidence):
+        return True
     return is_all and _is_witnessed(reading, confidence, suspicion)
 
 
-def _enough_of_words(suspicion: float) -> float:
-    """Return by which confidence words stop the robot whatever the ear hears."""
-    is_heard_twice = suspicion >= SLIGHT_SUSPICION
+def _enough_of_words(suspicion: float, is_doubtful: bool) -> float:
+    """Return by which confidence words stop the robot; `is_doubtful` if the ear hears none yet."""
+    is_heard_twice = suspicion >= SLIGHT_SUSPICION and not is_doubtful
     return STOP_HEARD_TWICE_CONFIDENCE if is_heard_twice else STOP_WITHIN_CONFIDENCE
+
+
+def _is_heard_too(surety: float | None, confidence: float) -> bool:
+    """Tell whether the ear, if any, is sure enough of a word that was read and spotted, too."""
+    if surety is not None and surety >= WORDS_HEARD_SURETY:
+        return True
+    is_heard = surety is None or surety >= SUSPECTED_SURETY
+    return is_heard and confidence >= STOP_SUSPECTED_CONFIDENCE
 
 
 def _is_witnessed(reading: Reading, confidence: float, suspicion: float) -> bool:

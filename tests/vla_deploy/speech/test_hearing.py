@@ -42,7 +42,7 @@ class Reader:
         self._log_probability = log_probability
         self._others = others
 
-    def read(self, samples: Any, _hot_words: str) -> Reading:
+    def read(self, samples: Any, _hot_words: str, _earlier: Any) -> Reading:
         voiced_s = float((np.abs(samples) >= LOUD).sum()) / 16_000
         return Reading(
             text=" ".join(self._words[: 1 + int(voiced_s / 0.3)]),

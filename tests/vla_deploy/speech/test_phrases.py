@@ -5,7 +5,7 @@ import pytest
 
 from platforms import SpeechSettings
 from vla_deploy.speech.frames import Frame, Framing
-from vla_deploy.speech.phrases import Happening, Phrases, Step
+from vla_deploy.speech.phrases import EARLIER_FRAMES, Happening, Phrases, Step
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.voice_activity import FRAME, FRAME_S
 
@@ -143,3 +143,22 @@ def test_blocks_of_any_length_become_frames_in_time() -> None:
     assert frames[-1].stamp_ns == pytest.approx(duration_ns(8 * FRAME), abs=100_000)
     (after,) = framing.feed(SoundBlock(stamp_ns=9, samples=sound[:FRAME], follows=False))
     assert (after.stamp_ns, after.follows) == (9, False)
+
+
+def test_a_phrase_knows_what_was_heard_just_before_it() -> None:
+    stream = Stream()
+    first = stream.play(13 * "." + 10 * "v" + 10 * ".", level=0.1)[-1].phrase
+    stream.play(15 * ".", level=0.2)
+    second = stream.play(10 * "v" + 10 * ".", level=0.3)[-1].phrase
+    assert len(first.earlier) + len(first.samples) == 33 * FRAME
+    assert len(first.earlier) == 3 * FRAME
+    assert len(second.earlier) == EARLIER_FRAMES * FRAME
+    assert list(np.unique(second.earlier)) == [np.float32(0.1), np.float32(0.2)]
+    assert list(np.unique(second.samples)) == [np.float32(0.2), np.float32(0.3)]
+
+
+def test_nothing_from_before_a_gap_goes_along_with_a_phrase() -> None:
+    stream = Stream()
+    stream.play(40 * ".")
+    stream.phrases.reset()
+    assert not len(stream.play(12 * "v" + 12 * ".")[-1].phrase.earlier)

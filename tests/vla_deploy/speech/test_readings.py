@@ -1,6 +1,7 @@
 """Phrases are read beside the steps: in advance, in order, in bounds, and never by surprise."""
 
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,15 +43,17 @@ class Reader:
 
     def __init__(self) -> None:
         self.read_phrases: list[int] = []
+        self.earlier: list[int] = []
         self.hot_words: list[str] = []
         self.fails = False
         self.latency = LatencyHistogram()
         self.closed = 0
 
-    def read(self, samples: Any, hot_words: str) -> Reading:
+    def read(self, samples: Any, hot_words: str, earlier: Any) -> Reading:
         if self.fails:
             raise RunFailed("ours: out of memory")
         self.read_phrases.append(len(samples))
+        self.earlier.append(len(earlier))
         self.hot_words.append(hot_words)
         return Reading(
             text=f"{len(samples)} samples",
@@ -93,6 +96,19 @@ def readings(pool: Waiting, reader: Any, clock: ManualClock) -> Readings:
     readings = Readings(pool, clock)
     readings.take(reader, "")
     return readings
+
+
+def test_a_phrase_is_read_with_what_was_heard_before_it(
+    readings: Readings, pool: Waiting, reader: Reader
+) -> None:
+    readings.finish(replace(phrase(1, 0.9), earlier=np.zeros(70, np.float32)), "red cup")
+    readings.glance(phrase(2, 1.9), "")
+    pool.work()
+    assert reader.earlier == [70]
+    assert len(list(readings.answers())) == 1
+    readings.glance(phrase(2, 1.9), "")
+    pool.work()
+    assert reader.earlier == [70, 0]
 
 
 def test_what_was_read_in_advance_is_not_read_again(

@@ -96,16 +96,41 @@ def test_a_spoiled_ear_is_told(tmp_path: Path, spoil: Any) -> None:
         open_stop_ear(model(tmp_path, FILE))
 
 
+def test_a_word_that_was_said_before_a_phrase_is_not_in_it(ear: StopEar) -> None:
+    assert ear.surety(frames(12, 13), from_s=0.48) == 1.0
+    assert ear.surety(frames(12, 13), from_s=0.56) == 0.0
+    assert ear.surety(frames(12, 13), from_s=9.0) == 0.0
+
+
+class Listening:
+    """Give frames of a word for so many sounds, then of none; note how long each sound is."""
+
+    def __init__(self, words: int) -> None:
+        self.heard: list[int] = []
+        self._words = words
+
+    def frames_of(self, sound: np.ndarray) -> np.ndarray:
+        self.heard.append(len(sound))
+        return frames(12, 13) if len(self.heard) <= self._words else frames()
+
+
+NOTHING, SECOND = np.zeros(0, np.float32), np.zeros(16_000, np.float32)
+
+
 def test_a_phrase_that_may_hold_a_word_is_heard_again_and_the_mean_tells(ear: StopEar) -> None:
-    heard: list[int] = []
+    listening = Listening(3)
+    assert ear.surety_of(SECOND, SECOND, [frames()], listening.frames_of) == 0.0
+    assert listening.heard == []
+    surety = ear.surety_of(SECOND, NOTHING, [frames(12, 13)], listening.frames_of)
+    assert surety == pytest.approx(4 / 7)
+    assert listening.heard[:2] == [15_840, 16_480]
+    assert [round(16_000 / count, 2) for count in listening.heard[2:]] == [0.89, 0.94, 1.06, 1.12]
 
-    def frames_of(sound: np.ndarray) -> np.ndarray:
-        heard.append(len(sound))
-        return frames(12, 13) if len(heard) <= 3 else frames()
 
-    sound = np.zeros(16_000, np.float32)
-    assert ear.surety_of(sound, [frames()], frames_of) == 0.0
-    assert heard == []
-    assert ear.surety_of(sound, [frames(12, 13)], frames_of) == pytest.approx(4 / 7)
-    assert heard[:2] == [15_840, 16_480]
-    assert [round(16_000 / count, 2) for count in heard[2:]] == [0.89, 0.94, 1.06, 1.12]
+def test_it_is_heard_after_what_was_before_too_and_the_least_counts(ear: StopEar) -> None:
+    earlier = SECOND[:800]
+    for words, least in ((13, 1.0), (8, 2 / 7), (3, 0.0)):
+        listening = Listening(words)
+        surety = ear.surety_of(SECOND, earlier, [frames(12, 13)], listening.frames_of)
+        assert surety == pytest.approx(least)
+        assert listening.heard[6:9] == [16_800, 16_640, 17_280]

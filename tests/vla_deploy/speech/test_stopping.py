@@ -71,6 +71,22 @@ def test_words_that_the_spotter_suspects_too_need_no_ear() -> None:
     assert not stops(reading, 0.65, 0.25)
 
 
+def test_but_while_somebody_speaks_they_do_where_they_may_be_half_of_another_word() -> None:
+    reading = heard("leaving up to the window and stop it", surety=0.0)
+    assert stops(reading, 0.65, 0.35)
+    assert not stops(reading, 0.65, 0.35, is_all=False)
+    assert stops(replace(reading, stop_surety=0.06), 0.65, 0.35, is_all=False)
+    assert stops(replace(reading, stop_surety=None), 0.65, 0.35, is_all=False)
+    assert stops(reading, 0.9, 0.35, is_all=False)
+
+
+def test_less_sure_words_that_the_spotter_suspects_need_an_ear_that_hears_some_of_it() -> None:
+    reading = heard("halt you", surety=0.12)
+    assert stops(reading, 0.55, 0.4)
+    assert not stops(replace(reading, stop_surety=0.08), 0.55, 0.4)
+    assert stops(replace(reading, stop_surety=None), 0.55, 0.4)
+
+
 def test_while_somebody_speaks_only_what_was_read_helps_a_strong_suspicion() -> None:
     reading = heard("start by", ("stop by", 0.5), surety=0.9)
     assert stops(reading, 0.2, 0.75)
