@@ -27,8 +27,8 @@ a glance may see "stop it" where "stopping" is said."""
 SUSPECTED_SURETY: Final = 0.1
 """Words that are only as sure as STOP_SUSPECTED_CONFIDENCE need an ear that is so sure."""
 WORDS_HEARD_SURETY: Final = 0.7
-"""An ear so sure makes up for words that are not, where the spotter suspects one as well: while
-somebody speaks, too, who has gone on after the word."""
+"""An ear so sure makes up for words that are hardly so, where the spotter suspects one as well:
+while somebody speaks, too, who has gone on after the word."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
@@ -103,7 +103,7 @@ def _enough_of_words(suspicion: float, is_doubtful: bool) -> float:
 def _is_heard_too(surety: float | None, confidence: float) -> bool:
     """Tell whether the ear, if any, is sure enough of a word that was read and spotted, too."""
     if surety is not None and surety >= WORDS_HEARD_SURETY:
-        return True
+        return confidence >= STOP_CONFIDENCE
     is_heard = surety is None or surety >= SUSPECTED_SURETY
     return is_heard and confidence >= STOP_SUSPECTED_CONFIDENCE
 

@@ -10,7 +10,7 @@ KEPT_NS: Final = 12 * NS_PER_S
 SETTLES_NS: Final = 6 * NS_PER_S // 10
 """A word that ends a phrase is settled so long after it at most."""
 
-ALONE_SHARE: Final[Mapping[str, float]] = {"low": 0.45}
+ALONE_SHARE: Final[Mapping[str, float]] = {"low": 0.6}
 """How far above its threshold a word must come to stop the robot by itself, as a share of what is
 left to certainty, by sensitivity: at "low" the recogniser judges what is less sure."""
 
