@@ -91,7 +91,6 @@ class Recogniser:
         self._clock = clock
         self._beam = beam
         self._stop_ear = open_stop_ear(model)
-        whisper.keeps_frames = self._stop_ear is not None
 
     def read(self, samples: Sound, hot_words: str = "", earlier: Sound = _NOTHING) -> Reading:
         """Return what is said in a phrase of at most 29 s.
@@ -149,15 +148,13 @@ class Recogniser:
         self.claim.release()
 
     def _stop_surety(self, samples: Sound, earlier: Sound) -> float | None:
-        ear, whisper = self._stop_ear, self._whisper
-        if ear is None:
+        if self._stop_ear is None:
             return None
-        return ear.surety_of(samples, earlier, whisper.frames, whisper.frames_of)
+        return self._stop_ear.surety_of(samples, earlier, self._whisper.frames_of)
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper
         whisper.hypotheses.clear()
-        whisper.frames.clear()
         if self.declared.context == Context.TRIMMED:
             whisper.content_frames = len(samples) // whisper.feature_extractor.hop_length
         seconds = len(samples) / RATE_HZ

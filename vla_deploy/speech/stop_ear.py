@@ -2,11 +2,12 @@
 
 A decoder writes the words that are likeliest as a whole, and in noise makes "hold it" of a "halt".
 This network listens for the stop words alone. It began as a copy of the recogniser's encoder, and
-hears the very frames that the recogniser does; `training/stop_ear` makes it for the recogniser that
-is shipped, another Whisper has none.
+hears frames of the same kind, of a phrase and a moment before it: where a phrase begins is only the
+guess of the voice network. `training/stop_ear` makes it for the recogniser that is shipped, another
+Whisper has none.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.inference.graph_session import GraphSession
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import Model
-from vla_deploy.speech.sound import RATE_HZ, Sound
+from vla_deploy.speech.sound import RATE_HZ, Sound, count_of
 
 FILE: Final = "stop_ear.onnx"
 FRAMES, SCORES = "frames", "scores"
@@ -26,6 +27,8 @@ HEARD_AGAIN_FROM: Final = 0.02
 """From that surety on a phrase is heard again: what is only chance seldom stays."""
 STATE_S: Final = 0.04
 """Each score is for so much sound."""
+LONGEST_S: Final = 27.0
+"""Spoken slower it still fits into the network's 32 s; what was said first is left out."""
 LATER_S: Final = (-0.01, 0.03)
 PACES: Final = (0.89, 0.94, 1.06, 1.12)
 """As what it is heard again: as if it had begun so much earlier or later, or was spoken so fast."""
@@ -67,38 +70,29 @@ class StopEar:
         runs = np.lib.stride_tricks.sliding_window_view(scores[:, 1:], SETTLING, axis=0)
         return float(runs.mean(axis=2).max())
 
-    def surety_of(
-        self, sound: Sound, earlier: Sound, frames: Sequence[Array], frames_of: FramesOf
-    ) -> float:
-        """Return how surely one is in a phrase, however it is heard: alone, and after what was.
+    def surety_of(self, sound: Sound, earlier: Sound, frames_of: FramesOf) -> float:
+        """Return the mean surety of a phrase as it is and as it might as well have been spoken.
 
-        What may hold one is heard as it might as well have been spoken, too, and the mean counts;
-        the least of both, as what is taken for a word by chance is seldom one in either.
-        `frames` are what the recogniser was given of the phrase, `frames_of` what it would be
-        given; `earlier` is what was heard before.
+        It is heard together with what was `earlier`, just before. `frames_of` returns what the
+        recogniser would be given of sound.
 
         Raises:
             RunFailed: the frames are not of as many mel bands as it was made for.
         """
-        first = max(map(self.surety, frames), default=0.0)
+        whole = np.concatenate((earlier, sound))[-count_of(LONGEST_S) :]
+        from_s = max(0, len(whole) - len(sound)) / RATE_HZ
+        first = self.surety(frames_of(whole), from_s)
         if first < HEARD_AGAIN_FROM:
             return first
-        alone = float(np.mean([first, *self._sureties(_varied(sound), frames_of)]))
-        if not len(earlier):
-            return alone
-        whole, from_s = np.concatenate((earlier, sound)), len(earlier) / RATE_HZ
-        ways = ((whole, from_s), *_varied(whole, from_s))
-        return min(alone, float(np.mean(self._sureties(ways, frames_of))))
-
-    def _sureties(self, ways: Iterable[tuple[Sound, float]], frames_of: FramesOf) -> list[float]:
-        return [self.surety(frames_of(sound), from_s) for sound, from_s in ways]
+        again = [self.surety(frames_of(one), at_s) for one, at_s in _varied(whole, from_s)]
+        return float(np.mean([first, *again]))
 
     def close(self) -> None:
         """Release the memory."""
         self._graph.close()
 
 
-def _varied(sound: Sound, from_s: float = 0.0) -> Iterator[tuple[Sound, float]]:
+def _varied(sound: Sound, from_s: float) -> Iterator[tuple[Sound, float]]:
     """Yield sound a moment earlier and later, slower and faster, and where its phrase begins."""
     for later_s in LATER_S:
         count = round(RATE_HZ * later_s)

@@ -33,21 +33,12 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
     """Keep what else the search found beside what it read, which the library drops.
 
     `hypotheses` are those of each window of sound: texts with the logarithm of their probability,
-    the best first; where `keeps_frames` says so, `frames` are what the encoder was given of each,
-    (mel, frame). Whoever reads empties both before.
+    the best first. Whoever reads empties them before.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.hypotheses: list[list[tuple[str, float]]] = []
-        self.keeps_frames = False
-        self.frames: list[NDArray[np.float32]] = []
-
-    def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
-        """Return what the encoder makes of features, (mel bands, frames)."""
-        if self.keeps_frames:
-            self.frames.append(features.reshape(features.shape[-2:]))
-        return super().encode(features)
 
     def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return what the encoder would be given of a phrase, (mel, frame)."""

@@ -118,19 +118,25 @@ NOTHING, SECOND = np.zeros(0, np.float32), np.zeros(16_000, np.float32)
 
 
 def test_a_phrase_that_may_hold_a_word_is_heard_again_and_the_mean_tells(ear: StopEar) -> None:
-    listening = Listening(3)
-    assert ear.surety_of(SECOND, SECOND, [frames()], listening.frames_of) == 0.0
-    assert listening.heard == []
-    surety = ear.surety_of(SECOND, NOTHING, [frames(12, 13)], listening.frames_of)
-    assert surety == pytest.approx(4 / 7)
-    assert listening.heard[:2] == [15_840, 16_480]
-    assert [round(16_000 / count, 2) for count in listening.heard[2:]] == [0.89, 0.94, 1.06, 1.12]
+    assert ear.surety_of(SECOND, NOTHING, Listening(0).frames_of) == 0.0
+    listening = Listening(4)
+    assert ear.surety_of(SECOND, NOTHING, listening.frames_of) == pytest.approx(4 / 7)
+    assert listening.heard[:3] == [16_000, 15_840, 16_480]
+    assert [round(16_000 / count, 2) for count in listening.heard[3:]] == [0.89, 0.94, 1.06, 1.12]
 
 
-def test_it_is_heard_after_what_was_before_too_and_the_least_counts(ear: StopEar) -> None:
-    earlier = SECOND[:800]
-    for words, least in ((13, 1.0), (8, 2 / 7), (3, 0.0)):
-        listening = Listening(words)
-        surety = ear.surety_of(SECOND, earlier, [frames(12, 13)], listening.frames_of)
-        assert surety == pytest.approx(least)
-        assert listening.heard[6:9] == [16_800, 16_640, 17_280]
+def test_it_is_heard_with_what_was_before_where_no_word_counts(ear: StopEar) -> None:
+    listening = Listening(7)
+    assert ear.surety_of(SECOND, SECOND[:800], listening.frames_of) == 1.0
+    assert listening.heard[:3] == [16_800, 16_640, 17_280]
+    assert ear.surety_of(SECOND, SECOND[:9_600], Listening(7).frames_of) == 0.0
+
+
+@pytest.mark.parametrize(("seconds", "heard_s"), [(26.8, 27.0), (29.0, 27.0)])
+def test_of_a_phrase_that_is_too_long_the_end_is_heard(
+    ear: StopEar, seconds: float, heard_s: float
+) -> None:
+    listening = Listening(0)
+    sound = np.zeros(round(16_000 * seconds), np.float32)
+    assert ear.surety_of(sound, SECOND[:9_600], listening.frames_of) == 0.0
+    assert listening.heard == [16_000 * heard_s]
