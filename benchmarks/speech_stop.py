@@ -25,12 +25,14 @@ from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.mixing import at_level, at_snr
 from training.voices.noises import KINDS, noise
 from training.voices.rooms import draw_room, in_room
+from vla_deploy.speech.sound import NOTHING
 
 SNRS_DB: Final[Mapping[str, float | None]] = {"clean": None, "20db": 20.0, "10db": 10.0, "5db": 5.0}
-_AFTER: Final = "_after_talk"
-AFTER_TALK: Final = "10db" + _AFTER
-CASES: Final = (*SNRS_DB, AFTER_TALK)
-_NOTHING: Final = np.zeros(0, np.float32)
+CASES: Final[Mapping[str, tuple[float | None, bool]]] = {
+    **{name: (snr_db, False) for name, snr_db in SNRS_DB.items()},
+    "10db_after_talk": (SNRS_DB["10db"], True),
+}
+"""How loud the noise is, and whether the voice has just said something else."""
 _TALK_SNRS: Final = ("clean", "clean", "20db", "10db")
 TOO_LATE_S: Final = 1.0
 _LEVEL_DB: Final = -26.0
@@ -75,10 +77,10 @@ def _stops(voices: Voices, ear: Ear, clips: int, random: np.random.Generator) ->
     for engine in voices.engines:
         for clip, (start_s, end_s) in phrases(voices, engine, clips, random):
             before = voices.before(clip, random)
-            for name in CASES:
-                first = before if name == AFTER_TALK else _NOTHING
+            for name, (snr_db, follows_talk) in CASES.items():
+                first = before if follows_talk else NOTHING
                 samples, later_s = np.concatenate((first, clip.samples)), len(first) / RATE_HZ
-                sound = _around(samples, SNRS_DB[name.removesuffix(_AFTER)], random)
+                sound = _around(samples, snr_db, random)
                 by = _delays_s(ear, sound, later_s + start_s, later_s + end_s)
                 for group in (engine, "all"):
                     missed[name][group].append(not by)

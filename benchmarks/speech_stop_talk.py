@@ -6,6 +6,7 @@ clips are by voices that it has not, where there are such.
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +17,7 @@ from training.stop_words.texts import is_clean
 from training.stop_words.timing import word_times
 from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.errors import EngineMissing, SynthesisFailed
+from vla_deploy.speech.sound import NOTHING
 
 _LAST: Final = (
     "{w}",
@@ -104,11 +106,11 @@ class Voices:
 
     def before(self, clip: Clip, random: np.random.Generator) -> Wave:
         """Let the voice of a clip say something else first; return the end of it and a pause."""
-        texts = list(_overheard())
+        texts = _overheard()
         text = texts[int(random.integers(len(texts)))]
         talk = _spoken(self._parts[clip.engine], text, clip.voice, random)
         if talk is None:
-            return np.zeros(0, np.float32)
+            return NOTHING
         kept = talk.samples[-round(RATE_HZ * _TALKED_S) :]
         return np.pad(kept, (0, round(RATE_HZ * random.uniform(*_PAUSE_S))))
 
@@ -164,10 +166,12 @@ def _all_voices(part: Part) -> tuple[str, ...]:
     return (*part.voices, *part.held_voices)
 
 
-def _overheard() -> Iterator[str]:
-    for name in _TALK:
-        lines = (_CORPORA / name).read_text(encoding="utf-8").splitlines()
-        yield from (line for line in lines if line and line[0] != "#" and is_clean(line))
+# A voice says one of them before each phrase.
+@cache
+def _overheard() -> tuple[str, ...]:
+    texts = (_CORPORA / name for name in _TALK)
+    lines = [line for text in texts for line in text.read_text(encoding="utf-8").splitlines()]
+    return tuple(line for line in lines if line and line[0] != "#" and is_clean(line))
 
 
 def _documented() -> Iterator[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vla_deploy.speech.sound import Sound, SoundBlock, duration_ns
+from vla_deploy.speech.sound import NOTHING, Sound, SoundBlock, duration_ns
 from vla_deploy.speech.voice_activity import FRAME
 
 
@@ -27,7 +27,7 @@ class Framing:
     """Hold what does not fill a frame yet."""
 
     def __init__(self) -> None:
-        self._rest: Sound = np.zeros(0, np.float32)
+        self._rest = NOTHING
         self._follows = False
 
     def feed(self, block: SoundBlock) -> Iterator[Frame]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from platforms import SpeechSettings
 from vla_deploy.speech.frames import Frame
-from vla_deploy.speech.sound import Sound
+from vla_deploy.speech.sound import NOTHING, Sound
 from vla_deploy.speech.voice_activity import FRAME_S
 
 ONSET: Final = 0.5
@@ -41,10 +41,6 @@ class Step(Enum):
     TOO_LONG = "the speaker goes on for longer than a command may take"
 
 
-def _nothing() -> Sound:
-    return np.zeros(0, np.float32)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Phrase:
     """Hold what somebody said; `number` counts phrases, `voiced_s` is without pauses at the ends.
@@ -61,7 +57,7 @@ class Phrase:
     clipped_ratio: float
     voice: float
     samples: Sound
-    earlier: Sound = field(default_factory=_nothing)
+    earlier: Sound = field(default_factory=lambda: NOTHING)
     own_words: str = ""
 
 
@@ -189,4 +185,4 @@ class Phrases:
 
 
 def _joined(frames: Iterable[Frame]) -> Sound:
-    return np.concatenate([_nothing(), *(frame.samples for frame in frames)])
+    return np.concatenate([NOTHING, *(frame.samples for frame in frames)])

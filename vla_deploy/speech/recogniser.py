@@ -19,10 +19,9 @@ from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.sound import RATE_HZ, Sound
+from vla_deploy.speech.sound import NOTHING, RATE_HZ, Sound
 from vla_deploy.speech.stop_ear import open_stop_ear
 
-_NOTHING: Final = np.zeros(0, np.float32)
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
 _MOST_TOKENS: Final = 200
@@ -92,7 +91,7 @@ class Recogniser:
         self._beam = beam
         self._stop_ear = open_stop_ear(model)
 
-    def read(self, samples: Sound, hot_words: str = "", earlier: Sound = _NOTHING) -> Reading:
+    def read(self, samples: Sound, hot_words: str = "", earlier: Sound = NOTHING) -> Reading:
         """Return what is said in a phrase of at most 29 s.
 
         `earlier` is what was heard just before: it helps the ear for stop words.

@@ -11,6 +11,7 @@ from drivers.clock import NS_PER_S
 RATE_HZ: Final = 16_000
 SILENCE_DB: Final = -100.0
 Sound = NDArray[np.float32]
+NOTHING: Final[Sound] = np.zeros(0, np.float32)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
