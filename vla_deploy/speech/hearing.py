@@ -1,6 +1,6 @@
 """Follow the stream from frame to phrase to reading, with the robot's own voice held off."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -15,7 +15,7 @@ from vla_deploy.speech.phrases import ABOVE_FLOOR_DB, OFFSET, Happening, Phrase,
 from vla_deploy.speech.readings import Answer, Readings
 from vla_deploy.speech.recogniser import Reading
 from vla_deploy.speech.sound import SoundBlock, level_db
-from vla_deploy.speech.stopping import stops
+from vla_deploy.speech.stop_watch import StopWatch
 from vla_deploy.speech.surroundings import Music, NoiseFloor
 from vla_deploy.speech.verdict import Case, Judgement, Verdict, judge
 from vla_deploy.speech.voice_activity import VoiceActivity
@@ -73,13 +73,18 @@ class Hearing:
         self.counts: Counter[str] = Counter()
         self._activity = voice_activity
         self._hot_words = hot_words
-        self._suspicion = suspicion
-        self._newest: tuple[Answer, bool] | None = None
+        self._watch = StopWatch(
+            readings,
+            self._confidence,
+            lambda phrase: suspicion(phrase.began_ns, phrase.ended_ns),
+            hot_words,
+        )
+        self._answered: deque[Answer] = deque()
+        self._told_stop: Answer | None = None
         self._framing = Framing()
         self._phrases = Phrases(settings)
         self._own_words = OwnWords()
         self._barge_ns: int | None = None
-        self._stopped_by = 0
         self._told: list[Heard] = []
 
     def enter(self, room: Room) -> None:
@@ -116,20 +121,15 @@ class Hearing:
     def heard(self) -> Iterator[Heard]:
         """Yield what has been understood, or not, since the last call."""
         self._heed_draft()
-        self._heed_stop(self.readings.glanced(), is_all=False)
-        self._heed_stop(self.readings.drafted(), is_all=True)
-        if self._newest is not None:
-            # The spotter may come to suspect a word only after it was read.
-            self._heed_stop(self._newest[0], is_all=self._newest[1])
+        yield from self._stop(self.readings.glanced(), is_all=False)
+        yield from self._stop(self.readings.drafted(), is_all=True)
         told, self._told = self._told, []
         yield from told
         for answer in self.readings.answers():
-            if self._newest is not None and self._newest[0].phrase.number <= answer.phrase.number:
-                self._newest = None
-            if answer.phrase.number != self._stopped_by:
-                yield self._judged(answer)
-            else:
-                yield self._after_stop(answer)
+            yield from self._stop(answer, is_all=True)
+            self._answered.append(answer)
+        while self._answered and not self._watch.doubts(self._answered[0].phrase):
+            yield from self._end(self._answered.popleft())
 
     def document(self) -> dict[str, Any]:
         """Return what hearing knows of the room, as `speech_status` tells it."""
@@ -150,7 +150,8 @@ class Hearing:
             self._activity.reset()
             self._phrases.reset()
             self.readings.forget_draft()
-            self._newest = None
+            self._watch.forget()
+        self._watch.note(frame)
         voice, level = self._activity.probability(frame.samples), level_db(frame.samples)
         self.gate.follow(playing)
         self._own_words.follow(frame, playing)
@@ -176,14 +177,17 @@ class Hearing:
         phrase = happening.phrase
         self.counts[happening.step.name.lower()] += 1
         if happening.step is Step.BEGAN:
-            self._newest = None
+            self._watch.forget()
             self._own_words.note_begun(is_person=not self.gate.is_shut)
         elif happening.step is Step.SPEAKING:
+            self._watch.expect(phrase)
             self.readings.glance(phrase, self._hot_words())
         elif happening.step is Step.PAUSED:
+            self._watch.expect(phrase)
             self.readings.draft(phrase, self._hot_words())
         elif happening.step is Step.ENDED:
             phrase = replace(phrase, own_words=self._own_words.within(phrase))
+            self._watch.expect(phrase)
             self.readings.finish(phrase, self._hot_words())
         else:
             self.readings.forget_draft()
@@ -196,22 +200,21 @@ class Hearing:
         if answer is not None and answer.reading and is_unfinished(answer.reading.text):
             self._phrases.wait_longer()
 
-    def _heed_stop(self, answer: Answer | None, *, is_all: bool) -> None:
-        """Stop at once by words read while the speaker goes on or pauses; once in a phrase."""
-        if answer is None or answer.reading is None or answer.phrase.number == self._stopped_by:
-            return
-        self._newest = answer, is_all
-        sure = self._confidence(answer.reading)
-        if not stops(answer.reading, sure, self._suspected(answer.phrase), is_all=is_all):
-            return
-        self._stopped_by = answer.phrase.number
-        judgement = Judgement(verdict=Verdict.STOP)
-        self._told.append(
-            Heard(phrase=answer.phrase, answer=answer, confidence=sure, judgement=judgement)
-        )
+    def _stop(self, answer: Answer | None, *, is_all: bool) -> Iterator[Heard]:
+        """Stop at once by what was read while the speaker goes on, pauses or has ended."""
+        self._watch.take(answer, is_all=is_all)
+        for stop, sure in self._watch.stops():
+            self._told_stop = stop
+            judgement = Judgement(verdict=Verdict.STOP)
+            yield Heard(phrase=stop.phrase, answer=stop, confidence=sure, judgement=judgement)
 
-    def _suspected(self, phrase: Phrase) -> float:
-        return self._suspicion(phrase.began_ns, phrase.ended_ns)
+    def _end(self, answer: Answer) -> Iterator[Heard]:
+        """Tell the whole of a phrase, unless it was told as a stop."""
+        self._watch.forget()
+        if not self._watch.has_stopped(answer.phrase):
+            yield self._judged(answer)
+        elif answer is not self._told_stop:
+            yield self._after_stop(answer)
 
     def _after_stop(self, answer: Answer) -> Heard:
         """Tell the whole of a phrase that has stopped the robot: it is no command."""
@@ -240,7 +243,6 @@ class Hearing:
             least_confidence=self.settings.least_confidence,
             languages=recogniser.declared.languages,
             music=self.music.plays,
-            suspicion=self._suspected(answer.phrase),
         )
         judgement = judge(case)
         if answer.trouble and judgement.verdict is not Verdict.STOP:

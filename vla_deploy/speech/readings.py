@@ -44,8 +44,8 @@ class Readings:
         """Take an executor of one thread over, or one that works at once."""
         self.why = "the recogniser is being loaded"
         self.recogniser: Recogniser | None = None
+        self.clock = clock
         self._executor = executor
-        self._clock = clock
         self._draft: _Asked | None = None
         self._drafting: Future[Reading] | None = None
         self._glance: _Asked | None = None
@@ -57,6 +57,12 @@ class Readings:
     def is_busy(self) -> bool:
         """Tell whether a phrase that has ended is being read."""
         return bool(self._ended)
+
+    @property
+    def is_fast(self) -> bool:
+        """Tell whether there is a recogniser that has time for more than what must be read."""
+        recogniser = self.recogniser
+        return recogniser is not None and recogniser.latency.percentile_ns(0.95) <= FAST_NS
 
     def take(self, recogniser: Recogniser | None, why: str) -> tuple[Recogniser | None, str]:
         """Put another recogniser to work for the next phrase; return the one before."""
@@ -86,9 +92,8 @@ class Readings:
         """Read what has been said so far, if the recogniser is fast and has nothing else to do."""
         recogniser = self.recogniser
         idle = self._drafting is None or self._drafting.done()
-        if recogniser is None or self._glance is not None or self._ended or not idle:
-            return
-        if recogniser.latency.percentile_ns(0.95) <= FAST_NS:
+        busy = self._glance is not None or bool(self._ended) or not idle
+        if recogniser is not None and self.is_fast and not busy:
             self._glance = self._ask(recogniser, phrase, hot_words)
 
     def glanced(self) -> Answer | None:
@@ -97,6 +102,12 @@ class Readings:
         if self._glance is not None and self._glance.future.done():
             self._glance = None
         return answer
+
+    def read_again(self, phrase: Phrase, hot_words: str) -> "Future[Reading] | None":
+        """Read a phrase once more with what was heard after it, whatever else is to be read."""
+        if self.recogniser is None:
+            return None
+        return self._ask(self.recogniser, phrase, hot_words).future
 
     def forget_draft(self) -> None:
         """Say that the speaker has gone on: what was read in advance is not all."""
@@ -139,7 +150,7 @@ class Readings:
         self.recogniser = None
 
     def _late(self, phrase: Phrase) -> str:
-        late_ns = self._clock.now_ns() - phrase.ended_ns
+        late_ns = self.clock.now_ns() - phrase.ended_ns
         return f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
 
     def _ask(self, recogniser: Recogniser, phrase: Phrase, hot_words: str) -> _Asked:

@@ -1,7 +1,9 @@
 """Decide whether what was read in a phrase, or in one so far, stops the robot.
 
 A stop too many does no harm: words that would be asked again as a command are enough for it, and
-where they are not, other witnesses may be.
+where they are not, other witnesses may be. But where it is not sure by its words, it has to be
+likely twice: of a sentence that is cut off the end often sounds like one, and no more so when a
+moment more of it is heard.
 """
 
 from dataclasses import dataclass
@@ -10,13 +12,10 @@ from typing import Final
 from vla_deploy.speech.recogniser import Reading
 from vla_deploy.speech.words import holds_form_of_stop, holds_stop, is_stop
 
-STOP_CONFIDENCE: Final = 0.25
-"""A stop is taken where another command would be asked again: a stop too many does no harm."""
-CALL_SURETY: Final = 0.2
-"""A call to stop of so unsure words needs an ear, if there is one, that is so sure: "oh" is read as
-"halt"."""
+CALL_CONFIDENCE: Final = 0.15
+"""A mere call to stop is taken where another command would be asked again."""
 STOP_WITHIN_CONFIDENCE: Final = 0.85
-STOP_SUSPECTED_CONFIDENCE: Final = 0.5
+STOP_SUSPECTED_CONFIDENCE: Final = 0.4
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
 STOP_HEARD_TWICE_CONFIDENCE: Final = 0.6
@@ -26,17 +25,18 @@ by STOP_HEARD_TWICE_CONFIDENCE they are where the spotter suspects one as well a
 a glance may see "stop it" where "stopping" is said."""
 SUSPECTED_SURETY: Final = 0.1
 """Words that are only as sure as STOP_SUSPECTED_CONFIDENCE need an ear that is so sure."""
-WORDS_HEARD_SURETY: Final = 0.7
-"""An ear so sure makes up for words that are hardly so, where the spotter suspects one as well:
-while somebody speaks, too, who has gone on after the word."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
-SUSPICION: Final = 0.4
-STRONG_SUSPICION: Final = 0.7
+STRONG_SUSPICION: Final = 0.6
 """From these shares of its threshold on, what the spotter heard counts beside words that were read
-within others, beside a stop that may have been read instead, and beside any word that may be one.
-"""
+within others or a stop that may have been read instead, and beside any word that may be one."""
+TWICE_SURETY: Final = 0.9
+TWICE_SHARE: Final = 0.3
+"""An ear that is so sure both times needs no spotter, where so much of what may have been said both
+times holds a stop: also while somebody speaks, who has gone on after the word."""
+GLANCED_SURETY: Final = 0.5
+"""While somebody goes on, the ear, if any, has to be so sure the second time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,71 +54,104 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.2, suspicion=0.7),
-    _Enough(surety=0.5, share=0.3),
-    _Enough(surety=0.6, suspicion=0.3, most_confidence=0.5),
-    _Enough(surety=0.95, most_confidence=0.6),
+    _Enough(surety=0.2, suspicion=0.8),
+    _Enough(surety=0.4, share=0.3),
+    _Enough(surety=0.6, suspicion=0.2, most_confidence=0.5),
+    _Enough(surety=0.9, most_confidence=0.6),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
 """
 
 
-def stops(
-    reading: Reading, confidence: float, suspicion: float = 0.0, *, is_all: bool = True
-) -> bool:
-    """Tell whether words read by that confidence stop the robot; `is_all` unless more may follow.
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Hold what was read and by which confidence; `is_all` unless more may follow."""
 
-    As on the stream, the word itself does, whatever is meant by it. The less sure the words are,
-    the more the spotter must suspect one; then what may have been said instead counts, too.
+    reading: Reading
+    confidence: float
+    is_all: bool = True
+
+
+def is_sure(look: Look, suspicion: float) -> bool:
+    """Tell whether the words that were read stop the robot at once.
+
+    As on the stream, the word itself does, whatever is meant by it. `suspicion` is how near the
+    spotter came to hearing one.
     """
-    likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
-    is_read = holds_stop(reading.text, is_all=is_all)
-    surety = reading.stop_surety
-    is_unheard = surety is not None and surety < LEAST_SURETY
-    if is_read and confidence >= _enough_of_words(suspicion, is_unheard and not is_all):
-        return True
-    if is_unheard:
+    is_doubtful = _is_unheard(look) and not look.is_all
+    is_heard_twice = suspicion >= SLIGHT_SUSPICION and not is_doubtful
+    enough = STOP_HEARD_TWICE_CONFIDENCE if is_heard_twice else STOP_WITHIN_CONFIDENCE
+    return holds_stop(look.reading.text, is_all=look.is_all) and look.confidence >= enough
+
+
+def is_likely(look: Look, suspicion: float) -> bool:
+    """Tell whether words and other witnesses speak for a stop, which a second look may confirm.
+
+    The less sure the words are, the more the spotter must suspect one; then what may have been
+    said instead counts, too.
+    """
+    if _is_unheard(look):
         return False
+    reading, is_all = look.reading, look.is_all
+    surety = reading.stop_surety
+    likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
     # The ear knows better than the guesses of a glance, as soon as the word has ended.
     possible = (reading.text, *(likely if is_all or surety is None else ()))
     if suspicion >= STRONG_SUSPICION and any(map(holds_stop, possible)):
         return True
-    if is_all and suspicion >= SUSPICION and any(map(is_stop, likely)):
+    if is_all and suspicion >= SLIGHT_SUSPICION and any(map(is_stop, likely)):
         return True
-    is_call = is_all and is_stop(reading.text) and (surety is None or surety >= CALL_SURETY)
-    if is_call and confidence >= STOP_CONFIDENCE:
+    if is_all and is_stop(reading.text) and look.confidence >= CALL_CONFIDENCE:
         return True
-    if is_read and suspicion >= SLIGHT_SUSPICION and _is_heard_too(surety, confidence):
-        return True
-    return is_all and _is_witnessed(reading, confidence, suspicion)
-
-
-def _enough_of_words(suspicion: float, is_doubtful: bool) -> float:
-    """Return by which confidence words stop the robot; `is_doubtful` if the ear hears none yet."""
-    is_heard_twice = suspicion >= SLIGHT_SUSPICION and not is_doubtful
-    return STOP_HEARD_TWICE_CONFIDENCE if is_heard_twice else STOP_WITHIN_CONFIDENCE
-
-
-def _is_heard_too(surety: float | None, confidence: float) -> bool:
-    """Tell whether the ear, if any, is sure enough of a word that was read and spotted, too."""
-    if surety is not None and surety >= WORDS_HEARD_SURETY:
-        return confidence >= STOP_CONFIDENCE
+    is_read = holds_stop(reading.text, is_all=is_all) and suspicion >= SLIGHT_SUSPICION
     is_heard = surety is None or surety >= SUSPECTED_SURETY
-    return is_heard and confidence >= STOP_SUSPECTED_CONFIDENCE
+    if is_read and is_heard and look.confidence >= STOP_SUSPECTED_CONFIDENCE:
+        return True
+    return is_all and _is_witnessed(look, suspicion)
 
 
-def _is_witnessed(reading: Reading, confidence: float, suspicion: float) -> bool:
-    """Tell whether other witnesses than the words that were read say enough of a stop."""
-    surety = reading.stop_surety
-    if surety is None or holds_form_of_stop(reading.text):
+def wants_second(look: Look, suspicion: float) -> bool:
+    """Tell whether a second look may tell a stop."""
+    return is_likely(look, suspicion) or (look.reading.stop_surety or 0.0) >= TWICE_SURETY
+
+
+def is_confirmed(first: Look, second: Look, suspicion: float) -> bool:
+    """Tell whether the same phrase, read again with a moment more of sound, stops the robot."""
+    if _is_heard_twice(first.reading, second.reading):
+        return True
+    surety = second.reading.stop_surety
+    if not first.is_all and surety is not None and surety < GLANCED_SURETY:
         return False
-    share = _stop_share(reading)
+    is_still = is_sure(second, suspicion) or is_likely(second, suspicion)
+    return is_still and is_likely(first, suspicion)
+
+
+def _is_unheard(look: Look) -> bool:
+    surety = look.reading.stop_surety
+    return surety is not None and surety < LEAST_SURETY
+
+
+def _is_heard_twice(first: Reading, second: Reading) -> bool:
+    """Tell whether the ear is sure of a stop both times, and the words do not speak against it."""
+    readings = first, second
+    if any(holds_form_of_stop(one.text) for one in readings):
+        return False
+    is_heard = all((one.stop_surety or 0.0) >= TWICE_SURETY for one in readings)
+    return is_heard and sum(map(_stop_share, readings)) / len(readings) >= TWICE_SHARE
+
+
+def _is_witnessed(look: Look, suspicion: float) -> bool:
+    """Tell whether other witnesses than the words that were read say enough of a stop."""
+    surety = look.reading.stop_surety
+    if surety is None or holds_form_of_stop(look.reading.text):
+        return False
+    share = _stop_share(look.reading)
     return any(
         surety >= row.surety
         and share >= row.share
         and suspicion >= row.suspicion
-        and confidence <= row.most_confidence
+        and look.confidence <= row.most_confidence
         for row in STOP_WITNESSES
     )
 

@@ -1,4 +1,4 @@
-"""Decide what becomes of a phrase: a command for the planner, a stop, or nothing, with the reason.
+"""Decide what becomes of a phrase: a command for the planner, or nothing, with the reason.
 
 The first row of `_REFUSALS` that says something decides; it is told in `heard`. What is only not
 sure enough is doubted: the planner asks whether it is meant if it makes sense there.
@@ -12,7 +12,6 @@ from typing import Final
 
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.recogniser import Reading
-from vla_deploy.speech.stopping import stops
 from vla_deploy.speech.words import is_courtesy, words_of
 
 FASTEST_WORDS_S: Final = 7.0
@@ -38,7 +37,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Hold all that a phrase is judged by; `suspicion` is how near a spotted stop word came."""
+    """Hold all that a phrase is judged by."""
 
     reading: Reading
     phrase: Phrase
@@ -46,7 +45,6 @@ class Case:
     least_confidence: float
     languages: tuple[str, ...]
     music: bool = False
-    suspicion: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,9 +67,7 @@ class _Refusal:
 
 
 def judge(case: Case) -> Judgement:
-    """Return what becomes of a phrase."""
-    if stops(case.reading, case.confidence, case.suspicion):
-        return Judgement(verdict=Verdict.STOP)
+    """Return what becomes of a phrase that is no stop."""
     for row in _REFUSALS:
         reason = row.why(case)
         if reason:

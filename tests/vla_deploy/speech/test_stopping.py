@@ -1,4 +1,4 @@
-"""Words that are not enough for a stop are, where other witnesses say enough."""
+"""Sure words stop at once; what other witnesses make likely stops if it is so twice."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,7 +6,14 @@ from typing import Any
 import pytest
 
 from vla_deploy.speech.recogniser import Alternative, Reading
-from vla_deploy.speech.stopping import stops
+from vla_deploy.speech.stopping import (
+    TWICE_SURETY,
+    Look,
+    is_confirmed,
+    is_likely,
+    is_sure,
+    wants_second,
+)
 
 READING = Reading(
     text="",
@@ -19,40 +26,48 @@ READING = Reading(
 )
 
 
-def heard(text: str, *others: tuple[str, float], surety: float | None, **told: Any) -> Reading:
+def look(
+    text: str,
+    *others: tuple[str, float],
+    surety: float | None = None,
+    confidence: float = 0.3,
+    is_all: bool = True,
+) -> Look:
     alternatives = tuple(Alternative(one, odds) for one, odds in others)
-    return replace(READING, text=text, others=alternatives, stop_surety=surety, **told)
+    reading = replace(READING, text=text, others=alternatives, stop_surety=surety)
+    return Look(reading, confidence, is_all)
 
 
 @pytest.mark.parametrize(
-    ("reading", "suspicion", "is_stop"),
+    ("first", "suspicion", "likely"),
     [
-        (heard("you should hold", surety=0.97), 0.0, True),
-        (heard("up", surety=0.25), 0.8, True),
-        (heard("up", surety=0.25), 0.6, False),
-        (heard("you should hold", surety=0.7), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.6), surety=0.55), 0.0, True),
-        (heard("you should hold", ("you should halt", 0.6), surety=0.4), 0.0, False),
-        (heard("you should hold", ("you should halt", 0.2), surety=0.55), 0.0, False),
-        (heard("please, please", surety=0.65), 0.35, True),
-        (heard("please, please", surety=0.65), 0.25, False),
-        (heard("please, please", surety=0.55), 0.35, False),
-        (heard("please, please", surety=None), 0.6, False),
-        (heard("he stopped at the shop", ("he stop at the shop", 0.9), surety=0.99), 0.6, False),
+        (look("you should hold", surety=0.92), 0.0, True),
+        (look("up", surety=0.25), 0.85, True),
+        (look("up", surety=0.25), 0.75, False),
+        (look("you should hold", surety=0.7), 0.0, False),
+        (look("you should hold", ("you should halt", 0.6), surety=0.45), 0.0, True),
+        (look("you should hold", ("you should halt", 0.6), surety=0.35), 0.0, False),
+        (look("you should hold", ("you should halt", 0.2), surety=0.55), 0.0, False),
+        (look("please, please", surety=0.65), 0.25, True),
+        (look("please, please", surety=0.65), 0.15, False),
+        (look("please, please", surety=0.55), 0.25, False),
+        (look("please, please", surety=None), 0.9, False),
+        (look("he stopped at the shop", ("he stop at the shop", 0.9), surety=0.99), 0.5, False),
     ],
 )
-def test_three_witnesses_stop_together_what_no_words_would(
-    reading: Reading, suspicion: float, is_stop: bool
+def test_three_witnesses_make_likely_together_what_no_words_would(
+    first: Look, suspicion: float, likely: bool
 ) -> None:
-    assert stops(reading, 0.3, suspicion) is is_stop
+    assert is_likely(first, suspicion) is likely
+    assert not is_sure(first, suspicion)
 
 
 def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
-    reading, surer = heard("which cup", surety=0.7), heard("which cup", surety=0.97)
-    assert stops(reading, 0.5, 0.5)
-    assert not stops(reading, 0.55, 0.5)
-    assert stops(surer, 0.55, 0.5)
-    assert not stops(surer, 0.65, 0.5)
+    reading, surer = look("which cup", surety=0.7), look("which cup", surety=0.92)
+    assert is_likely(replace(reading, confidence=0.5), 0.5)
+    assert not is_likely(replace(reading, confidence=0.55), 0.5)
+    assert is_likely(replace(surer, confidence=0.55), 0.5)
+    assert not is_likely(replace(surer, confidence=0.65), 0.5)
 
 
 @pytest.mark.parametrize(("suspicion", "confidence"), [(0.0, 0.7), (0.9, 0.55)])
@@ -60,55 +75,79 @@ def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
 def test_unsure_words_are_no_stop_where_the_ear_hears_none(
     text: str, suspicion: float, confidence: float
 ) -> None:
-    assert not stops(heard(text, surety=0.02), confidence, suspicion)
-    assert stops(heard(text, surety=0.02), 0.9, suspicion)
-    assert stops(heard("halt", surety=None), 0.6, suspicion)
+    unheard = look(text, surety=0.02, confidence=confidence)
+    assert not is_sure(unheard, suspicion)
+    assert not is_likely(unheard, suspicion)
+    assert is_sure(replace(unheard, confidence=0.9), suspicion)
+    assert is_likely(look("halt", confidence=0.6), suspicion)
 
 
 def test_words_that_the_spotter_suspects_too_need_no_ear() -> None:
-    reading = heard("stop before you hit the chair", surety=0.0)
-    assert stops(reading, 0.65, 0.35)
-    assert not stops(reading, 0.65, 0.25)
+    unheard = look("stop before you hit the chair", surety=0.0, confidence=0.65)
+    assert is_sure(unheard, 0.35)
+    assert not is_sure(unheard, 0.25)
 
 
 def test_but_while_somebody_speaks_they_do_where_they_may_be_half_of_another_word() -> None:
-    reading = heard("leaving up to the window and stop it", surety=0.0)
-    assert stops(reading, 0.65, 0.35)
-    assert not stops(reading, 0.65, 0.35, is_all=False)
-    assert stops(replace(reading, stop_surety=0.06), 0.65, 0.35, is_all=False)
-    assert stops(replace(reading, stop_surety=None), 0.65, 0.35, is_all=False)
-    assert stops(reading, 0.9, 0.35, is_all=False)
+    glance = look("up to the window and stop it", surety=0.0, confidence=0.65, is_all=False)
+    assert is_sure(replace(glance, is_all=True), 0.35)
+    assert not is_sure(glance, 0.35)
+    for surety in (0.06, None):
+        assert is_sure(replace(glance, reading=replace(glance.reading, stop_surety=surety)), 0.35)
+    assert is_sure(replace(glance, confidence=0.9), 0.35)
 
 
 def test_less_sure_words_that_the_spotter_suspects_need_an_ear_that_hears_some_of_it() -> None:
-    reading = heard("halt you", surety=0.12)
-    assert stops(reading, 0.55, 0.4)
-    assert not stops(replace(reading, stop_surety=0.08), 0.55, 0.4)
-    assert stops(replace(reading, stop_surety=None), 0.55, 0.4)
+    assert is_likely(look("halt you", surety=0.12, confidence=0.45), 0.4)
+    assert not is_likely(look("halt you", surety=0.08, confidence=0.45), 0.4)
+    assert is_likely(look("halt you", surety=None, confidence=0.45), 0.4)
 
 
 def test_while_somebody_speaks_only_what_was_read_helps_a_strong_suspicion() -> None:
-    reading = heard("start by", ("stop by", 0.5), surety=0.9)
-    assert stops(reading, 0.2, 0.75)
-    assert not stops(reading, 0.2, 0.75, is_all=False)
+    start = look("start by", ("stop by", 0.5), surety=0.8, confidence=0.2)
+    assert is_likely(start, 0.75)
+    assert not is_likely(replace(start, is_all=False), 0.75)
 
 
 def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
-    assert not stops(heard("he", surety=0.99), 0.3, is_all=False)
-    assert stops(heard("stop the arm", surety=0.0), 0.9, is_all=False)
+    assert not is_likely(look("he", surety=0.99, is_all=False), 0.0)
+    assert is_sure(look("stop the arm", surety=0.0, confidence=0.9, is_all=False), 0.0)
+    assert not is_sure(look("the arm stop", surety=0.0, confidence=0.9, is_all=False), 0.0)
 
 
-def test_an_ear_that_is_sure_makes_up_for_words_that_are_not() -> None:
-    going_on = heard("stop before you hit", surety=0.75)
-    assert stops(going_on, 0.3, 0.35, is_all=False)
-    assert not stops(going_on, 0.2, 0.35, is_all=False)
-    assert not stops(going_on, 0.3, 0.25, is_all=False)
-    assert not stops(replace(going_on, stop_surety=0.65), 0.3, 0.35, is_all=False)
-    assert not stops(heard("you should stop", surety=0.75), 0.3, 0.35, is_all=False)
+def test_what_is_likely_twice_is_confirmed() -> None:
+    first = look("halt", surety=0.3)
+    assert is_confirmed(first, look("halt you", surety=0.2, confidence=0.45), 0.4)
+    assert is_confirmed(first, look("halt", surety=0.0, confidence=0.9), 0.4)
+    assert not is_confirmed(first, look("hold your", surety=0.04), 0.4)
+    assert not is_confirmed(look("hold", surety=0.2), look("halt", surety=0.3), 0.0)
 
 
-def test_an_unsure_call_to_stop_needs_an_ear_that_hears_some_of_it() -> None:
-    assert stops(heard("halt", surety=0.25), 0.4, 0.0)
-    assert stops(heard("halt", surety=None), 0.4, 0.0)
-    assert not stops(heard("halt", surety=0.15), 0.4, 0.0)
-    assert stops(heard("halt", surety=0.15), 0.9, 0.0)
+@pytest.mark.parametrize(("surety", "stops"), [(0.6, True), (0.4, False), (None, True)])
+def test_while_somebody_goes_on_the_ear_has_to_be_surer_the_second_time(
+    surety: float | None, stops: bool
+) -> None:
+    first = look("we halt the", surety=0.8, confidence=0.45, is_all=False)
+    second = look("we halt the way", surety=surety, confidence=0.45, is_all=False)
+    assert is_confirmed(first, second, 0.4) is stops
+
+
+SURE: Any = {"surety": TWICE_SURETY + 0.01, "is_all": False}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "stops"),
+    [
+        (look("halt", **SURE), look("halt before you", **SURE), True),
+        (look("store that", **SURE), look("stop at once", **SURE), True),
+        (look("store", **SURE), look("store", ("stop", 0.3), **SURE), False),
+        (look("halt", **SURE), look("halt before you", surety=0.8, is_all=False), False),
+        (look("halt", **SURE), look("halting", ("halt", 0.9), **SURE), False),
+        (look("although", **SURE), look("although my", **SURE), False),
+    ],
+)
+def test_an_ear_that_is_sure_twice_needs_no_spotter_where_the_words_may_say_it_too(
+    first: Look, second: Look, stops: bool
+) -> None:
+    assert wants_second(first, 0.0)
+    assert is_confirmed(first, second, 0.0) is stops
