@@ -18,7 +18,7 @@ STOP_WITHIN_CONFIDENCE: Final = 0.85
 STOP_SUSPECTED_CONFIDENCE: Final = 0.4
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
-STOP_HEARD_TWICE_CONFIDENCE: Final = 0.6
+STOP_HEARD_TWICE_CONFIDENCE: Final = 0.7
 LEAST_SURETY: Final = 0.05
 """Less sure words than STOP_WITHIN_CONFIDENCE are no stop where the ear, if any, hears none; but
 by STOP_HEARD_TWICE_CONFIDENCE they are where the spotter suspects one as well and nothing follows:
@@ -33,8 +33,10 @@ STRONG_SUSPICION: Final = 0.6
 within others or a stop that may have been read instead, and beside any word that may be one."""
 TWICE_SURETY: Final = 0.9
 TWICE_SHARE: Final = 0.3
-"""An ear that is so sure both times needs no spotter, where so much of what may have been said both
-times holds a stop: also while somebody speaks, who has gone on after the word."""
+TWICE_SUSPICION: Final = 0.8
+"""An ear that is so sure both times needs no more than that so much of what may have been said both
+times holds a stop, or so strong a suspicion: also while somebody speaks, who has gone on after the
+word."""
 GLANCED_SURETY: Final = 0.5
 """While somebody goes on, the ear, if any, has to be so sure the second time."""
 
@@ -55,8 +57,8 @@ class _Enough:
 
 STOP_WITNESSES: Final = (
     _Enough(surety=0.2, suspicion=0.8),
-    _Enough(surety=0.4, share=0.3),
-    _Enough(surety=0.6, suspicion=0.2, most_confidence=0.5),
+    _Enough(surety=0.6, share=0.3),
+    _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
     _Enough(surety=0.9, most_confidence=0.6),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
@@ -118,7 +120,7 @@ def wants_second(look: Look, suspicion: float) -> bool:
 
 def is_confirmed(first: Look, second: Look, suspicion: float) -> bool:
     """Tell whether the same phrase, read again with a moment more of sound, stops the robot."""
-    if _is_heard_twice(first.reading, second.reading):
+    if _is_heard_twice(first.reading, second.reading, suspicion):
         return True
     surety = second.reading.stop_surety
     if not first.is_all and surety is not None and surety < GLANCED_SURETY:
@@ -132,13 +134,15 @@ def _is_unheard(look: Look) -> bool:
     return surety is not None and surety < LEAST_SURETY
 
 
-def _is_heard_twice(first: Reading, second: Reading) -> bool:
-    """Tell whether the ear is sure of a stop both times, and the words do not speak against it."""
+def _is_heard_twice(first: Reading, second: Reading, suspicion: float) -> bool:
+    """Tell whether the ear is sure of a stop both times, and words or spotter speak for one."""
     readings = first, second
     if any(holds_form_of_stop(one.text) for one in readings):
         return False
-    is_heard = all((one.stop_surety or 0.0) >= TWICE_SURETY for one in readings)
-    return is_heard and sum(map(_stop_share, readings)) / len(readings) >= TWICE_SHARE
+    if any((one.stop_surety or 0.0) < TWICE_SURETY for one in readings):
+        return False
+    share = sum(map(_stop_share, readings)) / len(readings)
+    return share >= TWICE_SHARE or suspicion >= TWICE_SUSPICION
 
 
 def _is_witnessed(look: Look, suspicion: float) -> bool:
