@@ -245,6 +245,6 @@ class Hearing:
             music=self.music.plays,
         )
         judgement = judge(case)
-        if answer.trouble and judgement.verdict is not Verdict.STOP:
+        if answer.trouble:
             judgement = Judgement(verdict=Verdict.REJECTED, reason=answer.trouble, ask_again=True)
         return Heard(phrase=answer.phrase, answer=answer, confidence=sure, judgement=judgement)

@@ -59,7 +59,7 @@ class Aftermath:
 
 @dataclass(slots=True)
 class _Watched:
-    """Hold what was read first, since when it may be a stop, and what was read in a second look."""
+    """Hold what was read first, since when it may be a stop, and the second look at it."""
 
     answer: Answer
     first: Look
@@ -93,7 +93,7 @@ class StopWatch:
         self._hot_words = hot_words
         self._aftermath = Aftermath()
         self._watched: list[_Watched] = []
-        self._stopped_by = 0
+        self._stopped: deque[int] = deque(maxlen=_KEPT)
 
     def note(self, frame: Frame) -> None:
         """Take the next frame of the stream."""
@@ -109,7 +109,7 @@ class StopWatch:
 
     def has_stopped(self, phrase: Phrase) -> bool:
         """Tell whether a stop was heard in a phrase."""
-        return phrase.number == self._stopped_by
+        return phrase.number in self._stopped
 
     def doubts(self, phrase: Phrase) -> bool:
         """Tell whether there may be a stop in a phrase, which is not decided yet."""
@@ -128,10 +128,10 @@ class StopWatch:
     def stops(self) -> Iterator[tuple[Answer, float]]:
         """Yield what stops the robot by now, and by which confidence: once in a phrase."""
         for one in tuple(self._watched):
-            if one.number != self._stopped_by and self._is_stop(one):
-                self._stopped_by = one.number
+            if one.number not in self._stopped and self._is_stop(one):
+                self._stopped.append(one.number)
                 yield one.answer, one.first.confidence
-        self._watched = [one for one in self._watched if one.number != self._stopped_by]
+        self._watched = [one for one in self._watched if one.number not in self._stopped]
 
     def _is_stop(self, one: _Watched) -> bool:
         # The spotter may come to suspect a word only after it was read.

@@ -98,6 +98,14 @@ def test_a_stop_is_told_while_the_speaker_goes_on() -> None:
     assert told[1][1].text == "stop before you hit the chair now"
 
 
+def test_an_unsure_stop_is_told_after_a_second_look_before_its_phrase_is() -> None:
+    ((at_s, stop), (ended_s, after)) = heard("halt", 0.3, log_probability=-0.9)
+    assert (stop.judgement.verdict, stop.text) == (Verdict.STOP, "halt")
+    assert 0.3 + 0.25 < at_s < 0.3 + 0.4
+    assert at_s <= ended_s
+    assert after.judgement.reason == STOPPED
+
+
 @pytest.mark.parametrize("words", ["stopped at the shop today with him", "take the cup to me now"])
 def test_other_talk_is_told_once_at_its_end(words: str) -> None:
     ((at_s, one),) = heard(words, 2.4)

@@ -158,6 +158,17 @@ def test_what_is_said_meanwhile_takes_no_doubt_away(rig: Rig) -> None:
     assert rig.watch.has_stopped(one)
 
 
+def test_a_stop_in_the_next_phrase_ends_neither(rig: Rig) -> None:
+    doubted = rig.read("halt")
+    rig.stops()
+    sure = rig.read("stop the arm", number=2, confidence=SURE)
+    assert rig.stops() == ["stop the arm"]
+    rig.frames()
+    assert rig.stops() == ["halt"]
+    assert rig.watch.has_stopped(doubted)
+    assert rig.watch.has_stopped(sure)
+
+
 def test_what_is_no_doubt_is_forgotten(rig: Rig) -> None:
     rig.read("halt the arm", confidence=0.5)
     rig.stops()
