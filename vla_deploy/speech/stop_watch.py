@@ -1,13 +1,15 @@
 """Watch for a stop in what is read while somebody speaks, pauses or has ended.
 
 Sure words stop at once. What is only likely is read once more with the sound of the next moment,
-and stops if it still is; where nothing can be read again in time, it stops as well.
+and stops if it still is; where nothing can be read again in time, it stops as well. What hints at a
+stop in a pause may become likely at the second look, and is confirmed by a third.
 """
 
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -18,7 +20,7 @@ from vla_deploy.speech.frames import Frame
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.readings import Answer, Readings
 from vla_deploy.speech.recogniser import Reading
-from vla_deploy.speech.stopping import Look, is_confirmed, is_likely, is_sure, wants_second
+from vla_deploy.speech.stopping import Look, hints, is_confirmed, is_likely, is_sure, wants_another
 from vla_deploy.speech.voice_activity import FRAME_S
 
 LATER_FRAMES: Final = round(0.16 / FRAME_S)
@@ -26,8 +28,10 @@ LATER_FRAMES: Final = round(0.16 / FRAME_S)
 then, and the button is still hit in half a second."""
 PATIENCE_NS: Final = round(0.4 * NS_PER_S)
 """A likely stop that cannot be read again for so long is one."""
+MOST_LOOKS: Final = {False: 2, True: 3}
+"""By whether it may be all that is said: in a glance the next one sees more."""
 _KEPT: Final = 3
-"""A glance, what is read in advance and the whole phrase may wait for a second look at once."""
+"""A glance, what is read in advance and the whole phrase may wait for another look at once."""
 
 
 class Aftermath:
@@ -45,36 +49,37 @@ class Aftermath:
         if not frame.follows:
             self._after.clear()
         for _, frames in self._after:
-            if len(frames) < LATER_FRAMES:
+            if len(frames) < LATER_FRAMES * max(MOST_LOOKS.values()):
                 frames.append(frame)
 
-    def longer(self, phrase: Phrase) -> Phrase | None:
-        """Return a phrase with what was heard after it, as soon as that is enough."""
+    def longer(self, phrase: Phrase, times: int) -> Phrase | None:
+        """Return a phrase with so many times LATER_FRAMES after it, as soon as these are there."""
+        count = times * LATER_FRAMES
         for one, frames in self._after:
-            if one is phrase and len(frames) == LATER_FRAMES:
-                sound = np.concatenate([phrase.samples, *(frame.samples for frame in frames)])
-                return replace(phrase, samples=sound)
+            if one is phrase and len(frames) >= count:
+                sound = [phrase.samples, *(frame.samples for frame in frames[:count])]
+                return replace(phrase, samples=np.concatenate(sound))
         return None
 
 
 @dataclass(slots=True)
 class _Watched:
-    """Hold what was read first, since when it may be a stop, and the second look at it."""
+    """Hold what was read and read again, and since when another look is wanted."""
 
     answer: Answer
-    first: Look
+    looks: list[Look]
     since_ns: int | None = None
     again: "Future[Reading] | None" = None
-    is_settled: bool = False
+    is_given_up: bool = False
 
     @property
     def number(self) -> int:
         return self.answer.phrase.number
 
     @property
-    def is_doubt(self) -> bool:
-        """Tell whether a second look at it is to come."""
-        return self.since_ns is not None and not self.is_settled
+    def is_pending(self) -> bool:
+        """Tell whether another look is to come."""
+        return self.since_ns is not None
 
 
 class StopWatch:
@@ -105,7 +110,7 @@ class StopWatch:
 
     def forget(self) -> None:
         """Say that what was read last is over; what may be a stop is still looked at again."""
-        self._watched = [one for one in self._watched if one.is_doubt]
+        self._watched = [one for one in self._watched if one.is_pending]
 
     def has_stopped(self, phrase: Phrase) -> bool:
         """Tell whether a stop was heard in a phrase."""
@@ -113,54 +118,74 @@ class StopWatch:
 
     def doubts(self, phrase: Phrase) -> bool:
         """Tell whether there may be a stop in a phrase, which is not decided yet."""
-        return any(one.is_doubt and one.number == phrase.number for one in self._watched)
+        return any(
+            one.number == phrase.number and one.is_pending and self._is_wanted(one, is_hint=False)
+            for one in self._watched
+        )
 
     def take(self, answer: Answer | None, *, is_all: bool) -> None:
         """Watch what was read, `is_all` unless more may follow, and not what was read before it."""
         if answer is None or answer.reading is None or self.has_stopped(answer.phrase):
             return
-        if any(one.first.reading is answer.reading for one in self._watched):
+        if any(one.looks[0].reading is answer.reading for one in self._watched):
             return
         self.forget()
         first = Look(answer.reading, self._confidence(answer.reading), is_all)
-        self._watched.append(_Watched(answer, first))
+        self._watched.append(_Watched(answer, [first]))
 
     def stops(self) -> Iterator[tuple[Answer, float]]:
         """Yield what stops the robot by now, and by which confidence: once in a phrase."""
         for one in tuple(self._watched):
             if one.number not in self._stopped and self._is_stop(one):
                 self._stopped.append(one.number)
-                yield one.answer, one.first.confidence
+                yield one.answer, one.looks[0].confidence
         self._watched = [one for one in self._watched if one.number not in self._stopped]
 
     def _is_stop(self, one: _Watched) -> bool:
         # The spotter may come to suspect a word only after it was read.
         suspicion = self._suspicion(one.answer.phrase)
-        if is_sure(one.first, suspicion):
+        if is_sure(one.looks[0], suspicion):
             return True
-        if one.since_ns is None and wants_second(one.first, suspicion):
-            one.since_ns = self._readings.clock.now_ns()
-        return one.since_ns is not None and self._is_stop_still(one, one.since_ns, suspicion)
+        self._look_again(one)
+        while one.again is not None and one.again.done():
+            self._take_again(one, one.again)
+            self._look_again(one)
+        if is_sure(one.looks[-1], suspicion):
+            return True
+        if any(is_confirmed(first, second, suspicion) for first, second in pairwise(one.looks)):
+            return True
+        return one.is_given_up and is_likely(one.looks[-1], suspicion)
 
-    def _is_stop_still(self, one: _Watched, since_ns: int, suspicion: float) -> bool:
-        """Tell it by a second look; where none is to be had, what was likely at first is one."""
-        if one.again is None and self._readings.is_fast:
-            longer = self._aftermath.longer(one.answer.phrase)
-            if longer is not None:
-                one.again = self._readings.read_again(longer, self._hot_words())
-        if one.again is not None and one.again.done():
-            one.is_settled = True
-            second = self._second(one.again, is_all=one.first.is_all)
-            if second is not None:
-                return is_confirmed(one.first, second, suspicion)
-        is_late = self._readings.clock.now_ns() - since_ns > PATIENCE_NS
-        one.is_settled = one.is_settled or is_late or not self._readings.is_fast
-        return one.is_settled and is_likely(one.first, suspicion)
+    def _is_wanted(self, one: _Watched, *, is_hint: bool = True) -> bool:
+        """Tell whether another look may tell a stop, or might by a mere hint at one."""
+        last = one.looks[-1]
+        if one.is_given_up or len(one.looks) == MOST_LOOKS[last.is_all]:
+            return False
+        if wants_another(last, self._suspicion(one.answer.phrase)):
+            return True
+        return is_hint and last.is_all and len(one.looks) == 1 and hints(last)
 
-    def _second(self, again: "Future[Reading]", *, is_all: bool) -> Look | None:
-        """Return what was read again, None where the recogniser failed."""
+    def _look_again(self, one: _Watched) -> None:
+        """Take another look, if one is wanted, as soon as it can be; give it up where it cannot."""
+        if not self._is_wanted(one):
+            one.since_ns = None
+            return
+        now_ns = self._readings.clock.now_ns()
+        one.since_ns = now_ns if one.since_ns is None else one.since_ns
+        longer = self._aftermath.longer(one.answer.phrase, len(one.looks))
+        if one.again is None and longer is not None and self._readings.is_fast:
+            one.again = self._readings.read_again(longer, self._hot_words())
+        if now_ns - one.since_ns > PATIENCE_NS or not self._readings.is_fast:
+            self._give_up(one)
+
+    def _take_again(self, one: _Watched, again: "Future[Reading]") -> None:
+        one.again = one.since_ns = None
         try:
             reading = again.result()
         except (RunFailed, CancelledError):
-            return None
-        return Look(reading, self._confidence(reading), is_all)
+            self._give_up(one)
+        else:
+            one.looks.append(Look(reading, self._confidence(reading), one.looks[0].is_all))
+
+    def _give_up(self, one: _Watched) -> None:
+        one.is_given_up, one.since_ns = True, None

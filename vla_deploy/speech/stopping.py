@@ -113,9 +113,14 @@ def is_likely(look: Look, suspicion: float) -> bool:
     return is_all and _is_witnessed(look, suspicion)
 
 
-def wants_second(look: Look, suspicion: float) -> bool:
-    """Tell whether a second look may tell a stop."""
+def wants_another(look: Look, suspicion: float) -> bool:
+    """Tell whether another look may confirm a stop."""
     return is_likely(look, suspicion) or (look.reading.stop_surety or 0.0) >= TWICE_SURETY
+
+
+def hints(look: Look) -> bool:
+    """Tell whether the ear hears anything like a stop, which another look may make likely."""
+    return (look.reading.stop_surety or 0.0) >= LEAST_SURETY
 
 
 def is_confirmed(first: Look, second: Look, suspicion: float) -> bool:

@@ -22,7 +22,7 @@ SURE, UNSURE = 0.9, 0.3
 SUSPICION = 0.5
 
 
-def reading(text: str, confidence: float = UNSURE) -> Reading:
+def reading(text: str, confidence: float = UNSURE, surety: float | None = None) -> Reading:
     """Return a reading whose log-probability is its confidence, for the watch under test."""
     return Reading(
         text=text,
@@ -32,6 +32,7 @@ def reading(text: str, confidence: float = UNSURE) -> Reading:
         language="en",
         duration_s=1.0,
         took_s=0.0,
+        stop_surety=surety,
     )
 
 
@@ -48,9 +49,9 @@ def phrase(number: int = 1) -> Phrase:
 
 
 class Reader:
-    """Read what the test says, in place of a network."""
+    """Read what the test says, the last of it ever again, in place of a network."""
 
-    def __init__(self, again: str) -> None:
+    def __init__(self, *again: Reading) -> None:
         self.latency = LatencyHistogram()
         self.lengths: list[int] = []
         self.fails = False
@@ -60,14 +61,14 @@ class Reader:
         self.lengths.append(len(samples))
         if self.fails:
             raise RunFailed("ours: out of memory")
-        return reading(self._again)
+        return self._again[min(len(self.lengths), len(self._again)) - 1]
 
 
 class Rig:
     """Run a watch on frames that come one by one."""
 
-    def __init__(self, clock: ManualClock, again: str) -> None:
-        self.reader = Reader(again)
+    def __init__(self, clock: ManualClock, *again: Reading) -> None:
+        self.reader = Reader(*again)
         self.suspicion = 0.0
         self._clock = clock
         self._readings = Readings(AtOnce(), clock)
@@ -77,11 +78,11 @@ class Rig:
             self._readings, lambda one: one.log_probability, lambda _: self.suspicion, lambda: ""
         )
 
-    def read(self, text: str, number: int = 1, **told: Any) -> Phrase:
+    def read(self, text: str, number: int = 1, *, is_all: bool = True, **told: Any) -> Phrase:
         """Take a phrase that was read as that text."""
         one = phrase(number)
         self.watch.expect(one)
-        self.watch.take(Answer(phrase=one, reading=reading(text, **told)), is_all=True)
+        self.watch.take(Answer(phrase=one, reading=reading(text, **told)), is_all=is_all)
         return one
 
     def frames(self, count: int = LATER_FRAMES, *, follows: bool = True) -> None:
@@ -101,7 +102,7 @@ class Rig:
 
 @pytest.fixture
 def rig(clock: ManualClock) -> Rig:
-    return Rig(clock, again="halt now")
+    return Rig(clock, reading("halt now"))
 
 
 def test_sure_words_stop_at_once_and_once(rig: Rig) -> None:
@@ -126,7 +127,7 @@ def test_likely_words_stop_if_they_still_are_with_the_next_moment(rig: Rig) -> N
 
 
 def test_words_that_turn_out_to_be_others_stop_nothing(clock: ManualClock) -> None:
-    rig = Rig(clock, again="hold your horses")
+    rig = Rig(clock, reading("hold your horses"))
     one = rig.read("halt")
     assert rig.stops() == []
     rig.frames()
@@ -134,6 +135,54 @@ def test_words_that_turn_out_to_be_others_stop_nothing(clock: ManualClock) -> No
     assert not rig.watch.doubts(one)
     rig.frames(30)
     assert rig.stops() == [], "not later either"
+    assert len(rig.reader.lengths) == 1
+
+
+def test_a_hint_in_a_pause_becomes_likely_at_the_second_look_and_is_confirmed_by_a_third(
+    clock: ManualClock,
+) -> None:
+    rig = Rig(clock, reading("halt", surety=0.3))
+    one = rig.read("hold", surety=0.1)
+    assert rig.stops() == []
+    assert not rig.watch.doubts(one), "it may be told as what it was read as"
+    rig.watch.forget()
+    rig.frames()
+    assert rig.stops() == []
+    assert rig.watch.doubts(one)
+    rig.frames(LATER_FRAMES - 1)
+    assert rig.stops() == []
+    rig.frames(1)
+    assert rig.stops() == ["hold"]
+    assert rig.reader.lengths == [(4 + times * LATER_FRAMES) * FRAME for times in (1, 2)]
+
+
+@pytest.mark.parametrize("surety", [0.01, 0.1])
+def test_neither_nothing_nor_a_hint_that_fades_stops(clock: ManualClock, surety: float) -> None:
+    rig = Rig(clock, reading("hold", surety=0.02))
+    rig.read("hold", surety=surety)
+    for _ in range(4):
+        assert rig.stops() == []
+        rig.frames()
+    assert len(rig.reader.lengths) == (surety > 0.05)
+
+
+def test_words_that_are_sure_at_the_second_look_stop(clock: ManualClock) -> None:
+    rig = Rig(clock, reading("the stop", confidence=SURE, surety=0.1))
+    rig.read("the store", surety=0.1)
+    rig.stops()
+    rig.frames()
+    assert rig.stops() == ["the store"]
+
+
+def test_while_somebody_goes_on_the_next_glance_sees_more_than_a_third_look(
+    clock: ManualClock,
+) -> None:
+    rig = Rig(clock, reading("halt the arm", surety=0.3))
+    rig.suspicion = SUSPICION
+    rig.read("halt the", is_all=False, confidence=0.5, surety=0.3)
+    for _ in range(4):
+        assert rig.stops() == []
+        rig.frames()
     assert len(rig.reader.lengths) == 1
 
 

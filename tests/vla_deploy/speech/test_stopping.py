@@ -12,7 +12,7 @@ from vla_deploy.speech.stopping import (
     is_confirmed,
     is_likely,
     is_sure,
-    wants_second,
+    wants_another,
 )
 
 READING = Reading(
@@ -149,7 +149,7 @@ SURE: Any = {"surety": TWICE_SURETY + 0.01, "is_all": False}
 def test_an_ear_that_is_sure_twice_needs_no_spotter_where_the_words_may_say_it_too(
     first: Look, second: Look, stops: bool
 ) -> None:
-    assert wants_second(first, 0.0)
+    assert wants_another(first, 0.0)
     assert is_confirmed(first, second, 0.0) is stops
 
 
