@@ -30,8 +30,9 @@ PATIENCE_NS: Final = round(0.4 * NS_PER_S)
 """A likely stop that cannot be read again for so long is one."""
 MOST_LOOKS: Final = {False: 2, True: 3}
 """By whether it may be all that is said: in a glance the next one sees more."""
-_KEPT: Final = 3
-"""A glance, what is read in advance and the whole phrase may wait for another look at once."""
+_KEPT: Final = 6
+"""So many glances, readings in advance and whole phrases may wait for another look at once: a
+pause may be broken off and begin again."""
 
 
 class Aftermath:
