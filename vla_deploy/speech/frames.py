@@ -1,6 +1,6 @@
 """Cut a stream of blocks into frames of one length, each with its time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,11 @@ class Frame:
     def end_ns(self) -> int:
         """Return the time at which the frame ends."""
         return self.stamp_ns + duration_ns(FRAME)
+
+
+def joined(frames: Iterable[Frame]) -> Sound:
+    """Return the samples of frames in a row."""
+    return np.concatenate([NOTHING, *(frame.samples for frame in frames)])
 
 
 class Framing:

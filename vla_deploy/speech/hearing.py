@@ -79,6 +79,11 @@ class Hearing:
             lambda phrase: suspicion(phrase.began_ns, phrase.ended_ns),
             hot_words,
         )
+        self._reads: dict[Step, Callable[[Phrase, str], None]] = {
+            Step.SPEAKING: readings.glance,
+            Step.PAUSED: readings.draft,
+            Step.ENDED: readings.finish,
+        }
         self._answered: deque[Answer] = deque()
         self._told_stop: Answer | None = None
         self._framing = Framing()
@@ -179,16 +184,11 @@ class Hearing:
         if happening.step is Step.BEGAN:
             self._watch.forget()
             self._own_words.note_begun(is_person=not self.gate.is_shut)
-        elif happening.step is Step.SPEAKING:
+        elif happening.step in self._reads:
+            if happening.step is Step.ENDED:
+                phrase = replace(phrase, own_words=self._own_words.within(phrase))
             self._watch.expect(phrase)
-            self.readings.glance(phrase, self._hot_words())
-        elif happening.step is Step.PAUSED:
-            self._watch.expect(phrase)
-            self.readings.draft(phrase, self._hot_words())
-        elif happening.step is Step.ENDED:
-            phrase = replace(phrase, own_words=self._own_words.within(phrase))
-            self._watch.expect(phrase)
-            self.readings.finish(phrase, self._hot_words())
+            self._reads[happening.step](phrase, self._hot_words())
         else:
             self.readings.forget_draft()
         if happening.step is Step.TOO_LONG:

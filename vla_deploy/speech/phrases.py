@@ -4,7 +4,7 @@ Pure but for what it remembers: a frame and its judgement in, what has happened 
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from platforms import SpeechSettings
-from vla_deploy.speech.frames import Frame
+from vla_deploy.speech.frames import Frame, joined
 from vla_deploy.speech.sound import NOTHING, Sound
 from vla_deploy.speech.voice_activity import FRAME_S
 
@@ -171,7 +171,7 @@ class Phrases:
         """Return the phrase so far."""
         voiced = [number for number, voice in enumerate(self._voices) if voice >= OFFSET]
         first, last = voiced[0], voiced[-1]
-        samples = _joined(self._frames)
+        samples = joined(self._frames)
         return Phrase(
             number=self._number,
             began_ns=self._frames[first].stamp_ns,
@@ -180,9 +180,5 @@ class Phrases:
             clipped_ratio=float(np.mean(np.abs(samples) >= CLIPPED)),
             voice=float(np.mean([self._voices[number] for number in voiced])),
             samples=samples,
-            earlier=_joined(self._earlier),
+            earlier=joined(self._earlier),
         )
-
-
-def _joined(frames: Iterable[Frame]) -> Sound:
-    return np.concatenate([NOTHING, *(frame.samples for frame in frames)])

@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from vla_deploy.inference.errors import RunFailed
-from vla_deploy.speech.frames import Frame
+from vla_deploy.speech.frames import Frame, joined
 from vla_deploy.speech.phrases import Phrase
 from vla_deploy.speech.readings import Answer, Readings
 from vla_deploy.speech.recogniser import Reading
@@ -58,8 +58,8 @@ class Aftermath:
         count = times * LATER_FRAMES
         for one, frames in self._after:
             if one is phrase and len(frames) >= count:
-                sound = [phrase.samples, *(frame.samples for frame in frames[:count])]
-                return replace(phrase, samples=np.concatenate(sound))
+                later = joined(frames[:count])
+                return replace(phrase, samples=np.concatenate((phrase.samples, later)))
         return None
 
 
@@ -120,7 +120,9 @@ class StopWatch:
     def doubts(self, phrase: Phrase) -> bool:
         """Tell whether there may be a stop in a phrase, which is not decided yet."""
         return any(
-            one.number == phrase.number and one.is_pending and self._is_wanted(one, is_hint=False)
+            one.number == phrase.number
+            and one.is_pending
+            and wants_another(one.looks[-1], self._suspicion(one.answer.phrase))
             for one in self._watched
         )
 
@@ -147,36 +149,29 @@ class StopWatch:
         suspicion = self._suspicion(one.answer.phrase)
         if is_sure(one.looks[0], suspicion):
             return True
-        self._look_again(one)
+        self._look_again(one, suspicion)
         while one.again is not None and one.again.done():
             self._take_again(one, one.again)
-            self._look_again(one)
+            self._look_again(one, suspicion)
         if is_sure(one.looks[-1], suspicion):
             return True
         if any(is_confirmed(first, second, suspicion) for first, second in pairwise(one.looks)):
             return True
         return one.is_given_up and is_likely(one.looks[-1], suspicion)
 
-    def _is_wanted(self, one: _Watched, *, is_hint: bool = True) -> bool:
-        """Tell whether another look may tell a stop, or might by a mere hint at one."""
-        last = one.looks[-1]
-        if one.is_given_up or len(one.looks) == MOST_LOOKS[last.is_all]:
-            return False
-        if wants_another(last, self._suspicion(one.answer.phrase)):
-            return True
-        return is_hint and last.is_all and len(one.looks) == 1 and hints(last)
-
-    def _look_again(self, one: _Watched) -> None:
+    def _look_again(self, one: _Watched, suspicion: float) -> None:
         """Take another look, if one is wanted, as soon as it can be; give it up where it cannot."""
-        if not self._is_wanted(one):
+        if not _is_wanted(one, suspicion):
             one.since_ns = None
             return
         now_ns = self._readings.clock.now_ns()
         one.since_ns = now_ns if one.since_ns is None else one.since_ns
-        longer = self._aftermath.longer(one.answer.phrase, len(one.looks))
-        if one.again is None and longer is not None and self._readings.is_fast:
-            one.again = self._readings.read_again(longer, self._hot_words())
-        if now_ns - one.since_ns > PATIENCE_NS or not self._readings.is_fast:
+        is_fast = self._readings.is_fast
+        if one.again is None and is_fast:
+            longer = self._aftermath.longer(one.answer.phrase, len(one.looks))
+            if longer is not None:
+                one.again = self._readings.read_again(longer, self._hot_words())
+        if now_ns - one.since_ns > PATIENCE_NS or not is_fast:
             self._give_up(one)
 
     def _take_again(self, one: _Watched, again: "Future[Reading]") -> None:
@@ -190,3 +185,12 @@ class StopWatch:
 
     def _give_up(self, one: _Watched) -> None:
         one.is_given_up, one.since_ns = True, None
+
+
+def _is_wanted(one: _Watched, suspicion: float) -> bool:
+    """Tell whether another look may tell a stop; in a pause a hint of one asks for a second."""
+    last = one.looks[-1]
+    if one.is_given_up or len(one.looks) == MOST_LOOKS[last.is_all]:
+        return False
+    is_hint = last.is_all and len(one.looks) == 1 and hints(last)
+    return is_hint or wants_another(last, suspicion)

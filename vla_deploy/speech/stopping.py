@@ -81,7 +81,7 @@ def is_sure(look: Look, suspicion: float) -> bool:
     As on the stream, the word itself does, whatever is meant by it. `suspicion` is how near the
     spotter came to hearing one.
     """
-    is_doubtful = _is_unheard(look) and not look.is_all
+    is_doubtful = _denies(look.reading, LEAST_SURETY) and not look.is_all
     is_heard_twice = suspicion >= SLIGHT_SUSPICION and not is_doubtful
     enough = STOP_HEARD_TWICE_CONFIDENCE if is_heard_twice else STOP_WITHIN_CONFIDENCE
     return holds_stop(look.reading.text, is_all=look.is_all) and look.confidence >= enough
@@ -93,13 +93,12 @@ def is_likely(look: Look, suspicion: float) -> bool:
     The less sure the words are, the more the spotter must suspect one; then what may have been
     said instead counts, too.
     """
-    if _is_unheard(look):
+    if _denies(look.reading, LEAST_SURETY):
         return False
     reading, is_all = look.reading, look.is_all
-    surety = reading.stop_surety
     likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
     # The ear knows better than the guesses of a glance, as soon as the word has ended.
-    possible = (reading.text, *(likely if is_all or surety is None else ()))
+    possible = (reading.text, *(likely if is_all or reading.stop_surety is None else ()))
     if suspicion >= STRONG_SUSPICION and any(map(holds_stop, possible)):
         return True
     if is_all and suspicion >= SLIGHT_SUSPICION and any(map(is_stop, likely)):
@@ -107,7 +106,7 @@ def is_likely(look: Look, suspicion: float) -> bool:
     if is_all and is_stop(reading.text) and look.confidence >= CALL_CONFIDENCE:
         return True
     is_read = holds_stop(reading.text, is_all=is_all) and suspicion >= SLIGHT_SUSPICION
-    is_heard = surety is None or surety >= SUSPECTED_SURETY
+    is_heard = not _denies(reading, SUSPECTED_SURETY)
     if is_read and is_heard and look.confidence >= STOP_SUSPECTED_CONFIDENCE:
         return True
     return is_all and _is_witnessed(look, suspicion)
@@ -115,28 +114,32 @@ def is_likely(look: Look, suspicion: float) -> bool:
 
 def wants_another(look: Look, suspicion: float) -> bool:
     """Tell whether another look may confirm a stop."""
-    return is_likely(look, suspicion) or (look.reading.stop_surety or 0.0) >= TWICE_SURETY
+    return is_likely(look, suspicion) or _affirms(look.reading, TWICE_SURETY)
 
 
 def hints(look: Look) -> bool:
     """Tell whether the ear hears anything like a stop, which another look may make likely."""
-    return (look.reading.stop_surety or 0.0) >= LEAST_SURETY
+    return _affirms(look.reading, LEAST_SURETY)
 
 
 def is_confirmed(first: Look, second: Look, suspicion: float) -> bool:
     """Tell whether the same phrase, read again with a moment more of sound, stops the robot."""
     if _is_heard_twice(first.reading, second.reading, suspicion):
         return True
-    surety = second.reading.stop_surety
-    if not first.is_all and surety is not None and surety < GLANCED_SURETY:
+    if not first.is_all and _denies(second.reading, GLANCED_SURETY):
         return False
     is_still = is_sure(second, suspicion) or is_likely(second, suspicion)
     return is_still and is_likely(first, suspicion)
 
 
-def _is_unheard(look: Look) -> bool:
-    surety = look.reading.stop_surety
-    return surety is not None and surety < LEAST_SURETY
+def _affirms(reading: Reading, least: float) -> bool:
+    """Tell whether there is an ear that is so sure of a stop."""
+    return reading.stop_surety is not None and reading.stop_surety >= least
+
+
+def _denies(reading: Reading, least: float) -> bool:
+    """Tell whether there is an ear that is not so sure of a stop."""
+    return reading.stop_surety is not None and reading.stop_surety < least
 
 
 def _is_heard_twice(first: Reading, second: Reading, suspicion: float) -> bool:
@@ -144,7 +147,7 @@ def _is_heard_twice(first: Reading, second: Reading, suspicion: float) -> bool:
     readings = first, second
     if any(holds_form_of_stop(one.text) for one in readings):
         return False
-    if any((one.stop_surety or 0.0) < TWICE_SURETY for one in readings):
+    if not all(_affirms(one, TWICE_SURETY) for one in readings):
         return False
     share = sum(map(_stop_share, readings)) / len(readings)
     return share >= TWICE_SHARE or suspicion >= TWICE_SUSPICION

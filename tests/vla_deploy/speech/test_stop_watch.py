@@ -227,21 +227,17 @@ def test_what_is_no_doubt_is_forgotten(rig: Rig) -> None:
     assert rig.stops() == []
 
 
-def test_where_the_stream_breaks_off_a_likely_stop_is_one(rig: Rig, clock: ManualClock) -> None:
-    rig.read("halt")
-    assert rig.stops() == []
-    rig.frames(follows=False)
-    assert rig.stops() == []
-    clock.sleep_until(clock.now_ns() + PATIENCE_NS)
-    assert rig.stops() == ["halt"]
-    assert rig.reader.lengths == []
-
-
-def test_where_no_more_sound_comes_a_likely_stop_is_one(rig: Rig, clock: ManualClock) -> None:
+@pytest.mark.parametrize("frames", [0, LATER_FRAMES], ids=["no more sound", "after a gap"])
+def test_where_no_more_sound_follows_a_likely_stop_is_one(
+    rig: Rig, clock: ManualClock, frames: int
+) -> None:
     one = rig.read("halt")
-    rig.stops()
+    assert rig.stops() == []
+    rig.frames(frames, follows=False)
+    assert rig.stops() == []
     clock.sleep_until(clock.now_ns() + PATIENCE_NS + 1)
     assert rig.stops() == ["halt"]
+    assert rig.reader.lengths == []
     assert not rig.watch.doubts(one)
 
 
