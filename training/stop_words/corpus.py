@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from training.stop_words.cast import PARTS, Part, draw_style
 from training.stop_words.examples import Examples
-from training.stop_words.stop_phrases import stop_phrases
+from training.stop_words.stop_texts import stop_texts
 from training.stop_words.texts import WORDS, other_talk
-from training.stop_words.timing import can_be_timed, sounding, word_times
+from training.stop_words.timing import sounding, word_times
 from training.voices.clip import RATE_HZ, Clip, Wave
 from training.voices.errors import SynthesisFailed
 from training.voices.phones import NUMBERS
@@ -108,10 +108,11 @@ def _clips(
     part: Part, split: str, kind: str, count: int, random: np.random.Generator
 ) -> list[Said]:
     voices = part.held_voices if split == HELD else part.voices
+    talk = other_talk(count, random, _lexicon(), _examples().draw)
     texts = (
-        _stop_texts(random, count, part.tells_times)
+        stop_texts(count, talk, random, timed=part.tells_times)
         if kind == "stops"
-        else _other_texts(random, count)
+        else [(text, "", False) for text in talk]
     )
     clips: list[Said] = []
     for text, word, is_last in texts:
@@ -125,32 +126,6 @@ def _clips(
         if said is not None:
             clips.append(said)
     return clips
-
-
-def _stop_texts(
-    random: np.random.Generator, count: int, timed: bool
-) -> list[tuple[str, str, bool]]:
-    """Return texts, their word, and whether it comes last; if not `timed` few can be used."""
-    phrases = {
-        word: [
-            (text, is_last)
-            for text, is_last in stop_phrases(word)
-            if timed or can_be_timed(text, word, is_last=is_last)
-        ]
-        for word in WORDS
-    }
-    texts = []
-    for number in range(count):
-        word = WORDS[number % len(WORDS)] if number % 2 else WORDS[0]
-        text, is_last = phrases[word][int(random.integers(len(phrases[word])))]
-        if random.random() < 0.3:
-            text, is_last = word, True
-        texts.append((text, word, is_last))
-    return texts
-
-
-def _other_texts(random: np.random.Generator, count: int) -> list[tuple[str, str, bool]]:
-    return [(text, "", False) for text in other_talk(count, random, _lexicon(), _examples().draw)]
 
 
 # Each engine's talk is drawn from both: they are read once.

@@ -8,6 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from training.stop_words.amid_talk import amid_talk
+
 Draw = Callable[[np.random.Generator], str]
 WORDS: Final = ("stop", "halt", "freeze")
 """The classes, in the order of the network's outputs; output 0 is none of them."""
@@ -39,7 +41,7 @@ CONFUSABLE: Final = (
     "phrase", "praise", "bees", "sneeze", "squeeze", "these", "keys", "seas", "seize", "sees",
     "street", "sleeve", "leaves", "fees", "flees", "feast", "feed", "friend", "from", "freight",
     "fresh", "hold", "on", "wait", "cup", "up", "now", "not", "box", "box", "on", "right", "left",
-    "go", "no", "robot",
+    "go", "no", "robot", "hope", "help", "held", "hurry", "both", "dock", "study", "big",
 )  # fmt: skip
 CARRIERS: Final = (
     "{a}",
@@ -151,6 +153,7 @@ def other_talk(
     kinds: tuple[Callable[[], str], ...] = (
         lambda: _carried(CONFUSABLE, random),
         lambda: _carried(CONFUSABLE, random),
+        lambda: amid_talk(_pick(CONFUSABLE, random), random, at_home, before=True, after=False),
         lambda: _filled(_COMMANDS, random),
         lambda: _filled(_TALK, random),
         lambda: _pick(running, random),
