@@ -10,6 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from training.stop_words.picking import pick
+
 MOST_BEFORE: Final = 4
 MOST_AFTER: Final = 3
 COMMA_SHARE: Final = 0.25
@@ -30,7 +32,7 @@ def amid_talk(
 
 def _piece(talk: Sequence[str], most: int, random: np.random.Generator) -> str:
     """Return some neighbouring words of a sentence."""
-    words = _WORD.findall(talk[int(random.integers(len(talk)))])
+    words = _WORD.findall(pick(talk, random))
     count = min(len(words), int(random.integers(1, most + 1)))
     start = int(random.integers(len(words) - count + 1))
     return " ".join(words[start : start + count])

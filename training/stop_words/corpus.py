@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from training.stop_words.cast import PARTS, Part, draw_style
 from training.stop_words.examples import Examples
+from training.stop_words.picking import pick
 from training.stop_words.stop_texts import stop_texts
 from training.stop_words.texts import WORDS, other_talk
 from training.stop_words.timing import sounding, word_times
@@ -116,7 +117,7 @@ def _clips(
     )
     clips: list[Said] = []
     for text, word, is_last in texts:
-        voice = voices[int(random.integers(len(voices)))]
+        voice = pick(voices, random)
         try:
             clip = part.speak(text, voice, draw_style(random))
         except SynthesisFailed as error:

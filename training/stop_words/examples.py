@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from training.stop_words.picking import pick
 from training.stop_words.texts import is_clean
 
 FOLDER: Final = Path("/usr/share/wordnet")
@@ -44,7 +45,7 @@ class Examples:
     def draw(self, random: np.random.Generator) -> str:
         """Return one of them."""
         some = self.alike if random.random() < 0.5 else self.others
-        return some[int(random.integers(len(some)))]
+        return pick(some, random)
 
 
 def _sentences(folder: Path) -> Iterator[str]:

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from training.stop_words.amid_talk import amid_talk
+from training.stop_words.picking import pick
 from training.stop_words.stop_phrases import stop_phrases
 from training.stop_words.texts import WORDS
 from training.stop_words.timing import can_be_timed
@@ -27,23 +28,24 @@ def stop_texts(
     """
     # In "stopped" are the sounds of a stop word, and where they are tells nobody which was said.
     plain = [text for text in talk if not any(word in text.lower() for word in WORDS)]
-    words = (WORDS[number % len(WORDS)] if number % 2 else WORDS[0] for number in range(count))
-    return [_text(word, plain, random, timed=timed) for word in words]
+    places = _PLACES if timed else _PLACES[:-1]
+    phrases = {word: _phrases(word, timed=timed) for word in WORDS}
+
+    def text_with(word: str) -> StopText:
+        share = random.random()
+        if share < ALONE_SHARE:
+            return word, word, True
+        if share < ALONE_SHARE + AMID_TALK_SHARE:
+            before, after = pick(places, random)
+            return amid_talk(word, random, plain, before=before, after=after), word, not after
+        return pick(phrases[word], random)
+
+    return [text_with(WORDS[n % len(WORDS)] if n % 2 else WORDS[0]) for n in range(count)]
 
 
-def _text(word: str, talk: Sequence[str], random: np.random.Generator, *, timed: bool) -> StopText:
-    share = random.random()
-    if share < ALONE_SHARE:
-        return word, word, True
-    if share < ALONE_SHARE + AMID_TALK_SHARE:
-        places = _PLACES if timed else _PLACES[:-1]
-        before, after = places[int(random.integers(len(places)))]
-        text = amid_talk(word, random, talk, before=before, after=after)
-        return text, word, not after
-    phrases = [
-        (text, is_last)
+def _phrases(word: str, *, timed: bool) -> list[StopText]:
+    return [
+        (text, word, is_last)
         for text, is_last in stop_phrases(word)
         if timed or can_be_timed(text, word, is_last=is_last)
     ]
-    text, is_last = phrases[int(random.integers(len(phrases)))]
-    return text, word, is_last

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from training.stop_words.amid_talk import amid_talk
+from training.stop_words.picking import pick
 
 Draw = Callable[[np.random.Generator], str]
 WORDS: Final = ("stop", "halt", "freeze")
@@ -153,17 +154,17 @@ def other_talk(
     kinds: tuple[Callable[[], str], ...] = (
         lambda: _carried(CONFUSABLE, random),
         lambda: _carried(CONFUSABLE, random),
-        lambda: amid_talk(_pick(CONFUSABLE, random), random, at_home, before=True, after=False),
+        lambda: amid_talk(pick(CONFUSABLE, random), random, at_home, before=True, after=False),
         lambda: _filled(_COMMANDS, random),
         lambda: _filled(_TALK, random),
-        lambda: _pick(running, random),
-        lambda: _pick(at_home, random),
-        lambda: _pick(at_home, random),
+        lambda: pick(running, random),
+        lambda: pick(at_home, random),
+        lambda: pick(at_home, random),
         *(4 * [lambda: example(random)]),
-        lambda: " ".join(_pick(lexicon, random) for _ in range(int(random.integers(1, 7)))),
+        lambda: " ".join(pick(lexicon, random) for _ in range(int(random.integers(1, 7)))),
         lambda: " ".join(_made_up(random) for _ in range(int(random.integers(1, 5)))),
     )
-    texts = (kinds[int(random.integers(len(kinds)))]() for _ in range(2 * count))
+    texts = (pick(kinds, random)() for _ in range(2 * count))
     return [text for text in texts if is_clean(text)][:count]
 
 
@@ -178,18 +179,14 @@ def _talk_at_home() -> list[str]:
 
 
 def _carried(words: Sequence[str], random: np.random.Generator) -> str:
-    carrier = _pick(CARRIERS, random)
-    return carrier.format(a=_pick(words, random), b=_pick(words, random), c=_pick(words, random))
+    carrier = pick(CARRIERS, random)
+    return carrier.format(a=pick(words, random), b=pick(words, random), c=pick(words, random))
 
 
 def _filled(patterns: Sequence[str], random: np.random.Generator) -> str:
-    filling = {key: _pick(values, random) for key, values in _FILL.items()}
-    return _pick(patterns, random).format(**filling)
+    filling = {key: pick(values, random) for key, values in _FILL.items()}
+    return pick(patterns, random).format(**filling)
 
 
 def _made_up(random: np.random.Generator) -> str:
-    return "".join(_pick(part, random) for part in (_ONSETS, _NUCLEI, _CODAS))
-
-
-def _pick(values: Sequence[str], random: np.random.Generator) -> str:
-    return values[int(random.integers(len(values)))]
+    return "".join(pick(part, random) for part in (_ONSETS, _NUCLEI, _CODAS))

@@ -12,6 +12,7 @@ PLACES = ((True, False), (False, True), (True, True))
 @pytest.mark.parametrize(("before", "after"), PLACES)
 def test_it_stands_where_it_was_told(before: bool, after: bool) -> None:
     random = np.random.default_rng(0)
+    spoken = [one.replace(",", "") for one in TALK]
     for _ in range(100):
         text = amid_talk("halt", random, TALK, before=before, after=after)
         words = text.replace(",", "").split()
@@ -19,7 +20,6 @@ def test_it_stands_where_it_was_told(before: bool, after: bool) -> None:
         first, last = words[:place], words[place + 1 :]
         assert (0 < len(first) <= MOST_BEFORE) if before else not first
         assert (0 < len(last) <= MOST_AFTER) if after else not last
-        spoken = [one.replace(",", "") for one in TALK]
         assert all(any(" ".join(some) in one for one in spoken) for some in (first, last))
 
 
