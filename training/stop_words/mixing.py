@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from training.stop_words.corpus import Clips, Said
 from training.stop_words.network import REACH
+from training.stop_words.picking import pick
 from training.stop_words.rooms import NoiseBank, in_a_room
 from training.voices.clip import RATE_HZ
 from vla_deploy.speech.stop_words.features import HOP, STRIDE, WINDOW, log_mel
@@ -90,7 +91,7 @@ class Mixer:
             engines = self._by_word[int(random.choice(len(WORD_SHARES), p=WORD_SHARES))]
             return self._stops[_one_of(engines, random)], -1
         if self.hard and random.random() < HARD_SHARE:
-            number = self.hard[int(random.integers(len(self.hard)))]
+            number = pick(self.hard, random)
         else:
             number = _one_of(self._by_engine, random)
         return self._others[number], number

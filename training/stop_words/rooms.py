@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.stop_words.corpus import Clips
+from training.stop_words.picking import pick
 from training.voices.clip import RATE_HZ
 
 Sound = NDArray[np.float32]
@@ -30,7 +31,7 @@ class NoiseBank:
 
     def take(self, count: int, random: np.random.Generator) -> Sound:
         """Return a stretch of one kind, of mean power 1 over the whole bank's minute."""
-        sound = self._sounds[int(random.integers(len(self._sounds)))]
+        sound = pick(self._sounds, random)
         start = int(random.integers(len(sound) - count))
         return sound[start : start + count]
 
