@@ -40,6 +40,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         stack = item.get_closest_marker("stack")
         if stack and stack.kwargs.get("again", True):
             item.add_marker(pytest.mark.flaky(reruns=2, condition=stood_still))
+    _stack_is_named({item.path for item in items if item.get_closest_marker("stack")})
+
+
+def _stack_is_named(paths: set[Path]) -> None:
+    """Refuse a mark that comes from elsewhere: `scripts/check` would run such a test nowhere."""
+    for path in sorted(paths):
+        if "mark.stack" not in path.read_text(encoding="utf-8"):
+            raise pytest.UsageError(f"{path}: tests marked `stack`; write pytest.mark.stack here")
 
 
 @pytest.hookimpl(tryfirst=True)
