@@ -19,6 +19,7 @@ settings.load_profile("any machine")
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
 WATCH = pytest.StashKey[StillnessWatch]()
+JUDGED = pytest.StashKey[list[str]]()
 STANDS = ("orphan", "hazard", "joint range", "joint speed", "workspace", "push", "fall ", "tilt")
 """A failure that tells of one of these is not explained by a computer that stood still."""
 
@@ -29,13 +30,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     A test that judges that by itself, as campaigns do, is marked `stack(again=False)`.
     """
 
-    def stood_still(error: BaseException) -> bool:
+    def stood_still(error: BaseException | None) -> bool:
+        if error is None:  # it is asked after a success, too
+            return False
         held_up_s = config.stash[WATCH].worst_s()
         void = held_up_s > HELD_UP_S and not any(word in str(error) for word in STANDS)
-        if void:
-            print(f"void: this computer stood still for {held_up_s:.3f} s; again")
+        verdict = "void, again" if void else "it stands"
+        judged.append(f"{verdict}: stood still for {held_up_s:.3f} s: {str(error)[:160]}")
         return void
 
+    judged = config.stash.setdefault(JUDGED, [])
     for item in items:
         stack = item.get_closest_marker("stack")
         if stack and stack.kwargs.get("again", True):
@@ -57,6 +61,14 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     if WATCH not in item.config.stash:
         item.config.stash[WATCH] = StillnessWatch()
     item.config.stash[WATCH].worst_s()
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Tell of each failure of the wall clock for how long the computer stood still meanwhile."""
+    for line in config.stash.get(JUDGED, []):
+        terminalreporter.write_line(line.replace("\n", " "))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
