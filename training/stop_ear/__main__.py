@@ -2,7 +2,7 @@
 
 `speak` says the clips that `training.stop_words` learns from; those that are there already stay.
 `mean` makes one of two that have gone on from the same weights with other seeds: it is better than
-either.
+either. `ship --with` has two of different trainings heard side by side, and the mean of both told.
 """
 
 import argparse
@@ -40,7 +40,9 @@ def main() -> None:
         help="folder of the recogniser that it is for (default: the one that is shipped)",
     )  # fmt: skip
     parser.add_argument("--start-from", type=Path, help="a shipped ear to go on from")
-    parser.add_argument("--with", dest="other", type=Path, help="of `mean`: the other training")
+    parser.add_argument(
+        "--with", dest="other", type=Path, help="of `mean`, `ship`: the other training"
+    )
     parser.add_argument("--into", type=Path, help="of `mean`: the folder for the mean of both")
     given = parser.parse_args()
     if given.step == "mean" and None in (given.other, given.into):
@@ -71,7 +73,7 @@ def _run(step: str, given: argparse.Namespace) -> None:
     else:
         from training.stop_ear.export import ship
 
-        ship(given.out, given.recogniser)
+        ship([one for one in (given.out, given.other) if one is not None], given.recogniser)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Write the ear as the robot runs it, in eight bits, and enter it in the recogniser's manifest."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -22,23 +23,25 @@ LONGEST_STATES: Final = 800
 
 
 class _Scores(nn.Module):
-    def __init__(self, ear: StopEar) -> None:
+    """Give the mean of what each of the ears says; what only one takes for a stop weighs less."""
+
+    def __init__(self, ears: Sequence[StopEar]) -> None:
         super().__init__()
-        self.ear = ear
+        self.ears = nn.ModuleList(ears)
 
     def forward(self, frames: Tensor) -> Tensor:
-        return torch.softmax(self.ear(frames), dim=2)
+        return torch.stack([torch.softmax(ear(frames), dim=2) for ear in self.ears]).mean(0)
 
 
-def ship(out: Path, recogniser: Path) -> None:
-    """Put the ear that was learnt beside the recogniser whose frames it hears.
+def ship(outs: Sequence[Path], recogniser: Path) -> None:
+    """Put the ears that were learnt, as one, beside the recogniser whose frames they hear.
 
     Raises:
         FileNotFoundError: nothing was learnt yet.
         ManifestInvalid: there is no recogniser.
     """
     path, manifest = recogniser / FILE, read_manifest(recogniser)
-    export(learnt(out), path)
+    export([learnt(out) for out in outs], path)
     others = (part for part in manifest.parts if part.path != FILE)
     parts = (*others, ModelFile(path=FILE, sha256=sha256_of(path)))
     write_manifest(recogniser, replace(manifest, parts=parts))
@@ -55,13 +58,14 @@ def learnt(out: Path) -> StopEar:
     return ear.eval()
 
 
-def export(ear: StopEar, path: Path) -> None:
-    """Write an ear as ONNX: weights of eight bits, all else of 32."""
-    places = ear.encoder.embed_positions
-    places.weight = nn.Parameter(places.weight[:LONGEST_STATES].clone(), requires_grad=False)
+def export(ears: Sequence[StopEar], path: Path) -> None:
+    """Write ears as one in ONNX: weights of eight bits, all else of 32."""
+    for ear in ears:
+        places = ear.encoder.embed_positions
+        places.weight = nn.Parameter(places.weight[:LONGEST_STATES].clone(), requires_grad=False)
     whole = path.with_suffix(".fp32")
     torch.onnx.export(
-        _Scores(ear),
+        _Scores(ears),
         (torch.zeros(1, MELS, 120),),
         str(whole),
         input_names=[FRAMES],

@@ -39,7 +39,7 @@ def train(
     """Learn for that long from the clips, and write the weights.
 
     `talk` are clips that the recogniser has learnt from. Where weights are already, it goes on from
-    them, else from those of an ear that was shipped, else from the recogniser's.
+    them, else from those of the first ear that was shipped, else from the recogniser's.
 
     Raises:
         FileNotFoundError: there are no clips.
@@ -54,7 +54,7 @@ def train(
     if (out / WEIGHTS).exists():
         ear.load_state_dict(torch.load(out / WEIGHTS, weights_only=True))
     elif start_from is not None:
-        ear.load_state_dict(ear.state_dict() | shipped_weights(start_from))
+        ear.load_state_dict(ear.state_dict() | shipped_weights(start_from)[0])
     learnt = [values for values in ear.parameters() if values.requires_grad]
     optimiser = torch.optim.AdamW(learnt, weight_decay=DECAY)
     began_s, steps, progress, told = time.monotonic(), 0, 0.0, np.zeros(2)

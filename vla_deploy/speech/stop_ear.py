@@ -1,10 +1,10 @@
 """Tell how surely a stop word is in a phrase, whatever the recogniser reads.
 
 A decoder writes the words that are likeliest as a whole, and in noise makes "hold it" of a "halt".
-This network listens for the stop words alone. It began as a copy of the recogniser's encoder, and
-hears frames of the same kind, of a phrase and a moment before it: where a phrase begins is only the
-guess of the voice network. `training/stop_ear` makes it for the recogniser that is shipped, another
-Whisper has none.
+This network listens for the stop words alone; it may be several of one kind, side by side, whose
+mean is told. It began as a copy of the recogniser's encoder, and hears frames of the same kind, of
+a phrase and a moment before it: where a phrase begins is only the guess of the voice network.
+`training/stop_ear` makes it for the recogniser that is shipped, another Whisper has none.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,8 +29,8 @@ STATE_S: Final = 0.04
 """Each score is for so much sound."""
 LONGEST_S: Final = 27.0
 """Spoken slower it still fits into the network's 32 s; what was said first is left out."""
-LATER_S: Final = (-0.01, 0.03)
-PACES: Final = (0.89, 0.94, 1.06, 1.12)
+LATER_S: Final = (0.03,)
+PACES: Final = (0.91, 1.09)
 """As what it is heard again: as if it had begun so much earlier or later, or was spoken so fast."""
 _RANK: Final = 3
 Array = NDArray[np.float32]

@@ -23,6 +23,9 @@ LEAST_SURETY: Final = 0.05
 """Less sure words than STOP_WITHIN_CONFIDENCE are no stop where the ear, if any, hears none; but
 by STOP_HEARD_TWICE_CONFIDENCE they are where the spotter suspects one as well and nothing follows:
 a glance may see "stop it" where "stopping" is said."""
+FORM_SURETY: Final = 0.5
+"""The same where a form of a stop word was read, such as "stopped": it is misread more often as the
+word than the word as it."""
 SUSPECTED_SURETY: Final = 0.1
 """Words that are only as sure as STOP_SUSPECTED_CONFIDENCE need an ear that is so sure."""
 STOP_ODDS: Final = 0.2
@@ -59,7 +62,7 @@ STOP_WITNESSES: Final = (
     _Enough(surety=0.2, suspicion=0.8),
     _Enough(surety=0.6, share=0.3),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
-    _Enough(surety=0.9, most_confidence=0.6),
+    _Enough(surety=0.93, most_confidence=0.6),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
@@ -93,9 +96,9 @@ def is_likely(look: Look, suspicion: float) -> bool:
     The less sure the words are, the more the spotter must suspect one; then what may have been
     said instead counts, too.
     """
-    if _denies(look.reading, LEAST_SURETY):
-        return False
     reading, is_all = look.reading, look.is_all
+    if _denies(reading, FORM_SURETY if holds_form_of_stop(reading.text) else LEAST_SURETY):
+        return False
     likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
     # The ear knows better than the guesses of a glance, as soon as the word has ended.
     possible = (reading.text, *(likely if is_all or reading.stop_surety is None else ()))

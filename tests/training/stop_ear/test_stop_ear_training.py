@@ -13,7 +13,7 @@ from training.speech.framing import IGNORED  # noqa: E402
 from training.speech.network import MELS, Encoder  # noqa: E402
 from training.speech.shipping import SHIPPED  # noqa: E402
 from training.stop_ear.batches import Corpus, _targets  # noqa: E402
-from training.stop_ear.export import ship  # noqa: E402
+from training.stop_ear.export import export, ship  # noqa: E402
 from training.stop_ear.network import SIZE, StopEar  # noqa: E402
 from training.stop_ear.shipped import PLACES, shipped_weights  # noqa: E402
 from training.stop_ear.training import WEIGHTS, encoder_of, mean  # noqa: E402
@@ -32,7 +32,7 @@ def test_the_robot_runs_what_was_learnt(tmp_path: Path) -> None:
     folder.mkdir()
     (folder / "model.toml").write_text((SHIPPED / "model.toml").read_text())
     for _ in range(2):
-        ship(tmp_path, folder)
+        ship([tmp_path], folder)
     entered = read_manifest(folder)
     assert [part.path for part in entered.parts].count(FILE) == 1
     assert {one.name for one in folder.iterdir()} == {"model.toml", FILE}
@@ -47,12 +47,25 @@ def test_the_robot_runs_what_was_learnt(tmp_path: Path) -> None:
 
 def test_a_training_goes_on_from_what_was_shipped() -> None:
     ear = StopEar(encoder_of(SHIPPED)).eval()
-    weights = shipped_weights(SHIPPED / FILE)
-    assert set(ear.state_dict()) - set(weights) == {PLACES}
-    ear.load_state_dict(ear.state_dict() | weights)
-    frames = torch.randn(1, MELS, 90)
+    frames, told = torch.randn(1, MELS, 90), []
+    for weights in shipped_weights(SHIPPED / FILE):
+        assert set(ear.state_dict()) - set(weights) == {PLACES}
+        ear.load_state_dict(ear.state_dict() | weights)
+        told.append(ear(frames).softmax(2).detach().numpy())
     run = ort.InferenceSession(str(SHIPPED / FILE)).run(None, {"frames": frames.numpy()})[0]
-    assert ear(frames).softmax(2).detach().numpy() == pytest.approx(run, abs=0.03)
+    assert np.mean(told, axis=0) == pytest.approx(run, abs=0.03)
+    assert np.abs(told[0] - told[1]).max() > 0.0
+
+
+def test_of_ears_that_are_shipped_as_one_the_mean_is_told(tmp_path: Path) -> None:
+    ears = [StopEar(encoder_of(SHIPPED)).eval() for _ in range(2)]
+    with pytest.warns(DeprecationWarning):
+        export(ears, tmp_path / FILE)
+    frames = torch.randn(1, MELS, 90)
+    run = ort.InferenceSession(str(tmp_path / FILE)).run(None, {"frames": frames.numpy()})[0]
+    told = [ear(frames).softmax(2).detach().numpy() for ear in ears]
+    assert np.mean(told, axis=0) == pytest.approx(run, abs=0.03)
+    assert len(shipped_weights(tmp_path / FILE)) == 2
 
 
 def test_the_mean_of_two_trainings_is_half_of_each(tmp_path: Path) -> None:

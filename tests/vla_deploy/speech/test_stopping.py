@@ -41,7 +41,8 @@ def look(
 @pytest.mark.parametrize(
     ("first", "suspicion", "likely"),
     [
-        (look("you should hold", surety=0.92), 0.0, True),
+        (look("you should hold", surety=0.94), 0.0, True),
+        (look("you should hold", surety=0.92), 0.0, False),
         (look("up", surety=0.25), 0.85, True),
         (look("up", surety=0.25), 0.75, False),
         (look("you should hold", surety=0.7), 0.0, False),
@@ -63,7 +64,7 @@ def test_three_witnesses_make_likely_together_what_no_words_would(
 
 
 def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
-    reading, surer = look("which cup", surety=0.8), look("which cup", surety=0.92)
+    reading, surer = look("which cup", surety=0.8), look("which cup", surety=0.94)
     assert is_likely(replace(reading, confidence=0.5), 0.5)
     assert not is_likely(replace(reading, confidence=0.55), 0.5)
     assert is_likely(replace(surer, confidence=0.55), 0.5)
@@ -113,6 +114,12 @@ def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
     assert not is_likely(look("he", surety=0.99, is_all=False), 0.0)
     assert is_sure(look("stop the arm", surety=0.0, confidence=0.9, is_all=False), 0.0)
     assert not is_sure(look("the arm stop", surety=0.0, confidence=0.9, is_all=False), 0.0)
+
+
+@pytest.mark.parametrize(("surety", "likely"), [(0.55, True), (0.45, False), (None, True)])
+def test_a_form_that_was_read_asks_for_a_surer_ear(surety: float | None, likely: bool) -> None:
+    forms = look("the arm has stopped", ("the arm has stop", 0.5), surety=surety)
+    assert is_likely(forms, 0.65) is likely
 
 
 def test_what_is_likely_twice_is_confirmed() -> None:
