@@ -22,7 +22,8 @@ from training.speech.trials import (
 from training.voices.clip import Clip
 from training.voices.errors import EngineMissing
 from vla_deploy.speech.confidence import confidence
-from vla_deploy.speech.recogniser import Reading, Recogniser
+from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.recogniser import Recogniser
 
 NOISY_DB: Final = 10.0
 

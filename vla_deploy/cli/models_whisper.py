@@ -20,7 +20,7 @@ from vla_deploy.speech.model_tools.benching import Bench, bench, noises, recordi
 from vla_deploy.speech.model_tools.calibrating import calibrate, keep, known_recordings
 from vla_deploy.speech.model_tools.checks import Check, checks_of
 from vla_deploy.speech.model_tools.fetching import fetch
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.reading import Reading
 
 Told = tuple[dict[str, object], str]
 

@@ -5,7 +5,7 @@ from dataclasses import astuple
 from typing import Final
 
 from vla_deploy.inference.manifest import Calibration
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.reading import Reading
 
 UNCALIBRATED: Final = Calibration(bias=3.0, log_probability=4.0, no_speech=-2.0, compression=-3.0)
 """For weights that nobody has measured: a mean log-probability of -0.75 is about half sure."""

@@ -12,8 +12,8 @@ from vla_deploy.speech.echo_gate import EchoGate
 from vla_deploy.speech.frames import Frame, Framing
 from vla_deploy.speech.own_words import OwnWords
 from vla_deploy.speech.phrases import ABOVE_FLOOR_DB, OFFSET, Happening, Phrase, Phrases, Step
+from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.readings import Answer, Readings
-from vla_deploy.speech.recogniser import Reading
 from vla_deploy.speech.sound import SoundBlock, level_db
 from vla_deploy.speech.stop_watch import StopWatch
 from vla_deploy.speech.surroundings import Music, NoiseFloor

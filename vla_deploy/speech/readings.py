@@ -14,7 +14,8 @@ from typing import Final
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.recogniser import Reading, Recogniser
+from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.recogniser import Recogniser
 
 LATE_NS: Final = 5 * NS_PER_S
 MOST_WAITING: Final = 3

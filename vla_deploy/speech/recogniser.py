@@ -1,7 +1,6 @@
 """Turn speech into text by a Whisper in CTranslate2's form, and tell what speaks for it."""
 
 import math
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final
 
@@ -19,14 +18,14 @@ from vla_deploy.inference.stats import resident_mb
 from vla_deploy.inference.store import Model
 from vla_deploy.one_line import one_line
 from vla_deploy.speech.errors import SpeechMissing
+from vla_deploy.speech.reading import Reading, others_of
 from vla_deploy.speech.sound import NOTHING, RATE_HZ, Sound
 from vla_deploy.speech.stop_ear import open_stop_ear
+from vla_deploy.speech.stop_odds import ASKED_FROM, stop_odds
 
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
 _MOST_TOKENS: Final = 200
-_LEAST_ODDS: Final = 0.02
-"""Of what may have been said instead: what is less likely is none of it."""
 _COMPUTE: Final = {
     (CPU, "int8"): "int8",
     (CPU, "fp16"): "float32",
@@ -37,36 +36,6 @@ _COMPUTE: Final = {
 }
 _DEVICES: Final = {CPU: "cpu", CUDA: "cuda"}
 _RUNTIME: Final = "vla_deploy.speech.whisper_runtime"
-
-
-@dataclass(frozen=True, slots=True)
-class Alternative:
-    """Hold what may have been said instead; `odds` is its probability over the reading's own."""
-
-    text: str
-    odds: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
-    """Hold what a model read in a phrase, and what speaks for it.
-
-    `stop_surety` is how surely a stop word is in it by the ear for them, None without one.
-    `log_probability` is the mean of its tokens, `no_speech` how probably nobody spoke;
-    `compression` is how much shorter zlib makes the text. `language` is the one that was spoken,
-    as far as the model knows several. `others` is what may have been said instead, the likeliest
-    first.
-    """
-
-    text: str
-    log_probability: float
-    no_speech: float
-    compression: float
-    language: str
-    duration_s: float
-    took_s: float
-    others: tuple[Alternative, ...] = ()
-    stop_surety: float | None = None
 
 
 class Recogniser:
@@ -104,13 +73,14 @@ class Recogniser:
         started_ns = self._clock.now_ns()
         try:
             segments, info = self._transcribe(samples, hot_words)
+            text = " ".join(one.text.strip() for one in segments).strip()
             stop_surety = self._stop_surety(samples, earlier)
+            odds = self._stop_odds(text, stop_surety)
         except _model_errors() as error:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
         self.latency.record(took_ns)
         weights = [max(1, len(one.tokens)) for one in segments]
-        text = " ".join(one.text.strip() for one in segments).strip()
         return Reading(
             text=text,
             log_probability=_mean([one.avg_logprob for one in segments], weights, 0.0),
@@ -121,6 +91,7 @@ class Recogniser:
             took_s=took_ns / NS_PER_S,
             others=others_of(self._whisper.hypotheses),
             stop_surety=stop_surety,
+            stop_odds=odds,
         )
 
     def document(self) -> dict[str, Any]:
@@ -150,6 +121,13 @@ class Recogniser:
         if self._stop_ear is None:
             return None
         return self._stop_ear.surety_of(samples, earlier, self._whisper.frames_of)
+
+    def _stop_odds(self, text: str, surety: float | None) -> float | None:
+        """Return how likely a stop word was said instead, where somebody suspects one."""
+        # Of several windows of sound only the last could be asked about.
+        if surety is None or surety < ASKED_FROM or len(self._whisper.hypotheses) != 1:
+            return None
+        return stop_odds(text, self._whisper.log_probabilities)
 
     def _transcribe(self, samples: Sound, hot_words: str) -> tuple[list[Any], Any]:
         whisper = self._whisper
@@ -214,19 +192,6 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     recogniser.load_s = (clock.now_ns() - started_ns) / NS_PER_S
     recogniser.memory_mb = max(0.0, resident_mb() - before_mb)
     return recogniser
-
-
-def others_of(windows: list[list[tuple[str, float]]]) -> tuple[Alternative, ...]:
-    """Return what else was found in a phrase; of several windows of sound nobody can tell."""
-    if len(windows) != 1:
-        return ()
-    (best, best_log), *rest = windows[0]
-    odds: dict[str, float] = {}
-    for text, log_probability in rest:
-        if text and text != best:
-            odds.setdefault(text, math.exp(min(0.0, log_probability - best_log)))
-    ranked = sorted(odds.items(), key=lambda one: -one[1])
-    return tuple(Alternative(text, round(one, 4)) for text, one in ranked if one >= _LEAST_ODDS)
 
 
 def _provider(choice: ModelChoice, runtime: Any) -> str:

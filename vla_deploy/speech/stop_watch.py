@@ -18,8 +18,8 @@ from drivers.clock import NS_PER_S
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.speech.frames import Frame, joined
 from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.readings import Answer, Readings
-from vla_deploy.speech.recogniser import Reading
 from vla_deploy.speech.stopping import Look, hints, is_confirmed, is_likely, is_sure, wants_another
 from vla_deploy.speech.voice_activity import FRAME_S
 

@@ -9,7 +9,7 @@ moment more of it is heard.
 from dataclasses import dataclass
 from typing import Final
 
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.words import holds_form_of_stop, holds_stop, is_stop
 
 CALL_CONFIDENCE: Final = 0.15
@@ -46,21 +46,24 @@ GLANCED_SURETY: Final = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Enough:
-    """Bound what three witnesses must say of a stop word in a phrase, each from 0 to 1.
+    """Bound what witnesses must say of a stop word in a phrase, each from 0 to 1.
 
     They are the ear for stop words, the share of what may have been said in which one is, and the
-    spotter. Words read by more than `most_confidence` outweigh them.
+    spotter; a fourth is how likely one was said in place of a word that was read. Words read by
+    more than `most_confidence` outweigh them.
     """
 
     surety: float
     share: float = 0.0
     suspicion: float = 0.0
+    odds: float = 0.0
     most_confidence: float = 1.0
 
 
 STOP_WITNESSES: Final = (
     _Enough(surety=0.2, suspicion=0.8),
     _Enough(surety=0.6, share=0.3),
+    _Enough(surety=0.45, suspicion=0.3, odds=0.05),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
     _Enough(surety=0.93, most_confidence=0.6),
 )
@@ -166,6 +169,7 @@ def _is_witnessed(look: Look, suspicion: float) -> bool:
         surety >= row.surety
         and share >= row.share
         and suspicion >= row.suspicion
+        and (look.reading.stop_odds or 0.0) >= row.odds
         and look.confidence <= row.most_confidence
         for row in STOP_WITNESSES
     )

@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Final
 
 from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.words import is_courtesy, words_of
 
 FASTEST_WORDS_S: Final = 7.0

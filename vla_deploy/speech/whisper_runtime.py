@@ -6,6 +6,7 @@ arithmetic that wait for work give their core away.
 
 import logging
 import os
+from collections.abc import Sequence
 from typing import Any
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
@@ -35,6 +36,8 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
     `hypotheses` are those of each window of sound: texts with the logarithm of their probability,
     the best first. Whoever reads empties them before.
     """
+
+    _read: "tuple[ctranslate2.StorageView, list[int], Any] | None" = None
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -70,6 +73,7 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
             suppress_tokens=how.suppress_tokens,
             max_initial_timestamp_index=round(how.max_initial_timestamp / self.time_precision),
         )[0]
+        self._read = encoder_output, prompt, tokenizer
         found = [
             (tokenizer.decode(tokens).strip(), score * len(tokens) ** how.length_penalty)
             for tokens, score in zip(result.sequences_ids, result.scores, strict=True)
@@ -79,6 +83,27 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
         # The end of the text is a token, too.
         mean = log_probability / (len(result.sequences_ids[0]) + 1)
         return result, mean, 0.0, get_compression_ratio(text)
+
+    def log_probabilities(self, texts: Sequence[str]) -> list[float]:
+        """Return the logarithm of each text's probability, given the window that was read last."""
+        assert self._read is not None, "nothing was read yet"
+        encoded, prompt, tokenizer = self._read
+        tokens = [tokenizer.encode(f" {text}") if text else [] for text in texts]
+        states = np.array(encoded.to_device(ctranslate2.Device.cpu))
+        results = self.model.generate(
+            ctranslate2.StorageView.from_array(np.repeat(states, len(texts), axis=0)),
+            [[*prompt, *each] for each in tokens],
+            beam_size=1,
+            # As above, it ends a text at half of that.
+            max_length=len(prompt) + 2 * (1 + max(map(len, tokens))),
+            return_logits_vocab=True,
+            suppress_blank=False,
+            suppress_tokens=[],
+        )
+        return [
+            _log_probability(result.logits[0], [*each, tokenizer.eot])
+            for result, each in zip(results, tokens, strict=True)
+        ]
 
 
 class TrimmedWhisper(Whisper):
@@ -97,6 +122,14 @@ class TrimmedWhisper(Whisper):
         """Return what the encoder would be given of a phrase, (mel, frame)."""
         content_frames = len(samples) // self.feature_extractor.hop_length
         return _trimmed(super().frames_of(samples), content_frames)
+
+
+def _log_probability(logits: "list[ctranslate2.StorageView]", tokens: list[int]) -> float:
+    """Return the logarithm of the probability of tokens, by what the model gave at each step."""
+    rows = np.stack([np.array(row) for row in logits[: len(tokens)]]).astype(np.float64)
+    rows -= rows.max(axis=1, keepdims=True)
+    chosen = rows[np.arange(len(tokens)), tokens]
+    return float((chosen - np.log(np.exp(rows).sum(axis=1))).sum())
 
 
 def _trimmed(features: NDArray[np.float32], content_frames: int) -> NDArray[np.float32]:

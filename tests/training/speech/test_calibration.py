@@ -4,7 +4,7 @@ from training.speech.calibration import fit
 from training.speech.judging import Read
 from training.voices.clip import Clip
 from vla_deploy.speech.confidence import confidence
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.reading import Reading
 
 
 def _read(text: str, log_probability: float) -> Read:

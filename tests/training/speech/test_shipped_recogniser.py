@@ -18,6 +18,7 @@ from vla_deploy.inference.store import Model
 from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE
 from vla_deploy.speech.recogniser import Recogniser, open_recogniser
+from vla_deploy.speech.stop_odds import stop_odds
 
 pytest.importorskip("faster_whisper")
 pytestmark = pytest.mark.skipif(not (SHIPPED / METRICS).exists(), reason="none is shipped yet")
@@ -59,9 +60,29 @@ def test_the_ear_tells_stop_words_from_commands_in_noise(
         pytest.skip("no libespeak-ng1")
     spoken = say(text, Speaker(engine="espeak", voice="en-us"), Style())
     clip = heard(spoken, np.random.default_rng(1), 15.0)
-    surety = recogniser.read(clip.samples).stop_surety
-    assert surety is not None
-    assert (surety > 0.5) is is_stop
+    reading = recogniser.read(clip.samples)
+    assert reading.stop_surety is not None
+    assert (reading.stop_surety > 0.5) is is_stop
+    assert reading.stop_odds == (1.0 if is_stop else None)
+
+
+@pytest.mark.parametrize(
+    ("said", "text", "least", "most"),
+    [
+        ("you should halt", "you should hope", 0.9, 1.0),
+        ("go to the kitchen", "go to the kitchen", 0.0, 0.01),
+    ],
+)
+def test_a_stop_word_that_was_not_read_is_found_as_likely_as_it_is(
+    recogniser: Recogniser, said: str, text: str, least: float, most: float
+) -> None:
+    try:
+        ctypes.CDLL("libespeak-ng.so.1")
+    except OSError:
+        pytest.skip("no libespeak-ng1")
+    spoken = say(said, Speaker(engine="espeak", voice="en-us"), Style())
+    recogniser.read(heard(spoken, np.random.default_rng(1), 15.0).samples)
+    assert least <= stop_odds(text, recogniser._whisper.log_probabilities) <= most
 
 
 def test_a_command_is_read_right_at_any_length(recogniser: Recogniser) -> None:

@@ -17,7 +17,7 @@ from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.errors import RecordingsInvalid
 from vla_deploy.speech.model_tools.adding import PLAIN_CHOICE
 from vla_deploy.speech.model_tools.calibrating import calibrate, keep, known_recordings, learn
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.reading import Reading
 
 READING = Reading(
     text="turn left",

@@ -10,8 +10,9 @@ from platforms import load_profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.manifest import Context, Whisper
 from vla_deploy.speech.hearing import STOPPED, Heard, Hearing, Suspicion, unsuspected
+from vla_deploy.speech.reading import Alternative, Reading
 from vla_deploy.speech.readings import Readings
-from vla_deploy.speech.recogniser import Alternative, Reading, Recogniser
+from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.recording import StreamClock
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.verdict import Verdict

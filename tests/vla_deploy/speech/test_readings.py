@@ -13,8 +13,8 @@ from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.readings import FAST_NS, MOST_WAITING, Readings
-from vla_deploy.speech.recogniser import Reading
 
 
 class Waiting(Executor):

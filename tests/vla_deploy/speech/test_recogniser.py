@@ -14,7 +14,8 @@ from vla_deploy.inference.errors import ModelFileSpoiled, ProviderUnavailable, R
 from vla_deploy.inference.manifest import Context
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.recogniser import Recogniser, open_recogniser, others_of
+from vla_deploy.speech.reading import others_of
+from vla_deploy.speech.recogniser import Recogniser, open_recogniser
 
 CHOICE = ModelChoice(
     tiers=("ours",),
@@ -115,6 +116,22 @@ def test_a_wide_search_tells_other_readings_than_the_best(scripted_whisper: Any)
     recogniser.close()
     assert reading.text == "pick up the red cup"
     assert all(one.text != reading.text and 0 < one.odds <= 1 for one in reading.others)
+
+
+@pytest.mark.parametrize("context", [Context.TRIMMED, Context.PADDED])
+def test_any_text_is_as_likely_as_the_search_would_tell(
+    scripted_whisper: Any, context: Context
+) -> None:
+    recogniser = opened(scripted_whisper.model("ours", "pick up the red cup", context=context))
+    reading = recogniser.read(SECOND)
+    whisper = recogniser._whisper
+    ((text, log_probability),) = whisper.hypotheses[0]
+    right, wrong, longer, nothing = whisper.log_probabilities(
+        [text, "pick up the red halt", "pick up the red cup please", ""]
+    )
+    assert right == pytest.approx(log_probability, abs=0.01)
+    assert max(wrong, longer, nothing) < right - 1.0
+    assert reading.stop_odds is None, "nobody suspected a stop"
 
 
 def test_a_model_of_many_languages_tells_which_one_was_spoken(scripted_whisper: Any) -> None:

@@ -12,8 +12,9 @@ from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import RunFailed
 from vla_deploy.speech.frames import Frame
 from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.readings import FAST_NS, Answer, Readings
-from vla_deploy.speech.recogniser import Reading, Recogniser
+from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.sound import duration_ns
 from vla_deploy.speech.stop_watch import LATER_FRAMES, PATIENCE_NS, StopWatch
 from vla_deploy.speech.voice_activity import FRAME

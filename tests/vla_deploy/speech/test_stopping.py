@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.speech.recogniser import Alternative, Reading
+from vla_deploy.speech.reading import Alternative, Reading
 from vla_deploy.speech.stopping import (
     TWICE_SURETY,
     Look,

@@ -13,8 +13,8 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.speech.hearing import Heard
 from vla_deploy.speech.hot_words import HotWords, joined, thing_names
 from vla_deploy.speech.phrases import Phrase
+from vla_deploy.speech.reading import Alternative, Reading
 from vla_deploy.speech.readings import Answer
-from vla_deploy.speech.recogniser import Alternative, Reading
 from vla_deploy.speech.telling import Telling
 from vla_deploy.speech.verdict import Judgement, Verdict
 

@@ -9,7 +9,7 @@ import pytest
 from vla_deploy.inference.manifest import Calibration
 from vla_deploy.speech.confidence import confidence
 from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.recogniser import Reading
+from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.verdict import Case, Verdict, judge
 from vla_deploy.speech.words import is_stop, is_unfinished, words_of
 

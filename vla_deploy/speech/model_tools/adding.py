@@ -15,7 +15,8 @@ from vla_deploy.inference.file_check import sha256_of
 from vla_deploy.inference.manifest import Manifest, ModelFile, Whisper
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.inference.whisper_schema import NEEDED_PARTS, SPEECH_TO_TEXT, VOCABULARIES
-from vla_deploy.speech.recogniser import Reading, open_recogniser
+from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.recogniser import open_recogniser
 from vla_deploy.speech.sound import RATE_HZ
 
 OPTIONAL_PARTS: Final = ("preprocessor_config.json",)

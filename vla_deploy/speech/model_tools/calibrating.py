@@ -23,7 +23,8 @@ from vla_deploy.inference.store import Model
 from vla_deploy.speech.confidence import UNCALIBRATED, confidence, evidence_of
 from vla_deploy.speech.errors import RecordingsInvalid
 from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.recogniser import Reading, open_recogniser
+from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.recogniser import open_recogniser
 from vla_deploy.speech.sound import Sound
 from vla_deploy.speech.words import words_of
 
