@@ -26,7 +26,7 @@ a glance may see "stop it" where "stopping" is said."""
 FORM_SURETY: Final = 0.5
 """The same where a form of a stop word was read, such as "stopped": it is misread more often as the
 word than the word as it."""
-SUSPECTED_SURETY: Final = 0.1
+SUSPECTED_SURETY: Final = 0.2
 """Words that are only as sure as STOP_SUSPECTED_CONFIDENCE need an ear that is so sure."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
@@ -34,7 +34,7 @@ SLIGHT_SUSPICION: Final = 0.3
 STRONG_SUSPICION: Final = 0.6
 """From these shares of its threshold on, what the spotter heard counts beside words that were read
 within others or a stop that may have been read instead, and beside any word that may be one."""
-TWICE_SURETY: Final = 0.9
+TWICE_SURETY: Final = 0.95
 TWICE_SHARE: Final = 0.3
 TWICE_SUSPICION: Final = 0.8
 """An ear that is so sure both times needs no more than that so much of what may have been said both
@@ -63,7 +63,8 @@ class _Enough:
 STOP_WITNESSES: Final = (
     _Enough(surety=0.2, suspicion=0.8),
     _Enough(surety=0.6, share=0.3),
-    _Enough(surety=0.45, suspicion=0.3, odds=0.05),
+    _Enough(surety=0.45, suspicion=0.3, odds=0.03),
+    _Enough(surety=0.6, odds=0.05),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
     _Enough(surety=0.93, most_confidence=0.6),
 )

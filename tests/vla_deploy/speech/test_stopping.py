@@ -63,6 +63,28 @@ def test_three_witnesses_make_likely_together_what_no_words_would(
     assert not is_sure(first, suspicion)
 
 
+@pytest.mark.parametrize(
+    ("surety", "odds", "suspicion", "likely"),
+    [
+        (0.5, 0.04, 0.35, True),
+        (0.4, 0.9, 0.35, False),
+        (0.5, 0.02, 0.35, False),
+        (0.5, 0.04, 0.25, False),
+        (0.65, 0.06, 0.0, True),
+        (0.55, 0.9, 0.0, False),
+        (0.65, 0.04, 0.0, False),
+        (0.65, None, 0.5, False),
+    ],
+)
+def test_a_stop_nearly_as_likely_as_what_was_read_makes_up_for_a_doubtful_ear(
+    surety: float, odds: float | None, suspicion: float, likely: bool
+) -> None:
+    asked = look("you should hope", surety=surety, confidence=0.58)
+    asked = replace(asked, reading=replace(asked.reading, stop_odds=odds))
+    assert is_likely(asked, suspicion) is likely
+    assert not is_likely(replace(asked, is_all=False), suspicion)
+
+
 def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
     reading, surer = look("which cup", surety=0.8), look("which cup", surety=0.94)
     assert is_likely(replace(reading, confidence=0.5), 0.5)
@@ -99,8 +121,8 @@ def test_but_while_somebody_speaks_they_do_where_they_may_be_half_of_another_wor
 
 
 def test_less_sure_words_that_the_spotter_suspects_need_an_ear_that_hears_some_of_it() -> None:
-    assert is_likely(look("halt you", surety=0.12, confidence=0.45), 0.4)
-    assert not is_likely(look("halt you", surety=0.08, confidence=0.45), 0.4)
+    assert is_likely(look("halt you", surety=0.22, confidence=0.45), 0.4)
+    assert not is_likely(look("halt you", surety=0.18, confidence=0.45), 0.4)
     assert is_likely(look("halt you", surety=None, confidence=0.45), 0.4)
 
 
