@@ -119,6 +119,8 @@ def _delays_s(ear: Ear, sound: Wave, start_s: float, end_s: float) -> dict[str, 
 
 def _around(samples: Wave, snr_db: float | None, random: np.random.Generator) -> Wave:
     """Return speech with a quiet moment at each end, in noise, every other time in a room."""
+    # An engine may speak longer another time; what is drawn later must not depend on it.
+    random = random.spawn(1)[0]
     before, after = round(_BEFORE_S * RATE_HZ), round(_AFTER_S * RATE_HZ)
     sound = np.pad(at_level(samples, _LEVEL_DB), (before, after))
     if random.random() < 0.5:

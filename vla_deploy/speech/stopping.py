@@ -28,13 +28,17 @@ FORM_SURETY: Final = 0.5
 word than the word as it."""
 SUSPECTED_SURETY: Final = 0.2
 """Words that are only as sure as STOP_SUSPECTED_CONFIDENCE need an ear that is so sure."""
+STOP_READ_CONFIDENCE: Final = 0.5
+READ_SURETY: Final = 0.02
+"""Words that are so sure need an ear that does not quite rule a stop out, if nothing follows: it
+knows some voices less well than the recogniser does."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
 STRONG_SUSPICION: Final = 0.6
 """From these shares of its threshold on, what the spotter heard counts beside words that were read
 within others or a stop that may have been read instead, and beside any word that may be one."""
-TWICE_SURETY: Final = 0.95
+TWICE_SURETY: Final = 0.9
 TWICE_SHARE: Final = 0.3
 TWICE_SUSPICION: Final = 0.8
 """An ear that is so sure both times needs no more than that so much of what may have been said both
@@ -64,9 +68,10 @@ STOP_WITNESSES: Final = (
     _Enough(surety=0.2, suspicion=0.8),
     _Enough(surety=0.6, share=0.3),
     _Enough(surety=0.45, suspicion=0.3, odds=0.03),
-    _Enough(surety=0.6, odds=0.05),
+    _Enough(surety=0.6, odds=0.02),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
     _Enough(surety=0.93, most_confidence=0.6),
+    _Enough(surety=0.95, suspicion=0.3, most_confidence=0.8),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
@@ -101,6 +106,8 @@ def is_likely(look: Look, suspicion: float) -> bool:
     said instead counts, too.
     """
     reading, is_all = look.reading, look.is_all
+    if is_all and _is_read(look, suspicion, STOP_READ_CONFIDENCE, READ_SURETY):
+        return True
     if _denies(reading, FORM_SURETY if holds_form_of_stop(reading.text) else LEAST_SURETY):
         return False
     likely = [one.text for one in reading.others if one.odds >= STOP_ODDS]
@@ -112,11 +119,16 @@ def is_likely(look: Look, suspicion: float) -> bool:
         return True
     if is_all and is_stop(reading.text) and look.confidence >= CALL_CONFIDENCE:
         return True
-    is_read = holds_stop(reading.text, is_all=is_all) and suspicion >= SLIGHT_SUSPICION
-    is_heard = not _denies(reading, SUSPECTED_SURETY)
-    if is_read and is_heard and look.confidence >= STOP_SUSPECTED_CONFIDENCE:
+    if _is_read(look, suspicion, STOP_SUSPECTED_CONFIDENCE, SUSPECTED_SURETY):
         return True
     return is_all and _is_witnessed(look, suspicion)
+
+
+def _is_read(look: Look, suspicion: float, confidence: float, surety: float) -> bool:
+    """Tell whether a stop word was read so surely, and neither ear nor spotter denies it."""
+    is_heard = suspicion >= SLIGHT_SUSPICION and not _denies(look.reading, surety)
+    is_there = holds_stop(look.reading.text, is_all=look.is_all)
+    return is_there and is_heard and look.confidence >= confidence
 
 
 def wants_another(look: Look, suspicion: float) -> bool:

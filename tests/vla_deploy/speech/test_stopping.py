@@ -70,9 +70,9 @@ def test_three_witnesses_make_likely_together_what_no_words_would(
         (0.4, 0.9, 0.35, False),
         (0.5, 0.02, 0.35, False),
         (0.5, 0.04, 0.25, False),
-        (0.65, 0.06, 0.0, True),
+        (0.65, 0.03, 0.0, True),
         (0.55, 0.9, 0.0, False),
-        (0.65, 0.04, 0.0, False),
+        (0.65, 0.01, 0.0, False),
         (0.65, None, 0.5, False),
     ],
 )
@@ -91,6 +91,20 @@ def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
     assert not is_likely(replace(reading, confidence=0.55), 0.5)
     assert is_likely(replace(surer, confidence=0.55), 0.5)
     assert not is_likely(replace(surer, confidence=0.65), 0.5)
+    surest = look("which cup", surety=0.96, confidence=0.75)
+    assert is_likely(surest, 0.35)
+    assert not is_likely(surest, 0.25)
+    assert not is_likely(replace(surest, confidence=0.85), 0.35)
+
+
+def test_an_ear_that_hardly_hears_a_stop_gives_way_to_one_that_was_read_and_suspected() -> None:
+    read = look("you should halt", surety=0.03, confidence=0.55)
+    assert is_likely(read, 0.35)
+    assert not is_likely(read, 0.25)
+    assert not is_likely(replace(read, confidence=0.45), 0.35)
+    assert not is_likely(replace(read, is_all=False), 0.35)
+    ruled_out = replace(read.reading, stop_surety=0.01)
+    assert not is_likely(replace(read, reading=ruled_out), 0.35)
 
 
 @pytest.mark.parametrize(("suspicion", "confidence"), [(0.0, 0.7), (0.9, 0.65)])
@@ -98,7 +112,7 @@ def test_words_that_were_read_for_sure_outweigh_the_ear() -> None:
 def test_unsure_words_are_no_stop_where_the_ear_hears_none(
     text: str, suspicion: float, confidence: float
 ) -> None:
-    unheard = look(text, surety=0.02, confidence=confidence)
+    unheard = look(text, surety=0.01, confidence=confidence)
     assert not is_sure(unheard, suspicion)
     assert not is_likely(unheard, suspicion)
     assert is_sure(replace(unheard, confidence=0.9), suspicion)
