@@ -29,9 +29,9 @@ STATE_S: Final = 0.04
 """Each score is for so much sound."""
 LONGEST_S: Final = 27.0
 """Spoken slower it still fits into the network's 32 s; what was said first is left out."""
-LATER_S: Final = (0.03,)
+LATER_S: Final = 0.03
 PACES: Final = (0.91, 1.09)
-"""As what it is heard again: as if it had begun so much earlier or later, or was spoken so fast."""
+"""As what it is heard again: as if it had begun so much later, or was spoken so fast."""
 _RANK: Final = 3
 Array = NDArray[np.float32]
 FramesOf = Callable[[Sound], Array]
@@ -93,10 +93,8 @@ class StopEar:
 
 
 def _varied(sound: Sound, from_s: float) -> Iterator[tuple[Sound, float]]:
-    """Yield sound a moment earlier and later, slower and faster, and where its phrase begins."""
-    for later_s in LATER_S:
-        count = round(RATE_HZ * later_s)
-        yield np.pad(sound, (count, 0)) if count > 0 else sound[-count:], from_s + later_s
+    """Yield sound a moment later, slower and faster, and where its phrase begins."""
+    yield np.pad(sound, (round(RATE_HZ * LATER_S), 0)), from_s + LATER_S
     for pace in PACES:
         times = np.arange(0.0, len(sound) - 1.0, pace)
         spoken = np.interp(times, np.arange(len(sound)), sound).astype(np.float32)

@@ -37,11 +37,10 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
     the best first. Whoever reads empties them before.
     """
 
-    _read: "tuple[ctranslate2.StorageView, list[int], Any] | None" = None
-
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.hypotheses: list[list[tuple[str, float]]] = []
+        self._read: tuple[ctranslate2.StorageView, list[int], Any] | None = None
 
     def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return what the encoder would be given of a phrase, (mel, frame)."""

@@ -12,7 +12,7 @@ from training.speech.sentences import normal
 from training.speech.shipping import BEAM, CARD, LEAST_CONFIDENCE, SHIPPED
 from training.speech.trials import heard, noises_alone
 from training.voices.cast import Speaker, say
-from training.voices.clip import Style
+from training.voices.clip import Clip, Style
 from vla_deploy.inference.manifest_file import read_manifest
 from vla_deploy.inference.store import Model
 from vla_deploy.speech.confidence import confidence
@@ -34,16 +34,19 @@ def recogniser() -> Iterator[Recogniser]:
     opened.close()
 
 
-@pytest.mark.parametrize("text", COMMANDS)
-def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: str) -> None:
+def by_espeak(text: str, seed: int, snr_db: float) -> Clip:
+    """Return a text as eSpeak says it, heard in noise; the test is skipped where there is none."""
     try:
         ctypes.CDLL("libespeak-ng.so.1")
     except OSError:
         pytest.skip("no libespeak-ng1")
-    clip = heard(
-        say(text, Speaker(engine="espeak", voice="en-us"), Style()), np.random.default_rng(0), 20.0
-    )
-    reading = recogniser.read(clip.samples)
+    spoken = say(text, Speaker(engine="espeak", voice="en-us"), Style())
+    return heard(spoken, np.random.default_rng(seed), snr_db)
+
+
+@pytest.mark.parametrize("text", COMMANDS)
+def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: str) -> None:
+    reading = recogniser.read(by_espeak(text, 0, 20.0).samples)
     assert normal(reading.text) == normal(text)
     assert confidence(reading, recogniser.declared.calibration) >= LEAST_CONFIDENCE
 
@@ -54,13 +57,7 @@ def test_plain_commands_are_read_right_and_surely(recogniser: Recogniser, text: 
 def test_the_ear_tells_stop_words_from_commands_in_noise(
     recogniser: Recogniser, text: str, is_stop: bool
 ) -> None:
-    try:
-        ctypes.CDLL("libespeak-ng.so.1")
-    except OSError:
-        pytest.skip("no libespeak-ng1")
-    spoken = say(text, Speaker(engine="espeak", voice="en-us"), Style())
-    clip = heard(spoken, np.random.default_rng(1), 15.0)
-    reading = recogniser.read(clip.samples)
+    reading = recogniser.read(by_espeak(text, 1, 15.0).samples)
     assert reading.stop_surety is not None
     assert (reading.stop_surety > 0.5) is is_stop
     assert reading.stop_odds == (1.0 if is_stop else None)
@@ -76,26 +73,16 @@ def test_the_ear_tells_stop_words_from_commands_in_noise(
 def test_a_stop_word_that_was_not_read_is_found_as_likely_as_it_is(
     recogniser: Recogniser, said: str, text: str, least: float, most: float
 ) -> None:
-    try:
-        ctypes.CDLL("libespeak-ng.so.1")
-    except OSError:
-        pytest.skip("no libespeak-ng1")
-    spoken = say(said, Speaker(engine="espeak", voice="en-us"), Style())
-    recogniser.read(heard(spoken, np.random.default_rng(1), 15.0).samples)
+    recogniser.read(by_espeak(said, 1, 15.0).samples)
     assert least <= stop_odds(text, recogniser._whisper.log_probabilities) <= most
 
 
 def test_a_command_is_read_right_at_any_length(recogniser: Recogniser) -> None:
-    try:
-        ctypes.CDLL("libespeak-ng.so.1")
-    except OSError:
-        pytest.skip("no libespeak-ng1")
-    spoken = say("turn left by ninety degrees", Speaker(engine="espeak", voice="en-us"), Style())
-    clip = heard(spoken, np.random.default_rng(0), 30.0)
+    clip = by_espeak("turn left by ninety degrees", 0, 30.0)
     rate_hz, step_s = 16_000, 0.04
     counts = [round(rate_hz * step_s * number) for number in range(35)]
     read = {recogniser.read(np.pad(clip.samples, (count, 0))).text for count in counts}
-    assert {normal(one) for one in read} == {spoken.text}
+    assert {normal(one) for one in read} == {clip.text}
 
 
 def test_noise_gives_no_sure_words(recogniser: Recogniser) -> None:
