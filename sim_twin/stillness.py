@@ -11,7 +11,9 @@ import sys
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Final
 
 # Above the serial workers and control; below the kernel's own watchdogs at 99.
@@ -23,6 +25,8 @@ LEAST_NS: Final = 300_000
 _MOST: Final = 10_000
 HELD_UP_S: Final = 0.02
 """With no answer for so much longer, control may rightly take the bus for lost."""
+TOGETHER_S: Final = 0.05
+"""Control's patience with a servo, `SafetyLimits.servo_age_s`: what comes later stands apart."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +52,8 @@ class StillnessWatch:
         self._process = subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True)
 
     def worst_s(self) -> float:
-        """Return the longest time a core stood still since the last call."""
-        return max((stall.seconds for stall in self.stalls()), default=0.0)
+        """Return the most that cores stood still within any `TOGETHER_S` since the last call."""
+        return worst_together_s(self.stalls())
 
     def stalls(self) -> tuple[Stall, ...]:
         """Return every time a core was late by 0.3 ms or more since the last call."""
@@ -70,6 +74,42 @@ class StillnessWatch:
         self._process.stdin.close()
         self._process.stdout.close()
         self._process.wait()
+
+
+def worst_together_s(stalls: Sequence[Stall]) -> float:
+    """Return the most that cores stood still within any `TOGETHER_S`.
+
+    A servo's answer passes from core to core: what one after the other holds it up adds up. Two
+    that stand still at once count once.
+    """
+    spells = _spells(stalls)
+    together_ns = round(TOGETHER_S * 1e9)
+    return (
+        max(
+            (
+                sum(
+                    end_ns - at_ns
+                    for at_ns, end_ns in spells
+                    if 0 <= at_ns - begin_ns < together_ns
+                )
+                for begin_ns, _ in spells
+            ),
+            default=0,
+        )
+        / 1e9
+    )
+
+
+def _spells(stalls: Sequence[Stall]) -> list[tuple[int, int]]:
+    """Return when any core stood still, each time once: begin and end."""
+    spells: list[tuple[int, int]] = []
+    for stall in sorted(stalls, key=attrgetter("due_ns")):
+        end_ns = stall.due_ns + round(stall.seconds * 1e9)
+        if spells and stall.due_ns <= spells[-1][1]:
+            spells[-1] = (spells[-1][0], max(spells[-1][1], end_ns))
+        else:
+            spells.append((stall.due_ns, end_ns))
+    return spells
 
 
 def _watch(core: int, step_s: float, found: "deque[tuple[int, int]]") -> None:

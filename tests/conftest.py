@@ -63,6 +63,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     item.config.stash[WATCH].worst_s()
 
 
+@pytest.hookimpl(trylast=True)  # beside the failures, where a log that was cut still has it
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:

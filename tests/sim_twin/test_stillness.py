@@ -6,7 +6,15 @@ import sys
 
 import pytest
 
-from sim_twin.stillness import FINE_STEP_S, HELD_UP_S, PRIORITY, STEP_S, StillnessWatch
+from sim_twin.stillness import (
+    FINE_STEP_S,
+    HELD_UP_S,
+    PRIORITY,
+    STEP_S,
+    Stall,
+    StillnessWatch,
+    worst_together_s,
+)
 
 ABOVE = f"""
 import os, time
@@ -38,3 +46,22 @@ def test_a_core_that_stands_still_is_told_once(step_s: float) -> None:
         assert watch.worst_s() < 0.06
     finally:
         watch.close()
+
+
+def stalls(*at: tuple[float, float]) -> list[Stall]:
+    return [Stall(due_ns=round(due_s * 1e9), seconds=seconds) for due_s, seconds in at]
+
+
+@pytest.mark.parametrize(
+    ("found", "worst_s"),
+    [
+        ([], 0.0),
+        (stalls((1.0, 0.012)), 0.012),
+        (stalls((1.0, 0.012), (1.03, 0.015)), 0.027),
+        (stalls((1.03, 0.015), (1.0, 0.012)), 0.027),  # told core by core
+        (stalls((1.0, 0.012), (1.002, 0.012)), 0.014),  # both cores at once
+        (stalls((1.0, 0.012), (1.06, 0.015)), 0.015),
+    ],
+)
+def test_what_one_core_after_the_other_holds_up_adds_up(found: list[Stall], worst_s: float) -> None:
+    assert worst_together_s(found) == pytest.approx(worst_s)
