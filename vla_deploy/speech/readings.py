@@ -21,6 +21,8 @@ LATE_NS: Final = 5 * NS_PER_S
 MOST_WAITING: Final = 3
 FAST_NS: Final = NS_PER_S // 8
 """A recogniser that takes longer has no time for glances: what has ended would wait for them."""
+MOST_SLOW_RATIO: Final = 0.25
+"""Of the last readings so many may, as long as others have the computer for a moment."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,8 +64,11 @@ class Readings:
     @property
     def is_fast(self) -> bool:
         """Tell whether there is a recogniser that has time for more than what must be read."""
-        recogniser = self.recogniser
-        return recogniser is not None and recogniser.latency.percentile_ns(0.95) <= FAST_NS
+        if self.recogniser is None:
+            return False
+        lately_ns = self.recogniser.lately_ns.copy()  # another thread appends
+        slow = sum(took_ns > FAST_NS for took_ns in lately_ns)
+        return slow <= MOST_SLOW_RATIO * len(lately_ns)
 
     def take(self, recogniser: Recogniser | None, why: str) -> tuple[Recogniser | None, str]:
         """Put another recogniser to work for the next phrase; return the one before."""

@@ -1,6 +1,7 @@
 """Turn speech into text by a Whisper in CTranslate2's form, and tell what speaks for it."""
 
 import math
+from collections import deque
 from importlib import import_module
 from typing import Any, Final
 
@@ -23,6 +24,8 @@ from vla_deploy.speech.sound import NOTHING, RATE_HZ, Sound
 from vla_deploy.speech.stop_ear import open_stop_ear
 from vla_deploy.speech.stop_odds import ASKED_FROM, stop_odds
 
+LATELY: Final = 16
+"""So many of the last readings tell how busy the computer is."""
 _TOKENS_S: Final = 12.0
 _TOKENS: Final = 8
 _MOST_TOKENS: Final = 200
@@ -55,6 +58,7 @@ class Recogniser:
         self.memory_mb = 0.0
         self.claim = MemoryClaim()
         self.latency = LatencyHistogram()
+        self.lately_ns: deque[int] = deque(maxlen=LATELY)
         self._whisper: Any = whisper
         self._clock = clock
         self._beam = beam
@@ -80,6 +84,7 @@ class Recogniser:
             raise RunFailed(f"{self.model.manifest.name}: {one_line(error)}") from error
         took_ns = self._clock.now_ns() - started_ns
         self.latency.record(took_ns)
+        self.lately_ns.append(took_ns)
         weights = [max(1, len(one.tokens)) for one in segments]
         return Reading(
             text=text,
@@ -189,6 +194,7 @@ def open_recogniser(model: Model, choice: ModelChoice, *, beam: int, clock: Cloc
     recogniser = Recogniser(model, whisper, clock, provider=provider, beam=beam)
     recogniser.read(np.zeros(RATE_HZ, np.float32))
     recogniser.latency.reset()
+    recogniser.lately_ns.clear()
     recogniser.load_s = (clock.now_ns() - started_ns) / NS_PER_S
     recogniser.memory_mb = max(0.0, resident_mb() - before_mb)
     return recogniser

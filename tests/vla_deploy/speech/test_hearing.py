@@ -1,11 +1,11 @@
 """A spoken stop presses the button before its phrase has ended, once, and is no command."""
 
+from collections import deque
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from drivers.latency import LatencyHistogram
 from platforms import load_profile
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.manifest import Context, Whisper
@@ -38,7 +38,7 @@ class Reader:
         self, words: str, log_probability: float, others: tuple[Alternative, ...] = ()
     ) -> None:
         self.declared = Whisper(languages=("en",), context=Context.TRIMMED, hot_words=False)
-        self.latency = LatencyHistogram()
+        self.lately_ns: deque[int] = deque()
         self._words = words.split()
         self._log_probability = log_probability
         self._others = others

@@ -1,5 +1,6 @@
 """Phrases are read beside the steps: in advance, in order, in bounds, and never by surprise."""
 
+from collections import deque
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from typing import Any
@@ -8,7 +9,6 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.latency import LatencyHistogram
 from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import RunFailed
@@ -46,7 +46,7 @@ class Reader:
         self.earlier: list[int] = []
         self.hot_words: list[str] = []
         self.fails = False
-        self.latency = LatencyHistogram()
+        self.lately_ns: deque[int] = deque()
         self.closed = 0
 
     def read(self, samples: Any, hot_words: str, earlier: Any) -> Reading:
@@ -162,9 +162,17 @@ def test_a_glance_is_told_once_and_leaves_what_is_read_in_advance_alone(
 def test_a_slow_recogniser_has_no_time_for_glances(
     readings: Readings, pool: Waiting, reader: Reader
 ) -> None:
-    reader.latency.record(2 * FAST_NS)
+    reader.lately_ns.append(2 * FAST_NS)
     readings.glance(phrase(1, 0.5), "")
     assert not pool.waiting
+
+
+def test_one_slow_reading_of_many_leaves_time_for_glances(
+    readings: Readings, pool: Waiting, reader: Reader
+) -> None:
+    reader.lately_ns.extend((FAST_NS, FAST_NS, 2 * FAST_NS, FAST_NS))
+    readings.glance(phrase(1, 0.5), "")
+    assert pool.waiting
 
 
 def test_a_glance_that_fails_says_nothing(

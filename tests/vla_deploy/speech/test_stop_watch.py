@@ -1,12 +1,12 @@
 """What may be a stop is read once more with a moment more of sound, and stops if it still is."""
 
+from collections import deque
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from drivers.latency import LatencyHistogram
 from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.aside import AtOnce
 from vla_deploy.inference.errors import RunFailed
@@ -53,7 +53,7 @@ class Reader:
     """Read what the test says, the last of it ever again, in place of a network."""
 
     def __init__(self, *again: Reading) -> None:
-        self.latency = LatencyHistogram()
+        self.lately_ns: deque[int] = deque()
         self.lengths: list[int] = []
         self.fails = False
         self._again = again
@@ -251,7 +251,7 @@ def test_a_recogniser_that_fails_leaves_a_likely_stop_one(rig: Rig) -> None:
 
 
 def test_a_slow_recogniser_is_not_asked_again(rig: Rig) -> None:
-    rig.reader.latency.record(2 * FAST_NS)
+    rig.reader.lately_ns.append(2 * FAST_NS)
     rig.read("halt")
     assert rig.stops() == ["halt"]
     assert rig.reader.lengths == []
