@@ -6,6 +6,7 @@ likely twice: of a sentence that is cut off the end often sounds like one, and n
 moment more of it is heard.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -39,38 +40,36 @@ STRONG_SUSPICION: Final = 0.6
 """From these shares of its threshold on, what the spotter heard counts beside words that were read
 within others or a stop that may have been read instead, and beside any word that may be one."""
 TWICE_SURETY: Final = 0.9
-TWICE_SHARE: Final = 0.3
-TWICE_SUSPICION: Final = 0.8
-"""An ear that is so sure both times needs no more than that so much of what may have been said both
-times holds a stop, or so strong a suspicion: also while somebody speaks, who has gone on after the
+TWICE_SUSPICION: Final = 0.5
+TWICE_ODDS: Final = 0.1
+"""An ear that is so sure both times needs no words, if the spotter suspects a stop so much and the
+decoder finds one so likely both times: also while somebody speaks, who has gone on after the
 word."""
-GLANCED_SURETY: Final = 0.5
+GLANCED_SURETY: Final = 0.85
 """While somebody goes on, the ear, if any, has to be so sure the second time."""
+LEAST_ODDS: Final = 0.01
+"""A stop that the decoder finds less likely than that both times is none, whatever else speaks for
+one, unless the spotter has come to its threshold."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Enough:
     """Bound what witnesses must say of a stop word in a phrase, each from 0 to 1.
 
-    They are the ear for stop words, the share of what may have been said in which one is, and the
-    spotter; a fourth is how likely one was said in place of a word that was read. Words read by
-    more than `most_confidence` outweigh them.
+    They are the ear for stop words, the spotter, and the decoder: how likely one was said in place
+    of a word that was read. Words read by more than `most_confidence` outweigh them.
     """
 
     surety: float
-    share: float = 0.0
     suspicion: float = 0.0
     odds: float = 0.0
     most_confidence: float = 1.0
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.2, suspicion=0.8),
-    _Enough(surety=0.6, share=0.3),
-    _Enough(surety=0.45, suspicion=0.3, odds=0.03),
+    _Enough(surety=0.45, suspicion=0.5, odds=0.15),
     _Enough(surety=0.6, odds=0.02),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
-    _Enough(surety=0.93, most_confidence=0.6),
     _Enough(surety=0.95, suspicion=0.3, most_confidence=0.8),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
@@ -143,7 +142,10 @@ def hints(look: Look) -> bool:
 
 def is_confirmed(first: Look, second: Look, suspicion: float) -> bool:
     """Tell whether the same phrase, read again with a moment more of sound, stops the robot."""
-    if _is_heard_twice(first.reading, second.reading, suspicion):
+    readings = first.reading, second.reading
+    if suspicion < 1.0 and _are_unlikely(readings):
+        return False
+    if suspicion >= TWICE_SUSPICION and all(map(_is_surely_heard, readings)):
         return True
     if not first.is_all and _denies(second.reading, GLANCED_SURETY):
         return False
@@ -161,15 +163,17 @@ def _denies(reading: Reading, least: float) -> bool:
     return reading.stop_surety is not None and reading.stop_surety < least
 
 
-def _is_heard_twice(first: Reading, second: Reading, suspicion: float) -> bool:
-    """Tell whether the ear is sure of a stop both times, and words or spotter speak for one."""
-    readings = first, second
-    if any(holds_form_of_stop(one.text) for one in readings):
-        return False
-    if not all(_affirms(one, TWICE_SURETY) for one in readings):
-        return False
-    share = sum(map(_stop_share, readings)) / len(readings)
-    return share >= TWICE_SHARE or suspicion >= TWICE_SUSPICION
+def _are_unlikely(readings: Sequence[Reading]) -> bool:
+    """Tell whether the decoder was asked for a stop, and never found one likely."""
+    odds = [one.stop_odds for one in readings if one.stop_odds is not None]
+    return bool(odds) and max(odds) < LEAST_ODDS
+
+
+def _is_surely_heard(reading: Reading) -> bool:
+    """Tell whether the ear is sure of a stop, and the decoder finds one likely."""
+    is_likely_said = (reading.stop_odds or 0.0) >= TWICE_ODDS
+    is_form = holds_form_of_stop(reading.text)
+    return is_likely_said and not is_form and _affirms(reading, TWICE_SURETY)
 
 
 def _is_witnessed(look: Look, suspicion: float) -> bool:
@@ -177,18 +181,10 @@ def _is_witnessed(look: Look, suspicion: float) -> bool:
     surety = look.reading.stop_surety
     if surety is None or holds_form_of_stop(look.reading.text):
         return False
-    share = _stop_share(look.reading)
     return any(
         surety >= row.surety
-        and share >= row.share
         and suspicion >= row.suspicion
         and (look.reading.stop_odds or 0.0) >= row.odds
         and look.confidence <= row.most_confidence
         for row in STOP_WITNESSES
     )
-
-
-def _stop_share(reading: Reading) -> float:
-    """Return the share of what may have been said that holds a stop, each text by its odds."""
-    texts = [(reading.text, 1.0), *((one.text, one.odds) for one in reading.others)]
-    return sum(odds for text, odds in texts if holds_stop(text)) / sum(odds for _, odds in texts)
