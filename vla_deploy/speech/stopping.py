@@ -47,7 +47,7 @@ decoder finds one so likely both times: also while somebody speaks, who has gone
 word."""
 GLANCED_SURETY: Final = 0.85
 """While somebody goes on, the ear, if any, has to be so sure the second time."""
-LEAST_ODDS: Final = 0.01
+LEAST_ODDS: Final = 0.03
 """A stop that the decoder finds less likely than that both times is none, whatever else speaks for
 one, unless the spotter has come to its threshold."""
 
@@ -67,8 +67,8 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.45, suspicion=0.5, odds=0.15),
-    _Enough(surety=0.6, odds=0.02),
+    _Enough(surety=0.45, suspicion=0.6, odds=0.15),
+    _Enough(surety=0.6, odds=0.03),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
     _Enough(surety=0.95, suspicion=0.3, most_confidence=0.8),
 )

@@ -42,13 +42,13 @@ def look(
 @pytest.mark.parametrize(
     ("surety", "odds", "suspicion", "likely"),
     [
-        (0.5, 0.2, 0.55, True),
-        (0.4, 0.9, 0.55, False),
-        (0.5, 0.1, 0.55, False),
-        (0.5, 0.2, 0.45, False),
-        (0.65, 0.03, 0.0, True),
+        (0.5, 0.2, 0.65, True),
+        (0.4, 0.9, 0.65, False),
+        (0.5, 0.1, 0.65, False),
+        (0.5, 0.2, 0.55, False),
+        (0.65, 0.04, 0.0, True),
         (0.55, 0.9, 0.0, False),
-        (0.65, 0.01, 0.0, False),
+        (0.65, 0.02, 0.0, False),
         (0.65, None, 0.5, False),
         (0.75, None, 0.25, True),
         (0.75, None, 0.15, False),
@@ -182,10 +182,10 @@ def test_an_ear_that_is_sure_twice_needs_no_words_where_spotter_and_decoder_agre
 @pytest.mark.parametrize(
     ("odds", "suspicion", "stops"),
     [
-        ((0.005, 0.005), 0.9, False),
-        ((0.005, 0.005), 1.0, True),
-        ((0.005, 0.02), 0.9, True),
-        ((None, 0.005), 0.9, False),
+        ((0.02, 0.02), 0.9, False),
+        ((0.02, 0.02), 1.0, True),
+        ((0.02, 0.04), 0.9, True),
+        ((None, 0.02), 0.9, False),
         ((None, None), 0.9, True),
     ],
 )
