@@ -19,7 +19,7 @@ STOP_WITHIN_CONFIDENCE: Final = 0.85
 STOP_SUSPECTED_CONFIDENCE: Final = 0.4
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
-STOP_HEARD_TWICE_CONFIDENCE: Final = 0.7
+STOP_HEARD_TWICE_CONFIDENCE: Final = 0.6
 LEAST_SURETY: Final = 0.05
 """Less sure words than STOP_WITHIN_CONFIDENCE are no stop where the ear, if any, hears none; but
 by STOP_HEARD_TWICE_CONFIDENCE they are where the spotter suspects one as well and nothing follows:
@@ -27,12 +27,9 @@ a glance may see "stop it" where "stopping" is said."""
 FORM_SURETY: Final = 0.5
 """The same where a form of a stop word was read, such as "stopped": it is misread more often as the
 word than the word as it."""
-SUSPECTED_SURETY: Final = 0.2
-"""Words that are only as sure as STOP_SUSPECTED_CONFIDENCE need an ear that is so sure."""
-STOP_READ_CONFIDENCE: Final = 0.5
 READ_SURETY: Final = 0.02
-"""Words that are so sure need an ear that does not quite rule a stop out, if nothing follows: it
-knows some voices less well than the recogniser does."""
+"""Words that the spotter suspects too need no more than an ear that does not quite rule a stop out,
+if nothing follows: it knows some voices less well than the recogniser does."""
 STOP_ODDS: Final = 0.2
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
@@ -70,7 +67,7 @@ STOP_WITNESSES: Final = (
     _Enough(surety=0.45, suspicion=0.6, odds=0.15),
     _Enough(surety=0.6, odds=0.03),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
-    _Enough(surety=0.95, suspicion=0.3, most_confidence=0.8),
+    _Enough(surety=0.9, suspicion=0.3, most_confidence=0.8),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
@@ -105,7 +102,7 @@ def is_likely(look: Look, suspicion: float) -> bool:
     said instead counts, too.
     """
     reading, is_all = look.reading, look.is_all
-    if is_all and _is_read(look, suspicion, STOP_READ_CONFIDENCE, READ_SURETY):
+    if _is_read(look, suspicion):
         return True
     if _denies(reading, FORM_SURETY if holds_form_of_stop(reading.text) else LEAST_SURETY):
         return False
@@ -118,16 +115,15 @@ def is_likely(look: Look, suspicion: float) -> bool:
         return True
     if is_all and is_stop(reading.text) and look.confidence >= CALL_CONFIDENCE:
         return True
-    if _is_read(look, suspicion, STOP_SUSPECTED_CONFIDENCE, SUSPECTED_SURETY):
-        return True
     return is_all and _is_witnessed(look, suspicion)
 
 
-def _is_read(look: Look, suspicion: float, confidence: float, surety: float) -> bool:
-    """Tell whether a stop word was read so surely, and neither ear nor spotter denies it."""
-    is_heard = suspicion >= SLIGHT_SUSPICION and not _denies(look.reading, surety)
+def _is_read(look: Look, suspicion: float) -> bool:
+    """Tell whether a stop word was read that the spotter suspects and the ear does not rule out."""
+    least = READ_SURETY if look.is_all else LEAST_SURETY
+    is_heard = suspicion >= SLIGHT_SUSPICION and not _denies(look.reading, least)
     is_there = holds_stop(look.reading.text, is_all=look.is_all)
-    return is_there and is_heard and look.confidence >= confidence
+    return is_there and is_heard and look.confidence >= STOP_SUSPECTED_CONFIDENCE
 
 
 def wants_another(look: Look, suspicion: float) -> bool:
