@@ -82,22 +82,16 @@ def worst_together_s(stalls: Sequence[Stall]) -> float:
     A servo's answer passes from core to core: what one after the other holds it up adds up. Two
     that stand still at once count once.
     """
-    spells = _spells(stalls)
     together_ns = round(TOGETHER_S * 1e9)
-    return (
-        max(
-            (
-                sum(
-                    end_ns - at_ns
-                    for at_ns, end_ns in spells
-                    if 0 <= at_ns - begin_ns < together_ns
-                )
-                for begin_ns, _ in spells
-            ),
-            default=0,
-        )
-        / 1e9
-    )
+    window: deque[tuple[int, int]] = deque()
+    within_ns = worst_ns = 0
+    for at_ns, end_ns in _spells(stalls):
+        window.append((at_ns, end_ns - at_ns))
+        within_ns += end_ns - at_ns
+        while at_ns - window[0][0] >= together_ns:
+            within_ns -= window.popleft()[1]
+        worst_ns = max(worst_ns, within_ns)
+    return worst_ns / 1e9
 
 
 def _spells(stalls: Sequence[Stall]) -> list[tuple[int, int]]:
