@@ -30,7 +30,11 @@ def word_times(clip: Clip, word: str, *, is_last: bool) -> list[tuple[float, flo
     if clip.sounds or not can_be_timed(clip.text, word, is_last=is_last):
         return []
     start_s, end_s = (edge / RATE_HZ for edge in sounding(clip.samples))
-    return [(max(0.0, end_s - _WORD_S), end_s) if is_last else (start_s, start_s + _FIRST_WORD_S)]
+    if not is_last:
+        return [(start_s, start_s + _FIRST_WORD_S)]
+    # Said slowly it takes longer than usual: as large a part of the sound as of the letters.
+    slow_s = (end_s - start_s) * len(word) / sum(map(str.isalpha, clip.text))
+    return [(max(0.0, end_s - max(_WORD_S, slow_s)), end_s)]
 
 
 def can_be_timed(text: str, word: str, *, is_last: bool) -> bool:

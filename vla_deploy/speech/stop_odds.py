@@ -10,7 +10,7 @@ from typing import Final
 
 from vla_deploy.speech.words import STOPS, holds_stop
 
-ASKED_FROM: Final = 0.4
+ASKED_FROM: Final = 0.3
 """Whoever listens for stop words alone has to be so sure first: asking takes 10 to 30 ms."""
 MOST_WORDS: Final = 8
 """Of a long phrase only the last ones are asked about: what was said before is decided."""

@@ -37,13 +37,10 @@ STRONG_SUSPICION: Final = 0.6
 """From these shares of its threshold on, what the spotter heard counts beside words that were read
 within others or a stop that may have been read instead, and beside any word that may be one."""
 TWICE_SURETY: Final = 0.9
-TWICE_SUSPICION: Final = 0.5
-TWICE_ODDS: Final = 0.1
-"""An ear that is so sure both times needs no words, if the spotter suspects a stop so much and the
-decoder finds one so likely both times: also while somebody speaks, who has gone on after the
-word."""
+"""From here on the ear asks for another look by itself: see TWICE_WITNESSES."""
 GLANCED_SURETY: Final = 0.85
-"""While somebody goes on, the ear, if any, has to be so sure the second time."""
+"""While somebody goes on, the ear, if any, has to be so sure the second time; where it is both
+times, and a stop word was read, nothing else is asked."""
 LEAST_ODDS: Final = 0.03
 """A stop that the decoder finds less likely than that both times is none, whatever else speaks for
 one, unless the spotter has come to its threshold."""
@@ -64,6 +61,9 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
+    _Enough(surety=0.3, suspicion=0.3, odds=0.9),
+    _Enough(surety=0.4, suspicion=0.3, odds=0.4),
+    _Enough(surety=0.4, odds=0.9),
     _Enough(surety=0.45, suspicion=0.6, odds=0.15),
     _Enough(surety=0.6, odds=0.03),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
@@ -72,6 +72,12 @@ STOP_WITNESSES: Final = (
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
 """
+TWICE_WITNESSES: Final = (
+    _Enough(surety=TWICE_SURETY, suspicion=0.5, odds=0.1),
+    _Enough(surety=0.95, suspicion=0.75),
+)
+"""An ear that is so sure both times needs no words, if the other witnesses say so much both times:
+also while somebody speaks, who has gone on after the word."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +125,17 @@ def is_likely(look: Look, suspicion: float) -> bool:
 
 
 def _is_read(look: Look, suspicion: float) -> bool:
-    """Tell whether a stop word was read that the spotter suspects and the ear does not rule out."""
+    """Tell whether a stop word was read that others do not rule out.
+
+    They are the ear, and the spotter, which must suspect one unless the ear is sure in a glance.
+    """
+    if not holds_stop(look.reading.text, is_all=look.is_all):
+        return False
+    if not look.is_all and _affirms(look.reading, GLANCED_SURETY):
+        return True
     least = READ_SURETY if look.is_all else LEAST_SURETY
     is_heard = suspicion >= SLIGHT_SUSPICION and not _denies(look.reading, least)
-    is_there = holds_stop(look.reading.text, is_all=look.is_all)
-    return is_there and is_heard and look.confidence >= STOP_SUSPECTED_CONFIDENCE
+    return is_heard and look.confidence >= STOP_SUSPECTED_CONFIDENCE
 
 
 def wants_another(look: Look, suspicion: float) -> bool:
@@ -139,10 +151,10 @@ def hints(look: Look) -> bool:
 def is_confirmed(first: Look, second: Look, suspicion: float) -> bool:
     """Tell whether the same phrase, read again with a moment more of sound, stops the robot."""
     readings = first.reading, second.reading
+    if any(_is_heard_twice(row, first, second, suspicion) for row in TWICE_WITNESSES):
+        return True
     if suspicion < 1.0 and _are_unlikely(readings):
         return False
-    if suspicion >= TWICE_SUSPICION and all(map(_is_surely_heard, readings)):
-        return True
     if not first.is_all and _denies(second.reading, GLANCED_SURETY):
         return False
     is_still = is_sure(second, suspicion) or is_likely(second, suspicion)
@@ -159,28 +171,37 @@ def _denies(reading: Reading, least: float) -> bool:
     return reading.stop_surety is not None and reading.stop_surety < least
 
 
+def _stop_odds(reading: Reading) -> float | None:
+    """Return how likely the decoder finds a stop: asked for one, or by its search; None if neither.
+
+    Where it was heard as nothing but other words, no one of them stands where the stop was said.
+    """
+    asked = () if reading.stop_odds is None else (reading.stop_odds,)
+    found = (one.odds for one in reading.others if holds_stop(one.text))
+    return max((*asked, *found), default=None)
+
+
 def _are_unlikely(readings: Sequence[Reading]) -> bool:
     """Tell whether the decoder was asked for a stop, and never found one likely."""
-    odds = [one.stop_odds for one in readings if one.stop_odds is not None]
+    odds = [one for one in map(_stop_odds, readings) if one is not None]
     return bool(odds) and max(odds) < LEAST_ODDS
 
 
-def _is_surely_heard(reading: Reading) -> bool:
-    """Tell whether the ear is sure of a stop, and the decoder finds one likely."""
-    is_likely_said = (reading.stop_odds or 0.0) >= TWICE_ODDS
-    is_form = holds_form_of_stop(reading.text)
-    return is_likely_said and not is_form and _affirms(reading, TWICE_SURETY)
+def _is_heard_twice(row: _Enough, first: Look, second: Look, suspicion: float) -> bool:
+    return all(_is_enough(row, look, suspicion) for look in (first, second))
 
 
 def _is_witnessed(look: Look, suspicion: float) -> bool:
     """Tell whether other witnesses than the words that were read say enough of a stop."""
-    surety = look.reading.stop_surety
-    if surety is None or holds_form_of_stop(look.reading.text):
-        return False
-    return any(
-        surety >= row.surety
+    return any(_is_enough(row, look, suspicion) for row in STOP_WITNESSES)
+
+
+def _is_enough(row: _Enough, look: Look, suspicion: float) -> bool:
+    """Tell whether there is an ear, and all witnesses say so much; no form may have been read."""
+    return (
+        _affirms(look.reading, row.surety)
         and suspicion >= row.suspicion
-        and (look.reading.stop_odds or 0.0) >= row.odds
+        and (_stop_odds(look.reading) or 0.0) >= row.odds
         and look.confidence <= row.most_confidence
-        for row in STOP_WITNESSES
+        and not holds_form_of_stop(look.reading.text)
     )

@@ -37,6 +37,13 @@ def test_without_sounds_a_last_word_ends_with_the_clip() -> None:
     assert word_times(clip("stop, stop"), "stop", is_last=True) == []
 
 
+def test_a_last_word_that_is_said_slowly_begins_sooner() -> None:
+    ((usual_s, _),) = word_times(clip("robot, halt"), "halt", is_last=True)
+    ((start_s, end_s),) = word_times(clip("robot, halt", duration_s=2.1), "halt", is_last=True)
+    assert usual_s == pytest.approx(0.35, abs=0.02)
+    assert (start_s, end_s) == pytest.approx((1.9 - 1.8 * 4 / 9, 1.9), abs=0.02)
+
+
 def test_without_sounds_a_first_word_begins_with_the_clip() -> None:
     ((start_s, end_s),) = word_times(clip("stop it please"), "stop", is_last=False)
     assert (start_s, end_s) == pytest.approx((0.1, 0.45), abs=0.02)

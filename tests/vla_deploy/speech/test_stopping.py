@@ -43,11 +43,17 @@ def look(
     ("surety", "odds", "suspicion", "likely"),
     [
         (0.5, 0.2, 0.65, True),
-        (0.4, 0.9, 0.65, False),
+        (0.35, 0.95, 0.35, True),
+        (0.35, 0.95, 0.25, False),
+        (0.35, 0.85, 0.65, False),
+        (0.25, 1.0, 0.9, False),
+        (0.45, 0.95, 0.0, True),
+        (0.45, 0.45, 0.35, True),
+        (0.45, 0.45, 0.25, False),
         (0.5, 0.1, 0.65, False),
         (0.5, 0.2, 0.55, False),
         (0.65, 0.04, 0.0, True),
-        (0.55, 0.9, 0.0, False),
+        (0.55, 0.85, 0.0, False),
         (0.65, 0.02, 0.0, False),
         (0.65, None, 0.5, False),
         (0.75, None, 0.25, True),
@@ -63,6 +69,15 @@ def test_three_witnesses_make_likely_together_what_no_words_would(
     assert is_likely(asked, suspicion) is likely
     assert not is_sure(asked, suspicion)
     assert not is_likely(replace(asked, is_all=False), suspicion)
+
+
+def test_a_stop_that_the_search_found_is_as_good_as_one_it_was_asked_for() -> None:
+    first, second = (look("you his sock", surety=0.65, odds=one) for one in (0.01, None))
+    assert not is_likely(first, 0.0)
+    found = replace(first.reading, others=(Alternative("you should stop", 0.8),))
+    assert is_likely(replace(first, reading=found), 0.0)
+    assert is_likely(look("you his sock", ("you should stop", 0.8), surety=0.65), 0.0)
+    assert not is_confirmed(first, second, 0.9)
 
 
 def test_but_not_where_a_form_of_a_stop_was_read() -> None:
@@ -134,6 +149,18 @@ def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
     assert not is_sure(look("the arm stop", surety=0.0, confidence=0.9, is_all=False), 0.0)
 
 
+@pytest.mark.parametrize(("surety", "stops"), [(0.9, True), (0.8, False), (None, False)])
+@pytest.mark.parametrize("read", ["halt right", "you must halt before"])
+def test_but_words_before_the_last_count_where_the_ear_is_sure(
+    read: str, surety: float | None, stops: bool
+) -> None:
+    glance = look(read, surety=surety, confidence=0.1, is_all=False)
+    assert is_likely(glance, 0.0) is stops
+    assert is_confirmed(glance, glance, 0.0) is stops
+    assert not is_sure(glance, 0.0)
+    assert not is_confirmed(look("halt", surety=0.99, is_all=False), glance, 0.0)
+
+
 @pytest.mark.parametrize(("surety", "likely"), [(0.55, True), (0.45, False), (None, True)])
 def test_a_form_that_was_read_asks_for_a_surer_ear(surety: float | None, likely: bool) -> None:
     forms = look("the arm has stopped", ("the arm has stop", 0.5), surety=surety)
@@ -158,6 +185,7 @@ def test_while_somebody_goes_on_the_ear_has_to_be_surer_the_second_time(
 
 
 SURE: Any = {"surety": TWICE_SURETY + 0.01, "is_all": False}
+SURER: Any = {"surety": 0.96, "odds": 0.01, "is_all": False}
 
 
 @pytest.mark.parametrize(
@@ -168,6 +196,9 @@ SURE: Any = {"surety": TWICE_SURETY + 0.01, "is_all": False}
         (look("store that", **SURE, odds=0.2), look("store", **SURE, odds=0.2), 0.45, False),
         (look("store that", **SURE, odds=0.2), look("store", **SURE, odds=0.05), 0.55, False),
         (look("store that", **SURE), look("store", **SURE), 0.55, False),
+        (look("up", **SURER), look("up", **SURER), 0.8, True),
+        (look("up", **SURER), look("up", **SURER), 0.7, False),
+        (look("up", **SURER), look("up", **SURE, odds=0.01), 0.8, False),
         (look("halt", **SURE, odds=1.0), look("halting", **SURE, odds=0.9), 0.55, False),
         (look("halt", **SURE, odds=1.0), look("halt the", surety=0.8, odds=1.0), 0.55, False),
     ],
