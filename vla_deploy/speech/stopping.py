@@ -63,7 +63,6 @@ class _Enough:
 STOP_WITNESSES: Final = (
     _Enough(surety=0.3, suspicion=0.3, odds=0.9),
     _Enough(surety=0.4, suspicion=0.3, odds=0.4),
-    _Enough(surety=0.4, odds=0.9),
     _Enough(surety=0.45, suspicion=0.6, odds=0.15),
     _Enough(surety=0.6, odds=0.03),
     _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
@@ -74,7 +73,7 @@ was read. While somebody speaks, "stop" may become "stopped": then words alone c
 """
 TWICE_WITNESSES: Final = (
     _Enough(surety=TWICE_SURETY, suspicion=0.5, odds=0.1),
-    _Enough(surety=0.95, suspicion=0.75),
+    _Enough(surety=0.95, suspicion=0.6),
 )
 """An ear that is so sure both times needs no words, if the other witnesses say so much both times:
 also while somebody speaks, who has gone on after the word."""
