@@ -43,15 +43,15 @@ GLANCED_SURETY: Final = 0.85
 times, and a stop word was read, nothing else is asked."""
 LEAST_ODDS: Final = 0.03
 """A stop that the decoder finds less likely than that both times is none, whatever else speaks for
-one, unless the spotter has come to its threshold."""
+one, unless the spotter has come to its threshold or a row of TWICE_WITNESSES does without it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Enough:
     """Bound what witnesses must say of a stop word in a phrase, each from 0 to 1.
 
-    They are the ear for stop words, the spotter, and the decoder: how likely one was said in place
-    of a word that was read. Words read by more than `most_confidence` outweigh them.
+    They are the ear for stop words, the spotter, and the decoder: how likely one was said instead
+    (`_stop_odds`). Words read by more than `most_confidence` outweigh them.
     """
 
     surety: float
@@ -181,7 +181,7 @@ def _stop_odds(reading: Reading) -> float | None:
 
 
 def _are_unlikely(readings: Sequence[Reading]) -> bool:
-    """Tell whether the decoder was asked for a stop, and never found one likely."""
+    """Tell whether the decoder was asked for a stop or found one, and never a likely one."""
     odds = [one for one in map(_stop_odds, readings) if one is not None]
     return bool(odds) and max(odds) < LEAST_ODDS
 
