@@ -1,22 +1,26 @@
 """Run what listens for a stop on board, spotter and recogniser, over whole pieces of sound."""
 
 import time
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from benchmarks.speech_stop_recall import Glances, Recall, RecallingReader
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.voices.clip import RATE_HZ, Wave
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.speech.choosing import ears_of
-from vla_deploy.speech.hearing import Room
-from vla_deploy.speech.recording import StreamClock, open_hearing
+from vla_deploy.speech.hearing import Hearing, Room
+from vla_deploy.speech.readings import Readings
+from vla_deploy.speech.recording import StreamClock
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.stop_words.opening import open_spotter
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
 from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
 from vla_deploy.speech.verdict import Verdict
+from vla_deploy.speech.voice_activity import open_voice_activity
 from vla_deploy.state_dir import user_base
 
 BLOCK: Final = RATE_HZ // 50
@@ -37,7 +41,7 @@ class Alarm:
 class Ear:
     """Run over whole pieces of sound what listens on board."""
 
-    def __init__(self) -> None:
+    def __init__(self, recall: Recall, glances: Glances) -> None:
         profile = load_profile("desktop")
         shelf = ModelShelf.of_base(user_base(), MonotonicClock())
         self.spotter: Spotter
@@ -47,9 +51,17 @@ class Ear:
         self._clock = StreamClock()
         ears = ears_of(shelf, profile, 0)
         self.why_no_words = ears.why
+        lately_ns = ears.recogniser.lately_ns if ears.recogniser is not None else deque[int]()
+        self._reader = RecallingReader(lately_ns, recall, glances)
+        readings = Readings(self._reader, self._clock)
+        readings.take(ears.recogniser, ears.why)
         self._suspicions = Suspicions()
-        self._hearing = open_hearing(
-            ears.recogniser, ears.why, profile, self._clock, suspicion=self._suspicions.highest
+        self._hearing = Hearing(
+            open_voice_activity(self._clock),
+            readings,
+            profile.speech,
+            lambda: "",
+            self._suspicions.highest,
         )
         self._count = 0
         self.busy_s = {SPOTTER: 0.0, WORDS: 0.0}
@@ -72,8 +84,9 @@ class Ear:
             for by, listen in ((SPOTTER, self._spot), (WORDS, self._read)):
                 began_s, busy_s = time.perf_counter(), time.process_time()
                 word = listen(block)
-                took_s = time.perf_counter() - began_s
-                self.busy_s[by] += time.process_time() - busy_s
+                recalled_s = self._reader.recalled_s()
+                took_s = time.perf_counter() - began_s + recalled_s
+                self.busy_s[by] += time.process_time() - busy_s + recalled_s
                 if word:
                     at_s = (at + len(samples)) / RATE_HZ
                     yield Alarm(word=word, by=by, at_s=at_s, computed_s=took_s)

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from benchmarks.speech_stop_recall import Recall, spoken
 from training.stop_words.cast import PARTS, Part, draw_style
 from training.stop_words.texts import is_clean
 from training.stop_words.timing import word_times
@@ -68,13 +69,14 @@ _SENTENCE: Final = re.compile(r"[A-Z][a-z]+(?: [a-z]+[,;]?){3,20}[.?!]")
 class Voices:
     """Know which engines are installed, and draw from their voices."""
 
-    def __init__(self) -> None:
+    def __init__(self, recall: Recall) -> None:
         """Try every engine once.
 
         Raises:
             EngineMissing: there is none at all.
         """
         self.missing: dict[str, str] = {}
+        self._recall = recall
         parts = {}
         for part in PARTS:
             try:
@@ -102,17 +104,25 @@ class Voices:
         both = part.voices and part.held_voices
         kept = part.held_voices if both and random.random() < 0.5 else _all_voices(part)
         voice = kept[int(random.integers(len(kept)))]
-        return _spoken(part, text, voice, random)
+        return self._spoken(part, text, voice, random)
 
     def before(self, clip: Clip, random: np.random.Generator) -> Wave:
         """Let the voice of a clip say something else first; return the end of it and a pause."""
         texts = _overheard()
         text = texts[int(random.integers(len(texts)))]
-        talk = _spoken(self._parts[clip.engine], text, clip.voice, random)
+        talk = self._spoken(self._parts[clip.engine], text, clip.voice, random)
         if talk is None:
             return NOTHING
         kept = talk.samples[-round(RATE_HZ * _TALKED_S) :]
         return np.pad(kept, (0, round(RATE_HZ * random.uniform(*_PAUSE_S))))
+
+    def _spoken(
+        self, part: Part, text: str, voice: str, random: np.random.Generator
+    ) -> Clip | None:
+        try:
+            return spoken(self._recall, part, text, voice, draw_style(random))
+        except SynthesisFailed:
+            return None
 
 
 def phrases(
@@ -141,13 +151,6 @@ def other_talk(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
 def words_alike(voices: Voices, random: np.random.Generator) -> Iterator[Clip]:
     """Yield sentences made of words that sound like a stop word, without end."""
     return _endless(_NEAR, voices, random)
-
-
-def _spoken(part: Part, text: str, voice: str, random: np.random.Generator) -> Clip | None:
-    try:
-        return part.speak(text, voice, draw_style(random))
-    except SynthesisFailed:
-        return None
 
 
 def _endless(texts: Sequence[str], voices: Voices, random: np.random.Generator) -> Iterator[Clip]:

@@ -39,14 +39,23 @@ ROLES: Final = {"anna": Role.ADMIN, "vera": Role.VIEWER}
 PASSWORD: Final = "five-words-that-nobody-guesses"
 SPOKEN: Final = "turn left"
 MICROPHONE_HZ: Final = 48_000
-SLOWER: Final = 'inherits = "desktop"\nperception_rate_hz = 4\ncamera_rate_hz = 4\n'
+SLOWER: Final = """\
+inherits = "desktop"
+control_rate_hz = 100
+perception_rate_hz = 4
+camera_rate_hz = 4
+"""
+"""What leaves a slow computer room for a browser: control and the twin run before all others."""
 
 expect.set_options(timeout=30_000)  # the machine may be busy; what is quick is not slowed by this
 
 
 @pytest.fixture(scope="package")
-def stack() -> Iterator[ProcessStack]:
-    """The real processes on a twin, armed, with a dashboard that trusts nobody unknown."""
+def stack(chromium: Browser) -> Iterator[ProcessStack]:
+    """The real processes on a twin, armed, with a dashboard that trusts nobody unknown.
+
+    The browser is up before: beside the robot that takes long.
+    """
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:  # sockets want a short path
         base = Path(folder) / "base"
         settings = config_dir_of(base) / SETTINGS_FILE
