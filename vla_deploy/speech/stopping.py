@@ -20,7 +20,9 @@ STOP_SUSPECTED_CONFIDENCE: Final = 0.4
 """The same, of a stop word anywhere among others: more words may be misread as one. The second is
 enough where the spotter suspects one."""
 STOP_HEARD_TWICE_CONFIDENCE: Final = 0.6
-LEAST_SURETY: Final = 0.05
+HINT_SURETY: Final = 0.05
+"""From here on what the ear hears is worth another look."""
+LEAST_SURETY: Final = 0.2
 """Less sure words than STOP_WITHIN_CONFIDENCE are no stop where the ear, if any, hears none; but
 by STOP_HEARD_TWICE_CONFIDENCE they are where the spotter suspects one as well and nothing follows:
 a glance may see "stop it" where "stopping" is said."""
@@ -41,7 +43,7 @@ TWICE_SURETY: Final = 0.9
 GLANCED_SURETY: Final = 0.85
 """While somebody goes on, the ear, if any, has to be so sure the second time; where it is both
 times, and a stop word was read, nothing else is asked."""
-LEAST_ODDS: Final = 0.03
+LEAST_ODDS: Final = 0.05
 """A stop that the decoder finds less likely than that both times is none, whatever else speaks for
 one, unless the spotter has come to its threshold or a row of TWICE_WITNESSES does without it."""
 
@@ -61,11 +63,10 @@ class _Enough:
 
 
 STOP_WITNESSES: Final = (
-    _Enough(surety=0.3, suspicion=0.3, odds=0.9),
+    _Enough(surety=0.35, suspicion=0.3, odds=0.9),
     _Enough(surety=0.4, suspicion=0.3, odds=0.4),
     _Enough(surety=0.45, suspicion=0.6, odds=0.15),
-    _Enough(surety=0.6, odds=0.03),
-    _Enough(surety=0.7, suspicion=0.2, most_confidence=0.5),
+    _Enough(surety=0.6, odds=0.1),
     _Enough(surety=0.9, suspicion=0.3, most_confidence=0.8),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
@@ -144,7 +145,7 @@ def wants_another(look: Look, suspicion: float) -> bool:
 
 def hints(look: Look) -> bool:
     """Tell whether the ear hears anything like a stop, which another look may make likely."""
-    return _affirms(look.reading, LEAST_SURETY)
+    return _affirms(look.reading, HINT_SURETY)
 
 
 def is_confirmed(first: Look, second: Look, suspicion: float) -> bool:
