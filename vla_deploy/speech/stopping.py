@@ -66,7 +66,7 @@ STOP_WITNESSES: Final = (
     _Enough(surety=0.35, suspicion=0.3, odds=0.9),
     _Enough(surety=0.4, suspicion=0.3, odds=0.4),
     _Enough(surety=0.45, suspicion=0.6, odds=0.15),
-    _Enough(surety=0.6, odds=0.1),
+    _Enough(surety=0.7, odds=0.1),
     _Enough(surety=0.9, suspicion=0.3, most_confidence=0.8),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word

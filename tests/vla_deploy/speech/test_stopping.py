@@ -52,10 +52,10 @@ def look(
         (0.45, 0.45, 0.25, False),
         (0.5, 0.1, 0.65, False),
         (0.5, 0.2, 0.55, False),
-        (0.65, 0.12, 0.0, True),
-        (0.55, 0.9, 0.0, False),
-        (0.65, 0.08, 0.0, False),
-        (0.65, None, 0.5, False),
+        (0.75, 0.12, 0.0, True),
+        (0.65, 0.9, 0.0, False),
+        (0.75, 0.08, 0.0, False),
+        (0.75, None, 0.5, False),
         (0.85, None, 0.5, False),
         (None, None, 0.9, False),
     ],
@@ -70,11 +70,11 @@ def test_three_witnesses_make_likely_together_what_no_words_would(
 
 
 def test_a_stop_that_the_search_found_is_as_good_as_one_it_was_asked_for() -> None:
-    first, second = (look("you his sock", surety=0.65, odds=one) for one in (0.01, None))
+    first, second = (look("you his sock", surety=0.75, odds=one) for one in (0.01, None))
     assert not is_likely(first, 0.0)
     found = replace(first.reading, others=(Alternative("you should stop", 0.8),))
     assert is_likely(replace(first, reading=found), 0.0)
-    assert is_likely(look("you his sock", ("you should stop", 0.8), surety=0.65), 0.0)
+    assert is_likely(look("you his sock", ("you should stop", 0.8), surety=0.75), 0.0)
     assert not is_confirmed(first, second, 0.9)
 
 
