@@ -12,15 +12,13 @@ from platforms import load_profile
 from training.voices.clip import RATE_HZ, Wave
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.speech.choosing import ears_of
-from vla_deploy.speech.hearing import Hearing, Room
-from vla_deploy.speech.readings import Readings
-from vla_deploy.speech.recording import StreamClock
+from vla_deploy.speech.hearing import Room
+from vla_deploy.speech.recording import StreamClock, open_hearing
 from vla_deploy.speech.sound import SoundBlock, duration_ns
 from vla_deploy.speech.stop_words.opening import open_spotter
 from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
 from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
 from vla_deploy.speech.verdict import Verdict
-from vla_deploy.speech.voice_activity import open_voice_activity
 from vla_deploy.state_dir import user_base
 
 BLOCK: Final = RATE_HZ // 50
@@ -53,15 +51,14 @@ class Ear:
         self.why_no_words = ears.why
         lately_ns = ears.recogniser.lately_ns if ears.recogniser is not None else deque[int]()
         self._reader = RecallingReader(lately_ns, recall, glances)
-        readings = Readings(self._reader, self._clock)
-        readings.take(ears.recogniser, ears.why)
         self._suspicions = Suspicions()
-        self._hearing = Hearing(
-            open_voice_activity(self._clock),
-            readings,
-            profile.speech,
-            lambda: "",
-            self._suspicions.highest,
+        self._hearing = open_hearing(
+            ears.recogniser,
+            ears.why,
+            profile,
+            self._clock,
+            suspicion=self._suspicions.highest,
+            executor=self._reader,
         )
         self._count = 0
         self.busy_s = {SPOTTER: 0.0, WORDS: 0.0}

@@ -44,27 +44,37 @@ class Recall:
 
     def __init__(self, path: Path | None = None) -> None:
         """Open the file, or begin it."""
-        self._answers = sqlite3.connect(path or ":memory:", isolation_level=None)
-        self._answers.execute("PRAGMA synchronous = OFF")
-        self._answers.execute(_TABLE)
-        self._keeps = path is not None
+        self._answers = None if path is None else sqlite3.connect(path, isolation_level=None)
+        if self._answers is not None:
+            self._answers.execute("PRAGMA synchronous = OFF")
+            self._answers.execute(_TABLE)
 
-    def find(self, asked: bytes) -> bytes | None:
+    def find(self, key: bytes) -> bytes | None:
         """Return what was answered before."""
-        key = hashlib.sha256(asked).digest()
+        if self._answers is None:
+            return None
         query = self._answers.execute("SELECT answer FROM answers WHERE asked = ?", (key,))
         found: tuple[bytes] | None = query.fetchone()
         return None if found is None else found[0]
 
-    def keep(self, asked: bytes, answer: bytes) -> None:
+    def keep(self, key: bytes, answer: bytes) -> None:
         """Keep an answer, if there is a file."""
-        if self._keeps:
-            key = hashlib.sha256(asked).digest()
+        if self._answers is not None:
             self._answers.execute("INSERT OR REPLACE INTO answers VALUES (?, ?)", (key, answer))
 
     def close(self) -> None:
         """Close the file."""
-        self._answers.close()
+        if self._answers is not None:
+            self._answers.close()
+
+
+def key_of(*asked: object) -> bytes:
+    """Return what stands for a question, whatever sound is in it."""
+    digest = hashlib.sha256()
+    for one in asked:
+        digest.update(one.tobytes() if isinstance(one, np.ndarray) else repr(one).encode())
+        digest.update(b"|")
+    return digest.digest()
 
 
 def spoken(recall: Recall, part: Part, text: str, voice: str, style: Style) -> Clip:
@@ -73,8 +83,8 @@ def spoken(recall: Recall, part: Part, text: str, voice: str, style: Style) -> C
     Raises:
         SynthesisFailed: the voice cannot say it.
     """
-    asked = repr((part.engine, text, voice, style)).encode()
-    before = recall.find(asked)
+    key = key_of(part.engine, text, voice, style)
+    before = recall.find(key)
     if before is not None:
         head, _, samples = before.partition(b"\n")
         told = json.loads(head)
@@ -83,7 +93,7 @@ def spoken(recall: Recall, part: Part, text: str, voice: str, style: Style) -> C
     clip = part.speak(text, voice, style)
     told = {"text": clip.text, "engine": clip.engine, "voice": clip.voice}
     told["sounds"] = [asdict(one) for one in clip.sounds]
-    recall.keep(asked, json.dumps(told).encode() + b"\n" + clip.samples.tobytes())
+    recall.keep(key, json.dumps(told).encode() + b"\n" + clip.samples.tobytes())
     return clip
 
 
@@ -108,11 +118,11 @@ class RecallingReader(AtOnce):
         return recalled_s
 
     def _read(self, read: Callable[..., Reading], args: tuple[Any, ...]) -> Reading:
-        asked = b"|".join(map(_bytes_of, args))
-        before = self._recall.find(asked)
+        key = key_of(*args)
+        before = self._recall.find(key)
         if before is None:
             reading = read(*args)
-            self._recall.keep(asked, json.dumps(asdict(reading)).encode())
+            self._recall.keep(key, json.dumps(asdict(reading)).encode())
         else:
             told = json.loads(before)
             others = tuple(Alternative(**one) for one in told.pop("others"))
@@ -127,7 +137,3 @@ class RecallingReader(AtOnce):
             self._lately_ns.clear()
         elif self._glances is Glances.NEVER:
             self._lately_ns.extend([FAST_NS + 1] * LATELY)
-
-
-def _bytes_of(asked: object) -> bytes:
-    return asked.tobytes() if isinstance(asked, np.ndarray) else repr(asked).encode()

@@ -1,6 +1,7 @@
 """Hear a whole recording as the robot would hear it live, only faster."""
 
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from typing import Any, Final
 
 import numpy as np
@@ -41,14 +42,17 @@ def open_hearing(
     clock: Clock,
     hot_words: str = "",
     suspicion: Suspicion = unsuspected,
+    executor: Executor | None = None,
 ) -> Hearing:
     """Return hearing that reads each phrase at once, as no process' steps wait for it.
+
+    An `executor` of one thread, or one that works at once, may read in its own way.
 
     Raises:
         SpeechMissing: faster-whisper is not installed.
         InferenceError: its voice network cannot be opened.
     """
-    readings = Readings(AtOnce(), clock)
+    readings = Readings(executor or AtOnce(), clock)
     readings.take(recogniser, why)
     activity = open_voice_activity(clock)
     return Hearing(activity, readings, profile.speech, lambda: hot_words, suspicion)

@@ -18,7 +18,7 @@ def test_the_flight_of_a_stop_is_downloaded(
     robot.operate("estop")
     page: Page = pages.of("anna", "events/files")
     link = page.get_by_role("link", name="Download").first
-    expect(link).to_be_visible(timeout=60_000)
+    expect(link).to_be_visible()
     with page.expect_download() as download:
         link.click()
     saved = tmp_path / download.value.suggested_filename
