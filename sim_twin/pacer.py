@@ -7,8 +7,10 @@ class Pacer:
     """Say when the next physics step is due.
 
     A machine that falls behind may catch up `lag_cap_ns` of steps; whatever is older is dropped, so
-    that simulated time slips and the buses are served between any two steps. `worst_lag_ns` is the
-    furthest behind since somebody set it to 0.
+    that simulated time slips and the buses are served between any two steps. It rests after a step
+    for as long as that took, a period at most: the twin runs before all others, and a slow computer
+    would have nothing left for the robot. `worst_lag_ns` is the furthest behind since somebody set
+    it to 0.
     """
 
     def __init__(self, step_ns: int, start_ns: int, lag_cap_ns: int = LAG_CAP_NS) -> None:
@@ -17,6 +19,8 @@ class Pacer:
         self._step_ns = step_ns
         self._lag_cap_ns = lag_cap_ns
         self._due_ns = start_ns
+        self._begun_ns = start_ns
+        self._rested_ns = start_ns
 
     def due(self, wall_ns: int) -> bool:
         """Return whether a step is due at `wall_ns`; drop the lag beyond the cap."""
@@ -26,15 +30,20 @@ class Pacer:
         if excess_ns > 0:
             self.slipped_ns += excess_ns
             self._due_ns += excess_ns
-        return wall_ns >= self._due_ns
+        self._begun_ns = wall_ns
+        return wall_ns >= max(self._due_ns, self._rested_ns)
 
     def stepped(self) -> None:
         """Note that one step was made."""
         self._due_ns += self._step_ns
 
+    def rest(self, wall_ns: int) -> None:
+        """Begin to rest at `wall_ns`, when all is done that the step brought with it."""
+        self._rested_ns = wall_ns + min(self._step_ns, wall_ns - self._begun_ns)
+
     def wait_ns(self, wall_ns: int) -> int:
         """Return how long from `wall_ns` to the next step, at least 0."""
-        return max(0, self._due_ns - wall_ns)
+        return max(0, max(self._due_ns, self._rested_ns) - wall_ns)
 
     def since_step_ns(self, wall_ns: int) -> int:
         """Return how much of a step has passed since the last one, at most a whole one."""

@@ -182,7 +182,7 @@ class TwinProcess:
     def _hear_frames(self) -> None:
         """Take what hosts have sent on CAN, as sent now."""
         self._twin.can_wire.poll(self._now_ns())
-        self._hub.poll_once()
+        self._hub.carry_once()
 
     def _step(self, wall_ns: int) -> None:
         # What waits was sent before now: were it heard after the step, heartbeats would be missed.
@@ -190,10 +190,9 @@ class TwinProcess:
         self._twin.step()
         self._pacer.stepped()
         for line in self._plugged():
-            line.poll_once()
+            line.send_once()
         for stream in self._streams.values():
-            if stream.has_client:
-                stream.poll_once()
+            stream.send_once()
         now_ns = self._twin.now_ns
         self._factor.update(wall_ns, now_ns)
         self._status.tell(wall_ns, now_ns, self._factor.value)
@@ -205,6 +204,7 @@ class TwinProcess:
         )
         for drawing in self._drawings:
             drawing.show(state)
+        self._pacer.rest(self._clock.now_ns())
 
     def _plugged(self) -> list[PtyLine]:
         return [line for line in self._lines.values() if line.is_plugged]
@@ -222,7 +222,8 @@ class TwinProcess:
             if not ready.isdisjoint(stream.filenos()):
                 stream.poll_once()
         if not ready.isdisjoint(self._hub.filenos()):
-            self._hear_frames()
+            self._twin.can_wire.poll(self._now_ns())
+            self._hub.poll_once()
         if not ready.isdisjoint(self._referee.filenos()):
             self._referee.poll_once()
 

@@ -192,7 +192,7 @@ class ProcessStack:
         """Return the speed of the fastest joint."""
         return fastest_joint(self.truth())[1]
 
-    def wait_until(self, condition: Callable[[], object], timeout_s: float = 30.0) -> bool:
+    def wait_until(self, condition: Callable[[], object], timeout_s: float = 60.0) -> bool:
         """Return whether `condition()` came true in time."""
         deadline_ns = self._clock.now_ns() + round(timeout_s * NS_PER_S)
         while not condition():

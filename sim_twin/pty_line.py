@@ -75,10 +75,18 @@ class PtyLine:
             if self._on_baud is not None:
                 self._on_baud(_baud_of(terminal))
             self._device.receive(request)
-        reply = self._device.transmit()
-        if reply:
-            self._write(line, reply)
-        return bool(request or reply)
+        return self._send(line) or bool(request)
+
+    def send_once(self) -> bool:
+        """Send what the device has ready by now, and leave what the host has sent; False when idle.
+
+        Raises:
+            LinkLost: the line is unplugged.
+        """
+        line, _ = self._plugged_ends()
+        if self._now_ns is not None:
+            self._device.step(self._now_ns())
+        return self._send(line)
 
     def send_at(self, due_ns: int, now_ns: Callable[[], int]) -> None:
         """Take what the device has ready at `due_ns`, watch the clock, and send it at that moment.
@@ -130,6 +138,12 @@ class PtyLine:
         if self._ends is None:
             raise LinkLost(f"{self.link_path}: unplugged; call replug() before using the line")
         return self._ends
+
+    def _send(self, line: int) -> bool:
+        reply = self._device.transmit()
+        if reply:
+            self._write(line, reply)
+        return bool(reply)
 
     def _read(self, line: int) -> bytes:
         try:

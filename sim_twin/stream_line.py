@@ -29,11 +29,6 @@ class StreamLine:
         """Return whether the client has yet to take what it was sent."""
         return len(self._pending) > 0
 
-    @property
-    def has_client(self) -> bool:
-        """Return whether somebody is there to be sent anything."""
-        return self._client is not None
-
     def filenos(self) -> list[int]:
         """Return the descriptors whose input matters."""
         sockets = [each for each in (self._listener, self._client) if each is not None]
@@ -54,6 +49,15 @@ class StreamLine:
             self._take_input(self._client)
             self._give_output(self._client)
         except OSError:  # the client died: the device hears of it and awaits the next one
+            self._drop()
+
+    def send_once(self) -> None:
+        """Give the client that is there what the device has ready; never waits."""
+        if self._client is None:
+            return
+        try:
+            self._give_output(self._client)
+        except OSError:
             self._drop()
 
     def unplug(self) -> None:

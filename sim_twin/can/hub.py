@@ -77,6 +77,10 @@ class CanHub:
     def poll_once(self) -> None:
         """Accept who knocks and carry what has been sent."""
         self._accept()
+        self.carry_once()
+
+    def carry_once(self) -> None:
+        """Carry what the clients that are known have sent."""
         for client in tuple(self._clients):
             self._serve(client)
 

@@ -2,14 +2,21 @@
 
 import json
 from http.client import HTTPConnection
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 import pytest
 
 from sim_twin.process_stack import ProcessStack
 
-pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+SLOWER: Final = str(Path(__file__).with_name("slower.toml"))
+pytestmark = [
+    pytest.mark.gl,
+    pytest.mark.stack,
+    pytest.mark.timeout(300),
+    pytest.mark.twin(profile=SLOWER),
+]
 
 MOVING_RAD_S = 1.0
 STANDSTILL_RAD_S = 0.05

@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Final
 
 import pytest
 
@@ -15,12 +16,13 @@ from platforms import load_profile
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
 
-pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 
 VLA_DEPLOY = [sys.executable, "-m", "vla_deploy.cli"]
 STANDSTILL_RAD_S = 0.02
 MOVING_RAD_S = 1.0
 DRIVE = "go to the kitchen"
+SLOWER: Final = str(Path(__file__).with_name("slower.toml"))
 
 
 class Run(ProcessStack):
@@ -42,7 +44,7 @@ def start(base: Path) -> Iterator[Callable[..., Run]]:
     runs: list[Run] = []
 
     def begin(*options: str) -> Run:
-        runs.append(Run(base, *options))
+        runs.append(Run(base, "--profile", SLOWER, *options))
         runs[-1].wait_until_armed()
         return runs[-1]
 
@@ -113,7 +115,7 @@ def test_bad_requests_are_one_line_each_and_lose_nothing(run: Run, tmp_path: Pat
 
 
 def test_kill_9_of_control_stops_the_robot_and_leaves_it_disarmed(run: Run) -> None:
-    profile = load_profile("desktop")
+    profile = load_profile(SLOWER)
     saying = run.drive()
     run.kill("control")
     # Physics runs on the wall clock here: allow a busy machine some time to ask.

@@ -1,3 +1,5 @@
+import pytest
+
 from sim_twin.pacer import Pacer, RealTimeFactor
 
 MS = 1_000_000
@@ -50,6 +52,37 @@ def test_time_that_slipped_is_never_made_up_later() -> None:
     pacer = Pacer(2 * MS, start_ns=0)
     steps_due(pacer, 1000 * MS)
     assert steps_due(pacer, 1004 * MS) == 2
+
+
+def test_it_rests_as_long_as_a_step_took_and_catches_up_in_between() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    assert pacer.due(10 * MS)
+    pacer.stepped()
+    pacer.rest(11 * MS)
+    assert pacer.wait_ns(11 * MS) == MS
+    assert [pacer.due(wall) for wall in (11 * MS, 12 * MS)] == [False, True]
+    assert pacer.slipped_ns == 0
+
+
+def test_a_computer_that_is_too_slow_keeps_half_of_its_time() -> None:
+    pacer, wall_ns, steps = Pacer(2 * MS, start_ns=0), 0, 0
+    while wall_ns < 1000 * MS:
+        wall_ns += pacer.wait_ns(wall_ns)
+        if pacer.due(wall_ns):
+            wall_ns += 2 * MS
+            pacer.stepped()
+            pacer.rest(wall_ns)
+            steps += 1
+    assert steps == 251
+    assert pacer.slipped_ns == pytest.approx(480 * MS, rel=0.02)
+
+
+def test_a_step_that_was_held_up_is_followed_by_a_period_of_rest_at_most() -> None:
+    pacer = Pacer(2 * MS, start_ns=0)
+    assert pacer.due(0)
+    pacer.stepped()
+    pacer.rest(300 * MS)
+    assert pacer.wait_ns(300 * MS) == 2 * MS
 
 
 def test_the_real_time_factor_is_that_of_the_last_whole_window() -> None:

@@ -71,6 +71,19 @@ def test_a_line_without_bytes_is_idle_also_before_and_after_a_host(line: PtyLine
     assert not line.poll_once()
 
 
+def test_what_is_ready_is_sent_without_hearing_the_host(line: PtyLine, device: Echo) -> None:
+    host = open_host(line)
+    os.write(host, b"asked")
+    device.ready = b"told"
+    assert line.send_once()
+    assert readable(host, 1000)
+    assert os.read(host, 4096) == b"told"
+    assert not line.send_once()
+    assert line.poll_once()
+    assert os.read(host, 4096) == b"asked"
+    os.close(host)
+
+
 def test_bytes_that_nobody_fetches_are_lost_and_counted(line: PtyLine, device: Echo) -> None:
     for _ in range(200):
         device.ready = EVERY_BYTE

@@ -55,6 +55,25 @@ def test_bytes_go_both_ways(line: StreamLine, device: Loudspeaker, tmp_path: Pat
         assert client.recv(100) == b"frame"
 
 
+def test_what_is_ready_is_sent_to_the_client_that_is_there(
+    line: StreamLine, device: Loudspeaker, tmp_path: Path, hang_ups: list[str]
+) -> None:
+    device.to_say = b"frame"
+    line.send_once()
+    assert device.to_say == b"frame"
+    with connect(tmp_path) as client:
+        line.poll_once()
+        client.sendall(b"start")
+        assert client.recv(100) == b"frame"
+        device.to_say = b"next"
+        line.send_once()
+        assert client.recv(100) == b"next"
+        assert device.heard == b""
+    device.to_say = b"for nobody"
+    line.send_once()
+    assert hang_ups == ["gone"]
+
+
 def test_a_slow_client_backs_the_line_up_and_gets_everything_in_order(
     line: StreamLine, device: Loudspeaker, tmp_path: Path
 ) -> None:

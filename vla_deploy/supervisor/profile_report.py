@@ -15,7 +15,9 @@ _log = logging.getLogger(__name__)
 class ProfileReport:
     """Write the `profile_status` cell, and the log's line about each request."""
 
-    def __init__(self, space: SharedSpace, clock: Clock) -> None:
+    def __init__(self, space: SharedSpace, clock: Clock, begun_with: str) -> None:
+        """Tell for the whole run which profile it has `begun_with`: the way back to an own file."""
+        self._begun_with = begun_with
         self._cell = space.cell_writer("profile_status")
         self._clock = clock
         self._last: dict[str, Any] = {}
@@ -46,6 +48,7 @@ class ProfileReport:
         self._cell.put_document(
             {
                 "profile": profile,
+                "begun_with": self._begun_with,
                 "phase": change.phase.value if change else "",
                 "target": change.request.profile if change else "",
                 "last": self._last,

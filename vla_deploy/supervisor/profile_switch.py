@@ -62,7 +62,7 @@ class ProfileSwitch:
         self._requests = space.ring_reader("profile_request", from_start=False)
         self._changes = space.ring_writer("profile_change")
         self._answers = space.ring_reader("profile_answer", from_start=False)
-        self._report = ProfileReport(space, clock)
+        self._report = ProfileReport(space, clock, begun_with=name)
         self._trial = Trial(space, clock)
         self._ids = itertools.count(1)
         self._change: Change | None = None

@@ -40,9 +40,9 @@ SPOKEN: Final = "turn left"
 MICROPHONE_HZ: Final = 48_000
 SLOWER: Final = """\
 inherits = "desktop"
-control_rate_hz = 100
-perception_rate_hz = 4
-camera_rate_hz = 4
+control_rate_hz = 50
+perception_rate_hz = 2
+camera_rate_hz = 2
 """
 """What leaves a slow computer room for a browser: control and the twin run before all others."""
 

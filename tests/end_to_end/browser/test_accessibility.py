@@ -6,7 +6,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Page, expect
 
-pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 
 AXE: Final = Path(__file__).parent.joinpath("vendor", "axe.js").read_text(encoding="utf-8")
 VIEWS: Final = ("now", "robot", "command", "budgets", "events", "profile")

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from sim_twin.process_stack import ProcessStack
 
-pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 
 
 def test_the_flight_of_a_stop_is_downloaded(

@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from sim_twin.process_stack import ProcessStack
 
-pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 
 
 def test_who_is_unknown_sees_nothing_but_login_and_stop(pages: Any, robot: ProcessStack) -> None:

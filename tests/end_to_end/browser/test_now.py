@@ -8,7 +8,7 @@ from playwright.sync_api import Locator, Page, expect
 
 from sim_twin.process_stack import ProcessStack
 
-pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 
 MOVING_RAD_S = 1.0
 STANDSTILL_RAD_S = 0.05

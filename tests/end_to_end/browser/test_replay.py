@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.gl, pytest.mark.stack, pytest.mark.timeout(300)]
 
 FLIGHT = Path(__file__).parents[2] / "vla_deploy/telemetry/flights/estop_while_driving.mcap"
 STANDING = ["--pause", "--from", "0.3"]  # driving, before the stop

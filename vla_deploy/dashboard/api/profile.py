@@ -25,7 +25,7 @@ class Wanted(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    name: Annotated[str, Field(max_length=64)]
+    name: Annotated[str, Field(max_length=4096)]
     may_restart: bool = False
     dry_run: bool = False
 
@@ -40,17 +40,18 @@ class Asked(BaseModel):
 def profile(request: Request) -> dict[str, Any]:
     """Return the profile in force, a change under way, what fits this computer, what there is."""
     name, why = detect()
+    current = _told(request)
     return {
-        "current": request.app.state.link.document("profile_status", age_limit_s=3.0),
+        "current": current,
         "detected": {"name": name, "why": why},
         "available": [
-            {"name": one, "inherits": read_source(one).parents, "fits": one == name}
-            for one in _names()
+            {"name": one, "inherits": _parents(one), "fits": one == name}
+            for one in _names(current)
         ],
     }
 
 
-@router.get("/{name}/difference", dependencies=[_Viewer])
+@router.get("/{name:path}/difference", dependencies=[_Viewer])
 def difference(name: str, request: Request) -> dict[str, Any]:
     """Return per key what is in force and what the named profile says, where they differ.
 
@@ -58,8 +59,8 @@ def difference(name: str, request: Request) -> dict[str, Any]:
         Refused: there is no such profile, nobody tells which one is in force, or a file of theirs
             cannot be read, as that of an own profile that was moved meanwhile.
     """
-    _check(name)
-    told = request.app.state.link.document("profile_status", age_limit_s=3.0)
+    told = _told(request)
+    _check(name, told)
     if told is None:
         raise Refused(
             HTTPStatus.SERVICE_UNAVAILABLE,
@@ -79,7 +80,7 @@ def difference(name: str, request: Request) -> dict[str, Any]:
 @router.post("", status_code=HTTPStatus.ACCEPTED, dependencies=[Depends(require(Role.ADMIN))])
 async def use(wanted: Wanted, request: Request) -> Asked:
     """Take the robot to another profile; it goes back by itself when that does not work."""
-    _check(wanted.name)
+    _check(wanted.name, _told(request))
     request_id = uuid.uuid4().hex
     request.app.state.link.publish(
         "profile_request",
@@ -94,6 +95,20 @@ async def use(wanted: Wanted, request: Request) -> Asked:
     return Asked(request_id=request_id)
 
 
+def _told(request: Request) -> dict[str, Any] | None:
+    told: dict[str, Any] | None = request.app.state.link.document(
+        "profile_status", age_limit_s=3.0
+    )
+    return told
+
+
+def _parents(name: str) -> tuple[str, ...]:
+    try:
+        return read_source(name).parents
+    except ProfileError:  # an own file that is gone or broken: whoever looks closer is told why
+        return ()
+
+
 def _values(name: str) -> dict[str, Any]:
     try:
         return dict(flat(read_source(name).values))
@@ -103,16 +118,20 @@ def _values(name: str) -> dict[str, Any]:
         ) from error
 
 
-def _names() -> list[str]:
-    return [name for name in profile_names() if not name.endswith(_TO_INHERIT_FROM)]
+def _names(told: dict[str, Any] | None) -> list[str]:
+    """Return the shipped profiles, and the own one that the run has begun with."""
+    shipped = [name for name in profile_names() if not name.endswith(_TO_INHERIT_FROM)]
+    begun_with = (told or {}).get("begun_with")
+    return shipped if begun_with in (None, *shipped) else [begun_with, *shipped]
 
 
-def _check(name: str) -> None:
-    """Accept the name of a shipped profile: a path in its place would read any file."""
-    if name not in _names():
+def _check(name: str, told: dict[str, Any] | None) -> None:
+    """Accept what is offered: any other path would read any file."""
+    names = _names(told)
+    if name not in names:
         raise Refused(
             HTTPStatus.NOT_FOUND,
             "no_such_profile",
-            f"no profile {name!r:.120}; there are {', '.join(_names())}",
+            f"no profile {name!r:.120}; there are {', '.join(names)}",
             "see GET /api/v1/profile",
         )

@@ -1,5 +1,7 @@
 """The profile in force, those that there are, their differences, and a switch."""
 
+from urllib.parse import quote
+
 import pytest
 
 
@@ -48,7 +50,26 @@ def test_a_switch_asks_the_supervisor(on_desktop):
     ]
 
 
+def test_the_own_profile_that_the_run_has_begun_with_is_a_way_back(dashboard, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text('inherits = "desktop"\ncamera_rate_hz = 4\n')
+    dashboard.robot.shows("profile_status", profile="desktop", begun_with=str(own))
+    offered = dashboard.get("profile")["available"][0]
+    assert (offered["name"], offered["inherits"]) == (str(own), ["desktop", "base"])
+    keys = dashboard.get(f"profile/{quote(str(own), safe='')}/difference")["keys"]
+    assert keys == {"camera_rate_hz": {"current": 5, "wanted": 4}}
+    dashboard.post("profile", body={"name": str(own)})
+    assert [asked["profile"] for asked in dashboard.robot.hears("profile_request")] == [str(own)]
+
+
+def test_an_own_profile_that_is_gone_does_not_hide_the_others(dashboard):
+    dashboard.robot.shows("profile_status", profile="desktop", begun_with="/etc/gone.toml")
+    first, *others = dashboard.get("profile")["available"]
+    assert (first["name"], first["inherits"]) == ("/etc/gone.toml", [])
+    assert "desktop" in [one["name"] for one in others]
+
+
 @pytest.mark.parametrize("name", ["nowhere", "base", "/etc/passwd.toml", "../profiles/desktop", ""])
-def test_only_shipped_profiles_have_names(on_desktop, name):
+def test_no_profile_but_those_offered_is_taken(on_desktop, name):
     on_desktop.post("profile", status=404, body={"name": name})
     assert on_desktop.robot.hears("profile_request") == []

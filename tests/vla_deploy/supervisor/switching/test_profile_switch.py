@@ -33,6 +33,7 @@ def test_every_process_switches_and_the_choice_is_kept(bench, profiles):
     assert (last["outcome"], last["reason"]) == ("kept", "")
     assert bench.names() == {"calm"}
     assert bench.choice.load() == bench.desk.status["profile"] == profiles["calm"]
+    assert bench.desk.status["begun_with"] == profiles["swift"]
     bench.tick()
     for worker in bench.workers.values():
         assert worker.alive == {worker.content} != {"first"}
