@@ -231,7 +231,8 @@ def test_kill_9_of_the_supervisor_ends_everything_and_a_new_run_starts(
     saying.communicate(timeout=30)
     assert saying.returncode == 1
     assert "no robot runs in" in one_line(run.ask("status"))
-    assert start().ask("say", "turn left 20 degrees").returncode == 0
+    fresh = start()
+    assert fresh.wait_until(lambda: fresh.ask("say", "turn left 20 degrees").returncode == 0)
     assert not run.run_dir.exists()
     assert not shared_memory.exists()
 

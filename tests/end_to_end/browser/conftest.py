@@ -41,8 +41,8 @@ MICROPHONE_HZ: Final = 48_000
 SLOWER: Final = """\
 inherits = "desktop"
 control_rate_hz = 50
-perception_rate_hz = 2
-camera_rate_hz = 2
+perception_rate_hz = 3
+camera_rate_hz = 3
 """
 """What leaves a slow computer room for a browser: control and the twin run before all others."""
 

@@ -53,8 +53,8 @@ def test_a_switch_that_the_computer_can_keep_changes_the_profile(
     begun_with = Path(robot.document("profile_status")["begun_with"])
     other = begun_with.with_name("less_is_seen.toml")
     other.write_text(LESS_IS_SEEN, encoding="utf-8")
-    used = robot.ask("profile", "use", str(other))
-    assert used.returncode == 0, used.stderr
+    use = ("profile", "use", str(other))
+    assert robot.wait_until(lambda: robot.ask(*use).returncode == 0), robot.status()
     computer = view.get_by_role("region", name="This computer")
     expect(computer).to_contain_text(str(other))
 

@@ -45,8 +45,7 @@ def profile(request: Request) -> dict[str, Any]:
         "current": current,
         "detected": {"name": name, "why": why},
         "available": [
-            {"name": one, "inherits": _parents(one), "fits": one == name}
-            for one in _names(current)
+            {"name": one, "inherits": _parents(one), "fits": one == name} for one in _names(current)
         ],
     }
 
@@ -96,9 +95,7 @@ async def use(wanted: Wanted, request: Request) -> Asked:
 
 
 def _told(request: Request) -> dict[str, Any] | None:
-    told: dict[str, Any] | None = request.app.state.link.document(
-        "profile_status", age_limit_s=3.0
-    )
+    told: dict[str, Any] | None = request.app.state.link.document("profile_status", age_limit_s=3.0)
     return told
 
 
