@@ -32,7 +32,7 @@ word than the word as it."""
 READ_SURETY: Final = 0.02
 """Words that the spotter suspects too need no more than an ear that does not quite rule a stop out,
 if nothing follows: it knows some voices less well than the recogniser does."""
-STOP_ODDS: Final = 0.2
+STOP_ODDS: Final = 0.4
 """What was at least by so much as likely as the words that were read counts beside them."""
 SLIGHT_SUSPICION: Final = 0.3
 STRONG_SUSPICION: Final = 0.6
@@ -45,7 +45,7 @@ GLANCED_SURETY: Final = 0.85
 times, and a stop word was read, nothing else is asked."""
 LEAST_ODDS: Final = 0.05
 """A stop that the decoder finds less likely than that both times is none, whatever else speaks for
-one, unless the spotter has come to its threshold or a row of TWICE_WITNESSES does without it."""
+one, unless the spotter has come to its threshold or a row of TWICE_WITNESSES asks for less."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,15 +66,15 @@ STOP_WITNESSES: Final = (
     _Enough(surety=0.35, suspicion=0.3, odds=0.9),
     _Enough(surety=0.4, suspicion=0.3, odds=0.4),
     _Enough(surety=0.45, suspicion=0.6, odds=0.15),
-    _Enough(surety=0.7, odds=0.1),
+    _Enough(surety=0.8, odds=0.1),
     _Enough(surety=0.9, suspicion=0.3, most_confidence=0.8),
 )
 """Any of these rows is enough for a stop in a phrase that may be over, unless a form of such a word
 was read. While somebody speaks, "stop" may become "stopped": then words alone count.
 """
 TWICE_WITNESSES: Final = (
-    _Enough(surety=TWICE_SURETY, suspicion=0.5, odds=0.1),
-    _Enough(surety=0.95, suspicion=0.6),
+    _Enough(surety=TWICE_SURETY, suspicion=0.5, odds=0.3),
+    _Enough(surety=0.95, suspicion=0.6, odds=0.03),
 )
 """An ear that is so sure both times needs no words, if the other witnesses say so much both times:
 also while somebody speaks, who has gone on after the word."""
