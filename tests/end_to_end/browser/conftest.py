@@ -3,6 +3,7 @@
 Loopback is not trusted here: every test goes through the doors that an operator goes through.
 """
 
+import shutil
 import tempfile
 import wave
 from collections.abc import Iterator
@@ -38,13 +39,7 @@ ROLES: Final = {"anna": Role.ADMIN, "vera": Role.VIEWER}
 PASSWORD: Final = "five-words-that-nobody-guesses"
 SPOKEN: Final = "turn left"
 MICROPHONE_HZ: Final = 48_000
-SLOWER: Final = """\
-inherits = "desktop"
-control_rate_hz = 50
-perception_rate_hz = 3
-camera_rate_hz = 3
-"""
-"""What leaves a slow computer room for a browser: control and the twin run before all others."""
+SLOWER: Final = Path(__file__).parents[1] / "slower.toml"
 
 PATIENCE_MS: Final = 60_000
 """The machine may be busy; what is quick is not slowed by this."""
@@ -64,8 +59,7 @@ def stack(chromium: Browser) -> Iterator[ProcessStack]:
         settings.parent.mkdir(parents=True)
         settings.write_text("trust_loopback = false\n", encoding="utf-8")
         add_accounts(base)
-        profile = Path(folder) / "slower.toml"
-        profile.write_text(SLOWER, encoding="utf-8")
+        profile = Path(shutil.copy(SLOWER, folder))  # tests write another one beside it
         stack = ProcessStack(base, "--profile", str(profile))
         try:
             stack.wait_until_armed()
