@@ -118,8 +118,8 @@ def _values(name: str) -> dict[str, Any]:
 def _names(told: dict[str, Any] | None) -> list[str]:
     """Return the shipped profiles, and the own one that the run has begun with."""
     shipped = [name for name in profile_names() if not name.endswith(_TO_INHERIT_FROM)]
-    begun_with = (told or {}).get("begun_with")
-    return shipped if begun_with in (None, *shipped) else [begun_with, *shipped]
+    begun_with = str((told or {}).get("begun_with", ""))
+    return shipped if begun_with in ("", *shipped) else [begun_with, *shipped]
 
 
 def _check(name: str, told: dict[str, Any] | None) -> None:
