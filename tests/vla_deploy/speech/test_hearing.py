@@ -134,7 +134,7 @@ def test_a_phrase_that_was_hardly_likelier_another_one_than_a_stop_is_one(
 
 
 def test_what_the_spotter_suspects_and_the_recogniser_may_have_read_is_a_stop() -> None:
-    within = (Alternative("please halt before the chair", 0.3),)
+    within = (Alternative("please halt before the chair", 0.5),)
     plain = heard("please hold before the chair", 1.2, others=within)
     assert [one.judgement.verdict for _, one in plain] == [Verdict.ACCEPTED]
     told = heard("please hold before the chair", 1.2, others=within, suspicion=suspecting(0.75))
@@ -153,6 +153,6 @@ def test_a_suspicion_that_comes_after_the_reading_still_counts() -> None:
         asked.append(1)
         return 0.8 if len(asked) > 2 else 0.0
 
-    told = heard("hey hold it there", 1.2, others=(Alternative("hey halt", 0.3),), suspicion=later)
+    told = heard("hey hold it there", 1.2, others=(Alternative("hey halt", 0.5),), suspicion=later)
     assert told[0][1].judgement.verdict is Verdict.STOP
     assert told[0][0] < 1.2, "while the speaker goes on"
