@@ -64,14 +64,15 @@ def press_the_door(stack: ProcessStack) -> Any:
     return told
 
 
-def test_it_stops_and_commands_the_robot_which_drives_on_without_it_and_stops_by_the_stop_door(
-    twin_stack: ProcessStack,
-) -> None:
+def stands(stack: ProcessStack) -> bool:
+    return stack.wait_until(lambda: stack.fastest_rad_s() < STANDSTILL_RAD_S, 3.0)
+
+
+def test_it_commands_the_robot_and_stops_it(twin_stack: ProcessStack) -> None:
     page = Page(twin_stack)
     stopped_id = page.drive()
     assert page.ask("POST", "stop", {"reason": "test"}) == {"pressed": True}
-    stands = twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() < STANDSTILL_RAD_S, 3.0)
-    assert stands, twin_stack.truth()
+    assert stands(twin_stack), twin_stack.truth()
     assert twin_stack.wait_until(lambda: twin_stack.state() == "stopped", 3.0)
     control = page.ask("GET", "state")["control"]
     assert (control["estop_latched"], control["cause"]) == (True, "estop")
@@ -79,6 +80,13 @@ def test_it_stops_and_commands_the_robot_which_drives_on_without_it_and_stops_by
     assert page.ask("POST", "reset", {})["control"]["state"] == "disarmed"
     assert page.ask("POST", "arm", {})["control"]["state"] == "armed"
 
+
+def test_the_robot_drives_on_without_it_and_its_history_is_found_again(
+    twin_stack: ProcessStack,
+) -> None:
+    page = Page(twin_stack)
+    ended_id = page.ask("POST", "commands", {"text": "bring me the moon"})["command_id"]
+    assert twin_stack.wait_until(lambda: page.state(ended_id) == "rejected")
     command_id, pid = page.drive(), twin_stack.row("dashboard")["pid"]
     twin_stack.kill("dashboard")
     assert twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() > MOVING_RAD_S, 2.0)
@@ -87,13 +95,15 @@ def test_it_stops_and_commands_the_robot_which_drives_on_without_it_and_stops_by
     assert Page(twin_stack).url == page.url
     is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
     assert is_done, page.ask("GET", f"commands/{command_id}")["events"][-1]
-    assert page.state(stopped_id) == "failed"
+    assert page.state(ended_id) == "rejected"
 
-    page.drive("the charging station")
+
+def test_the_stop_door_stops_the_robot_while_it_hangs(twin_stack: ProcessStack) -> None:
+    page = Page(twin_stack)
+    page.drive()
     twin_stack.freeze("dashboard")
     assert press_the_door(twin_stack)["pressed"] is True
-    stands = twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() < STANDSTILL_RAD_S, 3.0)
-    assert stands, twin_stack.truth()
+    assert stands(twin_stack), twin_stack.truth()
     assert press_the_door(twin_stack)["control"]["estop_latched"] is True
     twin_stack.thaw("dashboard")
     assert twin_stack.wait_until(lambda: "estop" in page.alarms(), 10.0)
