@@ -19,7 +19,6 @@ class Pacer:
         self._step_ns = step_ns
         self._lag_cap_ns = lag_cap_ns
         self._due_ns = start_ns
-        self._begun_ns = start_ns
         self._rested_ns = start_ns
 
     def due(self, wall_ns: int) -> bool:
@@ -30,16 +29,15 @@ class Pacer:
         if excess_ns > 0:
             self.slipped_ns += excess_ns
             self._due_ns += excess_ns
-        self._begun_ns = wall_ns
         return wall_ns >= max(self._due_ns, self._rested_ns)
 
     def stepped(self) -> None:
         """Note that one step was made."""
         self._due_ns += self._step_ns
 
-    def rest(self, wall_ns: int) -> None:
-        """Begin to rest at `wall_ns`, when all is done that the step brought with it."""
-        self._rested_ns = wall_ns + min(self._step_ns, wall_ns - self._begun_ns)
+    def rest(self, begun_ns: int, wall_ns: int) -> None:
+        """Rest from `wall_ns` on, when all is done that the step begun at `begun_ns` brought."""
+        self._rested_ns = wall_ns + min(self._step_ns, wall_ns - begun_ns)
 
     def wait_ns(self, wall_ns: int) -> int:
         """Return how long from `wall_ns` to the next step, at least 0."""

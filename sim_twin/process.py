@@ -204,7 +204,7 @@ class TwinProcess:
         )
         for drawing in self._drawings:
             drawing.show(state)
-        self._pacer.rest(self._clock.now_ns())
+        self._pacer.rest(wall_ns, self._clock.now_ns())
 
     def _plugged(self) -> list[PtyLine]:
         return [line for line in self._lines.values() if line.is_plugged]

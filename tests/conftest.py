@@ -38,8 +38,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         held_up_s = config.stash[WATCH].worst_s()
         void = held_up_s > HELD_UP_S and not any(word in str(error) for word in STANDS)
         verdict = "void, again" if void else "it stands"
-        judged.append(f"{verdict}: stood still for {held_up_s:.3f} s: {str(error)[:160]}")
-        terminal.line(_line(judged[-1]))  # at once, should the run be cut off
+        told = f"{verdict}: stood still for {held_up_s:.3f} s: {str(error)[:160]}"
+        judged.append(told.replace("\n", " "))
+        terminal.line(judged[-1])  # at once, should the run be cut off
         return void
 
     terminal = config.get_terminal_writer()
@@ -73,11 +74,7 @@ def pytest_terminal_summary(
 ) -> None:
     """Tell of each failure of the wall clock for how long the computer stood still meanwhile."""
     for line in config.stash.get(JUDGED, []):
-        terminalreporter.write_line(_line(line))
-
-
-def _line(verdict: str) -> str:
-    return verdict.replace("\n", " ")
+        terminalreporter.write_line(line)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

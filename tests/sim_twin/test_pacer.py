@@ -58,7 +58,7 @@ def test_it_rests_as_long_as_a_step_took_and_catches_up_in_between() -> None:
     pacer = Pacer(2 * MS, start_ns=0)
     assert pacer.due(10 * MS)
     pacer.stepped()
-    pacer.rest(11 * MS)
+    pacer.rest(10 * MS, 11 * MS)
     assert pacer.wait_ns(11 * MS) == MS
     assert [pacer.due(wall) for wall in (11 * MS, 12 * MS)] == [False, True]
     assert pacer.slipped_ns == 0
@@ -71,7 +71,7 @@ def test_a_computer_that_is_too_slow_keeps_half_of_its_time() -> None:
         if pacer.due(wall_ns):
             wall_ns += 2 * MS
             pacer.stepped()
-            pacer.rest(wall_ns)
+            pacer.rest(wall_ns - 2 * MS, wall_ns)
             steps += 1
     assert steps == 251
     assert pacer.slipped_ns == pytest.approx(480 * MS, rel=0.02)
@@ -81,7 +81,7 @@ def test_a_step_that_was_held_up_is_followed_by_a_period_of_rest_at_most() -> No
     pacer = Pacer(2 * MS, start_ns=0)
     assert pacer.due(0)
     pacer.stepped()
-    pacer.rest(300 * MS)
+    pacer.rest(0, 300 * MS)
     assert pacer.wait_ns(300 * MS) == 2 * MS
 
 
