@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,6 +26,7 @@ _POLL_NS: Final = NS_PER_S // 50
 _ANSWER_S: Final = 90.0
 _END_S: Final = 60.0
 _FRESH_S: Final = 1.0
+_TAKERS: Final = ("planner_status", "executor_status")
 
 
 class StackFailed(Exception):
@@ -43,6 +45,7 @@ class ProcessStack:
         self.run_dir = base
         self._clock = MonotonicClock()
         self._session: Session | None = None
+        self._begun: list[subprocess.Popen[str]] = []
         self.process = subprocess.Popen(
             self._words("run", "--twin", *options),
             stdout=subprocess.PIPE,
@@ -65,11 +68,14 @@ class ProcessStack:
         """Return once the robot takes commands.
 
         Raises:
-            StackFailed: the run ended, or control does not arm.
+            StackFailed: the run ended, control does not arm, or nobody plans or carries out.
         """
         self.wait_until_ready()
         if not self.wait_until(lambda: self.state() == "armed"):
             raise StackFailed(f"control does not arm: {self.status()['control']}")
+        for topic in _TAKERS:
+            if not self.wait_until(partial(self.document, topic, _FRESH_S)):
+                raise StackFailed(f"{topic} is silent: {self.status()['process_table']}")
 
     # --- as a user ----------------------------------------------------------------------------
 
@@ -80,9 +86,11 @@ class ProcessStack:
         )
 
     def begin(self, *words: str) -> "subprocess.Popen[str]":
-        """Start `vla-deploy WORDS` and do not wait for it."""
+        """Start `vla-deploy WORDS` and do not wait for it; it ends with the run at the latest."""
         pipe = subprocess.PIPE
-        return subprocess.Popen(self._words(*words), stdout=pipe, stderr=pipe, text=True)
+        begun = subprocess.Popen(self._words(*words), stdout=pipe, stderr=pipe, text=True)
+        self._begun.append(begun)
+        return begun
 
     def say(self, text: str) -> dict[str, Any]:
         """Give a command, wait for its end and return its last event.
@@ -210,6 +218,10 @@ class ProcessStack:
         if self._session is not None:
             self._session.close()
             self._session = None
+        for begun in self._begun:
+            begun.kill()  # nothing, where it has ended
+            begun.communicate()  # closes its pipes, too
+        self._begun.clear()
         if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGTERM)
         self.process.wait(_END_S)

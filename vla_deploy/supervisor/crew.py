@@ -16,8 +16,8 @@ from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.orphans import PROCESS_VARIABLE, end_leftovers
 from vla_deploy.supervisor.process import ChildProcess
 from vla_deploy.supervisor.readiness import Readiness
+from vla_deploy.supervisor.start_settings import nice_of, thread_limits
 from vla_deploy.supervisor.table import ProcessSpec
-from vla_deploy.supervisor.thread_limits import thread_limits
 
 _STDERR = 2
 _MOST_OUTPUT_BYTES = 4_000_000
@@ -163,6 +163,7 @@ class Crew:
                 PROCESS_VARIABLE: name,
             },
             self._output_path(name),
+            nice_of(self.in_force, name),
         )
 
     def _output_path(self, name: str) -> Path:

@@ -15,16 +15,21 @@ _LAUNCH = str(Path(__file__).with_name("launch.py"))
 class ChildProcess:
     """Run one Python command in its own session, its output in a file.
 
-    It gets SIGTERM from the kernel when the supervisor ends, however that ends.
+    It gets SIGTERM from the kernel when the supervisor ends, however that ends, and is as nice as
+    it shall be before it loads anything.
     """
 
     def __init__(
-        self, command: Sequence[str], environment: Mapping[str, str], output_path: Path
+        self,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        output_path: Path,
+        nice: int = 0,
     ) -> None:
         output_path.parent.mkdir(parents=True, exist_ok=True)
         with output_path.open("ab") as output:
             self._popen = subprocess.Popen(
-                [sys.executable, "-I", "-S", _LAUNCH, str(os.getpid()), *command],
+                [sys.executable, "-I", "-S", _LAUNCH, str(os.getpid()), str(nice), *command],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=output,

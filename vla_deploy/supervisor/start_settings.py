@@ -1,4 +1,4 @@
-"""Tell the numeric libraries of a child how many threads they may start; they read it once."""
+"""Tell what a child has from its very start: threads of its numeric libraries, and its nice."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -12,3 +12,9 @@ def thread_limits(profile: Profile, process: str) -> Mapping[str, str]:
     """Return the environment for a process; one that no profile speaks of gets none."""
     settings = profile.processes.get(process)
     return {} if settings is None else dict.fromkeys(_VARIABLES, str(settings.threads))
+
+
+def nice_of(profile: Profile, process: str) -> int:
+    """Return how nice a process is; one that no profile speaks of is as others are."""
+    settings = profile.processes.get(process)
+    return 0 if settings is None else settings.nice
