@@ -187,6 +187,7 @@ class TwinProcess:
     def _step(self, wall_ns: int) -> None:
         # What waits was sent before now: were it heard after the step, heartbeats would be missed.
         self._hear_frames()
+        self._twin.slipped_ns = self._pacer.slipped_ns
         self._twin.step()
         self._pacer.stepped()
         for line in self._plugged():

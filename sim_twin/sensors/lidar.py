@@ -35,6 +35,8 @@ _CHECKED_BYTES = _PACKET.itemsize - 1
 _PLACES = np.arange(_CHECKED_BYTES) * 256
 _LAST_POINT = POINTS_PER_PACKET - 1
 _NOISY_POINTS = POINTS_PER_S
+_MOST_BEHIND_NS = NS_PER_S // 5
+"""A line keeps no more than that; to make up for a long halt at once would be another one."""
 
 
 def _crc_parts() -> NDArray[np.uint8]:
@@ -134,7 +136,8 @@ class LidarDevice:
             self._start_ns = self.due_ns = now_ns
         self._send(now_ns)
         if now_ns >= self.due_ns:
-            self.due_ns += self._cast_every_ns
+            self._skip_before(now_ns - _MOST_BEHIND_NS)
+            self.due_ns = max(self.due_ns, now_ns - _MOST_BEHIND_NS) + self._cast_every_ns
             end = max(self._packets_due(self.due_ns), self._packets_due(now_ns))
             if end > self._sent_packets:
                 self._measure(end)
@@ -145,6 +148,12 @@ class LidarDevice:
         while waiting and waiting[0][0] <= now_ns:
             self._out += waiting.popleft()[1]
             self._sent_packets += 1
+
+    def _skip_before(self, begin_ns: int) -> None:
+        """Leave out what nobody has looked for in time: the head has turned on meanwhile."""
+        if self._packets_due(begin_ns) > self._sent_packets:
+            self._waiting.clear()
+            self._sent_packets = self._packets_due(begin_ns)
 
     def _packets_due(self, now_ns: int) -> int:
         """Return how many packets have been measured to their last point by `now_ns`."""
