@@ -137,7 +137,7 @@ class LidarDevice:
         self._send(now_ns)
         if now_ns >= self.due_ns:
             self._skip_before(now_ns - _MOST_BEHIND_NS)
-            self.due_ns = max(self.due_ns, now_ns - _MOST_BEHIND_NS) + self._cast_every_ns
+            self.due_ns = max(self.due_ns + self._cast_every_ns, now_ns)
             end = max(self._packets_due(self.due_ns), self._packets_due(now_ns))
             if end > self._sent_packets:
                 self._measure(end)

@@ -93,7 +93,7 @@ def test_the_robot_drives_on_without_it_and_its_history_is_found_again(
     assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["pid"] not in (pid, None))
     assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["state"] == "ready", 60.0)
     assert Page(twin_stack).url == page.url
-    is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
+    is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 120.0)
     assert is_done, page.ask("GET", f"commands/{command_id}")["events"][-1]
     assert page.state(ended_id) == "rejected"
 

@@ -119,12 +119,33 @@ def test_beams_carry_the_time_at_which_they_were_measured() -> None:
     assert np.abs(measured_s - stamped_s).max() < 0.04
 
 
-def test_a_lidar_that_was_held_up_goes_on_with_what_is_due() -> None:
-    turn = np.ones(360, np.float32)
-    device = LidarDevice(lambda beams: turn[: len(beams)])
-    for now_ns in (10**9, 2 * 10**9, 2 * 10**9 + STEP_NS, 2 * 10**9 + 2 * STEP_NS):
-        device.step(now_ns)
-    assert len(device.transmit()) == 376 * 47
+@pytest.mark.parametrize("held_up_s", [1, 3600])
+def test_a_lidar_that_was_held_up_goes_on_with_what_a_line_would_have_kept(held_up_s: int) -> None:
+    looks: list[range] = []
+
+    def cast(beams: range) -> NDArray[np.float32]:
+        looks.append(beams)
+        return np.ones(len(beams), np.float32)
+
+    line = Line(LidarDevice(cast))
+    lidar = Ld19(line, line)
+    line.sleep_until(line.now + 10 * STEP_NS)
+    lidar.poll()
+    line.now += held_up_s * 10**9
+    line.sleep_until(line.now + STEP_NS)
+    before = lidar.counters.packets
+    lidar.poll()
+    # And what it had measured before.
+    assert 375 // 5 <= lidar.counters.packets - before <= 375 // 5 + 375 // 30
+    ages_ns = []
+    for _ in range(50):
+        line.sleep_until(line.now + 5 * STEP_NS)
+        if (scan := lidar.poll()) is not None:
+            ages_ns.append(line.now - scan.stamp_ns)
+    assert len(ages_ns) == 5
+    assert max(ages_ns) < 40_000_000
+    assert lidar.counters.crc_errors == lidar.counters.discarded_bytes == 0
+    assert len(looks) < 30
 
 
 @pytest.mark.parametrize(
