@@ -47,8 +47,8 @@ class Page:
     def alarms(self) -> list[str]:
         return [alarm["field"] for alarm in self.ask("GET", "alarms")["alarms"]]
 
-    def drive(self, where: str = "the kitchen") -> str:
-        command_id: str = self.ask("POST", "commands", {"text": f"go to {where}"})["command_id"]
+    def drive(self, text: str = "go to the kitchen") -> str:
+        command_id: str = self.ask("POST", "commands", {"text": text})["command_id"]
         moves = self._stack.wait_until(lambda: self._stack.fastest_rad_s() > MOVING_RAD_S)
         assert moves, self.ask("GET", f"commands/{command_id}")["events"][-1]
         return command_id
@@ -87,13 +87,15 @@ def test_the_robot_drives_on_without_it_and_its_history_is_found_again(
     page = Page(twin_stack)
     ended_id = page.ask("POST", "commands", {"text": "bring me the moon"})["command_id"]
     assert twin_stack.wait_until(lambda: page.state(ended_id) == "rejected")
-    command_id, pid = page.drive(), twin_stack.row("dashboard")["pid"]
+    # No longer than it takes: a busy computer loses a servo for a moment about once a minute.
+    pid = twin_stack.row("dashboard")["pid"]
+    command_id = page.drive("turn left 180 degrees")
     twin_stack.kill("dashboard")
     assert twin_stack.wait_until(lambda: twin_stack.fastest_rad_s() > MOVING_RAD_S, 2.0)
     assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["pid"] not in (pid, None))
     assert twin_stack.wait_until(lambda: twin_stack.row("dashboard")["state"] == "ready", 60.0)
     assert Page(twin_stack).url == page.url
-    is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 120.0)
+    is_done = twin_stack.wait_until(lambda: page.state(command_id) == "succeeded", 60.0)
     assert is_done, page.ask("GET", f"commands/{command_id}")["events"][-1]
     assert page.state(ended_id) == "rejected"
 
