@@ -133,7 +133,7 @@ TABLE: tuple[ProcessSpec, ...] = (
         when=all_of(budgeted("perception"), not_suspended("perception")),
         ready_topic="scan",
         ready_files=("ready/perception",),
-        watched=(Watched(topic="scene", silence_limit_s=10.0),),
+        watched=(Watched(topic="scene", silence_limit_s=10.0, profile_rate="perception_rate_hz"),),
     ),
     ProcessSpec(
         name="speech",
