@@ -20,7 +20,7 @@ class Board:
     def __init__(self, *errors: Exception) -> None:
         self.errors = [*errors]
         self.rounds = 0
-        self.closed = False
+        self.closed = threading.Event()
         self.enough = threading.Event()
 
     def read(self) -> Mapping[str, Reading]:
@@ -32,7 +32,7 @@ class Board:
         return {HEAT.name: HEAT}
 
     def close(self) -> None:
-        self.closed = True
+        self.closed.set()
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_round_that_fails_is_logged_and_counted_and_the_next_one_is_tried(boar
     told = [record.message for record in caplog.records]
     assert len(told) == 2
     assert "Too many open files" in told[0]
-    assert board.closed
+    assert board.closed.wait(10.0)  # `close` itself waits for two periods
 
 
 def test_a_late_reader_gets_every_round(board):
