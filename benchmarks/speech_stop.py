@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
-from benchmarks.speech_stop_ear import SPOTTER, WORDS, Ear
+from benchmarks.speech_stop_ear import SPOTTER, WORDS, Delay, Ear, delay_figures
 from benchmarks.speech_stop_latch import latch
 from benchmarks.speech_stop_recall import Glances, Recall
 from benchmarks.speech_stop_talk import Voices, other_talk, phrases, words_alike
@@ -88,7 +88,7 @@ def _stops(
     voices: Voices, ear: Ear, clips: int, cases: Collection[str], random: np.random.Generator
 ) -> dict[str, Any]:
     missed: dict[str, dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
-    delays_s: list[float] = []
+    delays: list[Delay] = []
     misses: list[str] = []
     for engine in voices.engines:
         for clip, (start_s, end_s) in phrases(voices, engine, clips, random):
@@ -100,13 +100,13 @@ def _stops(
                 first = before if follows_talk else NOTHING
                 samples, later_s = np.concatenate((first, clip.samples)), len(first) / RATE_HZ
                 sound = _around(samples, snr_db, drawn)
-                by = _delays_s(ear, sound, later_s + start_s, later_s + end_s)
+                by = _delays(ear, sound, later_s + start_s, later_s + end_s)
                 for group in (engine, "all"):
                     missed[name][group].append(not by)
                 for one in (SPOTTER, WORDS):
                     missed[name][one].append(one not in by)
                 if by:
-                    delays_s.append(min(by.values()))
+                    delays.append(min(by.values(), key=sum))
                 else:
                     misses.append(f"{name}, {engine} {clip.voice}: {clip.text}")
     return {
@@ -122,19 +122,18 @@ def _stops(
             for engine, some in missed.get("10db", {}).items()
             if engine in voices.engines
         },
-        "stop_delay_p50_s": float(np.percentile(delays_s, 50)) if delays_s else None,
-        "stop_delay_p95_s": float(np.percentile(delays_s, 95)) if delays_s else None,
+        **delay_figures(delays),
         "stop_misses": misses,
     }
 
 
-def _delays_s(ear: Ear, sound: Wave, start_s: float, end_s: float) -> dict[str, float]:
+def _delays(ear: Ear, sound: Wave, start_s: float, end_s: float) -> dict[str, Delay]:
     """Return how long after the word each listener hit the button, unless far too late."""
-    found: dict[str, float] = {}
+    found: dict[str, Delay] = {}
     for alarm in ear.alarms(sound):
         late_s = alarm.at_s - (_BEFORE_S + end_s)
         if alarm.at_s > _BEFORE_S + start_s and late_s < TOO_LATE_S:
-            found.setdefault(alarm.by, max(0.0, late_s) + alarm.computed_s)
+            found.setdefault(alarm.by, Delay(max(0.0, late_s), alarm.computed_s))
     return found
 
 

@@ -2,9 +2,11 @@
 
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from benchmarks.speech_stop_recall import Glances, Recall, RecallingReader
 from drivers.clock import MonotonicClock
@@ -34,6 +36,25 @@ class Alarm:
     by: str
     at_s: float
     computed_s: float
+
+
+class Delay(NamedTuple):
+    """Tell how much had been heard since the word's end, and what the computer took for it."""
+
+    sound_s: float
+    computed_s: float
+
+
+def delay_figures(delays: Sequence[Delay]) -> dict[str, float | None]:
+    """Return the delays' spread, and what would be left of it on a computer that takes no time."""
+    if not delays:
+        return dict.fromkeys(("stop_delay_p50_s", "stop_delay_p95_s", "stop_delay_sound_p95_s"))
+    all_s = [sum(delay) for delay in delays]
+    return {
+        "stop_delay_p50_s": float(np.percentile(all_s, 50)),
+        "stop_delay_p95_s": float(np.percentile(all_s, 95)),
+        "stop_delay_sound_p95_s": float(np.percentile([one.sound_s for one in delays], 95)),
+    }
 
 
 class Ear:
