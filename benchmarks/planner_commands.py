@@ -13,10 +13,10 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from benchmarks.command import parser, show
+from benchmarks.percentiles import percentile
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import (
     ASK,
@@ -85,10 +85,10 @@ def latencies(answers: Sequence[Answer]) -> dict[str, Any]:
 def _times(answers: Sequence[Answer]) -> dict[str, float | None]:
     wall_s, cpu_s = [one.busy_s for one in answers], [one.cpu_s for one in answers]
     return {
-        "p50_s": _percentile(wall_s, 50),
-        "p95_s": _percentile(wall_s, 95),
-        "cpu_p50_s": _percentile(cpu_s, 50),
-        "cpu_p95_s": _percentile(cpu_s, 95),
+        "p50_s": percentile(wall_s, 50),
+        "p95_s": percentile(wall_s, 95),
+        "cpu_p50_s": percentile(cpu_s, 50),
+        "cpu_p95_s": percentile(cpu_s, 95),
     }
 
 
@@ -128,10 +128,6 @@ def _shares(
 
 def _share(some: Sequence[Any], holds: Callable[[Any], bool]) -> float | None:
     return sum(map(bool, map(holds, some))) / len(some) if some else None
-
-
-def _percentile(values: Sequence[float], percent: float) -> float | None:
-    return float(np.percentile(values, percent)) if values else None
 
 
 def _misses(verdicts: Sequence[Verdict]) -> list[dict[str, str]]:

@@ -20,6 +20,7 @@ import numpy as np
 
 from benchmarks.command import parser, show
 from benchmarks.live_robot import PROFILE_FILE, NotReached, arm, live_stack
+from benchmarks.percentiles import spread_s
 from benchmarks.perception_live import HERE
 from drivers.clock import NS_PER_S
 from platforms import load_profile
@@ -140,15 +141,8 @@ def _delays(
         f"{how}_commands": len(texts),
         f"{how}_planned": len(plans_s),
         f"{how}_moved": len(motions_s),
-        **_spread(f"{how}_to_plan", plans_s),
-        **_spread(f"{how}_to_motion", motions_s),
-    }
-
-
-def _spread(name: str, values_s: Sequence[float]) -> dict[str, float | None]:
-    return {
-        f"{name}_p50_s": float(np.percentile(values_s, 50)) if values_s else None,
-        f"{name}_p95_s": float(np.percentile(values_s, 95)) if values_s else None,
+        **spread_s(f"{how}_to_plan", plans_s),
+        **spread_s(f"{how}_to_motion", motions_s),
     }
 
 

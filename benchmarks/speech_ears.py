@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command import parser, show
+from benchmarks.percentiles import spread_s
 from drivers.clock import NS_PER_S, MonotonicClock
 from platforms import Profile, load_profile
 from sim_twin.sound.acoustics import Acoustics
@@ -78,8 +79,7 @@ def measure(profile: str = "jetson_orin_nano", rounds: int = 2) -> dict[str, Any
     }
     report["speech"] = by_snr
     every = [one for part in by_snr.values() for one in part.pop("ends_s")]
-    report["end_to_text_p50_s"] = float(np.percentile(every, 50)) if every else None
-    report["end_to_text_p95_s"] = float(np.percentile(every, 95)) if every else None
+    report |= spread_s("end_to_text", every)
     report["other_sound"] = {
         name: _other(ears, loaded, sound) for name, sound in _other_sounds().items()
     }

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-import numpy as np
-
+from benchmarks.percentiles import percentile, spread_s
 from benchmarks.speech_stop_recall import Glances, Recall, RecallingReader
 from drivers.clock import MonotonicClock
 from platforms import load_profile
@@ -47,13 +46,9 @@ class Delay(NamedTuple):
 
 def delay_figures(delays: Sequence[Delay]) -> dict[str, float | None]:
     """Return the delays' spread, and what would be left of it on a computer that takes no time."""
-    if not delays:
-        return dict.fromkeys(("stop_delay_p50_s", "stop_delay_p95_s", "stop_delay_sound_p95_s"))
-    all_s = [sum(delay) for delay in delays]
     return {
-        "stop_delay_p50_s": float(np.percentile(all_s, 50)),
-        "stop_delay_p95_s": float(np.percentile(all_s, 95)),
-        "stop_delay_sound_p95_s": float(np.percentile([one.sound_s for one in delays], 95)),
+        **spread_s("stop_delay", [sum(delay) for delay in delays]),
+        "stop_delay_sound_p95_s": percentile([delay.sound_s for delay in delays], 95),
     }
 
 
