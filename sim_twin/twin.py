@@ -163,8 +163,9 @@ class Twin:
         self._drive_motors()
         self.engine.step()
         now_ns = self.engine.now_ns
-        if self._device_ns() >= self.lidar.due_ns:
-            self.lidar.step(self._device_ns())
+        device_ns = self._device_ns()
+        if device_ns >= self.lidar.due_ns:
+            self.lidar.step(device_ns)
         if now_ns >= self.imu.due_ns:
             self.imu.step(now_ns)
         self.can_wire.poll(now_ns)

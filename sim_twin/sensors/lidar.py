@@ -136,9 +136,11 @@ class LidarDevice:
             self._start_ns = self.due_ns = now_ns
         self._send(now_ns)
         if now_ns >= self.due_ns:
-            self._skip_before(now_ns - _MOST_BEHIND_NS)
+            # What nobody has looked for in time is left out: the head has turned on meanwhile.
+            missed = self._packets_due(now_ns - _MOST_BEHIND_NS)
+            self._sent_packets = max(self._sent_packets, missed)
             self.due_ns = max(self.due_ns + self._cast_every_ns, now_ns)
-            end = max(self._packets_due(self.due_ns), self._packets_due(now_ns))
+            end = self._packets_due(self.due_ns)
             if end > self._sent_packets:
                 self._measure(end)
             self._send(now_ns)
@@ -148,12 +150,6 @@ class LidarDevice:
         while waiting and waiting[0][0] <= now_ns:
             self._out += waiting.popleft()[1]
             self._sent_packets += 1
-
-    def _skip_before(self, begin_ns: int) -> None:
-        """Leave out what nobody has looked for in time: the head has turned on meanwhile."""
-        if self._packets_due(begin_ns) > self._sent_packets:
-            self._waiting.clear()
-            self._sent_packets = self._packets_due(begin_ns)
 
     def _packets_due(self, now_ns: int) -> int:
         """Return how many packets have been measured to their last point by `now_ns`."""
