@@ -153,9 +153,10 @@ def stops_with(run: Run, *causes: str) -> bool:
 
 
 def drives_again(run: Run) -> bool:
-    # What a device says after its return may take a second to be believed.
-    assert run.wait_until(lambda: run.ask("reset").returncode == 0, 10.0)
-    assert run.ask("arm").returncode == 0
+    # What a device says after its return may take a second to be believed; and the bus of one that
+    # has just come up may be lost once more to a slow computer, which wants both again.
+    acts = ("reset", "arm")
+    assert run.wait_until(lambda: all(run.ask(act).returncode == 0 for act in acts), 30.0)
     return run.ask("say", "turn left 20 degrees").returncode == 0
 
 

@@ -23,7 +23,7 @@ from vla_deploy.speech.readings import Answer, Readings
 from vla_deploy.speech.stopping import Look, hints, is_confirmed, is_likely, is_sure, wants_another
 from vla_deploy.speech.voice_activity import FRAME_S
 
-LATER_FRAMES: Final = round(0.16 / FRAME_S)
+LATER_FRAMES: Final = round(0.1 / FRAME_S)
 """A second look is taken with so much more sound: what only sounded like a stop mostly is none
 then, and the button is still hit in half a second."""
 PATIENCE_NS: Final = round(0.4 * NS_PER_S)
