@@ -2,11 +2,13 @@ from collections import deque
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pytest
 
 from benchmarks.speech_stop_recall import Glances, Recall, RecallingReader, spoken
+from drivers.clock import NS_PER_S
 from training.stop_words.cast import PARTS
 from training.voices.clip import Clip, Style
 from vla_deploy.speech.reading import Alternative, Reading
@@ -14,6 +16,7 @@ from vla_deploy.speech.readings import FAST_NS
 from vla_deploy.speech.sound import Sound
 
 SOUND = np.linspace(-1.0, 1.0, 1600, dtype=np.float32)
+TOOK_NS: Final = NS_PER_S // 16
 
 
 class Recogniser:
@@ -25,7 +28,7 @@ class Recogniser:
 
     def read(self, samples: Sound, hot_words: str, earlier: Sound) -> Reading:
         self.count += 1
-        self.lately_ns.append(FAST_NS // 2)
+        self.lately_ns.append(TOOK_NS)
         return Reading(
             text=f"{len(samples)} {hot_words} {len(earlier)}",
             log_probability=-0.1 * self.count,
@@ -33,7 +36,7 @@ class Recogniser:
             compression=1.0,
             language="en",
             duration_s=0.1,
-            took_s=0.0625,
+            took_s=TOOK_NS / NS_PER_S,
             others=(Alternative("another", 0.5),),
             stop_surety=0.3,
         )
@@ -53,18 +56,18 @@ def ask(path: Path, glances: Glances = Glances.MEASURED) -> tuple[list[Reading],
 def test_what_was_read_once_is_not_read_again(tmp_path: Path) -> None:
     first, reader, recalled_s = ask(tmp_path / "kept")
     assert reader.count == 2
-    assert recalled_s == 0.0625
+    assert recalled_s == TOOK_NS / NS_PER_S
     assert first[0] != first[1]
     again, reader, recalled_s = ask(tmp_path / "kept")
     assert again == first
     assert reader.count == 0
-    assert recalled_s == 3 * 0.0625
+    assert recalled_s == 3 * TOOK_NS / NS_PER_S
 
 
 def test_what_is_recalled_counts_as_long_as_it_took(tmp_path: Path) -> None:
     ask(tmp_path / "kept")
     _, reader, _ = ask(tmp_path / "kept")
-    assert list(reader.lately_ns) == [FAST_NS // 2] * 3
+    assert list(reader.lately_ns) == [TOOK_NS] * 3
 
 
 @pytest.mark.parametrize(("glances", "slow"), [(Glances.ALWAYS, 0), (Glances.NEVER, 16)])

@@ -19,7 +19,7 @@ from vla_deploy.speech.recogniser import Recogniser
 
 LATE_NS: Final = 5 * NS_PER_S
 MOST_WAITING: Final = 3
-FAST_NS: Final = NS_PER_S // 8
+FAST_NS: Final = NS_PER_S // 6
 """A recogniser that takes longer has no time for glances: what has ended would wait for them."""
 MOST_SLOW_RATIO: Final = 0.25
 """Of the last readings so many may, as long as others have the computer for a moment."""
