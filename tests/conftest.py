@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from sim_twin.stillness import StillnessWatch
+from sim_twin.stillness import HELD_UP_S, StillnessWatch
 
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile(
@@ -22,8 +22,6 @@ WATCH = pytest.StashKey[StillnessWatch]()
 JUDGED = pytest.StashKey[list[str]]()
 MOST_AGAIN = 4
 """A busy host takes a core away for 0.1 s once a minute, which is as long as such a test runs."""
-HELD_UP_S = 0.01
-"""At the 50 Hz of `end_to_end/slower.toml` a missed read leaves 10 ms of the patience of 50."""
 STANDS = ("orphan", "hazard", "joint range", "joint speed", "workspace", "push", "fall ", "tilt")
 """A failure that tells of one of these is not explained by a computer that stood still."""
 
