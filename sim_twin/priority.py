@@ -24,11 +24,12 @@ def claim_priority() -> Priority:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, parameters)
     except PermissionError:
-        return _claim_niceness()
+        return claim_niceness()
     return Priority.FIFO
 
 
-def _claim_niceness() -> Priority:
+def claim_niceness() -> Priority:
+    """Ask for a lower niceness alone: for what may hold a core, such as a camera that is drawn."""
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     except PermissionError:

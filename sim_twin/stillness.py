@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Final
 
+import psutil
+
 # Above the serial workers and control; below the kernel's own watchdogs at 99.
 PRIORITY: Final = 90
 STEP_S: Final = 0.004
@@ -27,6 +29,8 @@ HELD_UP_S: Final = 0.02
 """With no answer for so much longer, control may rightly take the bus for lost."""
 TOGETHER_S: Final = 0.05
 """Control's patience with a servo, `SafetyLimits.servo_age_s`: what comes later stands apart."""
+STOLEN_RATIO: Final = 0.1
+"""With less left of the cores than the rest of this, a robot may rightly not keep its rates."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +78,29 @@ class StillnessWatch:
         self._process.stdin.close()
         self._process.stdout.close()
         self._process.wait()
+
+
+class StolenTime:
+    """Tell which share of all cores the host has given to others, as the kernel counts it.
+
+    Slices of a millisecond are no stall, and yet leave a robot less than the computer it was made
+    for (`steal`, proc_stat(5)).
+    """
+
+    def __init__(self) -> None:
+        self._before_s = _stolen_and_all_s()
+
+    def ratio(self) -> float:
+        """Return the share since the last call, from 0 to 1."""
+        stolen_s, all_s = now = _stolen_and_all_s()
+        before, self._before_s = self._before_s, now
+        return (stolen_s - before[0]) / max(1e-9, all_s - before[1])
+
+
+def _stolen_and_all_s() -> tuple[float, float]:
+    times = psutil.cpu_times()
+    # The kernel counts a guest's time as user's, too.
+    return times.steal, sum(times) - times.guest - times.guest_nice
 
 
 def worst_together_s(stalls: Sequence[Stall]) -> float:

@@ -58,7 +58,8 @@ def recording(twin_stack: ProcessStack, tmp_path: Path, job: str) -> Path:
     """What the recorder has made of a job, in a folder of its own."""
     begun = json.loads(twin_stack.ask("record", "start", "--json").stdout)
     assert begun["state"] in ("beginning", "recording")
-    assert twin_stack.say(job)["success"]
+    outcome = twin_stack.say(job)
+    assert outcome["success"], outcome
     assert json.loads(twin_stack.ask("record", "status", "--json").stdout)["lost"] == 0
     assert json.loads(twin_stack.ask("record", "stop", "--json").stdout)["state"] == "off"
     (made,) = json.loads(twin_stack.ask("record", "list", "--json").stdout)

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 
+import psutil
 import pytest
 
 from sim_twin.stillness import (
@@ -13,6 +14,7 @@ from sim_twin.stillness import (
     STEP_S,
     Stall,
     StillnessWatch,
+    StolenTime,
     worst_together_s,
 )
 
@@ -65,3 +67,21 @@ def stalls(*at: tuple[float, float]) -> list[Stall]:
 )
 def test_what_one_core_after_the_other_holds_up_adds_up(found: list[Stall], worst_s: float) -> None:
     assert worst_together_s(found) == pytest.approx(worst_s)
+
+
+def test_what_the_host_took_is_a_share_of_all_cores_since_the_last_call(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    times = psutil.cpu_times()
+    told = [
+        times,
+        times._replace(user=times.user + 6.0, idle=times.idle + 3.0, steal=times.steal + 1.0),
+        # A guest's time is in the user's.
+        times._replace(
+            user=times.user + 8.0, guest=2.0, idle=times.idle + 3.0, steal=times.steal + 3.0
+        ),
+    ]
+    monkeypatch.setattr(psutil, "cpu_times", lambda: told.pop(0))
+    stolen = StolenTime()
+    assert stolen.ratio() == pytest.approx(0.1)
+    assert stolen.ratio() == pytest.approx(0.5)
