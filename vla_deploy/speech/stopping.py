@@ -42,7 +42,9 @@ TWICE_SURETY: Final = 0.9
 """From here on the ear asks for another look by itself: see TWICE_WITNESSES."""
 GLANCED_SURETY: Final = 0.85
 """While somebody goes on, the ear, if any, has to be so sure the second time; where it is both
-times, and a stop word was read, nothing else is asked."""
+times, and a stop word was read by GLANCED_CONFIDENCE, nothing else is asked."""
+GLANCED_CONFIDENCE: Final = 0.1
+"""Less sure words of a sentence that goes on are anything that sounds a little like them."""
 LEAST_ODDS: Final = 0.05
 """A stop that the decoder finds less likely than that both times is none, whatever else speaks for
 one, unless the spotter has come to its threshold or a row of TWICE_WITNESSES asks for less."""
@@ -65,7 +67,8 @@ class _Enough:
 STOP_WITNESSES: Final = (
     _Enough(surety=0.35, suspicion=0.3, odds=0.9),
     _Enough(surety=0.4, suspicion=0.3, odds=0.4),
-    _Enough(surety=0.45, suspicion=0.6, odds=0.15),
+    _Enough(surety=0.45, suspicion=0.3, odds=0.05),
+    _Enough(surety=0.6, odds=0.6),
     _Enough(surety=0.8, odds=0.1),
     _Enough(surety=0.9, suspicion=0.3, most_confidence=0.8),
 )
@@ -75,6 +78,7 @@ was read. While somebody speaks, "stop" may become "stopped": then words alone c
 TWICE_WITNESSES: Final = (
     _Enough(surety=TWICE_SURETY, suspicion=0.5, odds=0.3),
     _Enough(surety=0.95, suspicion=0.6, odds=0.03),
+    _Enough(surety=0.97, suspicion=0.4, odds=0.003),
 )
 """An ear that is so sure both times needs no words, if the other witnesses say so much both times:
 also while somebody speaks, who has gone on after the word."""
@@ -132,10 +136,12 @@ def _is_read(look: Look, suspicion: float) -> bool:
     if not holds_stop(look.reading.text, is_all=look.is_all):
         return False
     if not look.is_all and _affirms(look.reading, GLANCED_SURETY):
-        return True
+        return look.confidence >= GLANCED_CONFIDENCE
     least = READ_SURETY if look.is_all else LEAST_SURETY
     is_heard = suspicion >= SLIGHT_SUSPICION and not _denies(look.reading, least)
-    return is_heard and look.confidence >= STOP_SUSPECTED_CONFIDENCE
+    is_call = look.is_all and is_stop(look.reading.text)
+    enough = CALL_CONFIDENCE if is_call else STOP_SUSPECTED_CONFIDENCE
+    return is_heard and look.confidence >= enough
 
 
 def wants_another(look: Look, suspicion: float) -> bool:

@@ -50,10 +50,14 @@ def look(
         (0.45, 0.95, 0.25, False),
         (0.45, 0.45, 0.35, True),
         (0.45, 0.45, 0.25, False),
-        (0.5, 0.1, 0.65, False),
-        (0.5, 0.2, 0.55, False),
+        (0.5, 0.06, 0.35, True),
+        (0.5, 0.06, 0.25, False),
+        (0.5, 0.04, 0.65, False),
+        (0.43, 0.3, 0.65, False),
+        (0.65, 0.65, 0.0, True),
+        (0.65, 0.55, 0.0, False),
+        (0.55, 0.9, 0.0, False),
         (0.85, 0.12, 0.0, True),
-        (0.75, 0.9, 0.0, False),
         (0.85, 0.08, 0.0, False),
         (0.75, None, 0.5, False),
         (0.85, None, 0.5, False),
@@ -98,6 +102,15 @@ def test_words_that_the_spotter_suspects_too_need_an_ear_that_does_not_rule_them
     for surety, likely in ((0.01, False), (None, True)):
         heard = replace(read, reading=replace(read.reading, stop_surety=surety))
         assert is_likely(heard, 0.35) is likely
+
+
+def test_a_mere_call_that_the_spotter_suspects_too_may_be_read_hardly() -> None:
+    call = look("hey, halt", surety=0.03, confidence=0.2)
+    assert is_likely(call, 0.35)
+    assert not is_likely(call, 0.25)
+    assert not is_likely(replace(call, confidence=0.1), 0.35)
+    assert not is_likely(replace(call, is_all=False), 0.35)
+    assert not is_likely(look("hey, halt the", surety=0.03, confidence=0.2), 0.35)
 
 
 def test_and_while_somebody_speaks_one_that_hears_some_of_it() -> None:
@@ -158,8 +171,9 @@ def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
 def test_but_words_before_the_last_count_where_the_ear_is_sure(
     read: str, surety: float | None, stops: bool
 ) -> None:
-    glance = look(read, surety=surety, confidence=0.1, is_all=False)
+    glance = look(read, surety=surety, confidence=0.12, is_all=False)
     assert is_likely(glance, 0.0) is stops
+    assert not is_likely(replace(glance, confidence=0.08), 0.0)
     assert is_confirmed(glance, glance, 0.0) is stops
     assert not is_sure(glance, 0.0)
     assert not is_confirmed(look("halt", surety=0.99, is_all=False), glance, 0.0)
@@ -190,6 +204,7 @@ def test_while_somebody_goes_on_the_ear_has_to_be_surer_the_second_time(
 
 SURE: Any = {"surety": TWICE_SURETY + 0.01, "is_all": False}
 SURER: Any = {"surety": 0.96, "odds": 0.04, "is_all": False}
+SUREST: Any = {"surety": 0.98, "odds": 0.004, "is_all": False}
 
 
 @pytest.mark.parametrize(
@@ -203,6 +218,9 @@ SURER: Any = {"surety": 0.96, "odds": 0.04, "is_all": False}
         (look("up", **SURER), look("up", **SURER), 0.65, True),
         (look("up", **SURER), look("up", **SURER), 0.55, False),
         (look("up", **SURER), look("up", **SURE, odds=0.04), 0.65, False),
+        (look("reading", **SUREST), look("reading", **SUREST), 0.45, True),
+        (look("reading", **SUREST), look("reading", **SUREST), 0.35, False),
+        (look("reading", **SUREST), look("reading", **SURER), 0.45, False),
         (look("in the hall", **SURER), look("in the hall", surety=0.99, odds=0.02), 0.75, False),
         (look("halt", **SURE, odds=1.0), look("halting", **SURE, odds=0.9), 0.55, False),
         (look("halt", **SURE, odds=1.0), look("halt the", surety=0.8, odds=1.0), 0.55, False),
