@@ -18,7 +18,6 @@ from sim_twin.head_camera import HeadCamera, camera_line
 from sim_twin.json_line_server import JsonLineServer
 from sim_twin.load import load_model
 from sim_twin.mirror import MirrorState, newest_state
-from sim_twin.priority import claim_niceness
 from sim_twin.referee import FILM_SOCKET
 from sim_twin.stream_line import StreamLine
 from vla_deploy.robots import load_robot
@@ -90,7 +89,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--devices-dir", type=Path, required=True)
     told = parser.parse_args(argv)
-    claim_niceness()  # a camera exposes however busy the robot's computer is
     return run_drawing(told, lambda: Studio(told.robot, told.world, told.seed, told.devices_dir))
 
 

@@ -24,12 +24,11 @@ def claim_priority() -> Priority:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, parameters)
     except PermissionError:
-        return claim_niceness()
+        return _claim_niceness()
     return Priority.FIFO
 
 
-def claim_niceness() -> Priority:
-    """Ask for a lower niceness alone: for what may hold a core, such as a camera that is drawn."""
+def _claim_niceness() -> Priority:
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     except PermissionError:

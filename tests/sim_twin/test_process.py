@@ -20,7 +20,6 @@ from drivers.dynamixel.codec import Instruction, encode_instruction
 from drivers.estop.open_estop import open_estop
 from drivers.opener import PathOpener
 from sim_twin.errors import RefereeRefusal, Unreachable
-from sim_twin.priority import NICENESS
 from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
 from vla_deploy.robots import load_robot
@@ -189,7 +188,6 @@ def test_without_a_twin_the_referee_is_unreachable(tmp_path: Path) -> None:
 def test_camera_and_film_are_served_and_sigterm_leaves_nothing(tmp_path: Path) -> None:
     twin = start(tmp_path, "--seed", "3")
     (studio,) = children(twin.pid)
-    assert os.getpriority(os.PRIO_PROCESS, studio) == (NICENESS if os.geteuid() == 0 else 0)
     clock = MonotonicClock()
     opener = PathOpener(device_links(load_robot("butler"), tmp_path / "dev"), clock)
     camera = RgbdCamera(opener.stream("camera"), clock)
