@@ -68,9 +68,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         return
     if WATCH not in item.config.stash:
         item.config.stash[WATCH] = StillnessWatch()
-        item.config.stash[STOLEN] = StolenTime()
     item.config.stash[WATCH].worst_s()
-    item.config.stash[STOLEN].ratio()
+    item.config.stash[STOLEN] = StolenTime()
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -3,7 +3,6 @@ import dataclasses
 import hashlib
 import itertools
 import json
-import math
 import ssl
 import threading
 import time
@@ -495,7 +494,6 @@ def _quiet_spec(vocabulary: int, width: int) -> Any:
     norms += [part.layer_norm for layer in layers for part in _parts(layer)]
     for norm in norms:
         norm.gamma, norm.beta = np.ones(width, np.float32), zeros(width)
-    decoder.layer_norm.gamma *= np.float32(math.sqrt((width / 2 - 1) / (width - 1)))
     return spec
 
 

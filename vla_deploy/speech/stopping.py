@@ -123,7 +123,7 @@ def is_likely(look: Look, suspicion: float) -> bool:
         return True
     if is_all and suspicion >= SLIGHT_SUSPICION and any(map(is_stop, likely)):
         return True
-    if is_all and is_stop(reading.text) and look.confidence >= CALL_CONFIDENCE:
+    if _is_call(look):
         return True
     return is_all and _is_witnessed(look, suspicion)
 
@@ -139,9 +139,13 @@ def _is_read(look: Look, suspicion: float) -> bool:
         return look.confidence >= GLANCED_CONFIDENCE
     least = READ_SURETY if look.is_all else LEAST_SURETY
     is_heard = suspicion >= SLIGHT_SUSPICION and not _denies(look.reading, least)
+    return is_heard and (_is_call(look) or look.confidence >= STOP_SUSPECTED_CONFIDENCE)
+
+
+def _is_call(look: Look) -> bool:
+    """Tell whether nothing but a call to stop was read, by enough confidence for one."""
     is_call = look.is_all and is_stop(look.reading.text)
-    enough = CALL_CONFIDENCE if is_call else STOP_SUSPECTED_CONFIDENCE
-    return is_heard and look.confidence >= enough
+    return is_call and look.confidence >= CALL_CONFIDENCE
 
 
 def wants_another(look: Look, suspicion: float) -> bool:

@@ -297,7 +297,7 @@ def test_silence_noise_and_music_say_nothing(bench: MakeBench) -> None:
 
 
 def test_an_unsure_reading_is_asked_again_and_never_carried_out(bench: MakeBench) -> None:
-    rig = bench(sureness=0.7)
+    rig = bench(sureness=0.6)
     rig.quiet(1.0)
     rig.say("quelle heure est il maintenant", voice="fr")
     rig.say(TEXT, gain=60.0)

@@ -171,7 +171,7 @@ def test_while_somebody_speaks_a_word_may_go_on_and_words_alone_count() -> None:
 def test_but_words_before_the_last_count_where_the_ear_is_sure(
     read: str, surety: float | None, stops: bool
 ) -> None:
-    glance = look(read, surety=surety, confidence=0.12, is_all=False)
+    glance = look(read, surety=surety, confidence=0.1, is_all=False)
     assert is_likely(glance, 0.0) is stops
     assert not is_likely(replace(glance, confidence=0.08), 0.0)
     assert is_confirmed(glance, glance, 0.0) is stops
