@@ -28,7 +28,7 @@ def live_stack(folder: Path, profile: str) -> Iterator[tuple[ProcessStack, Sessi
         StackFailed: the processes do not come up.
     """
     (folder / PROFILE_FILE).write_text(profile, encoding="utf-8")
-    stack = ProcessStack(folder / "run", "--profile", str(folder / PROFILE_FILE))
+    stack = ProcessStack(folder / "run", "--wall", "--profile", str(folder / PROFILE_FILE))
     try:
         stack.wait_until_ready()
         with closing(Session(stack.run_dir)) as session:

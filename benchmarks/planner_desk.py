@@ -167,7 +167,7 @@ class Desk:
         planner = open_planner(
             robot, profile.planning, self._clock, base, models.rungs, models.away
         )
-        return PlannerNode(self._context, robot, planner, beside("plan"))
+        return PlannerNode(self._context, robot, planner, beside("plan", self._context.clock, 0.2))
 
     def _start_anew(self) -> None:
         self.node.stop()

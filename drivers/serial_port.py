@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from drivers.clock import Clock
+from drivers.clock import Clock, waiter_of
 from drivers.errors import DeviceBusy, DeviceMissing, LinkLost
 
 _SPEEDS: Final = {
@@ -99,6 +99,7 @@ class SerialPort:
         self.low_latency = _request_low_latency(self._fd)
         self._poll = select.poll()
         self._poll.register(self._fd, select.POLLIN)
+        self._wait_readable = waiter_of(clock)
 
     def write(self, data: bytes) -> None:
         """Hand all of `data` to the line.
@@ -124,8 +125,7 @@ class SerialPort:
             LinkLost: the adapter is gone.
         """
         while True:
-            remaining_ns = deadline_ns - self._clock.now_ns()
-            if not self._poll.poll(remaining_ns / 1e6 if remaining_ns > 0 else 0):
+            if not self._wait_readable(self._poll, deadline_ns):
                 return b""
             data = self._read_now(max_bytes)
             if data:

@@ -4,7 +4,7 @@ import select
 import socket
 from pathlib import Path
 
-from drivers.clock import Clock
+from drivers.clock import Clock, waiter_of
 from drivers.errors import DeviceMissing, LinkLost
 
 _WRITE_PATIENCE_S = 0.05
@@ -33,6 +33,7 @@ class SocketStream:
         self._socket.settimeout(_WRITE_PATIENCE_S)
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
+        self._wait_readable = waiter_of(clock)
 
     def write(self, data: bytes) -> None:
         """Hand all of `data` to the stream.
@@ -51,8 +52,7 @@ class SocketStream:
         Raises:
             LinkLost: the other end has gone.
         """
-        remaining_ns = deadline_ns - self._clock.now_ns()
-        if not self._poll.poll(max(0.0, remaining_ns / 1e6)):
+        if not self._wait_readable(self._poll, deadline_ns):
             return b""
         try:
             data = self._socket.recv(max_bytes)

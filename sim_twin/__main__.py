@@ -9,6 +9,7 @@ from pathlib import Path
 
 from drivers.clock import MonotonicClock
 from drivers.errors import DriverError
+from drivers.twin_page import Pace
 from sim_twin.errors import TwinError
 from sim_twin.lifetime import die_with_parent
 from sim_twin.process import TwinOptions, TwinProcess
@@ -51,13 +52,15 @@ def _twin_options(options: argparse.Namespace) -> TwinOptions:
         camera=not options.no_camera,
         viewer=options.viewer,
         paced=options.paced,
+        pace=options.pace,
+        hold_for_pid=options.hold_for,
     )
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m sim_twin",
-        description="Serve a robot's devices from a simulation on the wall clock.",
+        description="Serve a robot's devices from a simulation.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -71,6 +74,16 @@ def _parser() -> argparse.ArgumentParser:
         "--paced",
         action="store_true",
         help="let bytes on the servo bus and frames on CAN take their time, at the robot's rates",
+    )
+    parser.add_argument(
+        "--pace",
+        type=Pace,
+        choices=list(Pace),
+        default=Pace.WALL,
+        help="real, fast: the processes of the run in RUN_DIR are waited for; default: wall",
+    )
+    parser.add_argument(
+        "--hold-for", type=int, metavar="PID", help="time begins when this process takes part in it"
     )
     parser.add_argument("--parent-pid", type=int, help="process with which to end")
     return parser

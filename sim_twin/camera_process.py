@@ -1,16 +1,24 @@
 """Render in a process of its own, so that drawing a frame never holds up physics or buses.
 
-It mirrors the physics' positions, serves the RGB-D camera's stream and shoots the film.
+It mirrors the physics' positions, serves the RGB-D camera's stream and shoots the film. On the
+twin's time it is a member: a frame leaves `LATENCY_NS` after its exposure, however long it took to
+draw, and time goes on meanwhile.
 """
 
+import contextlib
+import os
 import select
 import socket
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import mujoco
 
+from drivers.clock import NS_PER_S
+from drivers.twin_clock import TimeLine
+from drivers.twin_page import DEFAULT_HOLD, PAGE_FILE, Op, Role, TimePage
 from sim_twin.drawing_process import drawing_parser, run_drawing, take_over
 from sim_twin.faults.camera_relay import CameraBench, CameraFaults
 from sim_twin.film_desk import FilmDesk
@@ -18,18 +26,27 @@ from sim_twin.head_camera import HeadCamera, camera_line
 from sim_twin.json_line_server import JsonLineServer
 from sim_twin.load import load_model
 from sim_twin.mirror import MirrorState, newest_state
+from sim_twin.mirror_link import PERIOD_NS
 from sim_twin.referee import FILM_SOCKET
 from sim_twin.stream_line import StreamLine
 from vla_deploy.robots import load_robot
 
-_IDLE_S = 0.5
+LATENCY_NS: Final = 40_000_000
+"""From exposure to the first byte, as depth cameras need it (D435: some 40 ms at 30 Hz)."""
+_FILM_HOLD_NS: Final = 100_000_000
+_REST_NS: Final = 200_000
+"""How soon the rest of a frame follows that has not found room at once."""
+_ROLE: Final = Role(name="camera", order=-1)
+_IDLE_S: Final = 0.5
 
 
 class Studio:
     """Draw what the mirror shows, for the camera's client and for the film."""
 
-    def __init__(self, robot_name: str, world: str, seed: int, devices_dir: Path) -> None:
-        """Open OpenGL and serve the sockets.
+    def __init__(
+        self, robot_name: str, world: str, seed: int, devices_dir: Path, *, is_member: bool
+    ) -> None:
+        """Open OpenGL and serve the sockets; `is_member`: the twin's time waits for the camera.
 
         Raises:
             TwinError: the model does not load, or nothing can be rendered here.
@@ -37,7 +54,13 @@ class Studio:
         robot = load_robot(robot_name)
         self._model = load_model(robot, world)
         self._data = mujoco.MjData(self._model)
-        self._camera = HeadCamera(self._model, self._data, robot.camera, seed)
+        latency_ns = LATENCY_NS if is_member else 0
+        self._camera = HeadCamera(
+            self._model, self._data, robot.camera, seed, latency_s=latency_ns / NS_PER_S
+        )
+        self._devices_dir = devices_dir
+        self._is_member = is_member
+        self._line: TimeLine | None = None
         self._camera.open()
         self._shown_ns = 0
         line = camera_line(self._camera, robot.camera, lambda: self._shown_ns)
@@ -50,16 +73,51 @@ class Studio:
 
     def run(self, mirror: socket.socket) -> None:
         """Serve until the mirror's other end closes."""
+        with contextlib.suppress(EOFError):
+            if self._is_member:
+                self._run_as_member(mirror)
+            else:
+                self._run_on_wall_clock(mirror)
+
+    def _run_on_wall_clock(self, mirror: socket.socket) -> None:
         while True:
-            self._wait(mirror)
+            readable = [mirror.fileno(), *self._stream.filenos(), *self._film_server.filenos()]
+            select.select(readable, self._stream.output_filenos(), [], _IDLE_S)
             self._stream.poll_once()
             self._film_server.poll_once()
-            try:
-                state = newest_state(mirror)
-            except EOFError:
-                return
+            state = newest_state(mirror)
             if state is not None:
                 self._show(state)
+
+    def _run_as_member(self, mirror: socket.socket) -> None:
+        select.select([mirror], [], [])  # the twin moves time before it shows anything
+        page = TimePage(self._devices_dir / PAGE_FILE)
+        line = self._line = TimeLine(page, self._devices_dir)
+        line.send(Op.JOIN, os.getpid(), role=_ROLE)
+        shown_ns = page.now_ns()
+        while True:
+            state = newest_state(mirror)
+            if state is not None:
+                shown_ns = state.clock_ns
+                self._show(state)
+            self._stream.poll_once()
+            self._wait(line, self._next_ns(shown_ns, page.now_ns()))
+
+    def _next_ns(self, shown_ns: int, now_ns: int) -> int:
+        """Return when the next state comes, or the rest of a frame may find room."""
+        if self._stream.is_backed_up:
+            return now_ns + _REST_NS
+        periods = max(1, -((shown_ns - now_ns) // PERIOD_NS))
+        return shown_ns + periods * PERIOD_NS
+
+    def _wait(self, line: TimeLine, until_ns: int) -> None:
+        """Wait in the twin's time; what is asked about the film meanwhile takes none."""
+        line.send(Op.WAIT, until_ns, DEFAULT_HOLD)
+        asked = [line.fileno(), *self._film_server.filenos()]
+        while line.fileno() not in select.select(asked, [], [])[0]:
+            self._film_server.poll_once()
+            asked = [line.fileno(), *self._film_server.filenos()]
+        line.granted()
 
     def close(self) -> None:
         """Finish the film and take the sockets away."""
@@ -68,19 +126,25 @@ class Studio:
         self._stream.close()
         self._camera.close()
 
-    def _wait(self, mirror: socket.socket) -> None:
-        readable = [mirror.fileno(), *self._stream.filenos(), *self._film_server.filenos()]
-        select.select(readable, self._stream.output_filenos(), [], _IDLE_S)
-
     def _show(self, state: MirrorState) -> None:
-        """Take over a state; stamp camera frames with wall time, which never slips."""
-        self._shown_ns = state.wall_ns
+        """Take over a state; the frame that is due is stamped with its time."""
+        self._shown_ns = state.clock_ns
         self._faults.follow(state.camera_faults)
         take_over(state, self._model, self._data)
+        device = self._camera.device
         if not self._stream.is_backed_up:
-            self._camera.device.step(state.wall_ns)
-        self._desk.shoot_if_due(state.now_ns)
+            if device.is_due(state.clock_ns):
+                self._hold_until(state.clock_ns + LATENCY_NS)
+            device.step(state.clock_ns)
+        if self._desk.is_due(state.now_ns):
+            until_ns = state.clock_ns + _FILM_HOLD_NS
+            self._hold_until(min(until_ns, device.next_event_ns(until_ns)))
+            self._desk.shoot(state.now_ns)
         self._stream.poll_once()
+
+    def _hold_until(self, until_ns: int) -> None:
+        if self._line is not None:
+            self._line.send(Op.HOLD, until_ns)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -88,8 +152,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = drawing_parser("camera_process")
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--devices-dir", type=Path, required=True)
-    told = parser.parse_args(argv)
-    return run_drawing(told, lambda: Studio(told.robot, told.world, told.seed, told.devices_dir))
+    parser.add_argument("--member", action="store_true", help="take part in the twin's time")
+    given = parser.parse_args(argv)
+    return run_drawing(
+        given,
+        lambda: Studio(
+            given.robot, given.world, given.seed, given.devices_dir, is_member=given.member
+        ),
+    )
 
 
 if __name__ == "__main__":

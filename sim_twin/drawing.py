@@ -10,8 +10,12 @@ from sim_twin.mirror_link import MirrorLink
 DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
-def start_camera(robot: str, world: str, seed: int, devices_dir: Path) -> MirrorLink:
+def start_camera(
+    robot: str, world: str, seed: int, devices_dir: Path, *, is_member: bool
+) -> MirrorLink:
     """Start the process that renders the camera's frames and films, and wait for it.
+
+    `is_member` lets the twin's time wait for its frames.
 
     Raises:
         DrawingFailed: it cannot render here, or does not start.
@@ -24,7 +28,8 @@ def start_camera(robot: str, world: str, seed: int, devices_dir: Path) -> Mirror
     }
     # One llvmpipe thread draws as fast as two and leaves the other core to the robot.
     environment = {"LP_NUM_THREADS": "1"}
-    return _ready(MirrorLink("camera", "sim_twin.camera_process", arguments, environment))
+    flags = ["--member"] if is_member else []
+    return _ready(MirrorLink("camera", "sim_twin.camera_process", arguments, environment, flags))
 
 
 def start_viewer(robot: str, world: str, environ: Mapping[str, str] = os.environ) -> MirrorLink:

@@ -40,12 +40,14 @@ class FilmDesk:
             raise RefereeRefusal(f"no operation {request.get('op')!r}; there are {known}")
         return operation(request)
 
-    def shoot_if_due(self, now_ns: int) -> None:
-        """Add a frame when one is due in simulated time."""
-        if self._film is None or now_ns < self._due_ns:
-            return
+    def is_due(self, now_ns: int) -> bool:
+        """Return whether a frame is due in simulated time."""
+        return self._film is not None and now_ns >= self._due_ns
+
+    def shoot(self, now_ns: int) -> None:
+        """Add a frame."""
         self._due_ns = max(self._due_ns + round(NS_PER_S / FPS), now_ns)
-        self._film.shoot()
+        self._running().shoot()
 
     def close(self) -> None:
         """Finish a film that still runs."""

@@ -27,7 +27,13 @@ class HeadCamera:
     """Render from the MJCF camera named as the robot file's optical site; GL opens at first use."""
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, camera: Camera, seed: int
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        camera: Camera,
+        seed: int,
+        *,
+        latency_s: float = 0.0,
     ) -> None:
         """Check the calibration and prepare the device.
 
@@ -40,7 +46,7 @@ class HeadCamera:
         self._view = fixed_camera(model, camera.site)
         self._renderer: Renderer | None = None
         _check_fovy(model, camera)
-        self.device = CameraDevice(self.render, camera.pinhole, seed=seed)
+        self.device = CameraDevice(self.render, camera.pinhole, latency_s=latency_s, seed=seed)
 
     def open(self) -> None:
         """Open OpenGL now rather than at the first frame.

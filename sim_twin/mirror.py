@@ -15,10 +15,10 @@ _MAX_STATE_BYTES = 65_536
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MirrorState:
-    """Hold one moment: simulated time, monotonic time, all positions, and the camera's faults."""
+    """Hold one moment: simulated time, the run's time, all positions, and the camera's faults."""
 
     now_ns: int
-    wall_ns: int
+    clock_ns: int
     qpos: NDArray[np.float64]
     camera_faults: str = "[]"
 
@@ -38,7 +38,7 @@ def send_state(sender: socket.socket, state: MirrorState) -> None:
         BrokenPipeError: the receiver has ended.
     """
     try:
-        head = _HEAD.pack(state.now_ns, state.wall_ns, len(state.qpos))
+        head = _HEAD.pack(state.now_ns, state.clock_ns, len(state.qpos))
         sender.send(head + state.qpos.tobytes() + state.camera_faults.encode())
     except BlockingIOError:
         return
@@ -61,7 +61,7 @@ def newest_state(receiver: socket.socket) -> MirrorState | None:
         newest = packet
     if newest is None:
         return None
-    now_ns, wall_ns, count = _HEAD.unpack_from(newest)
+    now_ns, clock_ns, count = _HEAD.unpack_from(newest)
     qpos = np.frombuffer(newest, np.float64, count, offset=_HEAD.size)
     faults = newest[_HEAD.size + qpos.nbytes :].decode()
-    return MirrorState(now_ns=now_ns, wall_ns=wall_ns, qpos=qpos, camera_faults=faults)
+    return MirrorState(now_ns=now_ns, clock_ns=clock_ns, qpos=qpos, camera_faults=faults)

@@ -5,7 +5,7 @@ import select
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from sim_twin.errors import DrawingFailed
 from sim_twin.mirror import READY, MirrorState, mirror_pair, send_state
@@ -19,7 +19,8 @@ _MESSAGE_BYTES = 4096
 class MirrorLink:
     """Own a drawing process and the mirror that feeds it; it can never hold up the physics.
 
-    `module` is run with `arguments`, `--mirror-fd` and `--parent-pid`; `name` is for messages.
+    `module` is run with `flags`, `arguments`, `--mirror-fd` and `--parent-pid`; `name` is for
+    messages.
     """
 
     def __init__(
@@ -28,6 +29,7 @@ class MirrorLink:
         module: str,
         arguments: Mapping[str, str],
         environment: Mapping[str, str] | None = None,
+        flags: Sequence[str] = (),
     ) -> None:
         self._name = name
         self._sender, receiver = mirror_pair()
@@ -38,7 +40,7 @@ class MirrorLink:
             "--mirror-fd": str(receiver.fileno()),
             "--parent-pid": str(os.getpid()),
         }
-        words = [word for pair in options.items() for word in pair]
+        words = [*flags, *(word for pair in options.items() for word in pair)]
         with receiver:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", module, *words],

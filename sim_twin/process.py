@@ -1,4 +1,4 @@
-"""Run the twin on the wall clock: physics paced, buses answered between any two steps."""
+"""Run the twin for other processes: physics step by step, buses answered between any two steps."""
 
 import gc
 import json
@@ -10,7 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock
+from drivers.twin_clock import TwinClock
+from drivers.twin_page import Pace
 from sim_twin.can import CanHub
 from sim_twin.drawing import start_camera, start_viewer
 from sim_twin.engine import STEP_NS
@@ -18,11 +20,12 @@ from sim_twin.errors import RefereeRefusal, TwinError
 from sim_twin.faults.camera_relay import faults_in_force
 from sim_twin.faults.desk import FaultDesk
 from sim_twin.faults.plug import Carrier
+from sim_twin.governor import Governor
 from sim_twin.json_line_server import JsonLineServer
 from sim_twin.mirror import MirrorState
 from sim_twin.mirror_link import MirrorLink
 from sim_twin.pacer import Pacer, RealTimeFactor
-from sim_twin.priority import claim_priority
+from sim_twin.priority import Priority, claim_priority
 from sim_twin.pty_line import PtyLine
 from sim_twin.referee import REFEREE_SOCKET
 from sim_twin.servos import WireTiming
@@ -30,6 +33,8 @@ from sim_twin.sound.desk import SoundDesk
 from sim_twin.stream_line import StreamLine
 from sim_twin.twin import Twin
 from sim_twin.twin_status import TwinStatus
+from sim_twin.wall_time import TimeKeeper, WallTime
+from sim_twin.wire_digest import WireDigest
 from vla_deploy.robots import load_robot
 
 READY_FILE = "ready"
@@ -41,7 +46,8 @@ MOST_PATH_BYTES = 90
 class TwinOptions:
     """Say which robot lives in which world, and where its devices are served.
 
-    `paced` gives bytes on the servo bus and frames on the CAN bus the time they take on the wire.
+    `paced` gives bytes on the servo bus and frames on the CAN bus the time they take on the wire;
+    `pace` says how time goes, which waits for the process `hold_for_pid` before it begins.
     """
 
     robot: str
@@ -51,6 +57,8 @@ class TwinOptions:
     camera: bool = True
     viewer: bool = False
     paced: bool = False
+    pace: Pace = Pace.WALL
+    hold_for_pid: int | None = None
 
     @property
     def devices_dir(self) -> Path:
@@ -62,7 +70,7 @@ class TwinProcess:
     """Serve one twin's devices under `<run_dir>/dev` from a single-threaded loop."""
 
     def __init__(self, options: TwinOptions, clock: Clock) -> None:
-        """Serve every device; the file `ready` appears last.
+        """Serve every device; the file `ready` appears last. `clock` is the wall's.
 
         Raises:
             TwinError: the model does not load, the camera cannot render, or there is no display
@@ -73,12 +81,14 @@ class TwinProcess:
         devices.mkdir(parents=True, exist_ok=True)
         self._ready = devices / READY_FILE
         self._ready.unlink(missing_ok=True)
-        self._clock = clock
         robot = load_robot(options.robot)
         timing = WireTiming(baud=robot.servo_bus.baud) if options.paced else None
         self._twin = Twin(robot, options.world, options.seed, timing)
         self._twin.can_wire.timed = options.paced
-        self._hub = CanHub(self._twin.can_wire, devices / robot.can_bus.device)
+        self._digest = WireDigest(lambda: self._now_ns())
+        self._hub = CanHub(
+            self._twin.can_wire, devices / robot.can_bus.device, on_packet=self._digest.add
+        )
         self._drawings = _start_drawings(options)
         self._servo_line = self._open_servo_line(devices / robot.servo_bus.device)
         self._lines = {robot.servo_bus.device: self._servo_line} | {
@@ -99,31 +109,39 @@ class TwinProcess:
             "inside": self._inside,
             "hazards": self._hazards,
             **FaultDesk(self._twin.faults, robot).operations,
-            **SoundDesk(self._twin, devices, options.seed, self._wall_ns).operations,
+            **SoundDesk(self._twin, devices, options.seed, self._clock_ns).operations,
         }
         gc.collect()
         gc.freeze()  # a full collection of the model and libraries takes longer than a step
-        now_ns = clock.now_ns()
-        self._priority = claim_priority()
-        self._pacer = Pacer(STEP_NS, now_ns)
-        self._factor = RealTimeFactor(now_ns, self._twin.now_ns)
-        self._status = TwinStatus(options.run_dir, clock)
+        self._held_by = ""
+        self._next_ns = 0
+        self._wall = clock
+        self._time = self._begin_time(options)
+        self._base_ns = self._time.now_ns - self._twin.now_ns
+        self._factor = RealTimeFactor(clock.now_ns(), self._twin.now_ns)
+        self._status = TwinStatus(options.run_dir, self._clock(options), options.pace)
         self._ready.write_text(json.dumps({"pid": os.getpid()}), encoding="utf-8")
 
     def run(self, should_stop: Callable[[], bool]) -> None:
         """Step and serve until `should_stop()`."""
+        wait_s = 0.0
         while not should_stop():
-            wall_ns = self._clock.now_ns()
-            if self._pacer.due(wall_ns):
-                self._step(wall_ns)
-            ready, _, _ = select.select(self._filenos(), [], [], self._wait_ns() / NS_PER_S)
+            began_ns = self._wall.now_ns()
+            ready, _, _ = select.select(self._filenos(), [], [], wait_s)
+            if wait_s:
+                self._time.blame(self._next_ns, self._wall.now_ns() - began_ns)
+            self._base_ns += self._time.go_round()
             if ready:
                 self._serve(set(ready))
-            self._deliver()
+                wait_s = 0.0
+            else:
+                # Nothing is under way any more: what everybody has done up to now is known.
+                wait_s = self._go_on()
 
     def close(self) -> None:
         """Take every device away."""
         self._ready.unlink(missing_ok=True)
+        self._time.close()
         self._status.close()
         self._referee.close()
         self._hub.close()
@@ -151,31 +169,59 @@ class TwinProcess:
         """Serve the servo bus, whose bytes may take their time, at the speed that the host sets."""
         twin = self._twin
         line, on_baud = twin.lines[path.name], twin.servos.set_host_baud
-        return PtyLine(line, path, now_ns=self._now_ns, on_baud=on_baud)
+        return PtyLine(line, path, now_ns=self._now_ns, on_baud=on_baud, on_bytes=self._digest.add)
+
+    def _begin_time(self, options: TwinOptions) -> TimeKeeper:
+        # As fast as it can, it would leave the robot's page and whoever watches no core.
+        self._priority = Priority.ORDINARY if options.pace is Pace.FAST else claim_priority()
+        if options.pace is Pace.WALL:
+            return WallTime(self._wall)
+        pacer = Pacer(self._wall, is_fast=options.pace is Pace.FAST)
+        return Governor(options.devices_dir, pacer, options.hold_for_pid)
+
+    def _clock(self, options: TwinOptions) -> Clock:
+        if options.pace is Pace.WALL:
+            return self._wall
+        return TwinClock(options.devices_dir)
+
+    def _go_on(self) -> float:
+        """Wake one member, or move time to what is due next; return how long to wait instead."""
+        self._deliver()
+        if self._time.wake_next():
+            return 0.0
+        step_ns = self._twin.now_ns + STEP_NS + self._base_ns
+        next_ns = max(self._time.now_ns, min(step_ns, *self._due_between_steps_ns(step_ns)))
+        self._next_ns = next_ns
+        wait_s = self._time.wait_s(next_ns)
+        if wait_s > 0.0:
+            return wait_s
+        self._time.advance(next_ns)
+        if next_ns >= step_ns:
+            self._step()
+        return 0.0
+
+    def _due_between_steps_ns(self, step_ns: int) -> list[int]:
+        """Return when members are due, and when something arrives at a host."""
+        wire = self._twin.can_wire
+        arrivals = self._twin.servos.next_due_ns(), wire.next_due_ns() if wire.timed else None
+        due = [due_ns + self._base_ns for due_ns in arrivals if due_ns is not None]
+        wake_ns = self._time.next_wake_ns()
+        return [*due, step_ns if wake_ns is None else wake_ns]
 
     def _now_ns(self) -> int:
         """Return simulated time, which passes between two steps too."""
-        return self._twin.now_ns + self._pacer.since_step_ns(self._clock.now_ns())
+        return min(self._time.now_ns - self._base_ns, self._twin.now_ns + STEP_NS)
 
-    def _wall_ns(self, sim_ns: int) -> int:
-        """Return the host's time of a simulated one, as time passes now."""
-        return self._clock.now_ns() + sim_ns - self._now_ns()
-
-    def _wait_ns(self) -> int:
-        """Return how long nothing is due: no step, and nothing under way to a host."""
-        wait_ns = self._pacer.wait_ns(self._clock.now_ns())
-        wire = self._twin.can_wire
-        due = self._twin.servos.next_due_ns(), wire.next_due_ns() if wire.timed else None
-        arrivals = [due_ns for due_ns in due if due_ns is not None]
-        if not arrivals:
-            return wait_ns
-        return min(wait_ns, max(0, min(arrivals) - self._now_ns()))
+    def _clock_ns(self, sim_ns: int) -> int:
+        """Return the time on the run's clock at a simulated time."""
+        return sim_ns + self._base_ns
 
     def _deliver(self) -> None:
         """Hand over what has arrived between two steps."""
         reply_ns = self._twin.servos.next_due_ns()
         if reply_ns is not None and reply_ns <= self._now_ns() and self._servo_line.is_plugged:
             self._servo_line.poll_once()
+            self._time.note_writes()
         if self._twin.can_wire.timed:
             self._twin.can_wire.poll(self._now_ns())
 
@@ -184,28 +230,33 @@ class TwinProcess:
         self._twin.can_wire.poll(self._now_ns())
         self._hub.carry_once()
 
-    def _step(self, wall_ns: int) -> None:
+    def _step(self) -> None:
         # What waits was sent before now: were it heard after the step, heartbeats would be missed.
         self._hear_frames()
-        self._twin.slipped_ns = self._pacer.slipped_ns
         self._twin.step()
-        self._pacer.stepped()
         for line in self._plugged():
             line.send_once()
         for stream in self._streams.values():
             stream.send_once()
         now_ns = self._twin.now_ns
-        self._factor.update(wall_ns, now_ns)
-        self._status.tell(wall_ns, now_ns, self._factor.value)
+        self._time.note_writes()
+        self._tell_status(now_ns)
         state = MirrorState(
             now_ns=now_ns,
-            wall_ns=wall_ns,
+            clock_ns=self._clock_ns(now_ns),
             qpos=self._twin.engine.data.qpos,
             camera_faults=faults_in_force(self._twin.faults),
         )
         for drawing in self._drawings:
             drawing.show(state)
-        self._pacer.rest(wall_ns, self._clock.now_ns())
+
+    def _tell_status(self, now_ns: int) -> None:
+        """Publish how fast time goes, and who has held it most of late."""
+        if self._factor.update(self._wall.now_ns(), now_ns):
+            blamed = self._time.blamed_ns
+            self._held_by = max(blamed, key=lambda name: blamed[name], default="")
+            blamed.clear()
+        self._status.publish(self._clock_ns(now_ns), now_ns, self._factor.value, self._held_by)
 
     def _plugged(self) -> list[PtyLine]:
         return [line for line in self._lines.values() if line.is_plugged]
@@ -213,9 +264,13 @@ class TwinProcess:
     def _filenos(self) -> list[int]:
         lines = [line.fileno() for line in self._plugged()]
         streams = [fileno for stream in self._streams.values() for fileno in stream.filenos()]
-        return [*lines, *streams, *self._hub.filenos(), *self._referee.filenos()]
+        devices = [*lines, *streams, *self._hub.filenos(), *self._referee.filenos()]
+        return [*self._time.filenos(), *devices]
 
     def _serve(self, ready: set[int]) -> None:
+        self._time.serve(ready)
+        if ready.issubset(self._time.filenos()):
+            return
         for line in self._plugged():
             if line.fileno() in ready:
                 line.poll_once()
@@ -227,25 +282,22 @@ class TwinProcess:
             self._hub.poll_once()
         if not ready.isdisjoint(self._referee.filenos()):
             self._referee.poll_once()
+        self._time.note_writes()
 
     def _truth(self, _request: Mapping[str, Any]) -> dict[str, Any]:
         return {
             **self._twin.engine.referee.truth(),
             "real_time_factor": self._factor.value,
-            "slipped_s": self._pacer.slipped_ns / NS_PER_S,
             "priority": self._priority.value,
+            "wire_digest": self._digest.text(),
         }
 
     def _hazards(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Tell the hazards since the last time that somebody wanted to `begin`.
-
-        `held_up_s` is for how long the computer let the devices stand still meanwhile.
-        """
+        """Return the hazards since the last time that somebody wanted to `begin`."""
         watch = self._twin.hazards
-        found = {"hazards": watch.document(), "held_up_s": self._pacer.worst_lag_ns / NS_PER_S}
+        found = {"hazards": watch.document()}
         if request.get("begin"):
             watch.begin()
-            self._pacer.worst_lag_ns = 0
         return found
 
     def _inside(self, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -260,7 +312,15 @@ def _start_drawings(options: TwinOptions) -> list[MirrorLink]:
             drawings.append(start_viewer(options.robot, options.world))
         if options.camera:
             devices_dir = options.devices_dir
-            drawings.append(start_camera(options.robot, options.world, options.seed, devices_dir))
+            drawings.append(
+                start_camera(
+                    options.robot,
+                    options.world,
+                    options.seed,
+                    devices_dir,
+                    is_member=options.pace is not Pace.WALL,
+                )
+            )
     except BaseException:
         for drawing in drawings:
             drawing.close()

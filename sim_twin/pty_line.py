@@ -29,7 +29,8 @@ those with a constant, as <asm-generic/termbits.h> has it."""
 class PtyLine:
     """Carry bytes between a pseudo-terminal and a device; belongs to one single-threaded loop.
 
-    With `now_ns` the device is told its time whenever bytes may pass, not only when it is stepped.
+    With `now_ns` the device learns its time whenever bytes may pass, not only when it is stepped;
+    `on_bytes` gets what passes, in both directions.
     """
 
     def __init__(
@@ -39,12 +40,14 @@ class PtyLine:
         *,
         now_ns: Callable[[], int] | None = None,
         on_baud: Callable[[int], None] | None = None,
+        on_bytes: Callable[[bytes], None] = lambda _: None,
     ) -> None:
         self.link_path = link_path
         self.lost_bytes = 0
         self._device = device
         self._now_ns = now_ns
         self._on_baud = on_baud
+        self._on_bytes = on_bytes
         self._ends: tuple[int, int] | None = None
         self.replug()
 
@@ -74,6 +77,7 @@ class PtyLine:
         if request:
             if self._on_baud is not None:
                 self._on_baud(_baud_of(terminal))
+            self._on_bytes(request)
             self._device.receive(request)
         return self._send(line) or bool(request)
 
@@ -152,6 +156,7 @@ class PtyLine:
             return b""
 
     def _write(self, line: int, reply: bytes) -> None:
+        self._on_bytes(reply)
         try:
             sent = os.write(line, reply)
         except BlockingIOError:

@@ -1,7 +1,7 @@
 """Give tests a robot: pytest finds these fixtures wherever the package is installed.
 
 - `twin`: the whole robot in lock-step on simulated time, armed; same seed, same bits
-- `twin_stack`: the real processes on the wall clock, armed
+- `twin_stack`: the real processes on the twin's time, as fast as this computer can, armed
 - `faults`: the fault injector of the one that the test uses
 - `lockstep`, `make_lockstep`: a twin without nodes, for tests of single parts
 - `hardware`: the devices of a real robot, where `--hardware` names its file
@@ -133,7 +133,7 @@ def twin(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LockstepSta
 
 @pytest.fixture
 def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
-    """Give the real processes on the wall clock, armed."""
+    """Give the real processes on the twin's time, armed."""
     from sim_twin.process_stack import ProcessStack
 
     chosen = _chosen(request)
@@ -141,7 +141,7 @@ def twin_stack(request: pytest.FixtureRequest) -> Iterator[ProcessStack]:
     options = (f"--{name}={value}" for name, value in chosen.items())
     # Sockets want a short path, which pytest's own folders are not.
     with tempfile.TemporaryDirectory(prefix="vla-") as folder:
-        stack = ProcessStack(Path(folder) / "base", *options)
+        stack = ProcessStack(Path(folder) / "base", "--fast", *options)
         try:
             stack.wait_until_armed()
             yield stack

@@ -64,9 +64,8 @@ class Twin:
             robot.lidar.device: ld19.PACKET_BYTES,
             robot.imu.device: bno085_rvc.FRAME_BYTES,
         }
-        clocks = {robot.lidar.device: self._device_ns}
         self.lines = {
-            name: LineTamper(device, clocks.get(name, self._now_ns), frame_bytes.get(name))
+            name: LineTamper(device, self._now_ns, frame_bytes.get(name))
             for name, device in self.serial_devices.items()
         }
         self.streamed_devices = streamed_devices(robot, seed)
@@ -76,8 +75,6 @@ class Twin:
         names = (*self.lines, *self.stream_lines, robot.camera.device)
         self.plugs = {name: Plug() for name in names}
         self.servo_supply = Supply()
-        self.slipped_ns = 0
-        """How far simulated time is behind that of whoever paces it; a device's clock keeps up."""
         self.faults = FaultInjector(self)
         self._hazards: HazardWatch | None = None
         self._camera: HeadCamera | None = None
@@ -163,9 +160,8 @@ class Twin:
         self._drive_motors()
         self.engine.step()
         now_ns = self.engine.now_ns
-        device_ns = self._device_ns()
-        if device_ns >= self.lidar.due_ns:
-            self.lidar.step(device_ns)
+        if now_ns >= self.lidar.due_ns:
+            self.lidar.step(now_ns)
         if now_ns >= self.imu.due_ns:
             self.imu.step(now_ns)
         self.can_wire.poll(now_ns)
@@ -188,10 +184,6 @@ class Twin:
 
     def _now_ns(self) -> int:
         return self.engine.now_ns
-
-    def _device_ns(self) -> int:
-        """Return the time by which a device stamps what it sends: a host would take it for late."""
-        return self.engine.now_ns + self.slipped_ns
 
     def _drive_motors(self) -> None:
         engine, now_ns = self.engine, self.engine.now_ns

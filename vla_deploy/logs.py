@@ -20,7 +20,7 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, TextIO
 
-from drivers.clock import Clock, MonotonicClock
+from drivers.clock import Clock
 from vla_deploy.journal import JOURNAL_SOCKET, JournalHandler
 
 RUN_ID_VARIABLE = "VLA_DEPLOY_RUN_ID"
@@ -58,8 +58,8 @@ class RunLog:
         self,
         origin: LogOrigin,
         folder: Path,
-        journal: Path | None = None,
-        clock: Clock | None = None,
+        journal: Path | None,
+        clock: Clock,
     ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._root = logging.getLogger()
@@ -69,7 +69,7 @@ class RunLog:
             sinks.append(JournalHandler(journal, origin.journal_fields()))
         self._sinks = sinks
         self._queue: SimpleQueue[Any] = SimpleQueue()
-        self._handler = _NeverWaiting(self._queue, clock or MonotonicClock())
+        self._handler = _NeverWaiting(self._queue, clock)
         self._listener = logging.handlers.QueueListener(self._queue, *sinks)
 
     def __enter__(self) -> "RunLog":
@@ -160,7 +160,7 @@ def json_record(record: logging.LogRecord, origin: LogOrigin) -> dict[str, Any]:
 
 
 @contextmanager
-def process_log(process: str, robot: str, run_dir: Path) -> Iterator[None]:
+def process_log(process: str, robot: str, run_dir: Path, clock: Clock) -> Iterator[None]:
     """Log to the run's folder; to the journal or the terminal where these listen.
 
     Only a process that nobody supervises speaks to the terminal: a supervised one has none.
@@ -173,7 +173,7 @@ def process_log(process: str, robot: str, run_dir: Path) -> Iterator[None]:
     if console:
         root.addHandler(console)
     try:
-        with RunLog(origin, run_dir / LOGS_DIR, journal):
+        with RunLog(origin, run_dir / LOGS_DIR, journal, clock):
             yield
     finally:
         if console:

@@ -8,8 +8,9 @@ import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from drivers.clock import Clock, MonotonicClock
+from drivers.clock import Clock
 from drivers.errors import DeviceBusy, DeviceMissing, DriverError, LinkLost, NoReply
+from drivers.twin_clock import TwinClock, clock_of
 from platforms import ProfileError, load_profile
 from vla_deploy.adapting import AdaptingNode
 from vla_deploy.aside import AtOnce, background
@@ -27,6 +28,7 @@ from vla_deploy.logs import process_log
 from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.node import Node, NodeContext, run_node
 from vla_deploy.robots import RobotFileError
+from vla_deploy.runtime.twin_members import MEMBERSHIPS
 
 READY_DIR = "ready"
 # An adapter may be slow to appear at boot, a supply be switched on later, a dying holder let go.
@@ -66,10 +68,12 @@ def main(
     _name_process(name)
     give_large_blocks_back()
     stop_signals = _catch_stop_signals()
-    with process_log(name, context.robot, context.run_dir):
+    with process_log(name, context.robot, context.run_dir, context.clock):
         try:
             built = _adapting(name, build, context) if adapts else build(context)
             node = _Announced(built, context.run_dir / READY_DIR / name)
+            if isinstance(context.clock, TwinClock) and name in MEMBERSHIPS:
+                context.clock.join(MEMBERSHIPS[name].role, os.getpid())
             run(node, context.clock, lambda: bool(stop_signals))
         except ABSENCES as error:
             _log.error("%s", error)
@@ -99,7 +103,7 @@ def _adapting(
         clock=context.clock,
         host=host,
         # Control prepares two numbers; a thread that holds the interpreter could cost it a tick.
-        aside=AtOnce() if name == REALTIME_PROCESS else background(),
+        aside=AtOnce() if name == REALTIME_PROCESS else background(context.clock),
     )
 
 
@@ -142,7 +146,7 @@ def _context(name: str, arguments: Sequence[str] | None) -> NodeContext:
         robot=given.robot,
         profile=given.profile,
         devices_dir=given.devices_dir,
-        clock=MonotonicClock(),
+        clock=clock_of(given.run_dir),
     )
 
 

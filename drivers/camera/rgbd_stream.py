@@ -22,6 +22,8 @@ RESTART_NS = 2 * NS_PER_S
 MAX_RATE_HZ = 1000.0
 _READ_BYTES = 1 << 20
 _POLL_BYTES = 1 << 23
+_REST_NS = 10_000_000
+"""A frame is larger than the buffers on its way: for so long the rest of one is read on."""
 
 
 class RgbdCamera:
@@ -67,28 +69,41 @@ class RgbdCamera:
         self._transport.close()
 
     def poll(self) -> RgbdFrame | None:
-        """Return the newest frame completed since the last call, or None; never waits.
+        """Return the newest frame completed since the last call, or None.
 
-        A camera that stays silent for 2 s is asked again to start: its server may be a new one.
+        It waits for nothing but the rest of a frame that is arriving, 10 ms at most. A camera that
+        stays silent for 2 s is asked again to start: its server may be a new one.
 
         Raises:
             LinkLost: the stream has gone.
         """
-        self._fill()
+        newest = self._newest() if self._fill(0) else None
+        until_ns = self._clock.now_ns() + _REST_NS
+        while newest is None and self._buffer and self._fill(until_ns):
+            newest = self._newest()
+        self._keep_alive(heard=newest is not None)
+        return newest
+
+    def _newest(self) -> RgbdFrame | None:
         newest = None
         while (found := self._next_frame()) is not None:
             self.counters.superseded_frames += newest is not None
             newest = found
-        self._keep_alive(heard=newest is not None)
         return newest
 
-    def _fill(self) -> None:
-        """Read what is there, bounded so that a fast sender cannot hold up the caller."""
+    def _fill(self, deadline_ns: int) -> bool:
+        """Read what is there, bounded so that a fast sender cannot hold up the caller.
+
+        Return False where nothing came by the deadline.
+        """
+        had_bytes = len(self._buffer)
         while len(self._buffer) < _POLL_BYTES:
-            chunk = self._transport.read(_READ_BYTES, 0)
+            chunk = self._transport.read(_READ_BYTES, deadline_ns)
             if not chunk:
-                return
+                break
             self._buffer += chunk
+            deadline_ns = 0
+        return len(self._buffer) > had_bytes
 
     def _keep_alive(self, *, heard: bool) -> None:
         now_ns = self._clock.now_ns()

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, Protocol
 
-from drivers.clock import Clock
+from drivers.clock import Clock, waiter_of
 from drivers.errors import DeviceBusy, DeviceMissing, LinkLost
 from drivers.estop.input_event import EventType, key_report
 
@@ -63,6 +63,7 @@ class InputDevice:
         self._pending = b""
         self._poll = select.poll()
         self._poll.register(self._fd, select.POLLIN)
+        self._wait_readable = waiter_of(clock)
         self._set_up(grab)
 
     def write(self, data: bytes) -> None:
@@ -82,8 +83,7 @@ class InputDevice:
         if self._pending:
             data, self._pending = self._pending[:max_bytes], self._pending[max_bytes:]
             return data
-        remaining_ns = deadline_ns - self._clock.now_ns()
-        if not self._poll.poll(max(0.0, remaining_ns / 1e6)):
+        if not self._wait_readable(self._poll, deadline_ns):
             return b""
         try:
             data = os.read(self._fd, max_bytes)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from sim_twin.campaigns import fault_matrix, kills, pressure, soak, switches
+from sim_twin.campaigns import fault_matrix, kills, load, pressure, soak, switches
 from sim_twin.campaigns.orderly_end import end_on_sigterm
 from sim_twin.campaigns.report import Report, make_room
 from sim_twin.campaigns.selection import NothingChosen
@@ -17,6 +17,7 @@ from vla_deploy.cli.validate import duration_h, whole_number
 CAMPAIGNS: Final[Mapping[str, Callable[[argparse.Namespace, Callable[[str], None]], Report]]] = {
     "faults": fault_matrix.run,
     "kills": kills.run,
+    "load": load.run,
     "pressure": pressure.run,
     "switches": switches.run,
     "soak": soak.run,

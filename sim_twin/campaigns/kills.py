@@ -1,7 +1,8 @@
 """Kill, freeze and end every process of the robot at random moments of its work.
 
-The machine is a twin that runs by itself, so physics goes on and judges whatever dies. The robot
-runs as a service does, restarted and watched by `sim_twin.service_runner` in systemd's place.
+The machine is a twin that runs by itself, so physics goes on and judges whatever dies; all lives
+and is judged in its time, so it does not matter how busy this computer is. The robot runs as a
+service does, restarted and watched by `sim_twin.service_runner` in systemd's place.
 """
 
 import argparse
@@ -9,12 +10,11 @@ import contextlib
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from drivers.clock import NS_PER_S, MonotonicClock
-from sim_twin.campaigns.kill_failures import is_void, late_ready, wrong_state
+from drivers.clock import NS_PER_S
+from sim_twin.campaigns.kill_failures import late_ready, wrong_state
 from sim_twin.campaigns.kill_moment import Work
 from sim_twin.campaigns.kill_rest import RestWatch
 from sim_twin.campaigns.kill_rules import RULES, Injection, Rule, injections
@@ -22,13 +22,11 @@ from sim_twin.campaigns.machine import Machine
 from sim_twin.campaigns.report import Case, Report, told
 from sim_twin.campaigns.robot_service import NotReady, RobotService
 from sim_twin.campaigns.selection import chosen
-from sim_twin.stillness import StillnessWatch
 from vla_deploy.supervisor.table import RestartPolicy
 
 INJECTIONS: Final = 200
 _POLL_S: Final = 0.02
 _SETTLE_S: Final = 1.0
-_TRIES: Final = 3
 _POLL_LATER_S: Final = 0.05
 
 
@@ -36,21 +34,18 @@ class KillCampaign:
     """Own a machine and a robot, and do injections one after the other."""
 
     def __init__(self, folder: Path, seed: int, robot: str = "butler") -> None:
-        self._clock = MonotonicClock()
         self._hit_ns: dict[str, int] = {}
-        self._machine = Machine(folder / "machine", self._clock, robot=robot, seed=seed)
-        self._stillness = StillnessWatch()
+        self._machine = Machine(folder / "machine", robot=robot, seed=seed)
+        self._clock = self._machine.clock
         try:
             self._robot = RobotService(folder / "run", self._machine.devices_dir, self._clock)
         except BaseException:
-            self._stillness.close()
             self._machine.close()
             raise
         self._work = Work(self._robot, self._machine, self._clock)
 
     def inject(self, injection: Injection) -> Case:
         """Do one and judge it."""
-        self._stillness.worst_s()
         self._let_run_stably(injection.process)
         self._robot.make_ready()
         try:
@@ -83,15 +78,10 @@ class KillCampaign:
             seconds=self._since(began_ns),
         )
 
-    def held_up_s(self) -> float:
-        """Return for how long a core or the devices stood still, as those of a robot never do."""
-        return max(self._machine.held_up_s(), self._stillness.worst_s())
-
     def close(self) -> None:
         """End the robot's work, the robot, then its machine."""
         with contextlib.ExitStack() as closing:  # each, even where one of them fails
             closing.callback(self._machine.close)
-            closing.callback(self._stillness.close)
             closing.callback(self._robot.close)
             closing.callback(self._work.end)
 
@@ -150,26 +140,17 @@ def inject_all(drawn: Sequence[Injection], seed: int, tell: Callable[[str], None
     with tempfile.TemporaryDirectory(prefix="vla-kill-") as folder:
         campaign = KillCampaign(Path(folder), seed)
         try:
-            cases = [told(_tried(campaign, injection, tell), tell) for injection in drawn]
+            cases = [told(_injected(campaign, injection), tell) for injection in drawn]
         finally:
             campaign.close()
     return Report(campaign="kills", cases=tuple(cases), summary=_summary(cases))
 
 
-def _tried(campaign: KillCampaign, injection: Injection, tell: Callable[[str], None]) -> Case:
-    """Do an injection, again where all that failed follows from a computer that stood still."""
-    voids: list[str] = []
-    while True:
-        try:
-            case = campaign.inject(injection)
-        except NotReady as error:
-            case = Case(name=injection.name, failures=(str(error),))
-        case = replace(case, voids=tuple(voids))
-        held_up_s = campaign.held_up_s()
-        if len(voids) + 1 == _TRIES or not is_void(case.failures, held_up_s):
-            return case
-        voids.append(f"stood still for {held_up_s:.3f} s: {'; '.join(case.failures)}")
-        tell(f"{case.row}\n  void: this computer {voids[-1]}; again")
+def _injected(campaign: KillCampaign, injection: Injection) -> Case:
+    try:
+        return campaign.inject(injection)
+    except NotReady as error:
+        return Case(name=injection.name, failures=(str(error),))
 
 
 def _share(met: Sequence[Mapping[str, Any]], is_so: Callable[[Mapping[str, Any]], object]) -> float:

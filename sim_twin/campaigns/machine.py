@@ -6,7 +6,9 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import NS_PER_S, MonotonicClock
+from drivers.twin_clock import TwinClock
+from drivers.twin_page import Pace
 from sim_twin.errors import TwinError, Unreachable
 from sim_twin.process import READY_FILE
 from sim_twin.referee import ask, told_hazards
@@ -19,15 +21,15 @@ _POLL_NS: Final = NS_PER_S // 20
 class Machine:
     """Own the process of one twin; the robot finds its devices in `devices_dir`."""
 
-    def __init__(self, folder: Path, clock: Clock, *, robot: str, seed: int) -> None:
+    def __init__(self, folder: Path, *, robot: str, seed: int) -> None:
         """Start the twin and return when it serves every device.
 
         Raises:
             TwinError: it ended, or is not ready in time.
         """
         self.folder = folder
-        self._clock = clock
-        command = ["-m", "sim_twin", "--robot", robot, "--seed", str(seed)]
+        self._started_by = MonotonicClock()  # until there is a twin whose time could be told
+        command = ["-m", "sim_twin", "--robot", robot, "--seed", str(seed), "--pace", Pace.REAL]
         self._process = subprocess.Popen(
             [sys.executable, *command, "--run-dir", str(folder)], start_new_session=True
         )
@@ -36,6 +38,8 @@ class Machine:
         except BaseException:
             self.close()
             raise
+        self.clock = TwinClock(self.devices_dir)
+        """The twin's time, by which the robot lives, too."""
 
     @property
     def devices_dir(self) -> Path:
@@ -54,10 +58,6 @@ class Machine:
         """Return the hazards since the watch began, in words."""
         return told_hazards(self.folder)
 
-    def held_up_s(self) -> float:
-        """Return for how long the computer let every device stand still since the watch began."""
-        return float(ask(self.folder, "hazards", begin="")["held_up_s"])
-
     def close(self) -> None:
         """End the twin; ending twice is allowed."""
         if self._process.poll() is None:
@@ -65,13 +65,13 @@ class Machine:
         self._process.wait(_END_S)
 
     def _wait_until_ready(self) -> None:
-        deadline_ns = self._clock.now_ns() + round(_READY_S * NS_PER_S)
+        deadline_ns = self._started_by.now_ns() + round(_READY_S * NS_PER_S)
         while not self._is_ready():
             if self._process.poll() is not None:
                 raise TwinError(f"the twin ended with exit code {self._process.returncode}")
-            if self._clock.now_ns() > deadline_ns:
+            if self._started_by.now_ns() > deadline_ns:
                 raise TwinError(f"the twin under {self.folder} is not ready after {_READY_S:g} s")
-            self._clock.sleep_until(self._clock.now_ns() + _POLL_NS)
+            self._started_by.sleep_until(self._started_by.now_ns() + _POLL_NS)
 
     def _is_ready(self) -> bool:
         path = self.devices_dir / READY_FILE

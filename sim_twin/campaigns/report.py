@@ -14,12 +14,11 @@ from xml.etree import ElementTree
 class Case:
     """Tell one case: no `failures` means that all was as it must be; `figures` are for tables.
 
-    `voids` tells of each try that says nothing why, and `skipped` why the case was not played.
+    `skipped` is why the case was not played.
     """
 
     name: str
     failures: tuple[str, ...] = ()
-    voids: tuple[str, ...] = ()
     skipped: str = ""
     figures: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
@@ -31,8 +30,7 @@ class Case:
         verdict = "FAILED: " + "; ".join(self.failures) if self.failures else "ok"
         if self.skipped:
             verdict = f"skipped: {self.skipped}"
-        again = f"  void {len(self.voids)}" if self.voids else ""
-        return f"{self.name:44} {verdict:6} {figures}{again}".rstrip()
+        return f"{self.name:44} {verdict:6} {figures}".rstrip()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,11 +47,6 @@ class Report:
         return tuple(case for case in self.cases if case.failures)
 
     @property
-    def voids(self) -> tuple[str, ...]:
-        """Return why tries say nothing, each with the name of its case."""
-        return tuple(f"{case.name}: {why}" for case in self.cases for why in case.voids)
-
-    @property
     def skipped(self) -> tuple[Case, ...]:
         """Return the cases that could not be played."""
         return tuple(case for case in self.cases if case.skipped)
@@ -65,17 +58,15 @@ class Report:
             "cases": len(self.cases),
             "failed": len(self.failed),
             "skipped": len(self.skipped),
-            "void_tries": len(self.voids),
         }
         return {**head, **self.summary, "results": [asdict(case) for case in self.cases]}
 
     def text(self) -> str:
         """Return what was summed up, for people."""
         lines = [f"{name:32} {_short(value)}" for name, value in self.summary.items()]
-        lines += [f"void: {why}" for why in self.voids]
         lines += [case.row for case in (*self.skipped, *self.failed)]
         sums = f"{len(self.cases)} cases, {len(self.failed)} failed, {len(self.skipped)} skipped"
-        lines += [f"{self.campaign}: {sums}, {len(self.voids)} void tries"]
+        lines += [f"{self.campaign}: {sums}"]
         return "\n".join(lines)
 
     def write_junit(self, path: Path) -> None:
@@ -103,7 +94,7 @@ def make_room(path: Path) -> None:
 
 
 def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:
-    """Write cases in the JUnit format; void tries as the reruns of Maven Surefire."""
+    """Write cases in the JUnit format."""
     counts = {
         "name": suite,
         "tests": str(len(cases)),
@@ -120,9 +111,6 @@ def write_junit(path: Path, suite: str, cases: Sequence[Case]) -> None:
         )
         for failure in case.failures:
             ElementTree.SubElement(child, "failure", message=failure)
-        for why in case.voids:
-            again = "rerunFailure" if case.failures else "flakyFailure"
-            ElementTree.SubElement(child, again, message=why, type="void")
         if case.skipped:
             ElementTree.SubElement(child, "skipped", message=case.skipped)
         ElementTree.SubElement(child, "system-out").text = json.dumps(case.figures)

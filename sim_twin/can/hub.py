@@ -2,6 +2,7 @@
 
 import logging
 import socket
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -50,14 +51,17 @@ class CanHub:
     The owner polls `filenos()` and calls `poll_once()`; nothing here waits or starts a thread.
     """
 
-    def __init__(self, wire: CanWire, path: Path) -> None:
-        """Listen at `path`.
+    def __init__(
+        self, wire: CanWire, path: Path, on_packet: Callable[[bytes], None] = lambda _: None
+    ) -> None:
+        """Listen at `path`; `on_packet` gets what hosts send.
 
         Raises:
             DeviceBusy: another hub listens there.
         """
         self._wire = wire
         self._path = path
+        self._on_packet = on_packet
         self._clients: list[_Client] = []
         self.packets_malformed = 0
         self._frames_dropped = 0
@@ -104,6 +108,7 @@ class CanHub:
             self._carry(packet, client)
 
     def _carry(self, packet: bytes, client: _Client) -> None:
+        self._on_packet(packet)
         try:
             frame = decode_frame(packet)
         except ProtocolError as error:

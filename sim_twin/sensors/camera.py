@@ -78,9 +78,19 @@ class CameraDevice:
         self._out.clear()
         return data
 
+    def is_due(self, now_ns: int) -> bool:
+        """Return whether the next step exposes a frame."""
+        return self._period_ns > 0 and (self._due_ns is None or now_ns >= self._due_ns)
+
+    def next_event_ns(self, otherwise_ns: int) -> int:
+        """Return when the next frame is exposed or handed over, `otherwise_ns` where none is."""
+        ready = [ready_ns for ready_ns, _ in self._in_flight[:1]]
+        due = [self._due_ns] if self._period_ns and self._due_ns is not None else []
+        return min([*ready, *due], default=otherwise_ns)
+
     def step(self, now_ns: int) -> None:
         """Expose a frame when one is due; hand over those whose latency has passed."""
-        if self._period_ns and (self._due_ns is None or now_ns >= self._due_ns):
+        if self.is_due(now_ns):
             period_ns = round(self._period_ns / self.rate_ratio)
             self._due_ns = max((self._due_ns or now_ns) + period_ns, now_ns)
             self._in_flight.append((now_ns + self._latency_ns, self._frame(now_ns)))

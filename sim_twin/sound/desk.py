@@ -23,13 +23,13 @@ Answer = dict[str, Any]
 
 
 class SoundDesk:
-    """Serve one twin's room; `wall_ns` tells the host's time of a simulated one."""
+    """Serve one twin's room; `clock_ns` returns the run's time of a simulated one."""
 
-    def __init__(self, twin: Twin, folder: Path, seed: int, wall_ns: Callable[[int], int]) -> None:
+    def __init__(self, twin: Twin, folder: Path, seed: int, clock_ns: Callable[[int], int]) -> None:
         self._twin = twin
         self._folder = folder
         self._seed = seed
-        self._wall_ns = wall_ns
+        self._clock_ns = clock_ns
         self.operations: Mapping[str, Callable[[Mapping[str, Any]], Answer]] = {
             "sound_ear": self._ear,
             "sound_play": self._play,
@@ -57,8 +57,8 @@ class SoundDesk:
         sound = Clip(rate_hz=rate_hz, wave=wave)
         spoken = let_arrive(self._twin, Arrival(sound=sound, words=words))
         return {
-            "began_ns": self._wall_ns(spoken.begins_ns),
-            "ended_ns": self._wall_ns(spoken.ends_ns),
+            "began_ns": self._clock_ns(spoken.begins_ns),
+            "ended_ns": self._clock_ns(spoken.ends_ns),
         }
 
     def _said(self, request: Mapping[str, Any]) -> Answer:

@@ -2,20 +2,17 @@
 
 import json
 from http.client import HTTPConnection
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 
 from sim_twin.process_stack import ProcessStack
 
-SLOWER: Final = str(Path(__file__).with_name("slower.toml"))
 pytestmark = [
     pytest.mark.gl,
     pytest.mark.stack,
     pytest.mark.timeout(300),
-    pytest.mark.twin(profile=SLOWER),
 ]
 
 MOVING_RAD_S = 1.0

@@ -5,7 +5,7 @@ import pytest
 from sim_twin.campaigns import kills
 from sim_twin.campaigns.kill_rules import Injection, injections
 
-pytestmark = [pytest.mark.stack(again=False), pytest.mark.gl]
+pytestmark = [pytest.mark.stack, pytest.mark.gl]
 
 EARLY_S = 3.0
 

@@ -19,12 +19,10 @@ from websockets.sync.client import connect
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.telemetry.recording.recording_file import ALL_CHANNELS
 
-SLOWER: Final = str(Path(__file__).with_name("slower.toml"))
 pytestmark = [
     pytest.mark.gl,
     pytest.mark.stack,
     pytest.mark.timeout(300),
-    pytest.mark.twin(profile=SLOWER),
 ]
 
 JOBS = [

@@ -3,6 +3,7 @@ from typing import Any
 
 import pytest
 
+from drivers.clock import MonotonicClock
 from platforms import Profile, load_profile
 from platforms.profile_source import read_source
 from vla_deploy.adapting import TIER_RETRY_NS, AdaptingNode
@@ -230,7 +231,7 @@ def test_a_node_without_models_follows_any_tier(adapted, direct):
 
 
 def test_work_in_the_background_gets_its_result_or_its_error():
-    with background() as pool:
+    with background(MonotonicClock()) as pool:
         assert pool.submit(lambda: 7).result(timeout=10) == 7
         assert isinstance(pool.submit(lambda: 1 / 0).exception(timeout=10), ZeroDivisionError)
 

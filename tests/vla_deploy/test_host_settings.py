@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.clock import MonotonicClock
 from platforms import load_profile
 from vla_deploy import host_settings
 from vla_deploy.aside import background
@@ -92,7 +93,7 @@ def test_threads_that_have_put_themselves_aside_keep_their_nice(monkeypatch, pro
     gate = threading.Event()
     sharing = threading.Thread(target=gate.wait, daemon=True)
     sharing.start()
-    with background() as executor:
+    with background(MonotonicClock()) as executor:
         aside = executor.submit(threading.get_native_id).result()
         asked = {}
         monkeypatch.setattr(os, "setpriority", lambda _, thread, nice: asked.update({thread: nice}))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.clock import MonotonicClock
 from vla_deploy import logs
 from vla_deploy.journal import JournalHandler, encode, priority
 from vla_deploy.logs import LogOrigin, RunLog, journal_stream
@@ -49,7 +50,7 @@ def journal(tmp_path):
 
 
 def test_a_line_carries_process_robot_run_and_place(tmp_path):
-    with RunLog(ORIGIN, tmp_path):
+    with RunLog(ORIGIN, tmp_path, None, MonotonicClock()):
         log.warning("servo %d is hot", 3)
     (line,) = lines(tmp_path)
     assert line["message"] == "servo 3 is hot"
@@ -60,7 +61,7 @@ def test_a_line_carries_process_robot_run_and_place(tmp_path):
 
 
 def test_a_message_of_several_lines_and_a_traceback_stay_one_line_of_the_file(tmp_path):
-    with RunLog(ORIGIN, tmp_path):
+    with RunLog(ORIGIN, tmp_path, None, MonotonicClock()):
         try:
             raise KeyError("elbow")
         except KeyError:
@@ -72,7 +73,7 @@ def test_a_message_of_several_lines_and_a_traceback_stay_one_line_of_the_file(tm
 
 def test_arguments_are_made_text_when_logged_since_they_may_change(tmp_path):
     state = ["armed"]
-    with RunLog(ORIGIN, tmp_path):
+    with RunLog(ORIGIN, tmp_path, None, MonotonicClock()):
         log.info("state %s", state)
         state[0] = "stopped"
     assert lines(tmp_path)[0]["message"] == "state ['armed']"
@@ -80,7 +81,7 @@ def test_arguments_are_made_text_when_logged_since_they_may_change(tmp_path):
 
 def test_the_file_is_bounded_to_two_generations(tmp_path, monkeypatch):
     monkeypatch.setattr(logs, "GENERATION_BYTES", 20_000)
-    with RunLog(ORIGIN, tmp_path):
+    with RunLog(ORIGIN, tmp_path, None, MonotonicClock()):
         for number in range(500):
             log.info("line %d", number)
     kept = sorted(path.name for path in tmp_path.iterdir())
@@ -102,7 +103,7 @@ def hang_until(disk: threading.Event, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_caller_does_not_wait_for_a_writer_that_hangs(tmp_path, monkeypatch):
     disk = threading.Event()
     hang_until(disk, monkeypatch)
-    with RunLog(ORIGIN, tmp_path):
+    with RunLog(ORIGIN, tmp_path, None, MonotonicClock()):
         for number in range(2 * logs.QUEUE_LINES):
             log.info("line %d", number)
         disk.set()
@@ -112,7 +113,7 @@ def test_the_caller_does_not_wait_for_a_writer_that_hangs(tmp_path, monkeypatch)
 def test_what_a_full_queue_has_dropped_is_counted_in_the_next_line(tmp_path, monkeypatch):
     disk = threading.Event()
     hang_until(disk, monkeypatch)
-    with RunLog(ORIGIN, tmp_path) as run_log:
+    with RunLog(ORIGIN, tmp_path, None, MonotonicClock()) as run_log:
         for number in range(logs.QUEUE_LINES + 50):
             log.info("line %d", number)
         disk.set()
@@ -129,7 +130,7 @@ def test_a_full_disk_is_counted_and_raises_nothing(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(logs._LogFile, "shouldRollover", lambda *_: False)
-    run_log = RunLog(ORIGIN, tmp_path)
+    run_log = RunLog(ORIGIN, tmp_path, None, MonotonicClock())
     (sink,) = run_log._sinks
     real, sink.stream = sink.stream, Full()
     with run_log:
@@ -145,13 +146,13 @@ def test_a_full_disk_is_counted_and_raises_nothing(tmp_path, monkeypatch):
 def test_leaving_gives_the_root_logger_back(tmp_path):
     root = logging.getLogger()
     before = (root.level, list(root.handlers))
-    with RunLog(ORIGIN, tmp_path):
+    with RunLog(ORIGIN, tmp_path, None, MonotonicClock()):
         assert len(root.handlers) == len(before[1]) + 1
     assert (root.level, root.handlers) == before
 
 
 def test_the_journal_gets_one_entry_with_fields_that_can_be_searched(tmp_path, journal):
-    with RunLog(ORIGIN, tmp_path / "logs", tmp_path / "journal"):
+    with RunLog(ORIGIN, tmp_path / "logs", tmp_path / "journal", MonotonicClock()):
         log.error("servo 3: lost")
     entry = decode(journal.recv(65536))
     assert entry["MESSAGE"] == "servo 3: lost"
@@ -167,7 +168,7 @@ def test_the_journal_gets_one_entry_with_fields_that_can_be_searched(tmp_path, j
 
 
 def test_the_journal_gets_several_lines_whole(tmp_path, journal):
-    with RunLog(ORIGIN, tmp_path / "logs", tmp_path / "journal"):
+    with RunLog(ORIGIN, tmp_path / "logs", tmp_path / "journal", MonotonicClock()):
         log.info("one\ntwo = 2\n\nfour")
     assert decode(journal.recv(65536))["MESSAGE"] == "one\ntwo = 2\n\nfour"
 
@@ -200,8 +201,9 @@ def test_a_stream_is_the_journals_when_systemd_names_its_device_and_inode(tmp_pa
 SCRIPT = """
 import logging, sys
 from pathlib import Path
+from drivers.clock import MonotonicClock
 from vla_deploy.logs import process_log
-with process_log("planner", "butler", Path(sys.argv[1])):
+with process_log("planner", "butler", Path(sys.argv[1]), MonotonicClock()):
     logging.getLogger("x").error("gone")
 """
 

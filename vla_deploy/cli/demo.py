@@ -11,11 +11,12 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from drivers.clock import NS_PER_S, MonotonicClock
+from drivers.clock import NS_PER_S
 from vla_deploy.action_words import action_words
 from vla_deploy.cli.aloud import USUAL_VOICE
 from vla_deploy.cli.demo_sound import MotionWatch, SpokenCommand, await_ears
@@ -33,7 +34,7 @@ COMMAND = "pick up the red cup and put it in the box"
 EXAMPLES = """  vla-deploy demo
   vla-deploy demo --seed 7 --json
   vla-deploy demo --command "bring me the blue ball" --voice en-us+f4 --snr 10
-  vla-deploy demo --typed
+  vla-deploy demo --typed --fast
 """
 SETTLE_S = 1.0
 ARM_TIMEOUT_S = 20.0
@@ -70,6 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         world=arguments.world,
         runtime_base=arguments.runtime_base,
         arm=True,
+        pace=arguments.pace,
     )
     _make_folder(arguments.out)
     log = logging.NullHandler() if arguments.json else logging.StreamHandler(sys.stdout)
@@ -99,7 +101,6 @@ class Demo:
     def __init__(self, arguments: argparse.Namespace, options: RunOptions) -> None:
         self._arguments = arguments
         self._options = options
-        self._clock = MonotonicClock()
         self._plan: dict[str, Any] = {"actions": []}
         self._last: dict[str, Any] = {}
         self._spoken: SpokenCommand | None = None
@@ -110,26 +111,27 @@ class Demo:
         self._tell(f"starting the twin of {self._options.robot} (seed {self._options.seed})")
         with Supervisor(self._options) as supervisor:
             supervisor.start()
-            clock = SteppingClock(self._clock, supervisor)
+            clock = SteppingClock(supervisor)
             session = Session(supervisor.run_dir, clock)
             self._wait_armed(session)
             film = self._start_film(session)
-            started_ns = self._clock.now_ns()
+            started_ns, started_s = clock.now_ns(), time.monotonic()
             self._follow(self._give_command(session, clock), session)
-            wall_s = (self._clock.now_ns() - started_ns) / NS_PER_S
+            took_s, wall_s = (clock.now_ns() - started_ns) / NS_PER_S, time.monotonic() - started_s
+            seen = self._what_control_saw(session)
             session.pause(SETTLE_S)
             judged = self._judge(session)
             film_files = self._stop_film(session) if film else {}
             table = session.document("process_table") or {}
-        return self._outcome(wall_s, judged, film_files, table)
+        return self._outcome(took_s, wall_s, judged, film_files, table) | seen
 
     def _wait_armed(self, session: Session) -> None:
-        end_ns = self._clock.now_ns() + round(ARM_TIMEOUT_S * NS_PER_S)
+        end_ns = session.clock.now_ns() + round(ARM_TIMEOUT_S * NS_PER_S)
         while True:
             status = session.document("control_status", age_limit_s=1.0)
             if status is not None and status["state"] == "armed":
                 return
-            if self._clock.now_ns() > end_ns:
+            if session.clock.now_ns() > end_ns:
                 raise CommandFailed(f"the robot did not arm within {ARM_TIMEOUT_S:g} s: {status}")
             session.pause(0.1)
 
@@ -167,6 +169,16 @@ class Demo:
         answer = ask_referee(session, "inside", object=pair[0], container=pair[1])
         return {"judged_by": "mujoco", **answer}
 
+    def _what_control_saw(self, session: Session) -> dict[str, Any]:
+        """Return what control counted, and a digest of all that has passed on its buses."""
+        status = session.document("control_status") or {}
+        return {
+            "ticks": status.get("tick"),
+            "late_ticks": status.get("late_ticks"),
+            "bus_timeouts": sum(bus.get("timeouts", 0) for bus in status.get("buses", {}).values()),
+            "wire_digest": ask_referee(session, "truth")["wire_digest"],
+        }
+
     def _start_film(self, session: Session) -> bool:
         if self._arguments.headless:
             return False
@@ -191,6 +203,7 @@ class Demo:
 
     def _outcome(
         self,
+        took_s: float,
         wall_s: float,
         judged: dict[str, Any],
         film_files: dict[str, Any],
@@ -207,6 +220,7 @@ class Demo:
             "success": success,
             "refused": refused,
             "error": error,
+            "took_s": round(took_s, 2),
             "wall_s": round(wall_s, 2),
             "seed": self._options.seed,
             "command": self._arguments.order,
@@ -247,8 +261,8 @@ def _summary(outcome: dict[str, Any], path: Path) -> str:
     error_m = outcome["placement_error_m"]
     placed = "" if error_m is None else f", {1000 * error_m:.0f} mm from the middle"
     lines = [
-        f"{'success' if outcome['success'] else 'failed'} after {outcome['wall_s']:.1f} s "
-        f"(judged by {outcome['judged_by']}{placed})",
+        f"{'success' if outcome['success'] else 'failed'} after {outcome['took_s']:.1f} s, "
+        f"{outcome['wall_s']:.1f} s by the wall clock (judged by {outcome['judged_by']}{placed})",
         *_spoken_lines(outcome["spoken"]),
         f"peak memory of all processes: {outcome['peak_memory_mb']} MB "
         f"({outcome['memory_kind']}); share of a core: {shares}",

@@ -6,7 +6,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from drivers.clock import NS_PER_S, MonotonicClock
+from drivers.clock import NS_PER_S
+from drivers.twin_clock import TwinClock
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.session import Session
 from vla_deploy.supervisor.supervisor import Supervisor
@@ -17,15 +18,20 @@ STEP_NS = NS_PER_S // 20
 class SteppingClock:
     """Let the supervisor do its work whenever its own process waits."""
 
-    def __init__(self, clock: MonotonicClock, supervisor: Supervisor) -> None:
+    def __init__(self, supervisor: Supervisor) -> None:
         self.meanwhile: Callable[[], None] = lambda: None
         """What else is done while somebody waits; it must not wait itself."""
-        self._clock = clock
+        self._clock = supervisor.clock
         self._supervisor = supervisor
 
     def now_ns(self) -> int:
-        """Return the monotonic time."""
+        """Return the time of the run."""
         return self._clock.now_ns()
+
+    @property
+    def stands_still(self) -> bool:
+        """Return whether time stands still while nobody waits on this clock: the twin's does."""
+        return isinstance(self._clock, TwinClock)
 
     def sleep_until(self, deadline_ns: int) -> None:
         """Step the supervisor until the deadline.
@@ -57,7 +63,8 @@ def ask_referee(session: Session, op: str, **details: str) -> dict[str, Any]:
 def answer_of(session: Session, module: str, *words: str) -> dict[str, Any]:
     """Return what a module of the twin prints; it is started by name: the robot never imports it.
 
-    It may take seconds, in which the robot must not lose its supervisor.
+    It may take seconds, in which the robot must not lose its supervisor: on the twin's time these
+    are none, where it is the supervisor that asks.
 
     Raises:
         CommandFailed: it gives no answer.
@@ -71,6 +78,9 @@ def answer_of(session: Session, module: str, *words: str) -> dict[str, Any]:
         start_new_session=True,
     ) as asked:
         try:
+            clock = session.clock
+            if isinstance(clock, SteppingClock) and clock.stands_still:
+                asked.wait()
             while asked.poll() is None:
                 session.pause()
         except BaseException:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from drivers.twin_page import Pace
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
@@ -21,6 +22,7 @@ EXAMPLES = """  vla-deploy run --twin                 the robot butler in the fl
   vla-deploy run --twin --seed 7        other places for the objects
   vla-deploy run --twin --viewer        the twin in a window
   vla-deploy run --twin --paced         its buses as slow as the real ones
+  vla-deploy run --twin --fast          as fast as this computer can
   vla-deploy run --robot butler         the real robot; arm it when it is safe: vla-deploy arm
 """
 
@@ -66,6 +68,23 @@ def add_robot_arguments(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--world", default="flat", help="the twin's world")
     command.add_argument("--seed", type=_seed, default=0, help="where the objects lie")
+    pace = command.add_mutually_exclusive_group()
+    pace.add_argument(
+        "--fast",
+        dest="pace",
+        action="store_const",
+        const=Pace.FAST,
+        default=Pace.REAL,
+        help="let the twin's time go as fast as this computer can (default: as the wall clock, "
+        "or slower where the robot's processes need longer)",
+    )
+    pace.add_argument(
+        "--wall",
+        dest="pace",
+        action="store_const",
+        const=Pace.WALL,
+        help="let the wall clock be the twin's time, whoever is late: for real-time measurements",
+    )
 
 
 def _seed(text: str) -> int:
@@ -80,10 +99,14 @@ def main(arguments: argparse.Namespace) -> int:
     Raises:
         CommandFailed: the robot cannot go on without a process that was given up.
     """
-    for option in ("viewer", "paced"):
-        if vars(arguments)[option] and not arguments.twin:
-            sys.stderr.write(f"run: --{option} is about the twin; add --twin\n")
-            return 2
+    asked = {
+        "viewer": arguments.viewer,
+        "paced": arguments.paced,
+        arguments.pace.value: arguments.pace is not Pace.REAL,
+    }
+    for option in (name for name, is_asked in asked.items() if is_asked and not arguments.twin):
+        sys.stderr.write(f"run: --{option} is about the twin; add --twin\n")
+        return 2
     if arguments.twin and arguments.devices_dir is not None:
         sys.stderr.write("run: --devices-dir is of a twin that runs by itself; leave out --twin\n")
         return 2
@@ -104,6 +127,7 @@ def main(arguments: argparse.Namespace) -> int:
         devices_dir=arguments.devices_dir,
         viewer=arguments.viewer,
         paced=arguments.paced,
+        pace=arguments.pace,
         seed=arguments.seed,
         world=arguments.world,
         runtime_base=arguments.runtime_base,

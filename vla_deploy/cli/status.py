@@ -3,13 +3,17 @@
 import argparse
 import json
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.session import attach
 from vla_deploy.dashboard.robot_state import collect
 from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt
 from vla_deploy.supervisor.profile_change import Outcome
+
+KEEPS_UP: Final = 0.95
+"""Of real time: a twin that is slower is held by somebody."""
 
 
 def register(commands: Any) -> None:
@@ -35,6 +39,7 @@ def as_text(status: dict[str, Any]) -> str:
     return "\n".join(
         [
             *_replay(status),
+            *_twin(status),
             *_processes(status),
             _profile(status),
             _control(status),
@@ -55,6 +60,18 @@ def _replay(status: dict[str, Any]) -> list[str]:
         return []
     place = f"{shown['position_s']:.0f} of {shown['duration_s']:.0f} s"
     return [f"REPLAY of {shown['file']}, {shown['state']} at {place}: no robot runs here"]
+
+
+def _twin(status: dict[str, Any]) -> list[str]:
+    twin = status["twin"]
+    return [] if twin is None else [f"twin: {twin_words(twin)}"]
+
+
+def twin_words(twin: Mapping[str, Any]) -> str:
+    """Say how fast the twin's time goes, and who holds it most."""
+    factor, held_by = twin["real_time_factor"], twin["held_by"]
+    held = f", held by {held_by}" if held_by and factor < KEEPS_UP else ""
+    return f"at {factor:.1f} of real time{held}"
 
 
 def _processes(status: dict[str, Any]) -> list[str]:

@@ -23,7 +23,15 @@ from vla_deploy.cli.top_screen import screen
 from vla_deploy.ipc import TOPICS, PulseReader
 
 DOCUMENTS: Final = (
-    *("process_table", "control_status", "budget", "executor_status", "planner_status", "board"),
+    *(
+        "process_table",
+        "control_status",
+        "budget",
+        "executor_status",
+        "planner_status",
+        "board",
+        "twin_status",
+    ),
 )
 AGE_LIMIT_S: Final = 3.0
 _LONGEST_S: Final = 3600.0

@@ -7,6 +7,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from vla_deploy.cli.status import twin_words
+
 Told = Mapping[str, Any]
 _BAD: Final = "bold red"
 _POOR: Final = "yellow"
@@ -26,7 +28,9 @@ def _head(told: Told) -> Text:
     table = told["process_table"]
     if table is None:
         return Text("the supervisor is silent", style=_BAD)
-    twin = ", twin" if table["twin"] else ""
+    pace = told["twin_status"]
+    how_fast = f" {twin_words(pace)}" if pace else ""
+    twin = f", twin{how_fast}" if table["twin"] else ""
     refusal = f"  NO COMMANDS: {table['refusal']}" if table["refusal"] else ""
     words = Text(f"{table['robot']} on {table['profile']}{twin}", style="bold")
     return words.append(refusal, style=_BAD)

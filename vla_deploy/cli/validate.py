@@ -13,6 +13,7 @@ from vla_deploy.cli.example import add_top_command
 CAMPAIGNS = {
     "faults": "every fault in every phase of the work, on the lock-step twin",
     "kills": "kill -9, SIGSTOP and SIGTERM of every process at random moments",
+    "load": "the main job again and again beside eight busy loops: only its duration may change",
     "pressure": "too little memory, CPU, disk, cooling or power, and a clock that jumps",
     "switches": "hot profile switches under motion, and bad profiles",
     "soak": "hours of work in lock-step: memory, files and threads must not grow",

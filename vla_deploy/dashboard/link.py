@@ -5,7 +5,8 @@ import os
 from pathlib import Path
 from typing import Any, Final
 
-from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from drivers.clock import NS_PER_S, Clock
+from drivers.twin_clock import clock_of
 from vla_deploy.ipc import (
     CellReader,
     Frame,
@@ -37,7 +38,7 @@ class RobotLink:
             SpaceUnavailable: it cannot be opened.
         """
         self.run_dir = run_dir
-        self.clock: Clock = clock or MonotonicClock()
+        self.clock: Clock = clock or clock_of(run_dir)
         self.source = source
         self.robot = robot
         self._space = SharedSpace(run_dir / "ipc", self.clock)

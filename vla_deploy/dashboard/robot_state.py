@@ -15,6 +15,7 @@ def collect(link: RobotLink) -> dict[str, Any]:
     dashboard = link.document("dashboard_status", age_limit_s=3.0)
     return {
         "run_dir": str(link.run_dir),
+        "twin": link.document("twin_status", age_limit_s=3.0),
         "process_table": link.document("process_table", age_limit_s=3.0),
         "control": link.document("control_status", age_limit_s=1.0),
         "planner": link.document("planner_status", age_limit_s=2.0),

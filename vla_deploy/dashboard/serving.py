@@ -13,6 +13,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from drivers.clock import NS_PER_S, Clock
+from drivers.twin_clock import TwinClock
 from vla_deploy.dashboard.access.connections import (
     HEAD_BYTES,
     Connections,
@@ -81,6 +82,8 @@ async def _step(node: Node, clock: Clock, should_stop: Callable[[], bool]) -> No
     deadline_ns = clock.now_ns()
     while not should_stop():
         node.step()
+        if isinstance(clock, TwinClock):
+            clock.release()  # requests are answered by the wall clock, and hold nothing
         period_ns = round(node.period_s * NS_PER_S)
         deadline_ns = max(deadline_ns + period_ns, clock.now_ns())
         await asyncio.sleep((deadline_ns - clock.now_ns()) / NS_PER_S)

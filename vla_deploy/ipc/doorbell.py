@@ -9,7 +9,7 @@ import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
-from drivers.clock import NS_PER_S, Clock
+from drivers.clock import Clock, waiter_of
 
 _counter = itertools.count()
 
@@ -21,7 +21,6 @@ class Doorbell:
     """
 
     def __init__(self, directory: Path, topic: str, clock: Clock) -> None:
-        self._clock = clock
         folder = _folder(directory, topic)
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._path = folder / f"{os.getpid()}.{next(_counter)}"
@@ -30,14 +29,16 @@ class Doorbell:
         self._socket.setblocking(False)
         with short_path(folder) as short:
             self._socket.bind(f"{short}/{self._path.name}")
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
+        self._wait_readable = waiter_of(clock)
         self._close = weakref.finalize(self, _close, self._socket, self._path)
 
     def wait(self, deadline_ns: int) -> bool:
         """Return True when the bell rang, False at `deadline_ns` of the injected clock."""
-        remaining_s = max(0.0, (deadline_ns - self._clock.now_ns()) / NS_PER_S)
-        ready, _, _ = select.select([self._socket], [], [], remaining_s)
+        ready = self._wait_readable(self._poll, deadline_ns)
         self._forget_rings()
-        return bool(ready)
+        return ready
 
     def close(self) -> None:
         """Stop listening; closing twice is allowed."""

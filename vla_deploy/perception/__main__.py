@@ -2,6 +2,7 @@
 
 import os
 import sys
+from typing import Final
 
 from drivers.opener import PathOpener
 from drivers.recording_opener import RECORD_VARIABLE, recorded_if_asked
@@ -13,6 +14,9 @@ from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 
+DETECTION_S: Final = 0.1
+"""What the network takes for an image, of simulated time."""
+
 
 def build(context: NodeContext) -> PerceptionNode:
     """Build the node from what the process was started with."""
@@ -22,7 +26,9 @@ def build(context: NodeContext) -> PerceptionNode:
         PathOpener(links, context.clock), context.clock, os.environ.get(RECORD_VARIABLE)
     )
     profile = load_profile(context.profile)
-    return PerceptionNode(context, robot, profile, opener, beside("network"))
+    return PerceptionNode(
+        context, robot, profile, opener, beside("network", context.clock, DETECTION_S)
+    )
 
 
 if __name__ == "__main__":

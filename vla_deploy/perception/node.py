@@ -171,6 +171,7 @@ class PerceptionNode:
         rate_hz = self._profile.perception_rate_hz * self._rate_ratio
         self._next_look_ns = frame.stamp_ns + round(EARLY_RATIO * NS_PER_S / rate_hz)
         self._publish_image(frame)
+        self._next_scene_ns = 0  # a scene for each image, whatever the robot makes of it
         if self._looking.see(frame):
             self._publish_obstacles(1.0 / rate_hz)
 

@@ -1,6 +1,7 @@
 """Run the planner process: `python -m vla_deploy.planning --run-dir D --robot butler`."""
 
 import sys
+from typing import Final
 
 from platforms import load_profile
 from vla_deploy.aside import beside
@@ -10,6 +11,9 @@ from vla_deploy.planning.node import PlannerNode
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 
+PLANNING_S: Final = 0.2
+"""What a plan of the parser on board takes, of simulated time."""
+
 
 def build(context: NodeContext) -> PlannerNode:
     """Build the node from what the process was started with."""
@@ -17,7 +21,7 @@ def build(context: NodeContext) -> PlannerNode:
     profile, base = load_profile(context.profile), context.run_dir.parent
     planner = planner_for(robot, profile, context.clock, base, run_dir=context.run_dir)
     memory = open_memory(profile.planning, base)
-    return PlannerNode(context, robot, planner, beside("plan"), memory)
+    return PlannerNode(context, robot, planner, beside("plan", context.clock, PLANNING_S), memory)
 
 
 if __name__ == "__main__":

@@ -122,7 +122,7 @@ class PlannerNode:
             memory,
             self._space,
             self._clock,
-            background(),
+            background(self._clock),
             run_id=self._run_id,
             places=furniture_points(self._robot.places),
             wall_s=unix_s,

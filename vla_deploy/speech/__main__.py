@@ -1,6 +1,7 @@
 """Run the speech process: `python -m vla_deploy.speech --run-dir D --robot butler`."""
 
 import sys
+from typing import Final
 
 from platforms import load_profile
 from vla_deploy.aside import beside
@@ -13,6 +14,10 @@ from vla_deploy.speech.node import SpeechNode
 from vla_deploy.speech.stop_words.opening import build_page_stop_words, build_stop_words
 from vla_deploy.speech.voice.engines import build_voice
 
+SYNTHESIS_S: Final = 0.1
+RECOGNITION_S: Final = 0.25
+"""What a sentence takes, of simulated time."""
+
 
 def build(context: NodeContext) -> SpeechNode:
     """Build the node from what the process was started with."""
@@ -21,13 +26,13 @@ def build(context: NodeContext) -> SpeechNode:
     profile = load_profile(context.profile)
     clock = context.clock
     speaker = linked_speaker(robot, links, clock)
-    voice = build_voice(robot.voice, speaker, clock, beside("voice"))
+    voice = build_voice(robot.voice, speaker, clock, beside("voice", clock, SYNTHESIS_S))
     return SpeechNode(
         context,
         robot,
         profile,
         linked_microphone(robot, links, clock),
-        beside("recogniser"),
+        beside("recogniser", clock, RECOGNITION_S),
         voice=voice,
         listeners=[build_stop_words(context, profile, voice)],
         page_listeners=[build_page_stop_words(context, profile)],

@@ -5,9 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drivers.clock import Clock
+from drivers.clock import NS_PER_S, Clock
+from drivers.twin_clock import TwinClock
 from platforms import load_profile
 from vla_deploy.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
+from vla_deploy.runtime.twin_members import MEMBERSHIPS
 from vla_deploy.supervisor.lifecycle import Act, Action, Seen
 from vla_deploy.supervisor.liveness import Liveness, Vital
 from vla_deploy.supervisor.log_files import OUTPUT_SUFFIX
@@ -148,6 +150,10 @@ class Crew:
         self._unswept.add(name)
         self.started_under[name] = self.profile
         self.started[name] = (child.pid, self._clock.now_ns())
+        membership = MEMBERSHIPS.get(name)
+        if membership is not None and isinstance(self._clock, TwinClock):
+            loading_ns = round(membership.loading_s * NS_PER_S)
+            self._clock.expect(child.pid, membership.role, loading_ns)
 
     def _new_child(self, name: str) -> ChildProcess:
         self._readiness[name].forget()

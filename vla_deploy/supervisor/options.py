@@ -1,7 +1,10 @@
 """Say what one run of the robot is made of."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
+
+from drivers.twin_page import Pace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -10,7 +13,8 @@ class RunOptions:
 
     `profile_fault` tells why the profile is not the one that was chosen.
 
-    `viewer` shows the twin in a window; `paced` gives what is on its buses the time it takes.
+    `viewer` shows the twin in a window; `paced` gives what is on its buses the time it takes;
+    `pace` says how its time goes.
     `devices_dir` replaces the hardware by what is served there, as by a twin that runs by itself.
     """
 
@@ -20,6 +24,7 @@ class RunOptions:
     twin: bool = False
     viewer: bool = False
     paced: bool = False
+    pace: Pace = Pace.REAL
     seed: int = 0
     world: str = "flat"
     devices_dir: Path | None = None
@@ -31,6 +36,11 @@ class RunOptions:
         """Refuse what only the twin can do."""
         if self.probe_root != Path("/") and not self.twin:
             raise ValueError(f"probe_root {self.probe_root}: expected / without the twin")
+
+    @property
+    def has_twin_time(self) -> bool:
+        """Return whether the run lives on the twin's time."""
+        return self.twin and self.pace is not Pace.WALL
 
     @property
     def takes_devices(self) -> bool:
@@ -45,6 +55,8 @@ class RunOptions:
             "profile": self.profile,
             "world": self.world,
             "seed": self.seed,
+            "pace": self.pace,
+            "supervisor_pid": os.getpid(),
             "devices_dir": self.devices_dir or run_dir / "dev",
         }
         return [part.format_map(values) for part in command]

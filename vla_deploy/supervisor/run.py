@@ -4,15 +4,19 @@ import logging
 import os
 import signal
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from drivers.clock import Clock
+from drivers.clock import Clock, MonotonicClock
+from drivers.twin_clock import TwinClock, clock_of
+from drivers.twin_page import PAGE_FILE, TIME_LINK, TimePage
 from platforms import Profile
 from platforms.power_switch import PowerSwitch
 from vla_deploy.aside import background
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.journal import JOURNAL_SOCKET
 from vla_deploy.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
+from vla_deploy.runtime.twin_members import SUPERVISOR
 from vla_deploy.supervisor.budgets import open_keeper
 from vla_deploy.supervisor.crash_reports import CrashReports, crash_folder
 from vla_deploy.supervisor.crew import Crew
@@ -42,7 +46,7 @@ class Run:
         self,
         options: RunOptions,
         table: tuple[ProcessSpec, ...],
-        clock: Clock,
+        clock: Clock | None,
         profile: Callable[[], Profile],
         notify: NotifyTarget,
         on_stop_signal: Callable[[], None],
@@ -54,7 +58,9 @@ class Run:
             self._give_signals_back()
             raise
         try:
-            self._open(options, table, clock, profile, notify)
+            self.clock = clock or _clock_of_run(options, self.runtime.run_dir)
+            """The clock of the run, by which its processes live."""
+            self._open(options, table, self.clock, profile, notify)
         except BaseException:
             self.runtime.close()
             self._give_signals_back()
@@ -87,7 +93,7 @@ class Run:
             probe_root=options.probe_root,
         )
         self.directives = Directives(self.space)
-        power, aside = PowerSwitch(), background()
+        power, aside = PowerSwitch(), background(clock)
         self.switch = ProfileSwitch(
             options.profile,
             profile(),
@@ -100,8 +106,9 @@ class Run:
             fault=options.profile_fault,
         )
         self.health = Health(self.space, clock, lambda: profile().control_rate_hz)
-        self.serial_workers = SerialWorkers(clock)
-        self.notifier = Notifier(notify, clock)
+        # The kernel's workers and systemd go by the wall clock, whatever time the robot has.
+        self.serial_workers = SerialWorkers(MonotonicClock())
+        self.notifier = Notifier(notify, MonotonicClock())
         self.crashes = CrashReports(
             crash_folder(self.runtime.state_dir), run_dir, options, self.space, clock
         )
@@ -130,6 +137,21 @@ class Run:
     def _give_signals_back(self) -> None:
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
+
+
+def _clock_of_run(options: RunOptions, run_dir: Path) -> Clock:
+    """Return CLOCK_MONOTONIC on a robot, the twin's time where a twin moves it."""
+    devices_dir = options.devices_dir
+    if options.has_twin_time:
+        devices_dir = run_dir / "dev"
+        devices_dir.mkdir()
+        TimePage.create(devices_dir / PAGE_FILE)
+    if devices_dir is not None and (devices_dir / PAGE_FILE).exists():
+        (run_dir / TIME_LINK).symlink_to(devices_dir)
+    clock = clock_of(run_dir)
+    if isinstance(clock, TwinClock):
+        clock.join(SUPERVISOR, os.getpid())
+    return clock
 
 
 def _handle_stop_signals(on_stop_signal: Callable[[], None]) -> dict[signal.Signals, Any]:

@@ -4,7 +4,8 @@ import logging
 from collections.abc import Mapping
 from pathlib import Path
 
-from drivers.clock import NS_PER_S, Clock, MonotonicClock
+from drivers.clock import NS_PER_S, Clock
+from drivers.twin_clock import TwinClock
 from platforms import load_profile
 from platforms.profile_schema import NODES
 from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
@@ -63,7 +64,7 @@ class Supervisor:
         self._robot = load_robot(options.robot)
         self._options = options
         self._table = table
-        self._clock: Clock = clock or MonotonicClock()
+        self._given_clock = clock
         self._notify = own_target() if notify is None else notify
         self._records = {spec.name: Record() for spec in table}
         self._vitals: dict[str, tuple[Vital, ...]] = {}
@@ -89,6 +90,15 @@ class Supervisor:
         return self._started().runtime.run_dir
 
     @property
+    def clock(self) -> Clock:
+        """Return the clock of the run.
+
+        Raises:
+            SupervisorError: the run is not started.
+        """
+        return self._started().clock
+
+    @property
     def space(self) -> SharedSpace:
         """Return the run's shared memory.
 
@@ -110,7 +120,7 @@ class Supervisor:
         self._run = Run(
             self._options,
             self._table,
-            self._clock,
+            self._given_clock,
             lambda: self.profile,
             self._notify,
             self.request_stop,
@@ -188,7 +198,8 @@ class Supervisor:
         return StartCrashed("\n".join([f"{name} did not start: {record.reason}", *words]))
 
     def _step(self, *, stopping: bool) -> None:
-        run, now_ns, before = self._started(), self._clock.now_ns(), self._records
+        run, before = self._started(), self._records
+        now_ns = run.clock.now_ns()
         self._forgive_when_held_up(now_ns)
         self._records, actions = self._decide(stopping=stopping, now_ns=now_ns)
         run.crew.perform((*actions, *self._end_offenders(run, now_ns)))
@@ -259,7 +270,13 @@ class Supervisor:
         run = self._started()
         if now_ns >= self._report_due_ns:
             self._report_due_ns = now_ns + _REPORT_NS
-            self._vitals = run.crew.examine(run.directives.rate_ratios)
+            vitals = run.crew.examine(run.directives.rate_ratios)
+            # One that was told to end owes no more data.
+            self._vitals = {
+                name: signs
+                for name, signs in vitals.items()
+                if self._records[name].state is State.READY
+            }
             run.crew.bound_output()
             self._log_alarms()
         run.report.publish(
@@ -292,7 +309,9 @@ class Supervisor:
             self._started().crew.forgive_silence()
 
     def _pause(self) -> None:
-        self._clock.sleep_until(self._clock.now_ns() + _PERIOD_NS)
+        clock = self.clock
+        sleep = clock.sleep_until_governed if isinstance(clock, TwinClock) else clock.sleep_until
+        sleep(clock.now_ns() + _PERIOD_NS)
 
     def _started(self) -> Run:
         if self._run is None:

@@ -88,7 +88,10 @@ class ProcessSpec:
 
 
 _NODE = ("--run-dir", "{run_dir}", "--robot", "{robot}", "--profile", "{profile}")
-_TWIN = ("--robot", "{robot}", "--world", "{world}", "--seed", "{seed}", "--run-dir", "{run_dir}")
+_TWIN = (
+    *("--robot", "{robot}", "--world", "{world}", "--seed", "{seed}", "--run-dir", "{run_dir}"),
+    *("--pace", "{pace}", "--hold-for", "{supervisor_pid}"),
+)
 _DEVICES = ("--devices-dir", "{devices_dir}")
 
 TABLE: tuple[ProcessSpec, ...] = (

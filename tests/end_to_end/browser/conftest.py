@@ -3,7 +3,6 @@
 Loopback is not trusted here: every test goes through the doors that an operator goes through.
 """
 
-import shutil
 import tempfile
 import wave
 from collections.abc import Iterator
@@ -39,7 +38,6 @@ ROLES: Final = {"anna": Role.ADMIN, "vera": Role.VIEWER}
 PASSWORD: Final = "five-words-that-nobody-guesses"
 SPOKEN: Final = "turn left"
 MICROPHONE_HZ: Final = 48_000
-SLOWER: Final = Path(__file__).parents[1] / "slower.toml"
 
 PATIENCE_MS: Final = 60_000
 """The machine may be busy; what is quick is not slowed by this."""
@@ -59,7 +57,8 @@ def stack(chromium: Browser) -> Iterator[ProcessStack]:
         settings.parent.mkdir(parents=True)
         settings.write_text("trust_loopback = false\n", encoding="utf-8")
         add_accounts(base)
-        profile = Path(shutil.copy(SLOWER, folder))  # tests write another one beside it
+        profile = Path(folder) / "shipped.toml"  # tests write another one beside it
+        profile.write_text('inherits = "desktop"\n', encoding="utf-8")
         stack = ProcessStack(base, "--profile", str(profile))
         try:
             stack.wait_until_armed()

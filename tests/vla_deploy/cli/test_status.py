@@ -6,7 +6,7 @@ import pytest
 
 from vla_deploy.cli.status import as_text
 
-SILENT = ("process_table", "profile", "control", "pose", "planner", "executor", "speech")
+SILENT = ("twin", "process_table", "profile", "control", "pose", "planner", "executor", "speech")
 MODEL = {
     "model": "detector",
     "variant": "int8_u8s8",
@@ -76,3 +76,13 @@ def test_who_plans_what_is_asked_and_who_is_away_is_told() -> None:
     assert "plans by: rules 3, cache 0, server bench 0; refused 1" in text
     assert "  without cloud: no key" in text
     assert "asks: Which cup?" in text
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(1.0, "twin: at 1.0 of real time"), (0.6, "twin: at 0.6 of real time, held by perception")],
+)
+def test_how_fast_the_twins_time_goes_and_who_holds_it_is_shown(factor: float, words: str) -> None:
+    twin = {"pace": "real", "real_time_factor": factor, "held_by": "perception"}
+    lines = as_text({**dict.fromkeys(SILENT), "scene": None, "twin": twin}).splitlines()
+    assert words in lines

@@ -44,6 +44,7 @@ def told() -> dict[str, Any]:
         "executor_status": {"skill": "pick_up", "command_id": "cli-1"},
         "planner_status": {"commands": [], "question": None},
         "board": None,
+        "twin_status": {"pace": "real", "real_time_factor": 0.6, "held_by": "perception"},
         "topics": 12,
         "late_topics": [{"topic": "scan", "age_s": 3.0, "deadline_s": 0.5}],
     }
@@ -56,6 +57,7 @@ def test_the_screen_fits_and_says_what_matters_without_colour(told: dict[str, An
     text = "\n".join(lines)
     for words in (
         "safety: armed, obstacle_slow_zone front (0.4, limit 0.6, 0.05 s ago)",
+        "twin at 0.6 of real time, held by perception",
         "work: pick_up of cli-1",
         "450!",
         "250 Hz, 5 of 1000 ticks late (0.50 %)",

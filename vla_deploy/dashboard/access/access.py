@@ -11,7 +11,7 @@ from typing import Final, Self
 from starlette.requests import cookie_parser
 from starlette.types import Receive, Send
 
-from drivers.clock import Clock
+from drivers.clock import Clock, MonotonicClock
 from vla_deploy.aside import background
 from vla_deploy.dashboard.access.accounts import Accounts, wall_s
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
@@ -76,7 +76,7 @@ class Access:
     @classmethod
     def of_base(cls, base: Path, rules: AccessRules, clock: Clock) -> Self:
         """Return the access to the robot that runs in a runtime directory."""
-        audit = AuditLog.of_base(base, clock, background())
+        audit = AuditLog.of_base(base, clock, background(MonotonicClock()))
         return cls(rules, AccountsFile.of_base(base), audit, clock)
 
     def close(self) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+from drivers.twin_page import Pace
 from vla_deploy.dashboard.alarms.finding import Finding, Severity
 from vla_deploy.dashboard.alarms.told import Document, Told
 
@@ -47,15 +48,18 @@ def steps_taken(told: Told) -> Iterator[Finding]:
 
 
 def slow_twin(told: Told) -> Iterator[Finding]:
-    """Find a twin that does not keep pace with the wall clock."""
+    """Find a twin that does not keep pace with the wall clock: harmless, where its time waits."""
     status = told.document("twin_status")
     factor = None if status is None else status["real_time_factor"]
-    if factor is not None and factor < _REAL_TIME:
+    if status is not None and factor is not None and factor < _REAL_TIME:
+        waits = status["pace"] != Pace.WALL
         yield Finding(
             process="twin",
             field="real_time_factor",
-            text="the twin falls behind the wall clock: timings mean nothing",
-            severity=Severity.WARNING,
+            text=f"the twin is at {factor:.1f} of real time: all takes longer, nothing else changes"
+            if waits
+            else "the twin falls behind the wall clock: timings mean nothing",
+            severity=Severity.INFO if waits else Severity.WARNING,
             advice="give the computer less to do",
             measured=round(factor, 3),
             limit=_REAL_TIME,

@@ -7,12 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from drivers.clock import Clock
+from drivers.clock import NS_PER_S, Clock
 from platforms.probes import Reading
 from vla_deploy.supervisor.usage import Usage, UsageMeter
 
 SAMPLE_PERIOD_S: Final = 0.5
 KEPT_SNAPSHOTS: Final = 64
+_LOOK_S: Final = 0.05
+"""How often, by the wall clock, it is looked whether a sample is due on the clock of the run."""
 _log = logging.getLogger(__name__)
 
 
@@ -115,7 +117,11 @@ class BackgroundSampler:
 
     def _run(self) -> None:
         probes: Probes | None = None
-        while not self._closing.wait(self._period_s):
+        due_ns = self._clock.now_ns()
+        while not self._closing.wait(_LOOK_S):
+            if self._clock.now_ns() < due_ns:
+                continue
+            due_ns = self._clock.now_ns() + round(self._period_s * NS_PER_S)
             # This is the thread's main loop: whatever a system file or a sensor does, the next
             # round may succeed, and without one the ladder would stand still for the whole run.
             try:

@@ -53,7 +53,7 @@ def rolling_recorder(
         context.clock,
         new_tape=new_tape,
         new_collector=new_collector,
-        aside=aside or background(),
+        aside=aside or background(context.clock),
         always=chosen.wish if chosen.always else None,
     )
 

@@ -281,8 +281,10 @@ def test_what_nobody_can_measure_and_what_the_ladder_does_is_told(words):
          "nothing is remembered: disk full"),
         ("stop_door_status", {"open": False, "why": "port 8089 is taken"},
          "the stop door is closed: port 8089 is taken"),
-        ("twin_status", {"real_time_factor": 0.5},
+        ("twin_status", {"pace": "wall", "real_time_factor": 0.5},
          "the twin falls behind the wall clock: timings mean nothing"),
+        ("twin_status", {"pace": "real", "real_time_factor": 0.5},
+         "the twin is at 0.5 of real time: all takes longer, nothing else changes"),
     ],
 )  # fmt: skip
 def test_each_part_tells_what_it_lacks(words, topic, change, text):

@@ -158,7 +158,7 @@ def test_a_model_that_does_not_run_as_asked_is_told_to_the_log(shelf, profile, c
 def test_the_model_changes_between_two_steps_and_no_step_is_missed(tmp_path, shelf, profile, rgb):
     clock = MonotonicClock()
     looker = Looker(shelf, profile, rgb)
-    first, aside = looker.detector, background()
+    first, aside = looker.detector, background(MonotonicClock())
     node = AdaptingNode(
         "perception", looker, profile, ipc=tmp_path, clock=clock, host=NO_HOST, aside=aside
     )
@@ -185,7 +185,13 @@ def test_a_model_that_cannot_be_opened_leaves_the_present_one_at_work(
     looker = Looker(shelf, profile, rgb)
     (tmp_path / "models" / "small" / "model.toml").write_text("role = 'detector'")
     node = AdaptingNode(
-        "perception", looker, profile, ipc=tmp_path, clock=clock, host=NO_HOST, aside=background()
+        "perception",
+        looker,
+        profile,
+        ipc=tmp_path,
+        clock=clock,
+        host=NO_HOST,
+        aside=background(MonotonicClock()),
     )
     node.start()
     SharedSpace(tmp_path, clock).cell_writer("resource_directives").put_document(

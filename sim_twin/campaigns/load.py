@@ -1,0 +1,104 @@
+"""Do the main job beside busy loops: it may take longer, and nothing else may change."""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any, Final
+
+from sim_twin.campaigns.report import Case, Report, told
+
+BUSY_LOOPS: Final = 8
+COUNT: Final = 10
+MOST_APART_M: Final = 0.001
+_SPIN: Final = "while True: pass"
+_LONGEST_S: Final = 3600.0
+_NONE_OF: Final = ("late_ticks", "bus_timeouts")
+
+Outcome = Mapping[str, Any]
+
+
+def run(options: argparse.Namespace, tell: Callable[[str], None]) -> Report:
+    """Do the job once alone, then `options.count` times beside busy loops, 10 unless given."""
+    count = COUNT if options.count is None else options.count
+    alone = _demo(options.seed)
+    cases = [told(judge("alone", alone, alone), tell)]
+    with _busy_loops(BUSY_LOOPS):
+        for number in range(count):
+            case = judge(f"beside_{BUSY_LOOPS}_loops/{number}", _demo(options.seed), alone)
+            cases.append(told(case, tell))
+    return Report(campaign="load", cases=tuple(cases), summary=_summary(cases[1:]))
+
+
+def judge(name: str, outcome: Outcome, alone: Outcome) -> Case:
+    """Return the verdict on one run by the one that had the computer for itself."""
+    failures = [] if outcome["success"] else [f"failed: {outcome['error'] or outcome['refused']}"]
+    failures += [f"{what}: {outcome[what]}, expected 0" for what in _NONE_OF if outcome.get(what)]
+    if _skills(outcome) != _skills(alone):
+        failures.append(f"did {_skills(outcome)}, alone {_skills(alone)}")
+    apart_m = _apart_m(outcome, alone)
+    if apart_m > MOST_APART_M:
+        failures.append(f"placed {1000 * apart_m:.1f} mm from where it did alone")
+    names = ("took_s", "wall_s", "ticks", "placement_error_m", "wire_digest")
+    return Case(
+        name=name,
+        failures=tuple(failures),
+        figures={what: outcome.get(what) for what in names},
+        seconds=float(outcome.get("wall_s") or 0.0),
+    )
+
+
+def _skills(outcome: Outcome) -> list[str]:
+    return [f"{one['skill']} {one['status']}" for one in outcome["actions"]]
+
+
+def _apart_m(outcome: Outcome, alone: Outcome) -> float:
+    places = outcome["placement_error_m"], alone["placement_error_m"]
+    return 0.0 if None in places else abs(places[0] - places[1])
+
+
+def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+    ratios = [case.figures["took_s"] / case.figures["wall_s"] for case in cases if case.seconds]
+    return {
+        "failed": sum(bool(case.failures) for case in cases),
+        "median_real_time_ratio": median(ratios) if ratios else None,
+        "least_real_time_ratio": min(ratios, default=None),
+        "different_digests": len({case.figures["wire_digest"] for case in cases}),
+    }
+
+
+def _demo(seed: int) -> Outcome:
+    """Run `vla-deploy demo` as a new user does, on a runtime directory that remembers nothing."""
+    with tempfile.TemporaryDirectory(prefix="vla-load-") as folder:
+        base, out = Path(folder) / "base", Path(folder) / "out"
+        words = ["--runtime-base", str(base), "demo", "--json", "--seed", str(seed)]
+        done = subprocess.run(
+            [sys.executable, "-m", "vla_deploy.cli", *words, "--out", str(out)],
+            capture_output=True,
+            text=True,
+            timeout=_LONGEST_S,
+            check=False,
+        )
+    try:
+        outcome: Outcome = json.loads(done.stdout)
+    except json.JSONDecodeError:
+        error = done.stderr.strip() or f"exit code {done.returncode}"
+        return {"success": False, "error": error, "actions": [], "placement_error_m": None}
+    return outcome
+
+
+@contextmanager
+def _busy_loops(count: int) -> Iterator[None]:
+    """Keep so many loops at the same priority as the robot's processes."""
+    loops = [subprocess.Popen([sys.executable, "-c", _SPIN]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+            loop.wait()

@@ -1,0 +1,316 @@
+"""Move the twin's time: never past a member that is still working.
+
+This is conservative simulation (Chandy and Misra, 1979) of real processes: whoever holds time has
+said up to which moment it may go on without them. Members that hold it strictly are woken one at a
+time, in the order of their due times and then of their roles; so what they do to each other does
+not depend on how many cores there are, or on how busy they are.
+"""
+
+import contextlib
+import logging
+import os
+import socket
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from drivers.clock import NS_PER_S
+from drivers.twin_page import (
+    DEFAULT_HOLD,
+    GRANT,
+    MAX_PACKET_BYTES,
+    PAGE_FILE,
+    TIME_SOCKET,
+    UNTIL_LOADED,
+    Op,
+    Role,
+    TimePage,
+    Word,
+    process_state,
+    unpack,
+)
+from sim_twin.pacer import Pacer
+
+_LOOK_NS: Final = 20_000_000
+"""How often members that hold time are looked at: whether they are alive."""
+_MOST_WAIT_S: Final = 0.02
+_LOADING_PATIENCE_NS: Final = 90 * NS_PER_S
+_DEAD: Final = frozenset("XZx")
+_STOPPED: Final = frozenset("Tt")
+_WATCHER: Final = Role(name="", order=1 << 30, slack_ns=None)
+_FIRST: Final = Role(name="first member", order=0)
+_log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True, eq=False)
+class Member:
+    """Be one connection, or a child that is expected.
+
+    It waits while `until_ns` is set; else it works, and time goes no further than `hold_ns`.
+    """
+
+    role: Role = _WATCHER
+    connection: socket.socket | None = None
+    pid: int = 0
+    until_ns: int | None = None
+    waits_for_io: bool = False
+    next_hold_ns: int = DEFAULT_HOLD
+    hold_ns: int | None = None
+    since_wall_ns: int = field(default_factory=time.monotonic_ns)
+    patience_ns: int = 10 * NS_PER_S
+    excused: bool = False
+
+    def holds(self) -> bool:
+        """Return whether time may not pass `hold_ns`."""
+        return self.hold_ns is not None and self.until_ns is None and not self.excused
+
+
+class Governor:
+    """Own the time of one run."""
+
+    def __init__(self, devices_dir: Path, pacer: Pacer, hold_for_pid: int | None = None) -> None:
+        """Listen for members and take time over from now on.
+
+        It stands still until the process `hold_for_pid` has joined: all that follows is then a
+        matter of the twin's time.
+
+        Raises:
+            OSError: the socket cannot be made.
+        """
+        self.page = TimePage.create(devices_dir / PAGE_FILE)
+        self._words = self.page.words
+        self._pacer = pacer
+        self._members: dict[int, Member] = {}
+        self._expected: dict[int, Member] = {}
+        self._path = devices_dir / TIME_SOCKET
+        self._path.unlink(missing_ok=True)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._listener.setblocking(False)
+        self._listener.bind(str(self._path))
+        self._listener.listen(64)
+        self._look_due_ns = 0
+        self.blamed_ns: dict[str, int] = {}
+        """For how long each member has held time since somebody cleared this, wall time."""
+        self.excused: list[str] = []
+        """Who has been found dead, stopped or hung."""
+        self._take_over()
+        if hold_for_pid is not None:
+            self._expected[hold_for_pid] = Member(
+                role=_FIRST, pid=hold_for_pid, hold_ns=self.now_ns
+            )
+
+    @property
+    def now_ns(self) -> int:
+        """Return the time, continuous with CLOCK_MONOTONIC at the start."""
+        return self._words[Word.NOW_NS]
+
+    def filenos(self) -> list[int]:
+        """Return the descriptors whose input calls for `serve`."""
+        return [self._listener.fileno(), *self._members]
+
+    def serve(self, ready: set[int]) -> None:
+        """Take what members say."""
+        if self._listener.fileno() in ready:
+            self._accept()
+        for fileno in ready & self._members.keys():
+            self._hear(fileno, self._members[fileno])
+
+    def note_writes(self) -> None:
+        """Let those look again who wait for a device: it may have something for them."""
+        self._words[Word.WRITES] += 1
+        now_ns = self.now_ns
+        for member in self._members.values():
+            if member.waits_for_io and member.until_ns is not None:
+                member.until_ns = min(member.until_ns, now_ns)
+
+    def go_round(self) -> int:
+        """Show that the twin is alive, and look whether its members are; return how far time leapt.
+
+        It leaps where members had given this twin up, as one that was stopped: by now they are
+        ahead, by the wall clock.
+        """
+        wall_ns = time.monotonic_ns()
+        leapt_ns = 0
+        if not self.page.is_governed:
+            before_ns = self.now_ns
+            self._disconnect()
+            self._take_over()
+            leapt_ns = self.now_ns - before_ns
+        self._words[Word.OFFSET_NS] = self.now_ns - wall_ns
+        if wall_ns >= self._look_due_ns:
+            self._look_due_ns = wall_ns + _LOOK_NS
+            self._look_after(wall_ns)
+        return leapt_ns
+
+    def wake_next(self) -> bool:
+        """Wake who is due, at most one of those that hold time strictly; False when nobody is."""
+        now_ns = self.now_ns
+        due = [
+            one for one in self._waiting() if one.until_ns is not None and one.until_ns <= now_ns
+        ]
+        if not due:
+            return False
+        watching = [one for one in due if one.role.slack_ns is None]
+        for member in watching:
+            self._wake(member)
+        if watching:
+            return True
+        if any(hold_ns <= now_ns for hold_ns in self._holds()):
+            return False
+        self._wake(min(due, key=lambda one: (one.until_ns, one.role.order)))
+        return True
+
+    def next_wake_ns(self) -> int | None:
+        """Return when the next member is due, None when nobody waits."""
+        return min(
+            (one.until_ns for one in self._waiting() if one.until_ns is not None), default=None
+        )
+
+    def wait_s(self, next_ns: int) -> float:
+        """Return how long to wait for members or for the pace before time may go to `next_ns`."""
+        if any(hold_ns < next_ns for hold_ns in self._holds()) or self._is_somebody_due():
+            return _MOST_WAIT_S
+        return min(self._pacer.wait_ns(next_ns) / NS_PER_S, _MOST_WAIT_S)
+
+    def blame(self, next_ns: int, waited_ns: int) -> None:
+        """Note who held time for a while."""
+        for member in (*self._members.values(), *self._expected.values()):
+            if member.holds() and member.hold_ns is not None and member.hold_ns < next_ns:
+                name = member.role.name
+                self.blamed_ns[name] = self.blamed_ns.get(name, 0) + waited_ns
+
+    def advance(self, to_ns: int) -> None:
+        """Move time."""
+        self._words[Word.NOW_NS] = to_ns
+
+    def close(self) -> None:
+        """Give time back to the wall clock."""
+        self._words[Word.OFFSET_NS] = self.now_ns - time.monotonic_ns()
+        self._words[Word.GOVERNOR_PID] = 0
+        self._disconnect()
+        self._listener.close()
+        self._path.unlink(missing_ok=True)
+
+    def _take_over(self) -> None:
+        words = self._words
+        words[Word.NOW_NS] = words[Word.OFFSET_NS] + time.monotonic_ns()
+        words[Word.GENERATION] += 1
+        words[Word.GOVERNOR_PID] = os.getpid()
+        self._pacer.start(self.now_ns)
+
+    def _disconnect(self) -> None:
+        for member in self._members.values():
+            if member.connection is not None:
+                member.connection.close()
+        self._members.clear()
+        self._expected.clear()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                connection, _ = self._listener.accept()
+                connection.setblocking(False)
+                self._members[connection.fileno()] = Member(connection=connection)
+
+    def _hear(self, fileno: int, member: Member) -> None:
+        assert member.connection is not None
+        while True:
+            try:
+                packet = member.connection.recv(MAX_PACKET_BYTES)
+            except BlockingIOError:
+                return
+            except ConnectionResetError:
+                packet = b""
+            if not packet:
+                member.connection.close()
+                del self._members[fileno]
+                return
+            self._take(member, *unpack(packet))
+
+    def _take(self, member: Member, op: Op, a: int, b: int, role: Role | None) -> None:
+        if op in (Op.WAIT, Op.WAIT_IO):
+            self._take_wait(member, op, a, b)
+        elif op is Op.HOLD:
+            member.hold_ns, member.until_ns, member.excused = a, None, False
+            member.since_wall_ns = time.monotonic_ns()
+        elif op is Op.RELEASE:
+            member.hold_ns = member.until_ns = None
+        elif role is not None and op is Op.JOIN:
+            self._join(member, a, role)
+        elif role is not None and op is Op.EXPECT:
+            self._expected[a] = Member(
+                role=role, pid=a, hold_ns=self.now_ns + b, patience_ns=_LOADING_PATIENCE_NS
+            )
+
+    def _take_wait(self, member: Member, op: Op, a: int, b: int) -> None:
+        """Let a member wait; one that waits for input goes on at once where it missed some."""
+        member.excused = False
+        if a == UNTIL_LOADED:  # whoever it is: its start belongs to that moment
+            a = b = self.now_ns if member.hold_ns is None else member.hold_ns
+        member.waits_for_io = op is Op.WAIT_IO
+        missed = member.waits_for_io and b != self._words[Word.WRITES]
+        member.until_ns = self.now_ns if missed else a
+        member.next_hold_ns = DEFAULT_HOLD if member.waits_for_io else b
+        member.patience_ns = round(member.role.patience_s * NS_PER_S)
+
+    def _join(self, member: Member, pid: int, role: Role) -> None:
+        expected = self._expected.pop(pid, None)
+        member.role, member.pid = role, pid
+        member.since_wall_ns = time.monotonic_ns()
+        member.hold_ns = self.now_ns if role.slack_ns is not None else None
+        if expected is not None:
+            member.hold_ns = expected.hold_ns
+            member.patience_ns = expected.patience_ns
+
+    def _wake(self, member: Member) -> None:
+        assert member.connection is not None
+        slack_ns = member.role.slack_ns
+        if member.next_hold_ns != DEFAULT_HOLD:
+            member.hold_ns = member.next_hold_ns
+        else:
+            member.hold_ns = None if slack_ns is None else self.now_ns + slack_ns
+        member.until_ns = None
+        member.since_wall_ns = time.monotonic_ns()
+        with contextlib.suppress(OSError):  # it has died: its end of file comes next
+            member.connection.send(GRANT)
+
+    def _waiting(self) -> list[Member]:
+        return [one for one in self._members.values() if one.until_ns is not None]
+
+    def _is_somebody_due(self) -> bool:
+        next_ns = self.next_wake_ns()
+        return next_ns is not None and next_ns <= self.now_ns
+
+    def _holds(self) -> list[int]:
+        """Return the moments at which somebody holds time."""
+        return [
+            one.hold_ns
+            for one in (*self._members.values(), *self._expected.values())
+            if one.holds() and one.hold_ns is not None
+        ]
+
+    def _look_after(self, wall_ns: int) -> None:
+        for pid, member in tuple(self._expected.items()):
+            if self._is_lost(member, wall_ns):
+                del self._expected[pid]
+        for member in self._members.values():
+            if member.pid and member.until_ns is None and member.hold_ns is not None:
+                member.excused = self._is_lost(member, wall_ns)
+
+    def _is_lost(self, member: Member, wall_ns: int) -> bool:
+        """Tell whether one that holds time is dead, stopped, or hangs."""
+        state = process_state(member.pid)
+        if state in _DEAD or state in _STOPPED:
+            why = "has died" if state in _DEAD else "is stopped"
+            member.since_wall_ns = wall_ns
+        elif wall_ns - member.since_wall_ns > member.patience_ns:
+            why = f"has worked for more than {member.patience_ns / NS_PER_S:g} s"
+        else:
+            return False
+        if not member.excused:
+            self.excused.append(f"{member.role.name} {why}")
+            _log.warning(
+                "time goes on without %s (pid %d): it %s", member.role.name, member.pid, why
+            )
+        return True
