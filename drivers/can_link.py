@@ -26,8 +26,6 @@ class CanLink:
         self._watch = ControllerWatch()
         self._full_since_ns: int | None = None
         self._closed = False
-        self._last: dict[int, can.Message] = {}
-        """The newest data frame of each identifier: most are sent again as they were."""
         self.frames_sent = 0
         self.frames_received = 0
         self.frames_dropped = 0
@@ -74,17 +72,13 @@ class CanLink:
         Raises:
             LinkLost: the interface is down or gone.
         """
-        message = self._last.get(can_id)
-        if message is None or remote or message.data != data:
-            message = can.Message(
-                arbitration_id=can_id,
-                is_extended_id=False,
-                is_remote_frame=remote,
-                dlc=dlc if remote else len(data),
-                data=None if remote else data,
-            )
-            if not remote:
-                self._last[can_id] = message
+        message = can.Message(
+            arbitration_id=can_id,
+            is_extended_id=False,
+            is_remote_frame=remote,
+            dlc=dlc if remote else len(data),
+            data=None if remote else data,
+        )
         try:
             self._bus.send(message, timeout=0.0)
         except can.CanError as error:

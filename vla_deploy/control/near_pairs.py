@@ -47,7 +47,8 @@ class NearPairs:
         shapes, placed, measure = self._shapes, self._placed, pinocchio.computeDistance
         measured_m = [measure(shapes, placed, pair).min_distance for pair in due.tolist()]
         self._known_m[due], self._poses[due] = measured_m, pose
-        return np.minimum(self._known_m, self._reach_m)
+        found_m: Array = np.minimum(self._known_m, self._reach_m)
+        return found_m
 
 
 def _levers_m(
