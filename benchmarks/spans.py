@@ -1,8 +1,9 @@
 """Charge a thread's CPU time to named parts of a step, each part without those inside it."""
 
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any, Final, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -11,21 +12,32 @@ R = TypeVar("R")
 REST: Final = "rest"
 
 
+@dataclass(slots=True)
+class Tally:
+    """Sum up the steps of one kind, and the CPU time of each part."""
+
+    steps: int = 0
+    cpu_ns: Counter[str] = field(default_factory=Counter)
+
+
 class Spans:
     """Time calls that are made within `step`; all others pass through."""
 
     def __init__(self) -> None:
         self.steps = 0
         self.cpu_ns: Counter[str] = Counter()
+        self.kinds: defaultdict[str, Tally] = defaultdict(Tally)
+        self._step_ns: Counter[str] = Counter()
         self._open: list[str] = []
         self._since_ns = 0
         self._wrapped: list[tuple[Any, str, Any]] = []
 
-    def step(self, call: Callable[[], None]) -> Callable[[], None]:
-        """Return the call, timed as one step."""
+    def step(
+        self, call: Callable[[], None], kind_of_step: Callable[[], str] = lambda: ""
+    ) -> Callable[[], None]:
+        """Return the call, timed as one step; `kind_of_step` names, after it, what it was."""
 
         def stepped() -> None:
-            self.steps += 1
             self._open.append(REST)
             self._since_ns = time.thread_time_ns()
             try:
@@ -33,6 +45,7 @@ class Spans:
             finally:
                 self._charge()
                 self._open.pop()
+                self._sum_up(self.kinds[kind_of_step()])
 
         return stepped
 
@@ -61,7 +74,14 @@ class Spans:
 
         return timed
 
+    def _sum_up(self, tally: Tally) -> None:
+        self.steps += 1
+        self.cpu_ns += self._step_ns
+        tally.steps += 1
+        tally.cpu_ns += self._step_ns
+        self._step_ns.clear()
+
     def _charge(self) -> None:
         now_ns = time.thread_time_ns()
-        self.cpu_ns[self._open[-1]] += now_ns - self._since_ns
+        self._step_ns[self._open[-1]] += now_ns - self._since_ns
         self._since_ns = now_ns

@@ -1,5 +1,6 @@
 """Run the cycle that all buses of wheel drives share; a protocol adds its frames."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Generic, TypeVar
@@ -42,6 +43,7 @@ class DriveCycle(ABC, Generic[P]):
         self._budget = NodeBudget([port.spec.joint for port in ports])
         self._goals = GoalKeeper()
         self._closed = False
+        self._every_enabled = [PowerState.OPERATION_ENABLED] * len(self._ports)
 
     def connect(self) -> None:
         """Do all of `connecting`, waiting in between.
@@ -72,7 +74,8 @@ class DriveCycle(ABC, Generic[P]):
         return self._goals.goal is Goal.ENABLED and self._all_enabled()
 
     def _all_enabled(self) -> bool:
-        return all(port.power_state is PowerState.OPERATION_ENABLED for port in self._ports)
+        # Asked several times a tick: a generator would take three times as long.
+        return [port.power_state for port in self._ports] == self._every_enabled
 
     def enable(self) -> None:
         """Begin to power all drives; `enabled` tells when they follow."""
@@ -166,11 +169,19 @@ class DriveCycle(ABC, Generic[P]):
 
     def _state(self, lost: tuple[bool, ...], now_ns: int) -> DriveState:
         ports = self._ports
+        position_rad, velocity_rad_s, torque_nm, age_s = np.array(
+            (
+                [port.position_rad for port in ports],
+                [port.velocity_rad_s for port in ports],
+                [port.torque_nm for port in ports],
+                [port.age_s(now_ns) for port in ports],
+            )
+        )
         return DriveState(
-            position_rad=np.array([port.position_rad for port in ports]),
-            velocity_rad_s=np.array([port.velocity_rad_s for port in ports]),
-            torque_nm=np.array([port.torque_nm for port in ports]),
-            age_s=np.array([port.age_s(now_ns) for port in ports]),
+            position_rad=position_rad,
+            velocity_rad_s=velocity_rad_s,
+            torque_nm=torque_nm,
+            age_s=age_s,
             power_state=tuple(self._power_state(port) for port in ports),
             lost=lost,
             faulted=tuple(port.faulted for port in ports),
@@ -195,6 +206,6 @@ class DriveCycle(ABC, Generic[P]):
 
 
 def _finite(velocity_rad_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    if not np.isfinite(velocity_rad_s).all():
+    if not all(map(math.isfinite, velocity_rad_s.tolist())):
         raise ValueError(f"velocities {velocity_rad_s.tolist()} rad/s: NaN or infinite")
     return velocity_rad_s

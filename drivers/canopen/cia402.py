@@ -31,7 +31,7 @@ STATUSWORD_PATTERNS: Final[tuple[tuple[int, int, PowerState], ...]] = (
     (0x4F, 0x0F, PowerState.FAULT_REACTION_ACTIVE),
     (0x4F, 0x08, PowerState.FAULT),
 )
-FAULT_STATES: Final = frozenset({PowerState.FAULT, PowerState.FAULT_REACTION_ACTIVE})
+FAULT_STATES: Final = (PowerState.FAULT, PowerState.FAULT_REACTION_ACTIVE)
 
 # Anything not listed gets DISABLE_VOLTAGE, the one command that is safe in every state.
 _COMMANDS: Final[dict[tuple[Goal, PowerState], ControlCommand]] = {

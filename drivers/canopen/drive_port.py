@@ -32,6 +32,7 @@ class DrivePort:
 
     def __init__(self, spec: DriveSpec, heartbeat_limit_ns: int) -> None:
         self.spec = spec
+        self._counts_per_rad = spec.counts_per_rad
         self.rated_torque_nm = math.nan
         self.position_wire = TPDO2.wire
         self._limit_ns = heartbeat_limit_ns
@@ -61,7 +62,7 @@ class DrivePort:
     @property
     def position_rad(self) -> float:
         """Return the joint angle travelled since the drive was reset; it does not wrap."""
-        return self._travel_counts / self.spec.counts_per_rad
+        return self._travel_counts / self._counts_per_rad
 
     @property
     def complete(self) -> bool:
@@ -111,7 +112,7 @@ class DrivePort:
         """Take TPDO1."""
         statusword, velocity = _unpacked(TPDO1.wire, data)
         self.power_state = decode_statusword(statusword)
-        self.velocity_rad_s = velocity / self.spec.counts_per_rad
+        self.velocity_rad_s = velocity / self._counts_per_rad
         self._answered(_STATUS, now_ns)
 
     def on_position(self, data: bytes, now_ns: int) -> None:

@@ -167,3 +167,30 @@ def test_after_bus_off_the_drives_are_connected_anew_and_disabled() -> None:
     assert state.healthy
     assert state.power_state == (PowerState.SWITCH_ON_DISABLED,)
     again.close()
+
+
+def test_a_frame_goes_out_with_its_own_data_whatever_went_before_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bus = QueueBus()
+    sent: list[tuple[int, bytes, bool, int]] = []
+
+    def note(msg: can.Message, timeout: float | None = None) -> None:
+        sent.append((msg.arbitration_id, bytes(msg.data), msg.is_remote_frame, msg.dlc))
+
+    monkeypatch.setattr(bus, "send", note)
+    link = CanLink(bus, Clock())
+    for data in (b"\x01", b"\x01", b"\x02\x03", b""):
+        link.send(0x201, data)
+    link.send(0x202, b"\x01")
+    link.send(0x201, remote=True, dlc=8)
+    link.send(0x201)
+    assert sent == [
+        (0x201, b"\x01", False, 1),
+        (0x201, b"\x01", False, 1),
+        (0x201, b"\x02\x03", False, 2),
+        (0x201, b"", False, 0),
+        (0x202, b"\x01", False, 1),
+        (0x201, b"", True, 8),
+        (0x201, b"", False, 0),
+    ]

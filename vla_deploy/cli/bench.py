@@ -11,7 +11,7 @@ from vla_deploy.cli.example import add_top_command
 BENCHMARKS = {
     "bus": "16-servo cycle against dynamixel-sdk on the same emulated bus",
     "contact": "torque that no contact explains while the robot works, against its limits",
-    "control": "where the CPU time of a control tick goes, as shares of the period",
+    "control": "CPU time of a control tick by stage: at rest, driving, arms moving",
     "dashboard": "what clients cost control, one of them frozen; its stop to the wire; --part",
     "estop": "emergency stop: from the request to the wire under load, and to standstill",
     "perception": "how well, how fast and at what cost the robot sees; int8 beside fp32; --part",

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio
 from numpy.typing import NDArray
 
+from vla_deploy.control.axes import any_of
 from vla_deploy.control.near_pairs import NearPairs
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.mjcf import read_mjcf_names
@@ -89,7 +90,7 @@ class BodyShapes:
 
         For pairs that are too far apart to matter, the distance is only a bound.
         """
-        if self._surveyed is None or not np.array_equal(positions, self._surveyed[0]):
+        if self._surveyed is None or any_of(positions != self._surveyed[0]):
             found = self._near.distances(
                 self._model, self._data, self._expand(positions), positions
             )

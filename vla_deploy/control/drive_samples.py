@@ -23,8 +23,6 @@ def drive_samples(
     `age_limit_s` is that of their driver.
     """
     age_s = state.age_s.tolist()
-    commanded_rad_s = tracking.commanded_rad_s.tolist()
-    measured_rad_s = tracking.measured_rad_s.tolist()
     return tuple(
         DriveSample(
             name=name,
@@ -32,8 +30,8 @@ def drive_samples(
             age_s=age_s[row],
             age_limit_s=age_limit_s,
             fault_code=_fault_code(state, row, dropped_out=dropped_out),
-            commanded_rad_s=commanded_rad_s[row],
-            measured_rad_s=measured_rad_s[row],
+            commanded_rad_s=tracking.commanded_rad_s[row],
+            measured_rad_s=tracking.measured_rad_s[row],
         )
         for row, name in enumerate(names)
     )

@@ -1,5 +1,7 @@
 """Judge each tick by what is known in it, and record by what it was judged."""
 
+import numpy as np
+
 from drivers.clock import Clock
 from vla_deploy.control.axes import Flags, Floats, all_of
 from vla_deploy.control.servos import ServoLine
@@ -35,6 +37,7 @@ class Judging:
         self._wheels = wheels
         self._surroundings = SurroundingsWatch(space, robot)
         self._record = TickRecorder(space)
+        self._none: Flags = np.zeros(len(robot.joint_names), dtype=np.bool_)
 
     def judge(
         self,
@@ -75,7 +78,8 @@ class Judging:
         self.state, self.verdict = evaluate(before, inputs, self.limits)
         self.tick = tick
         self._record.judged(tick, now_ns, before, inputs, self.limits, self.verdict)
-        return jumped_joints(inputs, self.limits)
+        # A joint that jumps is a finding, which counts: most ticks have none, of any rule.
+        return jumped_joints(inputs, self.limits) if any(self.state.counts) else self._none
 
     def note_sent(self, setpoint: Floats, v_m_s: float, w_rad_s: float) -> None:
         """Record what the tick has sent to joints and wheels."""

@@ -33,20 +33,21 @@ class NearPairs:
         self._levers_m = _levers_m(model, shapes, leaders, columns)
         pairs = len(shapes.collisionPairs)
         self._known_m = np.full(pairs, -np.inf)
-        self._poses = np.zeros((pairs, columns))
+        self._poses = np.full((pairs, columns), np.nan)
 
     def distances(
         self, model: pinocchio.Model, data: pinocchio.Data, q: Array, pose: Array
     ) -> Array:
         """Return the distances at a pose, `q` in the model's own numbers; negative in overlap."""
         moved_m = np.einsum("pj,pj->p", self._levers_m, np.abs(pose - self._poses))
-        near = np.flatnonzero(~(self._known_m - moved_m >= self._reach_m))
+        # A pair whose joints stand where it was measured is as far as it was then.
+        is_due = (moved_m != 0.0) & ~(self._known_m - moved_m >= self._reach_m)
+        due = np.flatnonzero(is_due)
         pinocchio.updateGeometryPlacements(model, data, self._shapes, self._placed, q)
         shapes, placed, measure = self._shapes, self._placed, pinocchio.computeDistance
-        measured_m = [measure(shapes, placed, pair).min_distance for pair in near.tolist()]
-        self._known_m[near], self._poses[near] = measured_m, pose
-        found_m = np.full(len(self._known_m), self._reach_m)
-        found_m[near] = np.minimum(measured_m, self._reach_m)
+        measured_m = [measure(shapes, placed, pair).min_distance for pair in due.tolist()]
+        self._known_m[due], self._poses[due] = measured_m, pose
+        found_m: Array = np.minimum(self._known_m, self._reach_m)
         return found_m
 
 

@@ -7,9 +7,11 @@ velocity, a cruise, and a velocity phase to rest. That is optimal from rest; fro
 about one motion in a hundred could be more than 5 % faster.
 """
 
+from bisect import bisect_right
+
 import numpy as np
 
-from vla_deploy.control.axes import AxisLimits, AxisState, Floats, velocity_phase
+from vla_deploy.control.axes import AxisLimits, AxisState, Flags, Floats, velocity_phase
 from vla_deploy.control.peak_search import cruise_s, fastest_peak, peak_from_rest, slower_peak
 
 SEGMENTS = 7
@@ -29,16 +31,22 @@ class MotionProfile:
         begins = self._ends - durations
         self._table = np.stack([begins, *_integrate(start, durations, jerks), jerks])
         self._table = self._table.reshape(5, -1)
+        self._changes_s: list[float] = np.unique(self._ends).tolist()
+        self._between = bisect_right(self._changes_s, 0.0)
+        self._look_up(0.0)
 
     def sample(self, elapsed_s: float) -> AxisState:
         """Return the state `elapsed_s` after the start; the target at rest once it is over."""
         if elapsed_s >= self.duration_s:
             rest = np.zeros_like(self.target)
             return AxisState(position=self.target, velocity=rest, acceleration=rest)
-        segment = np.minimum((elapsed_s >= self._ends).sum(axis=1), SEGMENTS - 1)
-        begin, p, v, a, jerk = self._table[:, segment + self._offset]
+        between = bisect_right(self._changes_s, elapsed_s)
+        if between != self._between:
+            self._between = between
+            self._look_up(elapsed_s)
+        begin, p, v, a, jerk = self._rows
+        moving = self._moving
         t = elapsed_s - begin
-        moving = elapsed_s < self._axis_ends
         half_jerk_t = 0.5 * jerk * t
         position = p + t * (v + t * (0.5 * a + half_jerk_t / 3.0))
         return AxisState(
@@ -46,6 +54,12 @@ class MotionProfile:
             velocity=(v + t * (a + half_jerk_t)) * moving,
             acceleration=(a + 2.0 * half_jerk_t) * moving,
         )
+
+    def _look_up(self, elapsed_s: float) -> None:
+        """Take each axis' segment, which stays the same until the next one of any axis ends."""
+        segment = np.minimum((elapsed_s >= self._ends).sum(axis=1), SEGMENTS - 1)
+        self._rows: Floats = self._table[:, segment + self._offset]
+        self._moving: Flags = elapsed_s < self._axis_ends
 
 
 def plan_motion(start: AxisState, target: Floats, limits: AxisLimits) -> MotionProfile:

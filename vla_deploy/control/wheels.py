@@ -11,7 +11,6 @@ from drivers.errors import DriverError, LinkLost
 from drivers.opener import DeviceOpener
 from drivers.stepping import wait_for
 from platforms import Profile
-from vla_deploy.control.axes import Floats
 from vla_deploy.control.drive_buses import drive_bus
 from vla_deploy.control.drive_samples import drive_samples
 from vla_deploy.control.odometry import DifferentialDrive, Odometry
@@ -150,8 +149,8 @@ class Wheels:
         if self._off_at_ns is not None and self._clock.now_ns() >= self._off_at_ns:
             self.disable()
         try:
-            wanted = np.array(self._geometry.wheel_speeds(v_m_s, w_rad_s))
-            state = self._bus.cycle(wanted)
+            wanted_rad_s = self._geometry.wheel_speeds(v_m_s, w_rad_s)
+            state = self._bus.cycle(np.array(wanted_rad_s))
         except LinkLost as error:
             self.failure = str(error)
             self._note_loss()
@@ -161,8 +160,12 @@ class Wheels:
         self._followed = self._followed or state.enabled
         if any(state.lost):
             self._note_loss()
-        self._track(wanted, state)
-        self.odometry.update(*state.position_rad.tolist())
+        position_rad = state.position_rad.tolist()
+        if state.enabled:
+            self._tracking.note(self._clock.now_ns(), wanted_rad_s, position_rad)
+        else:
+            self._tracking.forget()
+        self.odometry.update(*position_rad)
         self.v_m_s, self.w_rad_s = self._geometry.base_velocity(*state.velocity_rad_s.tolist())
 
     def _attend(self, bus: DriveBus) -> None:
@@ -175,12 +178,6 @@ class Wheels:
             bus.cycle(None)
         except LinkLost as error:
             self.failure = str(error)
-
-    def _track(self, wanted_rad_s: Floats, state: DriveState) -> None:
-        if state.enabled:
-            self._tracking.note(self._clock.now_ns(), wanted_rad_s, state.position_rad)
-        else:
-            self._tracking.forget()
 
     @property
     def _dropped_out(self) -> bool:

@@ -1,5 +1,6 @@
 """Judge what lidar and depth camera see against the zones of the robot file."""
 
+import math
 from typing import Final
 
 import numpy as np
@@ -24,6 +25,7 @@ from vla_deploy.safety.zones import (
 
 # Of the base's top speed; no base that is led by control gets there.
 _FASTEST_RATIO: Final = 1.5
+_ROUNDING_M: Final = 1e-6
 
 
 class ZoneWatch:
@@ -43,6 +45,7 @@ class ZoneWatch:
         self._nearby = {source: Nearby(source, space, robot, model, body) for source in ZoneSource}
         self._triggers: dict[str, Trigger] = {}
         self._stands = False
+        self._radius_m = robot.base.footprint_radius_m
         self._reach_m = reaches_m(robot)
 
     @property
@@ -78,16 +81,19 @@ class ZoneWatch:
 
     def _judge(self, points: dict[ZoneSource, Points], motion: Motion) -> list[ZoneFinding]:
         distances2 = {source: (seen**2).sum(axis=1) for source, seen in points.items()}
+        nearest_m = {
+            source: math.sqrt(seen2.min(initial=math.inf)) for source, seen2 in distances2.items()
+        }
         found = []
         for zone in self._zones:
-            near = self._near(zone, points, distances2)
             before = self._triggers.get(zone.name, IDLE)
-            if before is IDLE and not len(near):
-                continue  # an idle zone stays so around which there is nothing
+            here_m = min(nearest_m[source] for source in zone.sources)
+            if before is IDLE and here_m > reach_m(zone, motion, self._radius_m) + _ROUNDING_M:
+                continue  # an idle zone stays so as long as there is nothing where it reaches
             trigger, finding = judge_zone(
                 zone,
                 before,
-                near,
+                self._near(zone, points, distances2),
                 self._footprint,
                 motion,
                 fresh=any(self._nearby[source].fresh for source in zone.sources),
@@ -113,10 +119,13 @@ def reaches_m(robot: RobotDescription) -> dict[str, float]:
         w_rad_s=0.0,
         deceleration_m_s2=base.max_acceleration_m_s2,
     )
-    reaches = {}
-    for zone in robot.protection.zones:
-        corners_m = (float(np.hypot(x, y)) for x, y in zone.polygon_m)
-        corner_m = max(corners_m, default=base.footprint_radius_m)
-        driven_m = top.v_m_s * zone.time_before_collision_s
-        reaches[zone.name] = corner_m + max(driven_m, braking_m(top, zone.reaction_s or 0.0))
-    return reaches
+    return {
+        zone.name: reach_m(zone, top, base.footprint_radius_m) for zone in robot.protection.zones
+    }
+
+
+def reach_m(zone: Zone, motion: Motion, footprint_radius_m: float) -> float:
+    """Return how far from the base's centre a point can matter to a zone in that motion."""
+    corner_m = max((math.hypot(x, y) for x, y in zone.polygon_m), default=footprint_radius_m)
+    driven_m = abs(motion.v_m_s) * zone.time_before_collision_s
+    return corner_m + max(driven_m, braking_m(motion, zone.reaction_s or 0.0))

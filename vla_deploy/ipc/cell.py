@@ -135,7 +135,7 @@ class CellReader:
         """
         for _ in range(_READ_ROUNDS):
             newest = self._segment.newest
-            if self._last is not None and self._last.sequence == newest:
+            if newest == (0 if self._last is None else self._last.sequence):
                 break
             content = self._newest_whole(newest)
             if content is not None:

@@ -10,6 +10,7 @@ import struct
 import typing
 from collections.abc import Callable, Sequence
 from enum import Enum
+from functools import partial
 from operator import attrgetter
 from typing import Any, Final
 
@@ -154,8 +155,8 @@ def _array_head(dtype: "np.dtype[Any]", shape: tuple[int, ...]) -> bytes:
 _PLAIN: dict[type, Callable[[Any], bytes]] = {
     type(None): lambda _: b"N",
     bool: lambda value: b"T" if value else b"F",
-    int: lambda value: _int(b"i", value),
-    float: lambda value: _float(b"d", value),
+    int: partial(_int, b"i"),
+    float: partial(_float, b"d"),
     str: _text,
     bytes: _bytes,
     np.ndarray: _array,

@@ -50,7 +50,8 @@ class Segment:
     @property
     def newest(self) -> int:
         """Return the newest published sequence, 0 before the first."""
-        return int(max(self._words[_NEWEST_WORD], self._words[_FORCED_WORD]))
+        newest, forced = self._words[_NEWEST_WORD], self._words[_FORCED_WORD]
+        return newest if newest > forced else forced
 
     @newest.setter
     def newest(self, sequence: int) -> None:

@@ -17,8 +17,14 @@ def estop(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
 
 def joint_position_limit(inputs: SafetyInputs, limits: SafetyLimits) -> Finding | None:
     """Find a powered joint beyond its range that is still moving outward."""
-    above = (inputs.position > limits.position_upper) & (inputs.velocity > limits.outward_velocity)
-    below = (inputs.position < limits.position_lower) & (inputs.velocity < -limits.outward_velocity)
+    above, below = (
+        inputs.position > limits.position_upper,
+        inputs.position < limits.position_lower,
+    )
+    if first_in(above | below) is None:
+        return None
+    above &= inputs.velocity > limits.outward_velocity
+    below &= inputs.velocity < -limits.outward_velocity
     joint = first_in((above | below) & inputs.torque_enabled)
     if joint is None:
         return None

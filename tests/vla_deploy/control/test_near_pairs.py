@@ -1,6 +1,9 @@
 """Near pairs against all pairs: the same distances wherever they matter."""
 
+from typing import Any
+
 import numpy as np
+import pinocchio
 import pytest
 
 from vla_deploy.control.body_shapes import BodyShapes
@@ -44,3 +47,28 @@ def test_a_survey_is_of_its_own_pose_whatever_was_asked_between() -> None:
     body.survey(pose)
     pose += 0.1
     assert body.survey(pose) is not survey
+
+
+def test_a_pair_whose_joints_stand_is_as_far_as_before_without_a_new_measurement(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    body = BodyShapes(ROBOT)
+    pose = np.zeros(len(ROBOT.joint_names))
+    measured: list[int] = []
+    measure = pinocchio.computeDistance
+
+    def counting(shapes: Any, placed: Any, pair: int) -> Any:
+        measured.append(pair)
+        return measure(shapes, placed, pair)
+
+    monkeypatch.setattr(pinocchio, "computeDistance", counting)
+    before = body.survey(pose).self_m
+    near = np.count_nonzero(before < before.max())
+    measured.clear()
+    pose = pose.copy()
+    pose[ROBOT.joint_index["left_elbow"]] += 1e-3
+    after = body.survey(pose).self_m
+    assert 0 < len(measured) < near
+    stand = [not any("left" in name for name in pair) for pair in body.self_pairs]
+    assert any(stand)
+    np.testing.assert_array_equal(after[stand], before[stand])

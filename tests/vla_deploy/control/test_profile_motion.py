@@ -194,3 +194,16 @@ def test_a_start_beyond_the_limits_is_brought_back_within_them() -> None:
     late = [profile.sample(t) for t in np.linspace(1.0, profile.duration_s, 50)]
     assert max(abs(s.velocity[0]) for s in late) <= 1.0 + 1e-9
     assert profile.sample(profile.duration_s).position == 5.0
+
+
+def test_a_sample_does_not_depend_on_what_was_sampled_before() -> None:
+    start = state([0.0, 1.0], [0.5, 0.0])
+    target = np.array([1.5, 0.2])
+    used = plan_motion(start, target, LIMITS)
+    times = np.linspace(0.0, used.duration_s, 60)
+    rng = np.random.default_rng(0)
+    for time_s in rng.permutation(times).tolist():
+        fresh = plan_motion(start, target, LIMITS).sample(time_s)
+        again = used.sample(time_s)
+        for name in ("position", "velocity", "acceleration"):
+            assert getattr(again, name).tolist() == getattr(fresh, name).tolist()
