@@ -65,7 +65,7 @@ def read_report(document: Mapping[str, Any]) -> Snapshot:
 
 
 def _object(told: Mapping[str, Any], stamp_ns: int) -> dict[str, Any]:
-    """Return a thing of a report as an object of the scene topic, whose optional fields are absent."""
+    """Return a thing of a report as the scene topic tells it, without nulls."""
     known = {key: value for key, value in told.items() if value is not None}
     unseen_ns = round(float(known.get("unseen_s", 0.0)) * NS_PER_S)
     return {**known, "last_seen_ns": stamp_ns - unseen_ns}

@@ -31,7 +31,7 @@ def test_a_report_is_read_back_as_the_world_it_tells_of(
         "cup_1", 1.0, 0.25, last_seen_ns=SEEN_NS, sigma_m=(0.01, 0.02, 0.03), yaw_rad=0.5,
         rests=Rest("on", "desk"), aliases=("cup_3",),
     )  # fmt: skip
-    held = thing("ball_1", 0.5, 0.0, held_by="left", last_seen_ns=STAMP_NS)
+    held = thing("ball_1", 0.5, 0.0, on_m=0.5, held_by="left", last_seen_ns=STAMP_NS)
     gone = Lost(
         thing=thing("bottle_1", 2.0, 1.0, last_seen_ns=SEEN_NS, rests=Rest("on", "desk")),
         cause="the left hand lost it",
