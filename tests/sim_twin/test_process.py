@@ -27,7 +27,12 @@ from vla_deploy.robots.links import device_links
 
 START_TIMEOUT_S = 30.0
 END_TIMEOUT_S = 15.0
-PARENT = "import subprocess, sys; subprocess.run([sys.executable, '-m', 'sim_twin', *sys.argv[1:]])"
+PARENT_PID = ("--parent-pid", str(os.getpid()))
+PARENT = """
+import os, subprocess, sys
+parent = ["--parent-pid", str(os.getpid())]
+subprocess.run([sys.executable, "-m", "sim_twin", *parent, *sys.argv[1:]])
+"""
 
 pytestmark = pytest.mark.stack
 
@@ -41,7 +46,7 @@ def await_that(what: str, holds: object, timeout_s: float) -> None:
 
 def start(run_dir: Path, *arguments: str) -> subprocess.Popen[bytes]:
     twin = subprocess.Popen(
-        [sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir), *arguments],
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir), *PARENT_PID, *arguments],
         stderr=subprocess.PIPE,
     )
     ready = run_dir / "dev" / "ready"
@@ -214,6 +219,31 @@ def test_the_twin_and_its_camera_end_when_their_parent_is_killed(tmp_path: Path)
     parent.wait(END_TIMEOUT_S)
     await_that("all ended", lambda: not is_running(twin) and not is_running(studio), END_TIMEOUT_S)
     assert not (tmp_path / "dev" / "ready").exists()
+
+
+def test_a_twin_in_the_background_outlives_the_shell_that_started_it(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sim_twin", "--no-camera", "--run-dir", str(tmp_path)]
+    ready = tmp_path / "dev" / "ready"
+    with subprocess.Popen(
+        ["sh", "-c", '"$@" >/dev/null 2>&1 & echo $!; read -r _', "sh", *command],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as shell:
+        assert shell.stdout is not None
+        twin = int(shell.stdout.readline())
+        await_that("ready", ready.exists, START_TIMEOUT_S)
+        shell.communicate("\n", END_TIMEOUT_S)
+    try:
+        # A signal at the shell's end would have reached it before it steps on.
+        before_s = ask(tmp_path, "truth")["sim_s"]
+        await_that("on", lambda: ask(tmp_path, "truth")["sim_s"] > before_s, END_TIMEOUT_S)
+        assert is_running(twin)
+    finally:
+        if is_running(twin):
+            os.kill(twin, signal.SIGTERM)
+    await_that("ended", lambda: not is_running(twin), END_TIMEOUT_S)
+    assert not ready.exists()
 
 
 def test_an_unknown_world_is_one_clear_line(tmp_path: Path) -> None:
