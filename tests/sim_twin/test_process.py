@@ -1,5 +1,6 @@
 import json
 import os
+import shutil
 import signal
 import statistics
 import subprocess
@@ -24,6 +25,7 @@ from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
+from vla_deploy.robots.loader import ROBOTS_DIR
 
 START_TIMEOUT_S = 30.0
 END_TIMEOUT_S = 15.0
@@ -61,6 +63,18 @@ def end(twin: subprocess.Popen[bytes]) -> int:
     assert twin.stderr is not None
     twin.stderr.close()
     return code
+
+
+def butler_with_camera(folder: Path, *, site: str, camera: str) -> Path:
+    """Make a butler whose camera's site and MuJoCo camera have other names."""
+    shutil.copytree(ROBOTS_DIR / "butler", folder)
+    mjcf, robot_file = folder / "butler.xml", folder / "robot.toml"
+    drawn = mjcf.read_text().replace('<site name="head_camera"', f'<site name="{site}"')
+    mjcf.write_text(drawn.replace('<camera name="head_camera"', f'<camera name="{camera}"'))
+    robot_file.write_text(
+        robot_file.read_text().replace('site = "head_camera"', f'site = "{site}"')
+    )
+    return folder
 
 
 def children(pid: int) -> list[int]:
@@ -207,6 +221,33 @@ def test_camera_and_film_are_served_and_sigterm_leaves_nothing(tmp_path: Path) -
     assert not is_running(studio)
     assert list((tmp_path / "dev").iterdir()) == []
     assert (tmp_path / "film.png").exists()
+
+
+@pytest.mark.gl
+def test_a_robot_whose_camera_has_another_name_is_filmed_too(tmp_path: Path) -> None:
+    robot = butler_with_camera(tmp_path / "robot", site="chest_eye", camera="chest_eye")
+    run_dir = tmp_path / "run"
+    run_dir.mkdir()
+    twin = start(run_dir, "--robot", str(robot))
+    ask(run_dir, "film_start", path=str(tmp_path / "film.avi"))
+    await_that("film", lambda: ask(run_dir, "truth")["sim_s"] > 1.0, 20.0)
+    assert ask(run_dir, "film_stop")["frames"] > 1
+    assert end(twin) == 0
+
+
+def test_a_robot_file_without_its_camera_in_the_mjcf_is_one_clear_line(tmp_path: Path) -> None:
+    robot = butler_with_camera(tmp_path / "robot", site="chest_eye", camera="head_camera")
+    refused = subprocess.run(
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(tmp_path), "--robot", str(robot)],
+        capture_output=True,
+        text=True,
+        timeout=START_TIMEOUT_S,
+        check=False,
+    )
+    assert refused.returncode == 2
+    (line,) = refused.stderr.splitlines()
+    assert 'expected a <camera name="chest_eye">' in line
+    assert "head_camera" in line
 
 
 @pytest.mark.gl
