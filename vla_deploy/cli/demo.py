@@ -34,7 +34,7 @@ EXAMPLES = """  vla-deploy demo
   vla-deploy demo --seed 7 --json
   vla-deploy demo --command "bring me the blue ball" --voice en-us+f4 --snr 10
   vla-deploy demo --typed
-  vla-deploy demo --viewer                        the twin in a window
+  vla-deploy demo --viewer                the twin in a window
 """
 SETTLE_S = 1.0
 ARM_TIMEOUT_S = 20.0
