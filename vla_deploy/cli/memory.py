@@ -104,8 +104,9 @@ def _written(documents: Iterable[Mapping[str, Any]], path: Path) -> int:
     try:
         with path.open("x", encoding="utf-8") as file:
             path.chmod(0o600)
-            for count, one in enumerate(documents, 1):
+            for one in documents:
                 file.write(json.dumps(one) + "\n")
+                count += 1
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}; name another file") from error
     return count
