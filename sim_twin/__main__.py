@@ -1,7 +1,6 @@
 """Start the twin: `python -m sim_twin --robot butler --world flat --seed 0 --run-dir D`."""
 
 import argparse
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -21,7 +20,7 @@ Devices appear under RUN_DIR/dev; the file RUN_DIR/dev/ready says that all are s
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Serve a twin until SIGTERM or SIGINT, or the end of the parent process."""
+    """Serve a twin until SIGTERM or SIGINT, or the end of the parent that asked for it."""
     options = _parser().parse_args(argv)
     stop = [False]
 
@@ -30,7 +29,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     signal.signal(signal.SIGTERM, request_stop)
     signal.signal(signal.SIGINT, request_stop)
-    die_with_parent(os.getppid() if options.parent_pid is None else options.parent_pid)
+    # A twin that a shell started in the background goes on when that shell ends.
+    if options.parent_pid is not None:
+        die_with_parent(options.parent_pid)
     try:
         process = TwinProcess(_twin_options(options), MonotonicClock())
     except (TwinError, DriverError, RobotFileError, OSError) as error:
@@ -85,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--hold-for", type=int, metavar="PID", help="time begins when this process takes part in it"
     )
-    parser.add_argument("--parent-pid", type=int, help="process with which to end")
+    parser.add_argument("--parent-pid", type=int, help="end with this process, the parent")
     return parser
 
 

@@ -68,7 +68,7 @@ class Studio:
         bench = CameraBench(robot, self._camera, line, lambda: self._shown_ns)
         bench.plugs[robot.camera.device].add_socket(self._stream)
         self._faults = CameraFaults(bench)
-        self._desk = FilmDesk(self._model, self._data)
+        self._desk = FilmDesk(self._model, self._data, camera=robot.camera.site)
         self._film_server = JsonLineServer(devices_dir / FILM_SOCKET, self._desk.answer)
 
     def run(self, mirror: socket.socket) -> None:

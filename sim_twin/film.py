@@ -1,4 +1,4 @@
-"""Film the robot at work: a chasing camera, the head camera inset, and a contact sheet."""
+"""Film the robot at work: a chasing camera, the robot's own camera inset, and a contact sheet."""
 
 from pathlib import Path
 
@@ -27,11 +27,18 @@ class Film:
     """Write frames to a video file and, at the end, a contact sheet beside it."""
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, path: Path, fps: float = FPS
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        path: Path,
+        *,
+        camera: str,
+        fps: float = FPS,
     ) -> None:
-        """Open the file; its ending chooses the codec.
+        """Open the file; its ending chooses the codec. `camera` is the robot's own, for the inset.
 
         Raises:
+            ModelMismatch: the model has no such camera.
             FilmFault: the ending is unknown, or the file cannot be written.
             OpenGLMissing: nothing can be rendered here.
         """
@@ -40,9 +47,9 @@ class Film:
         self.caption = ""
         self.frames = 0
         self._data = data
+        self._own = fixed_camera(model, camera)
         self._writer = _open_writer(path, fps)
         self._chase = ChaseCamera(model, data)
-        self._head = fixed_camera(model, "head_camera")
         self._renderer = Renderer(model, WIDTH, HEIGHT)
         self._inset_renderer = Renderer(model, INSET_WIDTH, INSET_HEIGHT)
         self._kept: list[Image] = []
@@ -51,7 +58,7 @@ class Film:
     def shoot(self) -> Image:
         """Add one frame of the present state; return it (RGB)."""
         image = self._renderer.render(self._data, self._chase.follow())[0]
-        self._paste_inset(image, self._inset_renderer.render(self._data, self._head)[0])
+        self._paste_inset(image, self._inset_renderer.render(self._data, self._own)[0])
         _write_caption(image, self.caption)
         self._writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
         self._keep(image)

@@ -14,11 +14,12 @@ _Text = Mapping[str, Any]
 
 
 class FilmDesk:
-    """Own at most one film of a model's state."""
+    """Own at most one film of a model's state; `camera` is the robot's own, for the inset."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, *, camera: str) -> None:
         self._model = model
         self._data = data
+        self._camera = camera
         self._film: Film | None = None
         self._due_ns = 0
         self._operations: dict[str, Callable[[_Text], dict[str, Any]]] = {
@@ -60,7 +61,7 @@ class FilmDesk:
         path = request.get("path")
         if not isinstance(path, str) or not path:
             raise RefereeRefusal(f"film_start: expected a path, got {path!r}")
-        self._film = Film(self._model, self._data, Path(path))
+        self._film = Film(self._model, self._data, Path(path), camera=self._camera)
         return {"film": path}
 
     def _stop(self, _request: _Text) -> dict[str, Any]:

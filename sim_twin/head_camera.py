@@ -38,7 +38,7 @@ class HeadCamera:
         """Check the calibration and prepare the device.
 
         Raises:
-            ModelMismatch: the MJCF camera's field of view is not the robot file's.
+            ModelMismatch: the MJCF has no such camera, or its field of view is another.
         """
         self._model = model
         self._data = data

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_twin.errors import OpenGLMissing
+from sim_twin.errors import ModelMismatch, OpenGLMissing
 
 APT_LINE = "apt-get install -y libegl1 libgl1-mesa-dri libopengl0"
 VISIBLE_GROUPS = (1, 1, 1, 0, 0, 0)
@@ -110,9 +110,16 @@ def fixed_camera(model: mujoco.MjModel, name: str) -> mujoco.MjvCamera:
     """Return the view of a camera that the model declares.
 
     Raises:
-        KeyError: the model has no such camera.
+        ModelMismatch: the model has no such camera.
     """
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA.value, name)
+    if number < 0:
+        found = ", ".join(repr(model.camera(one).name) for one in range(model.ncam)) or "none"
+        raise ModelMismatch(
+            f'expected a <camera name="{name}"> in the MJCF, as the robot file\'s camera.site, '
+            f"found {found}; make them agree"
+        )
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
-    camera.fixedcamid = model.camera(name).id
+    camera.fixedcamid = number
     return camera

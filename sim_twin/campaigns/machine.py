@@ -1,6 +1,7 @@
 """Run a robot's machine by itself, so that it outlives every process of the robot."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -30,9 +31,8 @@ class Machine:
         self.folder = folder
         self._started_by = MonotonicClock()  # until there is a twin whose time could be told
         command = ["-m", "sim_twin", "--robot", robot, "--seed", str(seed), "--pace", Pace.REAL]
-        self._process = subprocess.Popen(
-            [sys.executable, *command, "--run-dir", str(folder)], start_new_session=True
-        )
+        command += ["--run-dir", str(folder), "--parent-pid", str(os.getpid())]
+        self._process = subprocess.Popen([sys.executable, *command], start_new_session=True)
         try:
             self._wait_until_ready()
         except BaseException:

@@ -9,11 +9,13 @@ from sim_twin.errors import FilmFault, RefereeRefusal
 from sim_twin.film import HEIGHT, WIDTH, Film, contact_sheet
 from sim_twin.film_desk import FilmDesk
 
+OWN = "head_camera"
+
 
 @pytest.mark.gl
 @pytest.mark.parametrize("ending", [".webm", ".mp4", ".avi"])
 def test_a_film_can_be_played_back(engine: Engine, tmp_path: Path, ending: str) -> None:
-    film = Film(engine.model, engine.data, tmp_path / f"film{ending}")
+    film = Film(engine.model, engine.data, tmp_path / f"film{ending}", camera=OWN)
     for _ in range(5):
         film.shoot()
     film.close()
@@ -30,7 +32,7 @@ def test_a_film_can_be_played_back(engine: Engine, tmp_path: Path, ending: str) 
 
 @pytest.mark.gl
 def test_a_caption_is_written_across_the_bottom(engine: Engine, tmp_path: Path) -> None:
-    film = Film(engine.model, engine.data, tmp_path / "film.avi")
+    film = Film(engine.model, engine.data, tmp_path / "film.avi", camera=OWN)
     plain = film.shoot()
     film.caption = "pick_up: cup"
     captioned = film.shoot()
@@ -41,13 +43,13 @@ def test_a_caption_is_written_across_the_bottom(engine: Engine, tmp_path: Path) 
 
 def test_an_unknown_ending_is_refused(engine: Engine, tmp_path: Path) -> None:
     with pytest.raises(FilmFault, match=r"\.mov"):
-        Film(engine.model, engine.data, tmp_path / "film.mov")
+        Film(engine.model, engine.data, tmp_path / "film.mov", camera=OWN)
 
 
 def test_a_path_that_cannot_be_written_is_refused(engine: Engine, tmp_path: Path) -> None:
     (tmp_path / "film.avi").mkdir()
     with pytest.raises(FilmFault, match="cannot write"):
-        Film(engine.model, engine.data, tmp_path / "film.avi")
+        Film(engine.model, engine.data, tmp_path / "film.avi", camera=OWN)
 
 
 def test_the_sheet_spreads_over_the_whole_film() -> None:
@@ -61,7 +63,7 @@ def test_the_sheet_spreads_over_the_whole_film() -> None:
 def test_the_desk_shoots_at_the_films_pace_in_simulated_time(
     engine: Engine, tmp_path: Path
 ) -> None:
-    desk = FilmDesk(engine.model, engine.data)
+    desk = FilmDesk(engine.model, engine.data, camera=OWN)
     desk.answer({"op": "film_start", "path": str(tmp_path / "film.avi")})
     desk.answer({"op": "caption", "text": "hello"})
     for step in range(0, 1_000_000_000, 20_000_000):
@@ -72,9 +74,9 @@ def test_the_desk_shoots_at_the_films_pace_in_simulated_time(
 @pytest.mark.parametrize("op", ["film_stop", "caption", "explode"])
 def test_the_desk_refuses_what_it_cannot_do(engine: Engine, op: str) -> None:
     with pytest.raises(RefereeRefusal):
-        FilmDesk(engine.model, engine.data).answer({"op": op})
+        FilmDesk(engine.model, engine.data, camera=OWN).answer({"op": op})
 
 
 def test_a_film_needs_a_path(engine: Engine) -> None:
     with pytest.raises(RefereeRefusal, match="expected a path"):
-        FilmDesk(engine.model, engine.data).answer({"op": "film_start"})
+        FilmDesk(engine.model, engine.data, camera=OWN).answer({"op": "film_start"})

@@ -1,5 +1,6 @@
 import json
 import os
+import shutil
 import signal
 import statistics
 import subprocess
@@ -24,10 +25,16 @@ from sim_twin.referee import ask
 from sim_twin.sound.talk import said, talk
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
+from vla_deploy.robots.loader import ROBOTS_DIR
 
 START_TIMEOUT_S = 30.0
 END_TIMEOUT_S = 15.0
-PARENT = "import subprocess, sys; subprocess.run([sys.executable, '-m', 'sim_twin', *sys.argv[1:]])"
+PARENT_PID = ("--parent-pid", str(os.getpid()))
+PARENT = """
+import os, subprocess, sys
+parent = ["--parent-pid", str(os.getpid())]
+subprocess.run([sys.executable, "-m", "sim_twin", *parent, *sys.argv[1:]])
+"""
 
 pytestmark = pytest.mark.stack
 
@@ -41,7 +48,7 @@ def await_that(what: str, holds: object, timeout_s: float) -> None:
 
 def start(run_dir: Path, *arguments: str) -> subprocess.Popen[bytes]:
     twin = subprocess.Popen(
-        [sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir), *arguments],
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(run_dir), *PARENT_PID, *arguments],
         stderr=subprocess.PIPE,
     )
     ready = run_dir / "dev" / "ready"
@@ -56,6 +63,18 @@ def end(twin: subprocess.Popen[bytes]) -> int:
     assert twin.stderr is not None
     twin.stderr.close()
     return code
+
+
+def butler_with_camera(folder: Path, *, site: str, camera: str) -> Path:
+    """Make a butler whose camera's site and MuJoCo camera have other names."""
+    shutil.copytree(ROBOTS_DIR / "butler", folder)
+    mjcf, robot_file = folder / "butler.xml", folder / "robot.toml"
+    drawn = mjcf.read_text().replace('<site name="head_camera"', f'<site name="{site}"')
+    mjcf.write_text(drawn.replace('<camera name="head_camera"', f'<camera name="{camera}"'))
+    robot_file.write_text(
+        robot_file.read_text().replace('site = "head_camera"', f'site = "{site}"')
+    )
+    return folder
 
 
 def children(pid: int) -> list[int]:
@@ -205,6 +224,33 @@ def test_camera_and_film_are_served_and_sigterm_leaves_nothing(tmp_path: Path) -
 
 
 @pytest.mark.gl
+def test_a_robot_whose_camera_has_another_name_is_filmed_too(tmp_path: Path) -> None:
+    robot = butler_with_camera(tmp_path / "robot", site="chest_eye", camera="chest_eye")
+    run_dir = tmp_path / "run"
+    run_dir.mkdir()
+    twin = start(run_dir, "--robot", str(robot))
+    ask(run_dir, "film_start", path=str(tmp_path / "film.avi"))
+    await_that("film", lambda: ask(run_dir, "truth")["sim_s"] > 1.0, 20.0)
+    assert ask(run_dir, "film_stop")["frames"] > 1
+    assert end(twin) == 0
+
+
+def test_a_robot_file_without_its_camera_in_the_mjcf_is_one_clear_line(tmp_path: Path) -> None:
+    robot = butler_with_camera(tmp_path / "robot", site="chest_eye", camera="head_camera")
+    refused = subprocess.run(
+        [sys.executable, "-m", "sim_twin", "--run-dir", str(tmp_path), "--robot", str(robot)],
+        capture_output=True,
+        text=True,
+        timeout=START_TIMEOUT_S,
+        check=False,
+    )
+    assert refused.returncode == 2
+    (line,) = refused.stderr.splitlines()
+    assert 'expected a <camera name="chest_eye">' in line
+    assert "head_camera" in line
+
+
+@pytest.mark.gl
 def test_the_twin_and_its_camera_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     parent = subprocess.Popen([sys.executable, "-c", PARENT, "--run-dir", str(tmp_path)])
     await_that("ready", (tmp_path / "dev" / "ready").exists, START_TIMEOUT_S)
@@ -214,6 +260,31 @@ def test_the_twin_and_its_camera_end_when_their_parent_is_killed(tmp_path: Path)
     parent.wait(END_TIMEOUT_S)
     await_that("all ended", lambda: not is_running(twin) and not is_running(studio), END_TIMEOUT_S)
     assert not (tmp_path / "dev" / "ready").exists()
+
+
+def test_a_twin_in_the_background_outlives_the_shell_that_started_it(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sim_twin", "--no-camera", "--run-dir", str(tmp_path)]
+    ready = tmp_path / "dev" / "ready"
+    with subprocess.Popen(
+        ["sh", "-c", '"$@" >/dev/null 2>&1 & echo $!; read -r _', "sh", *command],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as shell:
+        assert shell.stdout is not None
+        twin = int(shell.stdout.readline())
+        await_that("ready", ready.exists, START_TIMEOUT_S)
+        shell.communicate("\n", END_TIMEOUT_S)
+    try:
+        # A signal at the shell's end would have reached it before it steps on.
+        before_s = ask(tmp_path, "truth")["sim_s"]
+        await_that("on", lambda: ask(tmp_path, "truth")["sim_s"] > before_s, END_TIMEOUT_S)
+        assert is_running(twin)
+    finally:
+        if is_running(twin):
+            os.kill(twin, signal.SIGTERM)
+    await_that("ended", lambda: not is_running(twin), END_TIMEOUT_S)
+    assert not ready.exists()
 
 
 def test_an_unknown_world_is_one_clear_line(tmp_path: Path) -> None:

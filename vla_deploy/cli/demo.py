@@ -24,7 +24,7 @@ from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.narrate import line_of
 from vla_deploy.cli.referee import SteppingClock, ask_referee
-from vla_deploy.cli.run import add_robot_arguments
+from vla_deploy.cli.run import add_robot_arguments, add_twin_arguments
 from vla_deploy.cli.session import Session
 from vla_deploy.planning.references import parse_object
 from vla_deploy.supervisor.options import RunOptions
@@ -35,6 +35,7 @@ EXAMPLES = """  vla-deploy demo
   vla-deploy demo --seed 7 --json
   vla-deploy demo --command "bring me the blue ball" --voice en-us+f4 --snr 10
   vla-deploy demo --typed --fast
+  vla-deploy demo --viewer                the twin in a window
 """
 SETTLE_S = 1.0
 ARM_TIMEOUT_S = 20.0
@@ -44,14 +45,16 @@ def register(commands: Any) -> None:
     """Add the command."""
     demo = add_top_command(commands, "demo", EXAMPLES)
     add_robot_arguments(demo)
+    add_twin_arguments(
+        demo,
+        twin="as always: the demo is of the twin",
+        headless="make no film and open no window, whatever there is",
+    )
     demo.add_argument("--command", dest="order", default=COMMAND, help=f'default: "{COMMAND}"')
     demo.add_argument("--voice", default=USUAL_VOICE, help="who says it, a voice of eSpeak NG")
     demo.add_argument("--snr", type=float, metavar="DB", help="over noise, this much louder")
     demo.add_argument("--typed", action="store_true", help="give the command as text, say nothing")
     demo.add_argument("--out", type=Path, default=Path("out"), help="folder for film and outcome")
-    demo.add_argument(
-        "--headless", action="store_true", help="make no film and open no window, whatever there is"
-    )
     demo.add_argument("--json", action="store_true", help="print only the outcome, as JSON")
     demo.set_defaults(run=run)
 
@@ -67,6 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
         robot=arguments.robot,
         profile=arguments.profile,
         twin=True,
+        viewer=arguments.viewer,
+        paced=arguments.paced,
         seed=arguments.seed,
         world=arguments.world,
         runtime_base=arguments.runtime_base,

@@ -3,7 +3,8 @@
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
@@ -52,14 +53,16 @@ def _act(acts: Any, name: str, summary: str, run: Any) -> argparse.ArgumentParse
 
 def list_episodes(arguments: argparse.Namespace) -> int:
     """Print the last commands, the newest first."""
-    episodes = _store(arguments).newest(arguments.count)
+    with _store(arguments) as store:
+        episodes = store.newest(arguments.count)
     told = [one.document() for one in episodes]
     return _tell(arguments, told, _numbered(episodes), "nothing is remembered yet")
 
 
 def find(arguments: argparse.Namespace) -> int:
     """Print what fits some words, the best first."""
-    found = _store(arguments).recall(arguments.text, arguments.count)
+    with _store(arguments) as store:
+        found = store.recall(arguments.text, arguments.count)
     told = [{**one.episode.document(), "score": round(one.score, 5)} for one in found]
     lines = _numbered([one.episode for one in found])
     return _tell(arguments, told, lines, "nothing like that is remembered")
@@ -67,7 +70,8 @@ def find(arguments: argparse.Namespace) -> int:
 
 def list_things(arguments: argparse.Namespace) -> int:
     """Print where things were seen last."""
-    things = _store(arguments).last_seen(arguments.kind, arguments.colour)
+    with _store(arguments) as store:
+        things = store.last_seen(arguments.kind, arguments.colour)
     now_s = unix_s()
     lines = [place_words(one, now_s) for one in things]
     told = [one.document() for one in things]
@@ -88,18 +92,24 @@ def _tell(
 
 def export(arguments: argparse.Namespace) -> int:
     """Write everything to a new file that only its owner can read."""
-    store, count = _store(arguments), 0
-    try:
-        with arguments.file.open("x", encoding="utf-8") as file:
-            arguments.file.chmod(0o600)
-            for document in store.export():
-                file.write(json.dumps(document) + "\n")
-                count += 1
-    except OSError as error:
-        raise UsageError(f"{arguments.file}: {error.strerror}; name another file") from error
+    with _store(arguments) as store:
+        count = _written(store.export(), arguments.file)
     told = {"file": str(arguments.file), "documents": count}
     print(json.dumps(told) if arguments.json else f"{count} documents written to {arguments.file}")
     return 0
+
+
+def _written(documents: Iterable[Mapping[str, Any]], path: Path) -> int:
+    count = 0
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            path.chmod(0o600)
+            for one in documents:
+                file.write(json.dumps(one) + "\n")
+                count += 1
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}; name another file") from error
+    return count
 
 
 def erase(arguments: argparse.Namespace) -> int:
@@ -108,11 +118,11 @@ def erase(arguments: argparse.Namespace) -> int:
         raise UsageError("give either the number of a command, or --all")
     what = "everything" if arguments.all else f"number {arguments.number}"
     _confirm(arguments, what)
-    store = _store(arguments)
-    if arguments.all:
-        store.erase_all()
-    else:
-        store.erase(arguments.number)
+    with _store(arguments) as store:
+        if arguments.all:
+            store.erase_all()
+        else:
+            store.erase(arguments.number)
     print(json.dumps({"erased": what}) if arguments.json else f"forgotten: {what}")
     return 0
 
@@ -126,5 +136,5 @@ def _confirm(arguments: argparse.Namespace, what: str) -> None:
         raise UsageError("nothing was forgotten")
 
 
-def _store(arguments: argparse.Namespace) -> MemoryStore:
-    return MemoryStore.of_base(arguments.runtime_base or default_base())
+def _store(arguments: argparse.Namespace) -> closing[MemoryStore]:
+    return closing(MemoryStore.of_base(arguments.runtime_base or default_base()))

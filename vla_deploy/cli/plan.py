@@ -25,6 +25,7 @@ from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.supervisor.runtime import default_base
 from vla_deploy.world import Snapshot, read_snapshot
+from vla_deploy.world.report import read_report
 
 EXAMPLES: Final = """  vla-deploy plan "pick up the red cup and put it in the box"
   vla-deploy plan "bring me the bottle" --scene scene.json --json
@@ -145,11 +146,5 @@ def read_scene(path: Path) -> Snapshot:
     except ValueError as error:
         raise UsageError(f"the scene {path} is no JSON: {error}") from error
     if isinstance(document, dict) and "things" in document:
-        document = {**document, "objects": [_without_nulls(one) for one in document["things"]]}
+        return read_report(document)
     return read_snapshot(document)
-
-
-def _without_nulls(thing: Any) -> Any:
-    if not isinstance(thing, dict):
-        return thing
-    return {key: value for key, value in thing.items() if value is not None}

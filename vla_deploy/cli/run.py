@@ -21,6 +21,7 @@ from vla_deploy.supervisor.supervisor import Supervisor
 EXAMPLES = """  vla-deploy run --twin                 the robot butler in the flat, armed once ready
   vla-deploy run --twin --seed 7        other places for the objects
   vla-deploy run --twin --viewer        the twin in a window
+  vla-deploy run --twin --headless      without a window, as without --viewer
   vla-deploy run --twin --paced         its buses as slow as the real ones
   vla-deploy run --twin --fast          as fast as this computer can
   vla-deploy run --robot butler         the real robot; arm it when it is safe: vla-deploy arm
@@ -36,12 +37,10 @@ def register(commands: Any) -> None:
     """Add the command."""
     run = add_top_command(commands, "run", EXAMPLES)
     add_robot_arguments(run)
-    run.add_argument("--twin", action="store_true", help="replace the hardware by the twin")
-    run.add_argument("--viewer", action="store_true", help="show the twin in a window")
-    run.add_argument(
-        "--paced",
-        action="store_true",
-        help="give what is on the twin's buses the time it takes on the wire",
+    add_twin_arguments(
+        run,
+        twin="replace the hardware by the twin",
+        headless="open no window, which is what happens without --viewer",
     )
     run.add_argument(
         "--devices-dir",
@@ -68,6 +67,19 @@ def add_robot_arguments(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--world", default="flat", help="the twin's world")
     command.add_argument("--seed", type=_seed, default=0, help="where the objects lie")
+
+
+def add_twin_arguments(command: argparse.ArgumentParser, *, twin: str, headless: str) -> None:
+    """Add what chooses how the twin runs and shows itself; the texts say what that means here."""
+    command.add_argument("--twin", action="store_true", help=twin)
+    window = command.add_mutually_exclusive_group()
+    window.add_argument("--viewer", action="store_true", help="show the twin in a window")
+    window.add_argument("--headless", action="store_true", help=headless)
+    command.add_argument(
+        "--paced",
+        action="store_true",
+        help="give what is on the twin's buses the time it takes on the wire",
+    )
     pace = command.add_mutually_exclusive_group()
     pace.add_argument(
         "--fast",

@@ -81,6 +81,10 @@ def test_what_a_person_can_mend_is_an_exception_of_that_module(module, name):
             ["run", "--seed", "-1"],
             "vla-deploy run: argument --seed: expected a whole number from 0",
         ),
+        (
+            ["run", "--twin", "--viewer", "--headless"],
+            "vla-deploy run: argument --headless: not allowed with argument --viewer",
+        ),
         (["bench", "nothing"], "vla-deploy bench: argument benchmark: invalid choice"),
     ],
 )
@@ -91,6 +95,24 @@ def test_bad_arguments_are_one_line_and_exit_code_2(words, complaint, capsys):
     error = capsys.readouterr().err
     assert error.startswith(complaint)
     assert error.count("\n") == 1
+
+
+SHARED = {
+    "robot": "my_folder", "profile": "jetson_orin_nano", "world": "flat", "seed": 7,
+    "twin": True, "paced": True,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["run", "demo"])
+@pytest.mark.parametrize("window", ["headless", "viewer"])
+def test_run_and_demo_take_the_same_words_about_the_twin(command, window):
+    values = {word: value for word, value in SHARED.items() if value is not True}
+    words = [word for name, value in values.items() for word in (f"--{name}", str(value))]
+    taken = vars(
+        parser([command]).parse_args([command, *words, "--twin", "--paced", f"--{window}"])
+    )
+    assert SHARED.items() <= taken.items()
+    assert (taken["headless"], taken["viewer"]) == (window == "headless", window == "viewer")
 
 
 def plan_file(tmp_path: Path, content: str) -> str:

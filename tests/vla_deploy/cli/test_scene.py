@@ -1,13 +1,15 @@
 """`vla-deploy scene` on a scene that a perception process might have told."""
 
 import argparse
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.cli.main import parser
+from vla_deploy.cli.main import main, parser
 from vla_deploy.cli.scene import as_text, collect
 from vla_deploy.cli.session import Session
 from vla_deploy.world import UnknownWord
@@ -107,6 +109,16 @@ def test_where_to_look_and_what_has_gone(session: Session, tell: Callable[..., N
     _, text = ask(session, "--of", "cup", "--look")
     assert "20% kitchen_table (cup_2): the left hand lost it" in text
     assert "gone: cup_2, last kitchen_table: the left hand lost it" in text
+
+
+def test_a_command_is_planned_in_a_scene_that_was_printed_while_something_was_lost(
+    session: Session, tell: Callable[..., None], tmp_path: Path
+) -> None:
+    tell(CUP, lost=[thing("bottle_2", 6.3, 4.3, 0.18, cause="the left hand lost it")])
+    scene = tmp_path / "scene.json"
+    scene.write_text(json.dumps(ask(session)[0]))
+    base = ["--runtime-base", str(tmp_path / "none")]
+    assert main([*base, "plan", "pick up the red cup", "--scene", str(scene)]) == 0
 
 
 def test_what_a_hand_feels(session: Session, tell: Callable[..., None]) -> None:

@@ -343,7 +343,7 @@ def test_a_session_is_recorded_on_request(bus, servo, tmp_path):
     [
         (["servo"], "vla-deploy servo: the following arguments are required: SERVO_COMMAND"),
         (["servo", "set-id", "253", "1"], "expected an id in 0..252, got '253'"),
-        (["servo", "scan", "--baud", "12345"], "argument --baud: invalid choice: 12345"),
+        (["servo", "scan", "--baud", "12345"], "argument --baud: invalid choice"),
         (["servo", "scan", "--ids", "9-3"], "expected the smaller id first, got '9-3'"),
         (["servo", "monitor", "--rate", "nan"], "--rate: expected 0.1 to 100, got 'nan'"),
         (["servo", "monitor", "--rate", "0"], "--rate: expected 0.1 to 100, got '0'"),

@@ -1,6 +1,7 @@
 """What the keeper makes of the topics, and how it bears a disk that takes nothing."""
 
 import sqlite3
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +64,10 @@ class Desk:
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
-    return Desk(tmp_path)
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    desk = Desk(tmp_path)
+    yield desk
+    desk.store.close()
 
 
 def cup(now_ns: int, x_m: float = 2.2, **changes: Any) -> dict[str, Any]:

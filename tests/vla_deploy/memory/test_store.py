@@ -3,6 +3,8 @@
 import json
 import sqlite3
 import threading
+from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,8 +26,10 @@ KEYS = LastSeen(
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> MemoryStore:
-    return MemoryStore(tmp_path / "memory" / "memory.sqlite3", most_episodes=8, most_things=4)
+def store(tmp_path: Path) -> Iterator[MemoryStore]:
+    store = MemoryStore(tmp_path / "memory" / "memory.sqlite3", most_episodes=8, most_things=4)
+    yield store
+    store.close()
 
 
 def told(*commands: str) -> list[Episode]:
@@ -103,9 +107,9 @@ def test_a_thing_is_remembered_where_it_was_last(store: MemoryStore) -> None:
 def test_it_outlives_the_process_and_only_its_owner_can_read_it(store: MemoryStore) -> None:
     store.add(told("bring me the bottle"), [KEYS])
     store.close()
-    again = MemoryStore(store.path)
-    assert again.newest()[0].command == "bring me the bottle"
-    assert again.last_seen() == [KEYS]
+    with closing(MemoryStore(store.path)) as again:
+        assert again.newest()[0].command == "bring me the bottle"
+        assert again.last_seen() == [KEYS]
     assert store.path.stat().st_mode & 0o077 == 0
 
 
@@ -136,16 +140,16 @@ def test_the_export_holds_everything_as_json(store: MemoryStore) -> None:
 def test_a_damaged_file_is_kept_aside_and_remembering_begins_anew(tmp_path: Path) -> None:
     path = tmp_path / "memory.sqlite3"
     path.write_bytes(b"this was a database once" * 100)
-    store = MemoryStore(path)
-    store.add(told("go to the kitchen"))
-    assert len(store.newest()) == 1
+    with closing(MemoryStore(path)) as store:
+        store.add(told("go to the kitchen"))
+        assert len(store.newest()) == 1
     assert (tmp_path / "memory.sqlite3.damaged").read_bytes().startswith(b"this was")
 
 
 def test_a_file_of_a_later_release_is_left_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "memory.sqlite3"
     MemoryStore(path).close()
-    with sqlite3.connect(path) as connection:
+    with closing(sqlite3.connect(path)) as connection:
         connection.execute("PRAGMA user_version = 99")
     with pytest.raises(MemoryUnusable, match="it has version 99, this release knows 1"):
         MemoryStore(path)
@@ -171,3 +175,4 @@ def test_two_threads_may_write_and_read_at_once(store: MemoryStore) -> None:
     for thread in threads:
         thread.join()
     assert len(roomy.newest(100)) == 40
+    roomy.close()

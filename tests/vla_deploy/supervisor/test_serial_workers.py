@@ -13,6 +13,9 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.supervisor.serial_workers import PRIORITY, SerialWorkers
 
+needs_real_time = pytest.mark.skipif(
+    os.geteuid() != 0, reason="needs the right to real-time scheduling"
+)
 ORDINARY = (os.SCHED_OTHER, 0)
 RAISED = (os.SCHED_FIFO, PRIORITY)
 
@@ -73,6 +76,7 @@ def scheduling(pid: int) -> tuple[int, int]:
     return os.sched_getscheduler(pid), os.sched_getparam(pid).sched_priority
 
 
+@needs_real_time
 def test_only_workers_bound_to_no_processor_are_raised(computer: Computer) -> None:
     worker = computer.begin("kworker/u8:3-events_unbound")
     bound, flusher = computer.begin("kworker/1:1H-kblockd"), computer.begin("kswapd0")
@@ -81,6 +85,7 @@ def test_only_workers_bound_to_no_processor_are_raised(computer: Computer) -> No
     assert scheduling(bound) == scheduling(flusher) == ORDINARY
 
 
+@needs_real_time
 def test_one_that_the_kernel_makes_later_is_raised_within_a_second(computer: Computer) -> None:
     computer.look()
     worker = computer.begin("kworker/u8:4")
@@ -90,6 +95,7 @@ def test_one_that_the_kernel_makes_later_is_raised_within_a_second(computer: Com
     assert scheduling(worker) == RAISED
 
 
+@needs_real_time
 def test_one_that_the_kernel_tells_of_is_raised_at_once(computer: Computer) -> None:
     computer.look()
     worker = computer.begin("kthreadd")
@@ -102,6 +108,7 @@ def test_one_that_the_kernel_tells_of_is_raised_at_once(computer: Computer) -> N
     assert scheduling(worker) == RAISED
 
 
+@needs_real_time
 def test_one_that_somebody_else_has_scheduled_is_left_as_it_is(computer: Computer) -> None:
     worker = computer.begin("kworker/u8:4")
     os.sched_setscheduler(worker, os.SCHED_FIFO, os.sched_param(7))

@@ -212,8 +212,8 @@ def starves(systemd: Systemd, supervisor: Supervisor, step_until, words: str) ->
         return any(text.startswith("STATUS=") and words in text for text in systemd.listen())
 
     assert step_until(supervisor, told)
-    until_ns = supervisor._clock.now_ns() + 3 * NS_PER_S // 2
-    step_until(supervisor, lambda: supervisor._clock.now_ns() > until_ns)
+    until_ns = supervisor.clock.now_ns() + 3 * NS_PER_S // 2
+    step_until(supervisor, lambda: supervisor.clock.now_ns() > until_ns)
     return "WATCHDOG=1" not in systemd.listen()
 
 

@@ -101,7 +101,7 @@ def _smoothed(scores: NDArray[np.float32], count: int) -> NDArray[np.float32]:
     """Return each word's best mean over `count` moments; those before the first count as 0."""
     padded = np.concatenate([np.zeros((count - 1, scores.shape[1]), np.float32), scores])
     windows = np.lib.stride_tricks.sliding_window_view(padded, count, axis=0)
-    best: NDArray[np.float32] = windows.mean(axis=2).max(axis=0)
+    best: NDArray[np.float32] = windows.mean(axis=2, dtype=np.float32).max(axis=0)
     return best
 
 

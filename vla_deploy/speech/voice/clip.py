@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ class Clip:
         return np.repeat(mono[:, None], format_.channels, axis=1)
 
 
-def _cut(spectrum: NDArray[np.complex128], rows: int) -> NDArray[np.complex128]:
+def _cut(spectrum: NDArray[np.complexfloating[Any, Any]], rows: int) -> NDArray[np.complex128]:
     """Return a spectrum as long as that of `rows` samples: shortened, or filled with nothing."""
     wanted = rows // 2 + 1
     fitted = np.zeros(wanted, np.complex128)

@@ -76,6 +76,7 @@ class EchoFilter:
         gain = self._doubt / (left + self._rest + _TINY)
         taps = np.fft.irfft(gain * self._spectra.conj() * rest, axis=1)
         taps[:, BLOCK:] = 0.0
-        self._path = _FORGETTING * (self._path + np.fft.rfft(taps, axis=1))
+        self._path += np.fft.rfft(taps, axis=1)
+        self._path *= _FORGETTING
         self._doubt *= _FORGETTING**2 * (1.0 - 0.5 * gain * powers)
         self._doubt += (1.0 - _FORGETTING**2) * np.abs(self._path) ** 2

@@ -10,6 +10,7 @@ import pytest
 from vla_deploy.supervisor.budgets import hold_back
 from vla_deploy.supervisor.budgets.hold_back import CpuHold, HoldRefused, MemoryHold
 
+needs_nice = pytest.mark.skipif(os.geteuid() != 0, reason="only root may lower nice again")
 THREADED = """
 import sys, threading
 threading.Thread(target=sys.stdin.read, daemon=True).start()
@@ -57,6 +58,7 @@ def threads(pid: int) -> list[int]:
     return [int(task.name) for task in Path(f"/proc/{pid}/task").iterdir()]
 
 
+@needs_nice
 def test_every_thread_of_a_cpu_hog_is_held_back_and_gets_back_what_it_had(child):
     before = os.sched_getaffinity(child.pid)
     nice = os.getpriority(os.PRIO_PROCESS, child.pid)
@@ -78,6 +80,7 @@ def claims(pid: int) -> dict[int, tuple[int, frozenset[int]]]:
     }
 
 
+@needs_nice
 def test_a_thread_that_put_itself_aside_gets_its_own_claim_back(child):
     aside = next(task for task in threads(child.pid) if task != child.pid)
     os.setpriority(os.PRIO_PROCESS, aside, 17)
@@ -88,6 +91,7 @@ def test_a_thread_that_put_itself_aside_gets_its_own_claim_back(child):
     assert claims(child.pid) == before
 
 
+@needs_nice
 def test_a_thread_that_ends_meanwhile_is_passed_over(child, monkeypatch):
     before, listed = claims(child.pid), hold_back._threads
     gone = 2**30  # no kernel gives out such an id
@@ -98,6 +102,7 @@ def test_a_thread_that_ends_meanwhile_is_passed_over(child, monkeypatch):
     assert claims(child.pid) == before
 
 
+@needs_nice
 def test_what_a_process_set_for_itself_meanwhile_stays(child):
     hold = CpuHold.take(child.pid, cores=0.6)
     os.setpriority(os.PRIO_PROCESS, child.pid, 18)
