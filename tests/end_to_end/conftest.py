@@ -12,15 +12,21 @@ CUP_ON_THE_TABLE = (2.25, 1.6, 0.4975, 0.0)
 BOX_ON_THE_TABLE = (1.93, 1.5, 0.45, 0.0)
 
 
+@pytest.fixture(scope="session")
+def coarse() -> str:
+    """A profile with fewer ticks: for what is done and told, not how soon."""
+    return str(Path(__file__).with_name("coarse.toml"))
+
+
 @pytest.fixture
 def make_stack(tmp_path: Path) -> Iterator[Callable[..., LockstepStack]]:
-    """Build whole robots in the flat with a seed and, if named, a robot file of their own."""
+    """Build whole robots in the flat with a seed, and a robot file or profile if one is named."""
     built: list[LockstepStack] = []
 
-    def make(seed: int = 0, robot: str = "butler") -> LockstepStack:
+    def make(seed: int = 0, **chosen: str) -> LockstepStack:
         run_dir = tmp_path / f"run{len(built)}"
         run_dir.mkdir()
-        built.append(LockstepStack(run_dir, seed=seed, robot=robot))
+        built.append(LockstepStack(run_dir, seed=seed, **chosen))
         return built[-1]
 
     yield make
@@ -37,8 +43,10 @@ def stack(make_stack: Callable[..., LockstepStack]) -> LockstepStack:
 
 
 @pytest.fixture
-def stack_at_table(make_stack: Callable[..., LockstepStack], tmp_path: Path) -> LockstepStack:
-    """The whole robot, armed, switched on before a table with the red cup and the box on it.
+def make_stack_at_table(
+    make_stack: Callable[..., LockstepStack], tmp_path: Path
+) -> Callable[[str], LockstepStack]:
+    """Switch the robot on before a table with the red cup and the box on it, and arm it.
 
     It knows where it stands and has still to see the things: only the drive there is left out.
     """
@@ -48,10 +56,28 @@ def stack_at_table(make_stack: Callable[..., LockstepStack], tmp_path: Path) -> 
     assert START in text
     moved = text.replace(START, 'start = "coffee_table"')
     (robot_dir / ROBOT_FILE).write_text(moved, encoding="utf-8")
-    made = make_stack(robot=str(robot_dir))
-    engine = made.lockstep.twin.engine
-    engine.pose(made.robot.poses["tuck"])
-    engine.place("red_cup", *CUP_ON_THE_TABLE)
-    engine.place("box", *BOX_ON_THE_TABLE)
-    made.arm()
-    return made
+
+    def make(profile: str) -> LockstepStack:
+        made = make_stack(robot=str(robot_dir), profile=profile)
+        engine = made.lockstep.twin.engine
+        engine.pose(made.robot.poses["tuck"])
+        engine.place("red_cup", *CUP_ON_THE_TABLE)
+        engine.place("box", *BOX_ON_THE_TABLE)
+        made.arm()
+        return made
+
+    return make
+
+
+@pytest.fixture
+def stack_at_table(make_stack_at_table: Callable[[str], LockstepStack]) -> LockstepStack:
+    """The robot before the table, at the rates of the desktop's profile."""
+    return make_stack_at_table("desktop")
+
+
+@pytest.fixture
+def coarse_at_table(
+    make_stack_at_table: Callable[[str], LockstepStack], coarse: str
+) -> LockstepStack:
+    """The robot before the table, in fewer ticks."""
+    return make_stack_at_table(coarse)
