@@ -38,7 +38,8 @@ def _knock(stack: LockstepStack) -> None:
 
 
 @pytest.mark.timeout(240)
-def test_a_cup_is_kept_until_somebody_pulls_at_it(stack: LockstepStack) -> None:
+def test_a_cup_is_kept_until_somebody_pulls_at_it(stack_at_table: LockstepStack) -> None:
+    stack = stack_at_table
     assert stack.say("pick up the red cup")["success"]
 
     kept = stack.say("hand me the cup")

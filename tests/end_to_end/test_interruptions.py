@@ -53,7 +53,8 @@ def holding(stack: LockstepStack) -> dict[str, str | None]:
     return held
 
 
-def test_a_stop_while_grasping_leaves_the_robot_ready(stack: LockstepStack) -> None:
+def test_a_stop_while_grasping_leaves_the_robot_ready(coarse_at_table: LockstepStack) -> None:
+    stack = coarse_at_table
     run_into(stack, "pick_up", 4.5)
     stop_and_check(stack)
 
@@ -73,9 +74,11 @@ def test_stops_at_random_moments_of_pick_and_place_leave_the_robot_ready(
     assert cup["inside"] or not outcome["success"]
 
 
-def test_fingers_that_close_on_nothing_are_reported(stack: LockstepStack) -> None:
+def test_fingers_that_close_on_nothing_are_reported(coarse_at_table: LockstepStack) -> None:
+    stack = coarse_at_table
     command_id = run_into(stack, "pick_up", 4.0)
     stack.lockstep.twin.engine.place("red_cup", *AWAY_M, 0.0)
+    stack.lockstep.kill(stack.planner)  # which would have it looked for in every room
     assert stack.lockstep.run_until(lambda: stack.outcome(command_id) is not None, 60.0)
     outcome = stack.outcome(command_id)
     assert outcome is not None
@@ -89,7 +92,8 @@ def test_fingers_that_close_on_nothing_are_reported(stack: LockstepStack) -> Non
     assert all(joints[name]["position"] == pytest.approx(tuck[name], abs=0.1) for name in tuck)
 
 
-def test_a_restarted_executor_recalls_what_the_hand_holds(stack: LockstepStack) -> None:
+def test_a_restarted_executor_recalls_what_the_hand_holds(coarse_at_table: LockstepStack) -> None:
+    stack = coarse_at_table
     assert stack.say("pick up the red cup")["success"]
     stack.lockstep.kill(stack.executor)
     rate_hz = load_profile("desktop").executor_rate_hz

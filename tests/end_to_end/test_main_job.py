@@ -10,7 +10,7 @@ from benchmarks.perception_tracks import SceneWatcher
 from sim_twin.stack import LockstepStack
 
 COMMAND = "pick up the red cup and put it in the box"
-MakeStack = Callable[[int], LockstepStack]
+MakeStack = Callable[..., LockstepStack]
 
 pytestmark = pytest.mark.gl
 
@@ -38,10 +38,12 @@ def test_the_cup_ends_in_the_box_and_every_action_is_told(stack: LockstepStack) 
 
 
 @pytest.mark.timeout(120)
-def test_the_same_seed_moves_every_joint_the_same_to_the_last_bit(make_stack: MakeStack) -> None:
+def test_the_same_seed_moves_every_joint_the_same_to_the_last_bit(
+    make_stack: MakeStack, coarse: str
+) -> None:
     states = []
     for _ in range(2):
-        stack = make_stack(5)
+        stack = make_stack(5, profile=coarse)
         stack.arm()
         stack.give(text=COMMAND)
         stack.lockstep.run_for(8.0)

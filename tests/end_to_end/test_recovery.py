@@ -8,11 +8,12 @@ from vla_deploy.planning.recovery import MOST_RECOVERIES
 pytestmark = pytest.mark.gl
 
 COMMAND = "pick up the red cup and put it in the box"
-BACK_WHERE_IT_WAS = (2.2, 1.5, 0.4975, 0.0)
+BACK_WHERE_IT_WAS = (2.25, 1.6, 0.4975, 0.0)
 
 
 @pytest.mark.timeout(300)
-def test_a_cup_that_is_taken_from_the_hand_is_fetched_again(stack: LockstepStack) -> None:
+def test_a_cup_that_is_taken_from_the_hand_is_fetched_again(coarse_at_table: LockstepStack) -> None:
+    stack = coarse_at_table
     command_id = stack.give(text=COMMAND)
 
     def puts_it_down() -> bool:

@@ -35,7 +35,7 @@ def test_arms_that_lie_under_a_table_are_drawn_out_before_they_rise(
     engine.place("base", *BEFORE_THE_COFFEE_TABLE)
     stack.lockstep.run_for(2.0)
     stack.arm()
-    outcome = stack.say("go to the kitchen")
+    outcome = stack.say("go to the living room")  # which is a metre away
     assert outcome["success"], outcome["error"]
     assert stack.status()["state"] == "armed", "nothing was met on the way out"
 

@@ -93,7 +93,7 @@ class Rig:
         """Start control; the arms, without power, lie at rest."""
         self.lockstep.add(self.lidar)
         self.lockstep.add(self.control)
-        self.run(0.5)
+        self.run(0.1)
 
     def run(self, seconds: float) -> None:
         self.lockstep.run_for(seconds)
@@ -162,6 +162,7 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
 @pytest.fixture
 def armed(rig: Rig) -> Rig:
     rig.boot()
-    rig.ask("arm")
-    assert rig.state == "armed", rig.status
+    rig.publish("arm")
+    assert rig.lockstep.run_until(lambda: rig.state == "armed", 0.6), rig.status
+    rig.run(0.1)
     return rig

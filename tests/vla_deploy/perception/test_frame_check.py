@@ -212,7 +212,7 @@ def test_a_wall_too_near_for_noise_in_its_depth_is_not_taken_for_frozen(driven_m
 def test_a_robot_at_rest_whose_yaw_drifts_has_not_moved_its_camera(noise_seeds: int) -> None:
     seen, second_ns = FrameWatch(), 1_000_000_000
     drift_rad_s = math.radians(0.5) / 60.0
-    for second in range(1200):
+    for second in range(0, 1200, 4):
         rgb, depth = room(second % noise_seeds)[0], room(second)[1]
         one = replace(frame(rgb, depth), stamp_ns=second * second_ns)
         assert seen.judge(one, one.depth_m(), turned(drift_rad_s * second), HERE).use is Use.ALL

@@ -63,9 +63,10 @@ def test_sentences_are_found() -> None:
         assert any(known in text for text in said), known
 
 
-@pytest.mark.parametrize("module", sorted(set(modules()) - NOT_SAID))
-def test_no_fixed_sentence_holds_a_stop_word(module: str) -> None:
-    assert [text for text in sentences(module) if STOP_WORD.search(text)] == []
+def test_no_fixed_sentence_holds_a_stop_word() -> None:
+    said = [(module, text) for module in modules() for text in sentences(module)]
+    wrong = [(module, text) for module, text in said if STOP_WORD.search(text)]
+    assert [one for one in wrong if one[0] not in NOT_SAID] == []
 
 
 def test_a_plan_that_stops_is_read_back_without_the_word(propose: Any) -> None:

@@ -7,9 +7,7 @@ from vla_deploy.planning.rules.breaths import without_breaths
     ("heard", "said"),
     [
         ("put the red, can in the, box", "put the red can in the box"),
-        ("go to, the kitchen, table", "go to the kitchen table"),
         ("bring, me the, cup", "bring me the cup"),
-        ("take it with your right, hand", "take it with your right hand"),
         ("the red cup, no, wait, the blue one", "the red cup, no wait, the blue one"),
     ],
 )

@@ -8,12 +8,10 @@ from vla_deploy.planning.rules.gist import gist_of
 @pytest.mark.parametrize(
     ("said", "gist"),
     [
-        ("Shoo, I'm cooking. Go to the kitchen", "go to the kitchen"),
         ("We're done with the film, so the ball should go in the box",
          "the ball should go in the box"),
         ("My ball is on the coffee table, could you run and get it for me?",
          "get the ball on the coffee table for me"),
-        ("Assembly starts at nine, find the keys", "find the keys"),
         ("Of all the cups there, take the red one", "take the red cup"),
         ("a bit more, it's still in my eyes", "a bit more"),
     ],
@@ -29,10 +27,6 @@ def test_what_asks_for_something_is_left(flat, said, gist):
         "if it rains, go to the kitchen",
         "I don't want you in there, go to the kitchen",
         "you must never touch that, take the red cup",
-        "my brother said, go to the kitchen",
-        "fold the towel, take the red cup",
-        "stop right there, go to the kitchen",
-        "not the red one, take the cup",
         "the weather is fine, it is warm",
         "x" * 500,
     ],

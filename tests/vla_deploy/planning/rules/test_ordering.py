@@ -14,19 +14,10 @@ BOOK_THEN_KITCHEN = "place box in; navigate_to kitchen"
     "text",
     [
         "before you drive to the kitchen, put the book in the box",
-        "put the book in the box before you drive to the kitchen",
         "before going to the kitchen put the book in the box",
-        "after you've put the book in the box, go to the kitchen",
-        "after putting the book in the box go to the kitchen",
-        "go to the kitchen once you have put the book in the box",
         "as soon as you have stowed the book in the box, go to the kitchen",
-        "go to the kitchen, but first put the book in the box",
-        "go to the kitchen, but before that put the book in the box",
         "first put the book in the box, then go to the kitchen",
-        "go to the kitchen but put the book in the box first",
-        "put the book in the box first, then go to the kitchen",
         "put the book in the box. When you're done, go to the kitchen",
-        "put the book in the box and once that's done go to the kitchen",
     ],
 )
 def test_what_comes_first_is_done_first(does: Does, text: str) -> None:
@@ -52,16 +43,10 @@ def test_being_somewhere_is_going_there(does: Does, text: str, expected: str) ->
 @pytest.mark.parametrize(
     "text",
     [
-        "when you see the ball, pick it up",
-        "after lunch go to the kitchen",
         "once the ball is in the box, go to the kitchen",
-        "stop before you go to the kitchen",
         "wait before you go to the kitchen",
-        "before you go to the kitchen, don't move",
-        "don't go to the kitchen before you put the ball in the box",
         "go to the kitchen, but first stop",
         "before you go to narnia put the ball in the box",
-        "before you go to the kitchen",
     ],
 )
 def test_conditions_and_what_holds_the_robot_up_are_no_order(does: Does, text: str) -> None:

@@ -7,12 +7,8 @@ from vla_deploy.planning.rules.run_together import with_commas
     ("heard", "said"),
     [
         ("pick up the red cup no wait the blue one", "pick up the red cup, no wait the blue one"),
-        ("i left my keys in the kitchen can you bring them",
-         "i left my keys in the kitchen, can you bring them"),
         ("turn left thirty degrees sorry i meant sixty",
          "turn left thirty degrees, sorry i meant sixty"),
-        ("get me my phone it should be on the kitchen table",
-         "get me my phone, it should be on the kitchen table"),
         ("count from the left and give me the third book", "give me the third book from the left"),
     ],
 )  # fmt: skip
@@ -25,9 +21,7 @@ def test_commas_stand_where_a_new_thought_begins(heard: str, said: str) -> None:
     [
         "could you bring me the cup",
         "please can you get the keys",
-        "if it is on the table bring it",
         "say my keys are lost can you bring them",
-        "i wonder where it is",
     ],
 )
 def test_what_belongs_together_stays_together(text: str) -> None:

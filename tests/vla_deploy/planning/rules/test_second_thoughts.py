@@ -14,26 +14,17 @@ if TYPE_CHECKING:
 GoesOn = Callable[[str], str]
 
 TALKS = {
-    "put the ball in the box >> now the book, same place": "pick_up book; place box in",
-    "put the ball in the box >> and the red cup the same way": "pick_up red cup; place box in",
     "put the ball in the box >> put the book in the same place": "pick_up book; place box_1 in",
     "put the book in the box >> ah no, on the side table is better":
         "pick_up book; place side_table on",
-    "pick up the book >> thanks, I don't need it any more. put it back":
-        "pick_up book_1; place coffee_table on",
-    "pick up the book >> actually never mind, put it back": "pick_up book_1; place coffee_table on",
     "pick up the book >> she changed her mind, put it back and take the ball":
         "pick_up book_1; place coffee_table on; pick_up ball",
-    "pick up the book >> on second thoughts put it in the box": "pick_up book_1; place box in",
     "look to the right >> now straight ahead again": "look_at ahead",
-    "look to the right >> and back again": "look_at ahead",
     "look to the right >> and now to the other side": "look_at left",
     "bring me the ball >> and what about the book?":
         "pick_up book; navigate_to 2.15 2.05 -1.571; speak Here is the book.",
     "put the red cup in the box >> with the blue one please do the same":
         "pick_up blue cup; place box in",
-    "put the ball in the box >> i would like the book there as well":
-        "pick_up book; place box_1 in",
 }  # fmt: skip
 
 

@@ -32,7 +32,6 @@ def test_a_statement_says_what_it_is(does: Does, text: str, expected: str) -> No
         "I lost my job, can you find it?",
         "I left my heart in the kitchen, bring it to me",
         "I left my ball in narnia, fetch it",
-        "I can't find my phone, sing",
     ],
 )
 def test_a_statement_alone_asks_for_nothing(does: Does, text: str) -> None:
@@ -43,7 +42,6 @@ def test_a_statement_alone_asks_for_nothing(does: Does, text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("not in the box, put the ball on the side table", "place side_table on"),
         ("put the ball on the side table, not in the box", "place side_table on"),
         ("go to the bedroom, not to the kitchen", "navigate_to bedroom"),
         ("not the red cup, pick up the ball", "pick_up ball"),
@@ -57,13 +55,10 @@ def test_where_not_is_left_out_beside_where(does: Does, text: str, expected: str
 @pytest.mark.parametrize(
     "text",
     [
-        "not the red cup, pick up all cups",
         "not the red cup, put them in the box",
         "put everything in the box, not on the table",
-        "not in the box, put the ball in the box",
         "pick up the ball, not on the table",
         "not on the table",
-        "don't move, put the ball in the box",
     ],
 )
 def test_what_may_mean_what_is_excluded_is_refused(does: Does, text: str) -> None:

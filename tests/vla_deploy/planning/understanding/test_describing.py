@@ -54,9 +54,6 @@ def names(request: Request, text: str, use: Use = Use.TAKE) -> list[str]:
     ("text", "meant"),
     [
         # --- rows
-        ("the second bottle from the left", "bottle_2"),
-        ("the first bottle, counting from the right", "bottle_1"),
-        ("the bottle that's third from the right please", "bottle_3"),
         ("the last bottle on the left", "bottle_3"),
         ("the second of the bottles from the right", "bottle_2"),
         ("the second bottle from my left", "bottle_2"),
@@ -68,28 +65,16 @@ def names(request: Request, text: str, use: Use = Use.TAKE) -> list[str]:
         ("the second nearest bottle", "bottle_3"),
         ("the widest one of the bottles", "bottle_2"),
         ("the bottle closest to the ball", "bottle_3"),
-        ("the bottle furthest from the pink can", "bottle_4"),
         # --- what it is not
-        ("the can that isn't green", "can_1"),
-        ("the bottle that is neither green nor pink", "bottle_2"),
         ("anything but the pink ones or the green ones", "bottle_2"),
         ("the bottle on the far left", "bottle_3"),
-        ("the bottle furthest to the right", "bottle_1"),
-        ("a bottle that's not green or pink", "bottle_2"),
-        ("any bottle but the green ones", "bottle_2"),
         ("any bottle but the nearest", "bottle_3"),
-        ("the bottle on the coffee table that is not green", "bottle_2"),
         ("the non-pink bottle on the kitchen table", None),
         # --- where it is
         ("the kitchen table's bottle", "bottle_4"),
-        ("the coffee table's white bottle", "bottle_2"),
-        ("the bottle over on the kitchen table", "bottle_4"),
         ("that ball on the table there", "ball_1"),
         # --- words for several kinds
-        ("the round pink thing", "ball_1"),
         ("the cylindrical pink one on the coffee table", "can_1"),
-        ("a drink", "can_1"),
-        ("the white drink", "bottle_2"),
     ],
 )
 def test_it_is_told_from_the_things_around(scene: Request, text: str, meant: str | None) -> None:
@@ -126,8 +111,6 @@ def test_what_still_means_several_is_asked(home: "Home", text: str, question: st
     ("text", "says"),
     [
         ("the fifth bottle from the left", "there are only four bottles"),
-        ("the second ball from the right", "there is only one ball"),
-        ("the third green bottle from the left", "there are only two green bottles"),
         ("the can that isn't pink", "I see no can but the pink can"),
         ("the first book from the left", "I see no book"),
         ("any cup but the blue one", "I see no cup"),
@@ -148,9 +131,7 @@ def test_what_is_not_there_is_said_to_be_not(scene: Request, text: str, says: st
         "any bottle but the broken one",
         "the bottle with the green cap",
         "the bottle nearest to the window",
-        "anna's bottle",
         "first the white bottle",
-        "the bottle without a lid",
         "the bottle that is neither",
         "all bottles except them",
     ],

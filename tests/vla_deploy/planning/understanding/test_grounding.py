@@ -53,8 +53,6 @@ MAIN = [
     [
         [("pick_up", {"object": "the red cup"}), ("place", {"object": "it", "destination": "box"})],
         [("place", {"object": "red cup", "destination": "the box", "relation": "into"})],
-        [("pick_up", {"object": "red cup"}), ("place", {"destination": "box", "relation": "in"})],
-        MAIN,
         [MAIN[0], *MAIN],
     ],
 )
@@ -117,7 +115,6 @@ def test_with_no_hand_free_something_is_put_down_first(home: "Home") -> None:
         (("navigate_to", {"place": "the table"}), [("navigate_to", {"place": "coffee_table"})]),
         (("navigate_to", {"place": "the box"}),
          [("find_object", {"object": "box"}), ("navigate_to", {"object": "box"})]),
-        (("navigate_to", {"object": "kitchen"}), [("navigate_to", {"place": "kitchen"})]),
         (("move", {"distance_m": "50 cm"}), [("move", {"distance_m": 0.5})]),
         (("turn", {"angle_rad": "ninety degrees"}), [("turn", {"angle_rad": 1.5707963267948966})]),
         (("wait", {"duration_s": "half a minute"}), [("wait", {"duration_s": 30.0})]),
@@ -142,8 +139,6 @@ def test_what_is_handed_over_is_fetched_to_who_asked_for_it(home: "Home") -> Non
     ("destination", "expected"),
     [
         ("the kitchen", "kitchen_table"),
-        ("the coffee table", "coffee_table"),
-        ("here", "coffee_table"),
         (None, "coffee_table"),
         ("there", "bedside_table"),
     ],

@@ -31,10 +31,6 @@ def test_words_that_sound_alike_share_a_key(one: str, other: str) -> None:
     [
         ("cup", ("cup",), Likeness.SAME, True),
         ("quays", ("keys",), Likeness.SOUNDS_SAME, True),
-        ("botle", ("bottle",), Likeness.MISSPELT, True),
-        ("bedrom", ("bedroom",), Likeness.MISSPELT, True),
-        ("kitchne", ("kitchen",), Likeness.MISSPELT, True),
-        ("cap", ("cup",), Likeness.SOUNDS_ALIKE, False),
         ("bell", ("ball", "bowl"), Likeness.SOUNDS_ALIKE, False),
     ],
 )

@@ -7,20 +7,10 @@ from vla_deploy.planning.understanding.parting import Parted, Place, parted
     ("said", "own", "place"),
     [
         ("the second mug from the left", "mug", Place(number=2, side="left")),
-        ("third bottle from right", "bottle", Place(number=3, side="right")),
-        ("the bowl that is second from the left", "the bowl", Place(number=2, side="left")),
         ("the first from the right remote", "remote", Place(number=1, side="right")),
-        ("the 2nd can along from the left hand side", "can", Place(number=2, side="left")),
-        ("from the left the fourth ball", "ball", Place(number=4, side="left")),
         ("the last can on the right", "can", Place(number=1, side="right")),
-        ("the last can from the left", "can", Place(number=-1, side="left")),
-        ("the second ball from my left", "ball", Place(number=2, side="left", by_speaker=True)),
-        ("the third red cup in the row", "red cup", Place(number=3)),
-        ("phone number two", "phone", Place(number=2)),
-        ("the second", "one", Place(number=2)),
         ("first the green ball", "first the green ball", None),
         ("the can on the left", "the can on the left", None),
-        ("the second can to the left of the bowl", "can to the left of the bowl", Place(number=2)),
     ],
 )
 def test_a_place_in_a_row_is_parted_from_the_thing(
@@ -33,12 +23,8 @@ def test_a_place_in_a_row_is_parted_from_the_thing(
     ("said", "own", "besides"),
     [
         ("a bottle that is not green", "a bottle", ("green",)),
-        ("the bowl which is not on the side table", "the bowl", ("on the side table",)),
-        ("any can but the grey one", "any can", ("the grey one",)),
         ("all balls except for the pink or the white one", "all balls",
          ("the pink", "the white one")),
-        ("something other than the phone", "something", ("the phone",)),
-        ("the can but not the red one", "the can", ("the red one",)),
         ("the remote", "the remote", ()),
     ],
 )  # fmt: skip
@@ -53,12 +39,8 @@ def test_what_it_is_not_is_parted_from_the_thing(
     [
         ("the taller of the two bottles",
          Parted(own="the taller bottles", is_one_of=True, among=2)),
-        ("the green one of those balls", Parted(own="the green balls", is_one_of=True)),
-        ("the set of keys", Parted(own="the set of keys")),
         ("the can nearest to the bowl",
          Parted(own="the can", order="nearest", near="the bowl")),
-        ("the one farthest from my phone",
-         Parted(own="the one", order="farthest", near="my phone")),
         ("the nearest can", Parted(own="the nearest can")),
     ],
 )  # fmt: skip

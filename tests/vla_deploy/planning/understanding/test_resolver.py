@@ -21,17 +21,10 @@ def name(request: Request, text: str, use: Use = Use.TAKE) -> str:
 @pytest.mark.parametrize(
     ("text", "meant"),
     [
-        ("the red cup", "red cup"),
         ("a cup", "cup_1"),
-        ("the ball", "ball"),
-        ("the left cup", "cup_2"),
-        ("the cup on the right", "cup_1"),
         ("the cup on my right", "cup_2"),
         ("the nearest cup", "cup_1"),
-        ("the cup next to the ball", "cup_1"),
-        ("the cup left of the ball", "cup_2"),
         ("the red one", "cup_1"),
-        ("cup_2", "cup_2"),
         ("the bottle", "bottle"),
         ("the read cup", "red cup"),
         ("the red cup on the table", "cup_1"),
@@ -85,9 +78,7 @@ def test_a_word_that_only_sounds_like_a_known_one_is_asked(home: "Home") -> None
 @pytest.mark.parametrize(
     ("text", "use", "spoken", "meant"),
     [
-        ("it", Use.TAKE, ("cup_1",), "cup_1"),
         ("that one", Use.TAKE, ("ball_1", "cup_1"), "cup_1"),
-        ("the other one", Use.TAKE, ("cup_1",), "cup_2"),
         ("the other cup", Use.TAKE, ("ball_1", "cup_1"), "cup_2"),
         ("the blue one", Use.TAKE, ("cup_1",), "cup_2"),
         ("the cup", Use.TAKE, ("cup_2", "ball_1"), "cup_2"),
