@@ -56,8 +56,7 @@ class TimeLine:
         except OSError:
             self._socket.close()
             raise
-        self.close = weakref.finalize(self, self._socket.close)
-        """Close the connection; closing twice is allowed."""
+        self._close = weakref.finalize(self, self._socket.close)
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
 
@@ -66,6 +65,10 @@ class TimeLine:
         """Return whether the twin at the other end moves time still."""
         page = self._page
         return page.is_governed and page.words[Word.GENERATION] == self.generation
+
+    def close(self) -> None:
+        """Close the connection; closing twice is allowed."""
+        self._close()
 
     def fileno(self) -> int:
         """Return the descriptor that has input once a wait is over."""
@@ -132,7 +135,7 @@ class TwinClock:
             line.send(Op.EXPECT, pid, loading_ns, role)
 
     def hold_until(self, until_ns: int) -> None:
-        """Let time go on to a moment while this thread works, and no further."""
+        """Let time go on to a moment while this thread works, and no further, until it waits."""
         line = self._line()
         if line is not None:
             line.send(Op.HOLD, until_ns)
@@ -172,11 +175,13 @@ class TwinClock:
 
     def line(self) -> TimeLine | None:
         """Return a connection for a thread to come, None where no twin moves time."""
+        generation = self.page.words[Word.GENERATION]
         if not self.page.is_governed:
             return None
         try:
             return TimeLine(self.page, self._devices_dir)
-        except OSError:  # the twin has just ended, or is about to serve its devices
+        except (ConnectionRefusedError, FileNotFoundError):
+            self.page.abandon(generation)  # it listens before it takes over: it has died
             return None
 
     def _wait(self, op: Op, until_ns: int, b: int) -> None:

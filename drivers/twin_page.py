@@ -139,7 +139,7 @@ class TimePage:
         # Plain numbers: this is read some fifty times in each tick of control.
         if words[2] and words[4] != words[3]:
             return words[0]
-        return words[1] + time.monotonic_ns()
+        return max(words[0], words[1] + time.monotonic_ns())
 
     def silent_ns(self) -> int:
         """Return for how long the twin has not gone round."""

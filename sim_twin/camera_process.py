@@ -34,7 +34,7 @@ from vla_deploy.robots import load_robot
 LATENCY_NS: Final = 40_000_000
 """From exposure to the first byte, as depth cameras need it (D435: some 40 ms at 30 Hz)."""
 _FILM_HOLD_NS: Final = 100_000_000
-_REST_NS: Final = 200_000
+_REST_NS: Final = 1_000_000
 """How soon the rest of a frame follows that has not found room at once."""
 _ROLE: Final = Role(name="camera", order=-1)
 _IDLE_S: Final = 0.5
@@ -90,18 +90,27 @@ class Studio:
                 self._show(state)
 
     def _run_as_member(self, mirror: socket.socket) -> None:
-        select.select([mirror], [], [])  # the twin moves time before it shows anything
+        """Take part in the time of the twin that shows states, anew where it took time over."""
         page = TimePage(self._devices_dir / PAGE_FILE)
-        line = self._line = TimeLine(page, self._devices_dir)
-        line.send(Op.JOIN, os.getpid(), role=_ROLE)
-        shown_ns = page.now_ns()
         while True:
+            select.select([mirror], [], [])  # the twin moves time before it shows anything
             state = newest_state(mirror)
+            if state is not None and page.is_governed:
+                self._line = TimeLine(page, self._devices_dir)
+                self._line.send(Op.JOIN, os.getpid(), role=_ROLE)
+                self._follow(mirror, state, page, self._line)
+
+    def _follow(
+        self, mirror: socket.socket, state: MirrorState | None, page: TimePage, line: TimeLine
+    ) -> None:
+        shown_ns = page.now_ns()
+        while line.is_current:
             if state is not None:
                 shown_ns = state.clock_ns
                 self._show(state)
             self._stream.poll_once()
             self._wait(line, self._next_ns(shown_ns, page.now_ns()))
+            state = newest_state(mirror)
 
     def _next_ns(self, shown_ns: int, now_ns: int) -> int:
         """Return when the next state comes, or the rest of a frame may find room."""

@@ -11,6 +11,7 @@ import logging
 import os
 import socket
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -39,6 +40,8 @@ _LOADING_PATIENCE_NS: Final = 90 * NS_PER_S
 _DEAD: Final = frozenset("XZx")
 _STOPPED: Final = frozenset("Tt")
 _WATCHER: Final = Role(name="", order=1 << 30, slack_ns=None)
+_WORKS: Final = -1
+_NEVER: Final = 1 << 62
 _FIRST: Final = Role(name="first member", order=0)
 _log = logging.getLogger(__name__)
 
@@ -47,23 +50,23 @@ _log = logging.getLogger(__name__)
 class Member:
     """Be one connection, or a child that is expected.
 
-    It waits while `until_ns` is set; else it works, and time goes no further than `hold_ns`.
+    It waits until `until_ns`, or works, and then time goes no further than `hold_ns`.
     """
 
     role: Role = _WATCHER
     connection: socket.socket | None = None
     pid: int = 0
-    until_ns: int | None = None
+    until_ns: int = _WORKS
     waits_for_io: bool = False
     next_hold_ns: int = DEFAULT_HOLD
-    hold_ns: int | None = None
+    hold_ns: int = _NEVER
     since_wall_ns: int = field(default_factory=time.monotonic_ns)
     patience_ns: int = 10 * NS_PER_S
     excused: bool = False
 
     def holds(self) -> bool:
         """Return whether time may not pass `hold_ns`."""
-        return self.hold_ns is not None and self.until_ns is None and not self.excused
+        return self.until_ns == _WORKS and self.hold_ns != _NEVER and not self.excused
 
 
 class Governor:
@@ -92,8 +95,8 @@ class Governor:
         self._look_due_ns = 0
         self.blamed_ns: dict[str, int] = {}
         """For how long each member has held time since somebody cleared this, wall time."""
-        self.excused: list[str] = []
-        """Who has been found dead, stopped or hung."""
+        self._blockers: list[str] = []
+        self._blocked_ns = 0
         self._take_over()
         if hold_for_pid is not None:
             self._expected[hold_for_pid] = Member(
@@ -117,20 +120,23 @@ class Governor:
             self._hear(fileno, self._members[fileno])
 
     def note_writes(self) -> None:
-        """Let those look again who wait for a device: it may have something for them."""
+        """Let members that wait for a device look again: it may have something for them."""
         self._words[Word.WRITES] += 1
         now_ns = self.now_ns
         for member in self._members.values():
-            if member.waits_for_io and member.until_ns is not None:
+            if member.waits_for_io and member.until_ns != _WORKS:
                 member.until_ns = min(member.until_ns, now_ns)
 
     def go_round(self) -> int:
-        """Show that the twin is alive, and look whether its members are; return how far time leapt.
+        """Show that the twin is alive, and check that its members are; return how far time leapt.
 
         It leaps where members had given this twin up, as one that was stopped: by now they are
         ahead, by the wall clock.
         """
         wall_ns = time.monotonic_ns()
+        for name in self._blockers:
+            self.blamed_ns[name] = self.blamed_ns.get(name, 0) + wall_ns - self._blocked_ns
+        self._blockers = []
         leapt_ns = 0
         if not self.page.is_governed:
             before_ns = self.now_ns
@@ -143,46 +149,37 @@ class Governor:
             self._look_after(wall_ns)
         return leapt_ns
 
-    def wake_next(self) -> bool:
-        """Wake who is due, at most one of those that hold time strictly; False when nobody is."""
-        now_ns = self.now_ns
-        due = [
-            one for one in self._waiting() if one.until_ns is not None and one.until_ns <= now_ns
-        ]
-        if not due:
-            return False
+    @property
+    def is_held(self) -> bool:
+        """Return whether a member works that time must not pass: devices answer when it waits."""
+        return self._blocks(self.now_ns)
+
+    def go_on(self, event_ns: int) -> float | None:
+        """Wake members that are due, or move time to the next event, `event_ns` at the latest.
+
+        Return for how long to wait for members, or for the pace, before the next look; None when
+        time has moved.
+        """
+        now_ns, waiting = self.now_ns, self._waiting()
+        due = [one for one in waiting if one.until_ns <= now_ns]
         watching = [one for one in due if one.role.slack_ns is None]
         for member in watching:
             self._wake(member)
         if watching:
-            return True
-        if any(hold_ns <= now_ns for hold_ns in self._holds()):
-            return False
-        self._wake(min(due, key=lambda one: (one.until_ns, one.role.order)))
-        return True
-
-    def next_wake_ns(self) -> int | None:
-        """Return when the next member is due, None when nobody waits."""
-        return min(
-            (one.until_ns for one in self._waiting() if one.until_ns is not None), default=None
-        )
-
-    def wait_s(self, next_ns: int) -> float:
-        """Return how long to wait for members or for the pace before time may go to `next_ns`."""
-        if any(hold_ns < next_ns for hold_ns in self._holds()) or self._is_somebody_due():
+            return 0.0
+        if due and not self.is_held:
+            self._wake(min(due, key=lambda one: (one.until_ns, one.role.order)))
             return _MOST_WAIT_S
-        return min(self._pacer.wait_ns(next_ns) / NS_PER_S, _MOST_WAIT_S)
-
-    def blame(self, next_ns: int, waited_ns: int) -> None:
-        """Note who held time for a while."""
-        for member in (*self._members.values(), *self._expected.values()):
-            if member.holds() and member.hold_ns is not None and member.hold_ns < next_ns:
-                name = member.role.name
-                self.blamed_ns[name] = self.blamed_ns.get(name, 0) + waited_ns
-
-    def advance(self, to_ns: int) -> None:
-        """Move time."""
-        self._words[Word.NOW_NS] = to_ns
+        next_ns = min((one.until_ns for one in waiting), default=event_ns)
+        next_ns = max(now_ns, min(next_ns, event_ns))
+        if due or self._blocks(next_ns - 1):
+            self._note_blockers(max(next_ns, now_ns + 1))
+            return _MOST_WAIT_S
+        wait_ns = self._pacer.wait_ns(next_ns)
+        if wait_ns:
+            return min(wait_ns / NS_PER_S, _MOST_WAIT_S)
+        self._words[Word.NOW_NS] = next_ns
+        return None
 
     def close(self) -> None:
         """Give time back to the wall clock."""
@@ -223,45 +220,63 @@ class Governor:
             except ConnectionResetError:
                 packet = b""
             if not packet:
-                member.connection.close()
-                del self._members[fileno]
+                self._dismiss(fileno, member)
                 return
-            self._take(member, *unpack(packet))
+            try:
+                self._take(member, *unpack(packet))
+            except (ValueError, TypeError) as error:
+                _log.warning("closed the connection of %s: %s", member.role.name, error)
+                self._dismiss(fileno, member)
+                return
+
+    def _dismiss(self, fileno: int, member: Member) -> None:
+        assert member.connection is not None
+        member.connection.close()
+        del self._members[fileno]
 
     def _take(self, member: Member, op: Op, a: int, b: int, role: Role | None) -> None:
         if op in (Op.WAIT, Op.WAIT_IO):
             self._take_wait(member, op, a, b)
         elif op is Op.HOLD:
-            member.hold_ns, member.until_ns, member.excused = a, None, False
+            member.hold_ns, member.until_ns, member.excused = a, _WORKS, False
             member.since_wall_ns = time.monotonic_ns()
         elif op is Op.RELEASE:
-            member.hold_ns = member.until_ns = None
+            member.hold_ns, member.until_ns = _NEVER, _WORKS
         elif role is not None and op is Op.JOIN:
             self._join(member, a, role)
         elif role is not None and op is Op.EXPECT:
-            self._expected[a] = Member(
-                role=role, pid=a, hold_ns=self.now_ns + b, patience_ns=_LOADING_PATIENCE_NS
-            )
+            self._expect(a, b, role)
 
     def _take_wait(self, member: Member, op: Op, a: int, b: int) -> None:
         """Let a member wait; one that waits for input goes on at once where it missed some."""
         member.excused = False
         if a == UNTIL_LOADED:  # whoever it is: its start belongs to that moment
-            a = b = self.now_ns if member.hold_ns is None else member.hold_ns
+            a = b = self.now_ns if member.hold_ns == _NEVER else member.hold_ns
         member.waits_for_io = op is Op.WAIT_IO
         missed = member.waits_for_io and b != self._words[Word.WRITES]
         member.until_ns = self.now_ns if missed else a
         member.next_hold_ns = DEFAULT_HOLD if member.waits_for_io else b
         member.patience_ns = round(member.role.patience_s * NS_PER_S)
 
+    def _expect(self, pid: int, loading_ns: int, role: Role) -> None:
+        """Hold time for a child that loads, unless it was quicker than this message."""
+        if any(one.pid == pid and one.role.name == role.name for one in self._members.values()):
+            return
+        self._expected[pid] = Member(
+            role=role,
+            pid=pid,
+            hold_ns=self.now_ns + loading_ns,
+            patience_ns=_LOADING_PATIENCE_NS,
+        )
+
     def _join(self, member: Member, pid: int, role: Role) -> None:
-        expected = self._expected.pop(pid, None)
         member.role, member.pid = role, pid
         member.since_wall_ns = time.monotonic_ns()
-        member.hold_ns = self.now_ns if role.slack_ns is not None else None
-        if expected is not None:
-            member.hold_ns = expected.hold_ns
-            member.patience_ns = expected.patience_ns
+        member.hold_ns = _NEVER if role.slack_ns is None else self.now_ns
+        expected = self._expected.get(pid)
+        if expected is not None and expected.role.name in (role.name, _FIRST.name):
+            del self._expected[pid]
+            member.hold_ns, member.patience_ns = expected.hold_ns, expected.patience_ns
 
     def _wake(self, member: Member) -> None:
         assert member.connection is not None
@@ -269,37 +284,37 @@ class Governor:
         if member.next_hold_ns != DEFAULT_HOLD:
             member.hold_ns = member.next_hold_ns
         else:
-            member.hold_ns = None if slack_ns is None else self.now_ns + slack_ns
-        member.until_ns = None
+            member.hold_ns = _NEVER if slack_ns is None else self.now_ns + slack_ns
+        member.until_ns = _WORKS
         member.since_wall_ns = time.monotonic_ns()
         with contextlib.suppress(OSError):  # it has died: its end of file comes next
             member.connection.send(GRANT)
 
-    def _waiting(self) -> list[Member]:
-        return [one for one in self._members.values() if one.until_ns is not None]
+    def _waiting(self) -> list["Member"]:
+        return [one for one in self._members.values() if one.until_ns != _WORKS]
 
-    def _is_somebody_due(self) -> bool:
-        next_ns = self.next_wake_ns()
-        return next_ns is not None and next_ns <= self.now_ns
+    def _holders(self) -> Iterator["Member"]:
+        return (one for one in (*self._members.values(), *self._expected.values()) if one.holds())
 
-    def _holds(self) -> list[int]:
-        """Return the moments at which somebody holds time."""
-        return [
-            one.hold_ns
-            for one in (*self._members.values(), *self._expected.values())
-            if one.holds() and one.hold_ns is not None
-        ]
+    def _blocks(self, at_ns: int) -> bool:
+        """Return whether a member works beyond which time would be at `at_ns`."""
+        return any(one.hold_ns <= at_ns for one in self._holders())
+
+    def _note_blockers(self, next_ns: int) -> None:
+        self._blocked_ns = time.monotonic_ns()
+        self._blockers = [one.role.name for one in self._holders() if one.hold_ns < next_ns]
 
     def _look_after(self, wall_ns: int) -> None:
         for pid, member in tuple(self._expected.items()):
-            if self._is_lost(member, wall_ns):
+            member.excused = self._is_lost(member, wall_ns)
+            if process_state(pid) in _DEAD:
                 del self._expected[pid]
         for member in self._members.values():
-            if member.pid and member.until_ns is None and member.hold_ns is not None:
+            if member.pid and member.until_ns == _WORKS and member.hold_ns != _NEVER:
                 member.excused = self._is_lost(member, wall_ns)
 
     def _is_lost(self, member: Member, wall_ns: int) -> bool:
-        """Tell whether one that holds time is dead, stopped, or hangs."""
+        """Return whether one that holds time is dead, stopped, or hangs."""
         state = process_state(member.pid)
         if state in _DEAD or state in _STOPPED:
             why = "has died" if state in _DEAD else "is stopped"
@@ -309,7 +324,6 @@ class Governor:
         else:
             return False
         if not member.excused:
-            self.excused.append(f"{member.role.name} {why}")
             _log.warning(
                 "time goes on without %s (pid %d): it %s", member.role.name, member.pid, why
             )

@@ -4,7 +4,7 @@ import gc
 import json
 import os
 import select
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 
 from drivers.clock import Clock
 from drivers.twin_clock import TwinClock
-from drivers.twin_page import Pace
+from drivers.twin_page import PAGE_FILE, Pace
 from sim_twin.can import CanHub
 from sim_twin.drawing import start_camera, start_viewer
 from sim_twin.engine import STEP_NS
@@ -33,11 +33,12 @@ from sim_twin.sound.desk import SoundDesk
 from sim_twin.stream_line import StreamLine
 from sim_twin.twin import Twin
 from sim_twin.twin_status import TwinStatus
-from sim_twin.wall_time import TimeKeeper, WallTime
+from sim_twin.wall_time import WallTime
 from sim_twin.wire_digest import WireDigest
 from vla_deploy.robots import load_robot
 
 READY_FILE = "ready"
+FOREVER_NS = 1 << 62
 MOST_PATH_BYTES = 90
 """A Unix socket's path holds 107 bytes; the device's name needs the rest."""
 
@@ -114,7 +115,6 @@ class TwinProcess:
         gc.collect()
         gc.freeze()  # a full collection of the model and libraries takes longer than a step
         self._held_by = ""
-        self._next_ns = 0
         self._wall = clock
         self._time = self._begin_time(options)
         self._base_ns = self._time.now_ns - self._twin.now_ns
@@ -126,10 +126,7 @@ class TwinProcess:
         """Step and serve until `should_stop()`."""
         wait_s = 0.0
         while not should_stop():
-            began_ns = self._wall.now_ns()
             ready, _, _ = select.select(self._filenos(), [], [], wait_s)
-            if wait_s:
-                self._time.blame(self._next_ns, self._wall.now_ns() - began_ns)
             self._base_ns += self._time.go_round()
             if ready:
                 self._serve(set(ready))
@@ -171,10 +168,11 @@ class TwinProcess:
         line, on_baud = twin.lines[path.name], twin.servos.set_host_baud
         return PtyLine(line, path, now_ns=self._now_ns, on_baud=on_baud, on_bytes=self._digest.add)
 
-    def _begin_time(self, options: TwinOptions) -> TimeKeeper:
+    def _begin_time(self, options: TwinOptions) -> Governor | WallTime:
         # As fast as it can, it would leave the robot's page and whoever watches no core.
         self._priority = Priority.ORDINARY if options.pace is Pace.FAST else claim_priority()
         if options.pace is Pace.WALL:
+            (options.devices_dir / PAGE_FILE).unlink(missing_ok=True)  # of a twin before this one
             return WallTime(self._wall)
         pacer = Pacer(self._wall, is_fast=options.pace is Pace.FAST)
         return Governor(options.devices_dir, pacer, options.hold_for_pid)
@@ -185,28 +183,22 @@ class TwinProcess:
         return TwinClock(options.devices_dir)
 
     def _go_on(self) -> float:
-        """Wake one member, or move time to what is due next; return how long to wait instead."""
+        """Wake a member, or move time to what is due next; return how long to wait for others."""
         self._deliver()
-        if self._time.wake_next():
-            return 0.0
         step_ns = self._twin.now_ns + STEP_NS + self._base_ns
-        next_ns = max(self._time.now_ns, min(step_ns, *self._due_between_steps_ns(step_ns)))
-        self._next_ns = next_ns
-        wait_s = self._time.wait_s(next_ns)
-        if wait_s > 0.0:
+        wait_s = self._time.go_on(min(step_ns, *self._arrivals_ns()))
+        if wait_s is not None:
             return wait_s
-        self._time.advance(next_ns)
-        if next_ns >= step_ns:
+        if self._time.now_ns >= step_ns:
             self._step()
         return 0.0
 
-    def _due_between_steps_ns(self, step_ns: int) -> list[int]:
-        """Return when members are due, and when something arrives at a host."""
+    def _arrivals_ns(self) -> Iterator[int]:
+        """Yield when something arrives at a host between two steps, and an end to all waiting."""
         wire = self._twin.can_wire
         arrivals = self._twin.servos.next_due_ns(), wire.next_due_ns() if wire.timed else None
-        due = [due_ns + self._base_ns for due_ns in arrivals if due_ns is not None]
-        wake_ns = self._time.next_wake_ns()
-        return [*due, step_ns if wake_ns is None else wake_ns]
+        yield from (due_ns + self._base_ns for due_ns in arrivals if due_ns is not None)
+        yield FOREVER_NS
 
     def _now_ns(self) -> int:
         """Return simulated time, which passes between two steps too."""
@@ -264,12 +256,19 @@ class TwinProcess:
     def _filenos(self) -> list[int]:
         lines = [line.fileno() for line in self._plugged()]
         streams = [fileno for stream in self._streams.values() for fileno in stream.filenos()]
-        devices = [*lines, *streams, *self._hub.filenos(), *self._referee.filenos()]
-        return [*self._time.filenos(), *devices]
+        devices = [*lines, *streams, *self._hub.filenos()]
+        # A member that works gets no answer before it waits: else what it reads without waiting
+        # would depend on how soon this process runs.
+        return [*self._askers(), *(() if self._time.is_held else devices)]
+
+    def _askers(self) -> list[int]:
+        return [*self._time.filenos(), *self._referee.filenos()]
 
     def _serve(self, ready: set[int]) -> None:
         self._time.serve(ready)
-        if ready.issubset(self._time.filenos()):
+        if not ready.isdisjoint(self._referee.filenos()):
+            self._referee.poll_once()
+        if ready.issubset(self._askers()):
             return
         for line in self._plugged():
             if line.fileno() in ready:
@@ -280,8 +279,6 @@ class TwinProcess:
         if not ready.isdisjoint(self._hub.filenos()):
             self._twin.can_wire.poll(self._now_ns())
             self._hub.poll_once()
-        if not ready.isdisjoint(self._referee.filenos()):
-            self._referee.poll_once()
         self._time.note_writes()
 
     def _truth(self, _request: Mapping[str, Any]) -> dict[str, Any]:

@@ -213,11 +213,11 @@ class AdaptingNode:
     def _abandon(self) -> None:
         """Forget a preparation; one that still runs is discarded as soon as it is done."""
         change, self._change = self._change, None
-        if change is not None and not change.future.cancel():
+        if change is not None:
             change.future.add_done_callback(self._discard_done)
 
     def _discard_done(self, future: "Future[tuple[Profile, Any]]") -> None:
-        if future.exception() is None:
+        if not future.cancelled() and future.exception() is None:
             self._discard(future.result()[1])
 
     def _discard(self, content: Any) -> None:

@@ -13,7 +13,7 @@ from drivers.twin_page import Op, Role
 
 T = TypeVar("T")
 _NICE: Final = 10
-_PREPARING_S: Final = 0.5
+_BACKGROUND_S: Final = 0.5
 
 
 class AtOnce(Executor):
@@ -148,10 +148,10 @@ def beside(name: str, clock: Clock, computing_s: float) -> Executor:
     return _timed(name, clock, computing_s, ThreadPoolExecutor(1, thread_name_prefix=name))
 
 
-def background(clock: Clock) -> Executor:
+def background(clock: Clock, computing_s: float = _BACKGROUND_S) -> Executor:
     """Return one thread that lets the steps of its process go first."""
     thread = ThreadPoolExecutor(1, thread_name_prefix="prepare", initializer=_give_way)
-    return _timed("background", clock, _PREPARING_S, thread)
+    return _timed("background", clock, computing_s, thread)
 
 
 def _timed(name: str, clock: Clock, computing_s: float, thread: ThreadPoolExecutor) -> Executor:

@@ -28,7 +28,7 @@ from vla_deploy.logs import process_log
 from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.node import Node, NodeContext, run_node
 from vla_deploy.robots import RobotFileError
-from vla_deploy.runtime.twin_members import MEMBERSHIPS
+from vla_deploy.runtime.twin_members import MEMBERSHIPS, STOPPING_NS, WATCHERS
 
 READY_DIR = "ready"
 # An adapter may be slow to appear at boot, a supply be switched on later, a dying holder let go.
@@ -71,7 +71,7 @@ def main(
     with process_log(name, context.robot, context.run_dir, context.clock):
         try:
             built = _adapting(name, build, context) if adapts else build(context)
-            node = _Announced(built, context.run_dir / READY_DIR / name)
+            node = _Announced(name, built, context)
             if isinstance(context.clock, TwinClock) and name in MEMBERSHIPS:
                 context.clock.join(MEMBERSHIPS[name].role, os.getpid())
             run(node, context.clock, lambda: bool(stop_signals))
@@ -110,8 +110,10 @@ def _adapting(
 class _Announced:
     """Say by a file that a node is started, for whoever waits for it."""
 
-    def __init__(self, node: Node, ready_file: Path) -> None:
-        self._ready_file = ready_file
+    def __init__(self, name: str, node: Node, context: NodeContext) -> None:
+        self._name = name
+        self._ready_file = context.run_dir / READY_DIR / name
+        self._clock = context.clock
         self._node = node
         self.step = node.step
 
@@ -126,6 +128,8 @@ class _Announced:
 
     def stop(self) -> None:
         self._ready_file.unlink(missing_ok=True)
+        if isinstance(self._clock, TwinClock) and self._name in WATCHERS:
+            self._clock.hold_until(self._clock.now_ns() + STOPPING_NS)
         self._node.stop()
 
 

@@ -6,6 +6,7 @@ Run as a program, this moves time in a folder as the twin does, without any phys
 import os
 import select
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -18,7 +19,7 @@ import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.twin_clock import TwinClock
-from drivers.twin_page import Role
+from drivers.twin_page import TIME_SOCKET, Op, Role, pack
 from sim_twin.governor import Governor
 from sim_twin.pacer import Pacer
 from vla_deploy.aside import TwinWorker, beside
@@ -61,21 +62,7 @@ class Metronome:
             governor.go_round()
             if ready:
                 governor.serve(set(ready))
-                wait_s = 0.0
-            else:
-                wait_s = self._go_on()
-
-    def _go_on(self) -> float:
-        governor = self.governor
-        if governor.wake_next():
-            return 0.0
-        step_ns = governor.now_ns + STEP_NS
-        wake_ns = governor.next_wake_ns()
-        next_ns = max(governor.now_ns, step_ns if wake_ns is None else min(step_ns, wake_ns))
-        wait_s = governor.wait_s(next_ns)
-        if wait_s == 0.0:
-            governor.advance(next_ns)
-        return wait_s
+            wait_s = 0.0 if ready else governor.go_on(governor.now_ns + STEP_NS) or 0.0
 
 
 @pytest.fixture
@@ -192,11 +179,12 @@ def test_one_that_is_continued_holds_time_again(
 
 
 def test_one_that_hangs_holds_time_for_as_long_as_its_patience(
-    metronome: Metronome, folder: Path
+    metronome: Metronome, folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with work(folder, patience_s=0.3) as child:
         assert passes(TwinClock(folder))
-        assert metronome.governor.excused == ["child has worked for more than 0.3 s"]
+        assert "child (pid" in caplog.text
+        assert "has worked for more than 0.3 s" in caplog.text
         child.kill()
 
 
@@ -224,6 +212,29 @@ def test_a_child_that_loads_holds_time_at_what_was_declared_and_begins_there(
         child.kill()
         thread.join(10)
     assert begins == [now_ns + 500 * MS]
+
+
+def test_a_child_that_is_quicker_than_its_announcement_freezes_nobody(
+    metronome: Metronome, folder: Path, child: "subprocess.Popen[str]"
+) -> None:
+    clock = TwinClock(folder)
+    child.send_signal(signal.SIGSTOP)  # one that has joined, and is waited for no more
+    clock.expect(child.pid, Role(name="child", order=1), 10 * MS)
+    assert passes(clock)
+
+
+@pytest.mark.parametrize(
+    "packet", [b"x", b"\xff" * 17, pack(Op.JOIN, 1) + b"{}", pack(Op.JOIN, 1) + b"[1]"]
+)
+def test_what_is_no_packet_costs_its_sender_the_connection_and_nobody_else(
+    metronome: Metronome, folder: Path, packet: bytes
+) -> None:
+    clock = TwinClock(folder)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as stranger:
+        stranger.connect(str(folder / TIME_SOCKET))
+        stranger.send(packet)
+        assert stranger.recv(1) == b""
+    assert passes(clock)
 
 
 def test_one_that_only_watches_holds_nothing(metronome: Metronome, folder: Path) -> None:
@@ -296,6 +307,14 @@ def slept_s(clock: TwinClock, span_s: float) -> float:
     clock.sleep_until(due_ns)
     assert clock.now_ns() >= due_ns
     return time.monotonic() - began_s
+
+
+def test_a_clock_that_first_waits_when_the_twin_has_died_goes_by_the_wall(
+    apart: Apart, folder: Path
+) -> None:
+    apart.process.kill()
+    apart.process.wait()
+    assert slept_s(TwinClock(folder), 0.2) == pytest.approx(0.2, abs=0.15)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])

@@ -5,7 +5,7 @@ from sim_twin.mirror import MirrorState, mirror_pair, newest_state, send_state
 
 
 def state(now_ns: int) -> MirrorState:
-    return MirrorState(now_ns=now_ns, wall_ns=7, qpos=np.array([1.0, 2.0]))
+    return MirrorState(now_ns=now_ns, clock_ns=7, qpos=np.array([1.0, 2.0]))
 
 
 def test_only_the_newest_state_arrives() -> None:
@@ -15,7 +15,7 @@ def test_only_the_newest_state_arrives() -> None:
         send_state(sender, state(2))
         newest = newest_state(receiver)
         assert newest is not None
-        assert (newest.now_ns, newest.wall_ns, newest.qpos.tolist()) == (2, 7, [1.0, 2.0])
+        assert (newest.now_ns, newest.clock_ns, newest.qpos.tolist()) == (2, 7, [1.0, 2.0])
         assert newest_state(receiver) is None
 
 

@@ -49,7 +49,7 @@ class CountingWindow:
 def send(sender: socket.socket, model: mujoco.MjModel, arm_rad: float) -> None:
     qpos = model.qpos0.copy()
     qpos[model.joint("arm").qposadr[0]] = arm_rad
-    send_state(sender, MirrorState(now_ns=10**9, wall_ns=0, qpos=qpos))
+    send_state(sender, MirrorState(now_ns=10**9, clock_ns=0, qpos=qpos))
 
 
 def test_the_window_shows_the_newest_state_and_ends_with_the_twin(

@@ -31,7 +31,7 @@ class SteppingClock:
     @property
     def stands_still(self) -> bool:
         """Return whether time stands still while nobody waits on this clock: the twin's does."""
-        return isinstance(self._clock, TwinClock)
+        return isinstance(self._clock, TwinClock) and self._clock.page.is_governed
 
     def sleep_until(self, deadline_ns: int) -> None:
         """Step the supervisor until the deadline.
@@ -79,14 +79,13 @@ def answer_of(session: Session, module: str, *words: str) -> dict[str, Any]:
     ) as asked:
         try:
             clock = session.clock
-            if isinstance(clock, SteppingClock) and clock.stands_still:
-                asked.wait()
-            while asked.poll() is None:
+            stands_still = isinstance(clock, SteppingClock) and clock.stands_still
+            while not stands_still and asked.poll() is None:
                 session.pause()
+            answer_text, complaint = asked.communicate()
         except BaseException:
             asked.kill()
             raise
-        answer_text, complaint = asked.communicate()
     if asked.returncode != 0:
         raise CommandFailed(complaint.strip() or f"{module} failed with {words}")
     answer: dict[str, Any] = json.loads(answer_text)

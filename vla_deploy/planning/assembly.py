@@ -4,7 +4,7 @@ import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from drivers.clock import Clock
+from drivers.clock import Clock, MonotonicClock
 from platforms import Profile
 from platforms.profile import PlanningSettings
 from vla_deploy.inference.roles import ModelShelf
@@ -59,7 +59,7 @@ def open_planner(
     which models could not be opened, and why. Nothing is sent yet.
     """
     away: dict[str, str] = dict(models_away or {})
-    servers = _served(robot, settings, clock, base, away) if settings.servers else ()
+    servers = _served(robot, settings, base, away) if settings.servers else ()
     for name in away.keys() - (models_away or {}).keys():
         _log.warning("planning does without server %s: %s", name, away[name])
     slow = (*on_board, *servers)[: settings.max_rungs]
@@ -80,7 +80,6 @@ def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:
 def _served(
     robot: RobotDescription,
     settings: PlanningSettings,
-    clock: Clock,
     base: Path,
     away: dict[str, str],
 ) -> Iterator[Rung]:
@@ -88,7 +87,8 @@ def _served(
     effort = Effort(candidates=settings.candidates, prompt_characters=settings.prompt_characters)
     for name in settings.servers:
         try:
-            server = ServerShelf.of_base(base, clock).open(name)
+            # A server answers by the wall clock, whatever time the robot lives by.
+            server = ServerShelf.of_base(base, MonotonicClock()).open(name)
         except ModelServerError as error:
             away[name] = one_line(error)
             continue

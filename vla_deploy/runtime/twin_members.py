@@ -38,4 +38,7 @@ MEMBERSHIPS: Final = {
         _member("dashboard", 7, 2.0, None),
     )
 }
+WATCHERS: Final = frozenset(name for name, one in MEMBERSHIPS.items() if one.role.slack_ns is None)
+"""Live by the wall clock while they run; their end takes `STOPPING_NS` at most."""
+STOPPING_NS: Final = NS_PER_S
 SUPERVISOR: Final = Role(name="supervisor", order=100, patience_s=60.0)

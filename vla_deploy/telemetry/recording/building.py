@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable
 from concurrent.futures import Executor
+from typing import Final
 
 from vla_deploy.aside import background
 from vla_deploy.ipc import SharedSpace
@@ -18,6 +19,9 @@ from vla_deploy.telemetry.recording.settings import RecordingSettings, read_sett
 from vla_deploy.telemetry.recording.tape import FileLimits, Tape
 
 _log = logging.getLogger(__name__)
+
+WRITING_S: Final = 0.02
+"""What writing a step's batch takes, of simulated time: less than the period of the steps."""
 
 
 def rolling_recorder(
@@ -53,7 +57,7 @@ def rolling_recorder(
         context.clock,
         new_tape=new_tape,
         new_collector=new_collector,
-        aside=aside or background(context.clock),
+        aside=aside or background(context.clock, WRITING_S),
         always=chosen.wish if chosen.always else None,
     )
 
