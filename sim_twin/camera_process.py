@@ -91,10 +91,10 @@ class Studio:
 
     def _run_as_member(self, mirror: socket.socket) -> None:
         """Take part in the time of the twin that shows states, anew where it took time over."""
-        page = TimePage(self._devices_dir / PAGE_FILE)
         while True:
             select.select([mirror], [], [])  # the twin moves time before it shows anything
             state = newest_state(mirror)
+            page = TimePage(self._devices_dir / PAGE_FILE)
             if state is not None and page.is_governed:
                 self._line = TimeLine(page, self._devices_dir)
                 self._line.send(Op.JOIN, os.getpid(), role=_ROLE)

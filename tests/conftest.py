@@ -16,10 +16,17 @@ settings.load_profile("any machine")
 # Whichever test loads onnxruntime first: it phones home otherwise.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
+BROWSER = "browser"
+"""The folder whose tests share one robot and one browser."""
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Refuse a mark that comes from elsewhere: `scripts/check` would run such a test nowhere."""
-    for path in sorted({item.path for item in items if item.get_closest_marker("stack")}):
+    """Keep what shares real processes on one worker, and its mark where `scripts/check` looks."""
+    stack = [item for item in items if item.get_closest_marker("stack")]
+    for item in stack:
+        group = item.path.parent if item.path.parent.name == BROWSER else item.path
+        item.add_marker(pytest.mark.xdist_group(str(group)))
+    for path in sorted({item.path for item in stack}):
         if "mark.stack" not in path.read_text(encoding="utf-8"):
             raise pytest.UsageError(f"{path}: tests marked `stack`; write pytest.mark.stack here")
 
