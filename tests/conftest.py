@@ -20,6 +20,7 @@ BROWSER = "browser"
 """The folder whose tests share one robot and one browser."""
 
 
+@pytest.hookimpl(tryfirst=True)  # the groups are read at collection, too
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Keep what shares real processes on one worker, and its mark where `scripts/check` looks."""
     stack = [item for item in items if item.get_closest_marker("stack")]
