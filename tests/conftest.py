@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
 
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile(
@@ -20,14 +22,21 @@ BROWSER = "browser"
 """The folder whose tests share one robot and one browser."""
 
 
-@pytest.hookimpl(tryfirst=True)  # the groups are read at collection, too
+class FileScheduling(LoadScopeScheduling):
+    """Give each file to one worker, and all files of the browser: they share one robot."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        return BROWSER if f"/{BROWSER}/" in file else file
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadScopeScheduling | None:
+    return FileScheduling(config, log) if config.getvalue("dist") == "loadfile" else None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep what shares real processes on one worker, and its mark where `scripts/check` looks."""
-    stack = [item for item in items if item.get_closest_marker("stack")]
-    for item in stack:
-        group = item.path.parent if item.path.parent.name == BROWSER else item.path
-        item.add_marker(pytest.mark.xdist_group(str(group)))
-    for path in sorted({item.path for item in stack}):
+    """Refuse a mark that comes from elsewhere: `scripts/check` would run such a test nowhere."""
+    for path in sorted({item.path for item in items if item.get_closest_marker("stack")}):
         if "mark.stack" not in path.read_text(encoding="utf-8"):
             raise pytest.UsageError(f"{path}: tests marked `stack`; write pytest.mark.stack here")
 
