@@ -17,9 +17,11 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock, MonotonicClock
 from drivers.twin_page import (
+    DEAD,
     DEFAULT_HOLD,
     MAX_PACKET_BYTES,
     PAGE_FILE,
+    STOPPED,
     TIME_LINK,
     TIME_SOCKET,
     UNTIL_LOADED,
@@ -36,7 +38,6 @@ _HUNG_TWIN_NS: Final = 10 * NS_PER_S
 _NAP_NS: Final = 50_000_000
 _STEP_NS: Final = 500_000
 """How often a member looks again for input that another process than the twin may write."""
-_GONE: Final = frozenset("XZTtx")
 
 
 class TimeLine:
@@ -93,7 +94,7 @@ class TimeLine:
             self._page.abandon(self.generation)
 
     def _look_after_twin(self) -> None:
-        is_gone = process_state(self._page.words[Word.GOVERNOR_PID]) in _GONE
+        is_gone = process_state(self._page.words[Word.GOVERNOR_PID]) in DEAD | STOPPED
         if is_gone or self._page.silent_ns() > _HUNG_TWIN_NS:
             self._page.abandon(self.generation)
 

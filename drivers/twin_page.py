@@ -151,6 +151,11 @@ class TimePage:
             self.words[Word.ABANDONED] = generation
 
 
+DEAD: Final = frozenset("XZx")
+STOPPED: Final = frozenset("Tt")
+"""States of a process, as proc_pid_stat(5) names them."""
+
+
 def process_state(pid: int) -> str:
     """Return the state of a process as proc_pid_stat(5) has it, "X" for one that is no more."""
     try:

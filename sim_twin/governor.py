@@ -18,10 +18,12 @@ from typing import Final
 
 from drivers.clock import NS_PER_S
 from drivers.twin_page import (
+    DEAD,
     DEFAULT_HOLD,
     GRANT,
     MAX_PACKET_BYTES,
     PAGE_FILE,
+    STOPPED,
     TIME_SOCKET,
     UNTIL_LOADED,
     Op,
@@ -37,8 +39,6 @@ _LOOK_NS: Final = 20_000_000
 """How often members that hold time are looked at: whether they are alive."""
 _MOST_WAIT_S: Final = 0.02
 _LOADING_PATIENCE_NS: Final = 90 * NS_PER_S
-_DEAD: Final = frozenset("XZx")
-_STOPPED: Final = frozenset("Tt")
 _WATCHER: Final = Role(name="", order=1 << 30, slack_ns=None)
 _WORKS: Final = -1
 _NEVER: Final = 1 << 62
@@ -307,7 +307,7 @@ class Governor:
     def _look_after(self, wall_ns: int) -> None:
         for pid, member in tuple(self._expected.items()):
             member.excused = self._is_lost(member, wall_ns)
-            if process_state(pid) in _DEAD:
+            if process_state(pid) in DEAD:
                 del self._expected[pid]
         for member in self._members.values():
             if member.pid and member.until_ns == _WORKS and member.hold_ns != _NEVER:
@@ -316,8 +316,8 @@ class Governor:
     def _is_lost(self, member: Member, wall_ns: int) -> bool:
         """Return whether one that holds time is dead, stopped, or hangs."""
         state = process_state(member.pid)
-        if state in _DEAD or state in _STOPPED:
-            why = "has died" if state in _DEAD else "is stopped"
+        if state in DEAD or state in STOPPED:
+            why = "has died" if state in DEAD else "is stopped"
             member.since_wall_ns = wall_ns
         elif wall_ns - member.since_wall_ns > member.patience_ns:
             why = f"has worked for more than {member.patience_ns / NS_PER_S:g} s"

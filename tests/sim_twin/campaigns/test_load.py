@@ -36,6 +36,7 @@ def test_a_job_that_only_takes_longer_is_in_order() -> None:
         ({"late_ticks": 1}, "late_ticks: 1, expected 0"),
         ({"bus_timeouts": 3}, "bus_timeouts: 3, expected 0"),
         ({"actions": []}, "did [], alone ['pick_up succeeded']"),
+        ({"wire_digest": "01"}, "other bytes on the buses than alone"),
         ({"placement_error_m": 0.0125}, "placed 1.5 mm from where it did alone"),
     ],
 )
