@@ -26,9 +26,9 @@ from drivers.twin_page import (
     TIME_SOCKET,
     UNTIL_LOADED,
     Op,
-    Role,
+    PageWord,
     TimePage,
-    Word,
+    TimeRole,
     pack,
     process_state,
 )
@@ -50,7 +50,7 @@ class TimeLine:
             OSError: nobody moves time there.
         """
         self._page = page
-        self.generation = page.words[Word.GENERATION]
+        self.generation = page.words[PageWord.GENERATION]
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
             self._socket.connect(str(devices_dir / TIME_SOCKET))
@@ -65,7 +65,7 @@ class TimeLine:
     def is_current(self) -> bool:
         """Return whether the twin at the other end moves time still."""
         page = self._page
-        return page.is_governed and page.words[Word.GENERATION] == self.generation
+        return page.is_governed and page.words[PageWord.GENERATION] == self.generation
 
     def close(self) -> None:
         """Close the connection; closing twice is allowed."""
@@ -75,7 +75,7 @@ class TimeLine:
         """Return the descriptor that has input once a wait is over."""
         return self._socket.fileno()
 
-    def send(self, op: Op, a: int = 0, b: int = 0, role: Role | None = None) -> None:
+    def send(self, op: Op, a: int = 0, b: int = 0, role: TimeRole | None = None) -> None:
         """Ask the twin for something; one that has gone is found by the next wait."""
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self._socket.send(pack(op, a, b, role))
@@ -94,7 +94,7 @@ class TimeLine:
             self._page.abandon(self.generation)
 
     def _look_after_twin(self) -> None:
-        is_gone = process_state(self._page.words[Word.GOVERNOR_PID]) in DEAD | STOPPED
+        is_gone = process_state(self._page.words[PageWord.GOVERNOR_PID]) in DEAD | STOPPED
         if is_gone or self._page.silent_ns() > _HUNG_TWIN_NS:
             self._page.abandon(self.generation)
 
@@ -117,7 +117,7 @@ class TwinClock:
         self.now_ns = page.now_ns
         """Return the twin's time in nanoseconds; no call in between, as it is asked often."""
 
-    def join(self, role: Role, pid: int) -> None:
+    def join(self, role: TimeRole, pid: int) -> None:
         """Take part in time on this thread; return when the time declared for loading is over.
 
         Time stands still from then on until this thread waits, or releases it.
@@ -129,20 +129,20 @@ class TwinClock:
             line.send(Op.WAIT, UNTIL_LOADED, DEFAULT_HOLD)
             line.granted()
 
-    def expect(self, pid: int, role: Role, loading_ns: int) -> None:
-        """Let a child take part before it can: time waits for it where loading takes longer."""
+    def expect(self, pid: int, role: TimeRole, loading_ns: int) -> None:
+        """Announce a child: time waits for it where its loading takes longer."""
         line = self._line()
         if line is not None:
             line.send(Op.EXPECT, pid, loading_ns, role)
 
     def hold_until(self, until_ns: int) -> None:
-        """Let time go on to a moment while this thread works, and no further, until it waits."""
+        """Hold time at a moment to come while this thread works, until it waits next."""
         line = self._line()
         if line is not None:
             line.send(Op.HOLD, until_ns)
 
     def release(self) -> None:
-        """Let time pass until this thread waits next."""
+        """Hold time no more until this thread waits next."""
         line = self._line()
         if line is not None:
             line.send(Op.RELEASE)
@@ -166,7 +166,7 @@ class TwinClock:
     def wait_readable(self, poll: select.poll, deadline_ns: int) -> bool:
         """Return True as soon as `poll` has input, False at `deadline_ns`."""
         while True:
-            writes = self.page.words[Word.WRITES]
+            writes = self.page.words[PageWord.WRITES]
             if poll.poll(0):
                 return True
             now_ns = self.now_ns()
@@ -176,7 +176,7 @@ class TwinClock:
 
     def line(self) -> TimeLine | None:
         """Return a connection for a thread to come, None where no twin moves time."""
-        generation = self.page.words[Word.GENERATION]
+        generation = self.page.words[PageWord.GENERATION]
         if not self.page.is_governed:
             return None
         try:

@@ -27,7 +27,7 @@ MAX_PACKET_BYTES: Final = 512
 _HEAD: Final = struct.Struct("<Bqq")
 
 
-class Pace(StrEnum):
+class TwinPace(StrEnum):
     """Name how the twin's time goes."""
 
     REAL = "real"  # waits for its members, and is never faster than the wall clock
@@ -35,7 +35,7 @@ class Pace(StrEnum):
     WALL = "wall"  # is the wall clock, whoever is late
 
 
-class Word(IntEnum):
+class PageWord(IntEnum):
     """Name the 64-bit words of the page."""
 
     NOW_NS = 0  # simulated time, continuous with CLOCK_MONOTONIC at the twin's start
@@ -64,7 +64,7 @@ UNTIL_LOADED: Final = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Role:
+class TimeRole:
     """Say how a member takes part in time.
 
     Members that are due at once are woken in the order of `order`. Time passes the moment at which
@@ -78,7 +78,7 @@ class Role:
     patience_s: float = 10.0
 
 
-def pack(op: Op, a: int = 0, b: int = 0, role: Role | None = None) -> bytes:
+def pack(op: Op, a: int = 0, b: int = 0, role: TimeRole | None = None) -> bytes:
     """Return one packet."""
     head = _HEAD.pack(op, a, b)
     if role is None:
@@ -86,7 +86,7 @@ def pack(op: Op, a: int = 0, b: int = 0, role: Role | None = None) -> bytes:
     return head + json.dumps([role.name, role.order, role.slack_ns, role.patience_s]).encode()
 
 
-def unpack(packet: bytes) -> tuple[Op, int, int, Role | None]:
+def unpack(packet: bytes) -> tuple[Op, int, int, TimeRole | None]:
     """Return what a packet says.
 
     Raises:
@@ -98,7 +98,12 @@ def unpack(packet: bytes) -> tuple[Op, int, int, Role | None]:
     if len(packet) == _HEAD.size:
         return Op(number), a, b, None
     name, order, slack_ns, patience_s = json.loads(packet[_HEAD.size :])
-    return Op(number), a, b, Role(name=name, order=order, slack_ns=slack_ns, patience_s=patience_s)
+    return (
+        Op(number),
+        a,
+        b,
+        TimeRole(name=name, order=order, slack_ns=slack_ns, patience_s=patience_s),
+    )
 
 
 class TimePage:
@@ -131,7 +136,10 @@ class TimePage:
     def is_governed(self) -> bool:
         """Return whether a twin moves time, as far as its members know."""
         words = self.words
-        return words[Word.GOVERNOR_PID] != 0 and words[Word.ABANDONED] != words[Word.GENERATION]
+        return (
+            words[PageWord.GOVERNOR_PID] != 0
+            and words[PageWord.ABANDONED] != words[PageWord.GENERATION]
+        )
 
     def now_ns(self) -> int:
         """Return the twin's time; by the wall clock from its last value where no twin moves it."""
@@ -143,12 +151,12 @@ class TimePage:
 
     def silent_ns(self) -> int:
         """Return for how long the twin has not gone round."""
-        return self.words[Word.OFFSET_NS] + time.monotonic_ns() - self.words[Word.NOW_NS]
+        return self.words[PageWord.OFFSET_NS] + time.monotonic_ns() - self.words[PageWord.NOW_NS]
 
     def abandon(self, generation: int) -> None:
-        """Let time go on by the wall clock: the twin of that generation is no more."""
-        if self.words[Word.GENERATION] == generation:
-            self.words[Word.ABANDONED] = generation
+        """Continue by the wall clock: the twin of that generation is no more."""
+        if self.words[PageWord.GENERATION] == generation:
+            self.words[PageWord.ABANDONED] = generation
 
 
 DEAD: Final = frozenset("XZx")

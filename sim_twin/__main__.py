@@ -8,7 +8,7 @@ from pathlib import Path
 
 from drivers.clock import MonotonicClock
 from drivers.errors import DriverError
-from drivers.twin_page import Pace
+from drivers.twin_page import TwinPace
 from sim_twin.errors import TwinError
 from sim_twin.lifetime import die_with_parent
 from sim_twin.process import TwinOptions, TwinProcess
@@ -78,9 +78,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--pace",
-        type=Pace,
-        choices=list(Pace),
-        default=Pace.WALL,
+        type=TwinPace,
+        choices=list(TwinPace),
+        default=TwinPace.WALL,
         help="real, fast: the processes of the run in RUN_DIR are waited for; default: wall",
     )
     parser.add_argument(

@@ -18,7 +18,7 @@ import mujoco
 
 from drivers.clock import NS_PER_S
 from drivers.twin_clock import TimeLine
-from drivers.twin_page import DEFAULT_HOLD, PAGE_FILE, Op, Role, TimePage
+from drivers.twin_page import DEFAULT_HOLD, PAGE_FILE, Op, TimePage, TimeRole
 from sim_twin.drawing_process import drawing_parser, run_drawing, take_over
 from sim_twin.faults.camera_relay import CameraBench, CameraFaults
 from sim_twin.film_desk import FilmDesk
@@ -36,7 +36,7 @@ LATENCY_NS: Final = 40_000_000
 _FILM_HOLD_NS: Final = 100_000_000
 _REST_NS: Final = 1_000_000
 """How soon the rest of a frame follows that has not found room at once."""
-_ROLE: Final = Role(name="camera", order=-1)
+_ROLE: Final = TimeRole(name="camera", order=-1)
 _IDLE_S: Final = 0.5
 
 

@@ -27,9 +27,9 @@ from drivers.twin_page import (
     TIME_SOCKET,
     UNTIL_LOADED,
     Op,
-    Role,
+    PageWord,
     TimePage,
-    Word,
+    TimeRole,
     process_state,
     unpack,
 )
@@ -39,21 +39,21 @@ _LOOK_NS: Final = 20_000_000
 """How often members that hold time are looked at: whether they are alive."""
 _MOST_WAIT_S: Final = 0.02
 _LOADING_PATIENCE_NS: Final = 90 * NS_PER_S
-_WATCHER: Final = Role(name="", order=1 << 30, slack_ns=None)
+_WATCHER: Final = TimeRole(name="", order=1 << 30, slack_ns=None)
 _WORKS: Final = -1
 _NEVER: Final = 1 << 62
-_FIRST: Final = Role(name="first member", order=0)
+_FIRST: Final = TimeRole(name="first member", order=0)
 _log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True, eq=False)
-class Member:
+class TimeMember:
     """Be one connection, or a child that is expected.
 
     It waits until `until_ns`, or works, and then time goes no further than `hold_ns`.
     """
 
-    role: Role = _WATCHER
+    role: TimeRole = _WATCHER
     connection: socket.socket | None = None
     pid: int = 0
     until_ns: int = _WORKS
@@ -84,8 +84,8 @@ class Governor:
         self.page = TimePage.create(devices_dir / PAGE_FILE)
         self._words = self.page.words
         self._pacer = pacer
-        self._members: dict[int, Member] = {}
-        self._expected: dict[int, Member] = {}
+        self._members: dict[int, TimeMember] = {}
+        self._expected: dict[int, TimeMember] = {}
         self._path = devices_dir / TIME_SOCKET
         self._path.unlink(missing_ok=True)
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -99,14 +99,14 @@ class Governor:
         self._blocked_ns = 0
         self._take_over()
         if hold_for_pid is not None:
-            self._expected[hold_for_pid] = Member(
+            self._expected[hold_for_pid] = TimeMember(
                 role=_FIRST, pid=hold_for_pid, hold_ns=self.now_ns
             )
 
     @property
     def now_ns(self) -> int:
         """Return the time, continuous with CLOCK_MONOTONIC at the start."""
-        return self._words[Word.NOW_NS]
+        return self._words[PageWord.NOW_NS]
 
     def filenos(self) -> list[int]:
         """Return the descriptors whose input calls for `serve`."""
@@ -120,8 +120,8 @@ class Governor:
             self._hear(fileno, self._members[fileno])
 
     def note_writes(self) -> None:
-        """Let members that wait for a device look again: it may have something for them."""
-        self._words[Word.WRITES] += 1
+        """Wake members that wait for a device: it may have something for them."""
+        self._words[PageWord.WRITES] += 1
         now_ns = self.now_ns
         for member in self._members.values():
             if member.waits_for_io and member.until_ns != _WORKS:
@@ -143,7 +143,7 @@ class Governor:
             self._disconnect()
             self._take_over()
             leapt_ns = self.now_ns - before_ns
-        self._words[Word.OFFSET_NS] = self.now_ns - wall_ns
+        self._words[PageWord.OFFSET_NS] = self.now_ns - wall_ns
         if wall_ns >= self._look_due_ns:
             self._look_due_ns = wall_ns + _LOOK_NS
             self._look_after(wall_ns)
@@ -178,22 +178,22 @@ class Governor:
         wait_ns = self._pacer.wait_ns(next_ns)
         if wait_ns:
             return min(wait_ns / NS_PER_S, _MOST_WAIT_S)
-        self._words[Word.NOW_NS] = next_ns
+        self._words[PageWord.NOW_NS] = next_ns
         return None
 
     def close(self) -> None:
         """Give time back to the wall clock."""
-        self._words[Word.OFFSET_NS] = self.now_ns - time.monotonic_ns()
-        self._words[Word.GOVERNOR_PID] = 0
+        self._words[PageWord.OFFSET_NS] = self.now_ns - time.monotonic_ns()
+        self._words[PageWord.GOVERNOR_PID] = 0
         self._disconnect()
         self._listener.close()
         self._path.unlink(missing_ok=True)
 
     def _take_over(self) -> None:
         words = self._words
-        words[Word.NOW_NS] = words[Word.OFFSET_NS] + time.monotonic_ns()
-        words[Word.GENERATION] += 1
-        words[Word.GOVERNOR_PID] = os.getpid()
+        words[PageWord.NOW_NS] = words[PageWord.OFFSET_NS] + time.monotonic_ns()
+        words[PageWord.GENERATION] += 1
+        words[PageWord.GOVERNOR_PID] = os.getpid()
         self._pacer.start(self.now_ns)
 
     def _disconnect(self) -> None:
@@ -208,9 +208,9 @@ class Governor:
             while True:
                 connection, _ = self._listener.accept()
                 connection.setblocking(False)
-                self._members[connection.fileno()] = Member(connection=connection)
+                self._members[connection.fileno()] = TimeMember(connection=connection)
 
-    def _hear(self, fileno: int, member: Member) -> None:
+    def _hear(self, fileno: int, member: TimeMember) -> None:
         assert member.connection is not None
         while True:
             try:
@@ -229,12 +229,12 @@ class Governor:
                 self._dismiss(fileno, member)
                 return
 
-    def _dismiss(self, fileno: int, member: Member) -> None:
+    def _dismiss(self, fileno: int, member: TimeMember) -> None:
         assert member.connection is not None
         member.connection.close()
         del self._members[fileno]
 
-    def _take(self, member: Member, op: Op, a: int, b: int, role: Role | None) -> None:
+    def _take(self, member: TimeMember, op: Op, a: int, b: int, role: TimeRole | None) -> None:
         if op in (Op.WAIT, Op.WAIT_IO):
             self._take_wait(member, op, a, b)
         elif op is Op.HOLD:
@@ -247,29 +247,29 @@ class Governor:
         elif role is not None and op is Op.EXPECT:
             self._expect(a, b, role)
 
-    def _take_wait(self, member: Member, op: Op, a: int, b: int) -> None:
-        """Let a member wait; one that waits for input goes on at once where it missed some."""
+    def _take_wait(self, member: TimeMember, op: Op, a: int, b: int) -> None:
+        """Set until when a member waits: until now, where input came before this message."""
         member.excused = False
         if a == UNTIL_LOADED:  # whoever it is: its start belongs to that moment
             a = b = self.now_ns if member.hold_ns == _NEVER else member.hold_ns
         member.waits_for_io = op is Op.WAIT_IO
-        missed = member.waits_for_io and b != self._words[Word.WRITES]
+        missed = member.waits_for_io and b != self._words[PageWord.WRITES]
         member.until_ns = self.now_ns if missed else a
         member.next_hold_ns = DEFAULT_HOLD if member.waits_for_io else b
         member.patience_ns = round(member.role.patience_s * NS_PER_S)
 
-    def _expect(self, pid: int, loading_ns: int, role: Role) -> None:
+    def _expect(self, pid: int, loading_ns: int, role: TimeRole) -> None:
         """Hold time for a child that loads, unless it was quicker than this message."""
         if any(one.pid == pid and one.role.name == role.name for one in self._members.values()):
             return
-        self._expected[pid] = Member(
+        self._expected[pid] = TimeMember(
             role=role,
             pid=pid,
             hold_ns=self.now_ns + loading_ns,
             patience_ns=_LOADING_PATIENCE_NS,
         )
 
-    def _join(self, member: Member, pid: int, role: Role) -> None:
+    def _join(self, member: TimeMember, pid: int, role: TimeRole) -> None:
         member.role, member.pid = role, pid
         member.since_wall_ns = time.monotonic_ns()
         member.hold_ns = _NEVER if role.slack_ns is None else self.now_ns
@@ -278,7 +278,7 @@ class Governor:
             del self._expected[pid]
             member.hold_ns, member.patience_ns = expected.hold_ns, expected.patience_ns
 
-    def _wake(self, member: Member) -> None:
+    def _wake(self, member: TimeMember) -> None:
         assert member.connection is not None
         slack_ns = member.role.slack_ns
         if member.next_hold_ns != DEFAULT_HOLD:
@@ -290,10 +290,10 @@ class Governor:
         with contextlib.suppress(OSError):  # it has died: its end of file comes next
             member.connection.send(GRANT)
 
-    def _waiting(self) -> list["Member"]:
+    def _waiting(self) -> list["TimeMember"]:
         return [one for one in self._members.values() if one.until_ns != _WORKS]
 
-    def _holders(self) -> Iterator["Member"]:
+    def _holders(self) -> Iterator["TimeMember"]:
         return (one for one in (*self._members.values(), *self._expected.values()) if one.holds())
 
     def _blocks(self, at_ns: int) -> bool:
@@ -313,7 +313,7 @@ class Governor:
             if member.pid and member.until_ns == _WORKS and member.hold_ns != _NEVER:
                 member.excused = self._is_lost(member, wall_ns)
 
-    def _is_lost(self, member: Member, wall_ns: int) -> bool:
+    def _is_lost(self, member: TimeMember, wall_ns: int) -> bool:
         """Return whether one that holds time is dead, stopped, or hangs."""
         state = process_state(member.pid)
         if state in DEAD or state in STOPPED:

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivers.clock import Clock
 from drivers.twin_clock import TwinClock
-from drivers.twin_page import PAGE_FILE, Pace
+from drivers.twin_page import PAGE_FILE, TwinPace
 from sim_twin.can import CanHub
 from sim_twin.drawing import start_camera, start_viewer
 from sim_twin.engine import STEP_NS
@@ -35,10 +35,9 @@ from sim_twin.twin import Twin
 from sim_twin.twin_status import TwinStatus
 from sim_twin.wall_time import WallTime
 from sim_twin.wire_digest import WireDigest
-from vla_deploy.robots import load_robot
+from vla_deploy.robots import RobotDescription, load_robot
 
 READY_FILE = "ready"
-FOREVER_NS = 1 << 62
 MOST_PATH_BYTES = 90
 """A Unix socket's path holds 107 bytes; the device's name needs the rest."""
 
@@ -58,7 +57,7 @@ class TwinOptions:
     camera: bool = True
     viewer: bool = False
     paced: bool = False
-    pace: Pace = Pace.WALL
+    pace: TwinPace = TwinPace.WALL
     hold_for_pid: int | None = None
 
     @property
@@ -83,9 +82,7 @@ class TwinProcess:
         self._ready = devices / READY_FILE
         self._ready.unlink(missing_ok=True)
         robot = load_robot(options.robot)
-        timing = WireTiming(baud=robot.servo_bus.baud) if options.paced else None
-        self._twin = Twin(robot, options.world, options.seed, timing)
-        self._twin.can_wire.timed = options.paced
+        self._twin = _build_twin(options, robot)
         self._digest = WireDigest(lambda: self._now_ns())
         self._hub = CanHub(
             self._twin.can_wire, devices / robot.can_bus.device, on_packet=self._digest.add
@@ -170,15 +167,15 @@ class TwinProcess:
 
     def _begin_time(self, options: TwinOptions) -> Governor | WallTime:
         # As fast as it can, it would leave the robot's page and whoever watches no core.
-        self._priority = Priority.ORDINARY if options.pace is Pace.FAST else claim_priority()
-        if options.pace is Pace.WALL:
+        self._priority = Priority.ORDINARY if options.pace is TwinPace.FAST else claim_priority()
+        if options.pace is TwinPace.WALL:
             (options.devices_dir / PAGE_FILE).unlink(missing_ok=True)  # of a twin before this one
             return WallTime(self._wall)
-        pacer = Pacer(self._wall, is_fast=options.pace is Pace.FAST)
+        pacer = Pacer(self._wall, is_fast=options.pace is TwinPace.FAST)
         return Governor(options.devices_dir, pacer, options.hold_for_pid)
 
     def _clock(self, options: TwinOptions) -> Clock:
-        if options.pace is Pace.WALL:
+        if options.pace is TwinPace.WALL:
             return self._wall
         return TwinClock(options.devices_dir)
 
@@ -186,7 +183,7 @@ class TwinProcess:
         """Wake a member, or move time to what is due next; return how long to wait for others."""
         self._deliver()
         step_ns = self._twin.now_ns + STEP_NS + self._base_ns
-        wait_s = self._time.go_on(min(step_ns, *self._arrivals_ns()))
+        wait_s = self._time.go_on(min((step_ns, *self._arrivals_ns())))
         if wait_s is not None:
             return wait_s
         if self._time.now_ns >= step_ns:
@@ -194,11 +191,10 @@ class TwinProcess:
         return 0.0
 
     def _arrivals_ns(self) -> Iterator[int]:
-        """Yield when something arrives at a host between two steps, and an end to all waiting."""
+        """Return when something arrives at a host between two steps."""
         wire = self._twin.can_wire
         arrivals = self._twin.servos.next_due_ns(), wire.next_due_ns() if wire.timed else None
-        yield from (due_ns + self._base_ns for due_ns in arrivals if due_ns is not None)
-        yield FOREVER_NS
+        return (due_ns + self._base_ns for due_ns in arrivals if due_ns is not None)
 
     def _now_ns(self) -> int:
         """Return simulated time, which passes between two steps too."""
@@ -265,10 +261,11 @@ class TwinProcess:
         return [*self._time.filenos(), *self._referee.filenos()]
 
     def _serve(self, ready: set[int]) -> None:
+        is_device = not ready.issubset(self._askers())  # before one of them may leave
         self._time.serve(ready)
         if not ready.isdisjoint(self._referee.filenos()):
             self._referee.poll_once()
-        if ready.issubset(self._askers()):
+        if not is_device:
             return
         for line in self._plugged():
             if line.fileno() in ready:
@@ -302,6 +299,13 @@ class TwinProcess:
         return self._twin.engine.referee.inside(*names)
 
 
+def _build_twin(options: TwinOptions, robot: RobotDescription) -> Twin:
+    timing = WireTiming(baud=robot.servo_bus.baud) if options.paced else None
+    twin = Twin(robot, options.world, options.seed, timing)
+    twin.can_wire.timed = options.paced
+    return twin
+
+
 def _start_drawings(options: TwinOptions) -> list[MirrorLink]:
     drawings: list[MirrorLink] = []
     try:
@@ -315,7 +319,7 @@ def _start_drawings(options: TwinOptions) -> list[MirrorLink]:
                     options.world,
                     options.seed,
                     devices_dir,
-                    is_member=options.pace is not Pace.WALL,
+                    is_member=options.pace is not TwinPace.WALL,
                 )
             )
     except BaseException:

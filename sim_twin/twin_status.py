@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
-from drivers.twin_page import Pace
+from drivers.twin_page import TwinPace
 from vla_deploy.ipc import SharedSpace
 
 _PERIOD_NS: Final = NS_PER_S // 2
@@ -13,7 +13,7 @@ _PERIOD_NS: Final = NS_PER_S // 2
 class TwinStatus:
     """Write the `twin_status` cell where the run has shared memory; a twin alone has none."""
 
-    def __init__(self, run_dir: Path, clock: Clock, pace: Pace) -> None:
+    def __init__(self, run_dir: Path, clock: Clock, pace: TwinPace) -> None:
         self._pace = pace
         folder = run_dir / "ipc"
         self._space = SharedSpace(folder, clock) if folder.is_dir() else None

@@ -1,4 +1,4 @@
-"""Let the twin's time be the wall clock: nobody is waited for, delays are caught up with."""
+"""Keep the twin's time by the wall clock: no process is waited for, delays are made up."""
 
 from typing import Final
 

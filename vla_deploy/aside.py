@@ -9,7 +9,7 @@ from typing import Any, Final, TypeVar
 
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TimeLine, TwinClock
-from drivers.twin_page import Op, Role
+from drivers.twin_page import Op, TimeRole
 
 T = TypeVar("T")
 _NICE: Final = 10
@@ -43,7 +43,7 @@ class TwinWorker(Executor):
         self._clock = clock
         self._computing_ns = round(computing_s * NS_PER_S)
         self._inner = inner
-        self._role = Role(name=name, order=50)
+        self._role = TimeRole(name=name, order=50)
         self._lock = threading.Lock()
         self._line: TimeLine | None = None
         self._free_ns = 0

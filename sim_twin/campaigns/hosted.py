@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drivers.twin_page import Pace
+from drivers.twin_page import TwinPace
 from sim_twin.campaigns import hog
 from vla_deploy.supervisor.options import RunOptions
 from vla_deploy.supervisor.supervisor import Supervisor
@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         runtime_base=given.base,
         arm=True,
         probe_root=given.probe_root,
-        pace=Pace.WALL,  # lateness and budgets are judged by the wall clock
+        pace=TwinPace.WALL,  # lateness and budgets are judged by the wall clock
     )
     table = TABLE if given.wish is None else table_with_hog(given.wish)
     with Supervisor(options, table) as supervisor:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.twin_clock import TwinClock
-from drivers.twin_page import Pace
+from drivers.twin_page import TwinPace
 from sim_twin.errors import TwinError, Unreachable
 from sim_twin.process import READY_FILE
 from sim_twin.referee import ask, told_hazards
@@ -30,7 +30,7 @@ class Machine:
         """
         self.folder = folder
         self._started_by = MonotonicClock()  # until there is a twin whose time could be told
-        command = ["-m", "sim_twin", "--robot", robot, "--seed", str(seed), "--pace", Pace.REAL]
+        command = ["-m", "sim_twin", "--robot", robot, "--seed", str(seed), "--pace", TwinPace.REAL]
         command += ["--run-dir", str(folder), "--parent-pid", str(os.getpid())]
         self._process = subprocess.Popen([sys.executable, *command], start_new_session=True)
         try:

@@ -19,7 +19,7 @@ import pytest
 
 from drivers.clock import NS_PER_S, MonotonicClock
 from drivers.twin_clock import TwinClock
-from drivers.twin_page import TIME_SOCKET, Op, Role, pack
+from drivers.twin_page import TIME_SOCKET, Op, TimeRole, pack
 from sim_twin.governor import Governor
 from sim_twin.pacer import Pacer
 from vla_deploy.aside import TwinWorker, beside
@@ -30,9 +30,9 @@ WORKER = """
 import os, sys
 from pathlib import Path
 from drivers.twin_clock import TwinClock
-from drivers.twin_page import Role
+from drivers.twin_page import TimeRole
 clock = TwinClock(Path(sys.argv[1]))
-clock.join(Role(name="child", order=1, patience_s=float(sys.argv[2])), os.getpid())
+clock.join(TimeRole(name="child", order=1, patience_s=float(sys.argv[2])), os.getpid())
 print("works", flush=True)
 sys.stdin.read()
 """
@@ -120,7 +120,7 @@ def test_time_stands_still_while_a_member_works(
 
 def test_time_goes_on_by_the_slack_of_one_that_works(metronome: Metronome, folder: Path) -> None:
     clock, slack_ns = TwinClock(folder), 100 * MS
-    clock.join(Role(name="recorder", order=1, slack_ns=slack_ns), os.getpid())
+    clock.join(TimeRole(name="recorder", order=1, slack_ns=slack_ns), os.getpid())
     due_ns = clock.now_ns() + MS
     clock.sleep_until(due_ns)
     assert passes(clock, span_ns=due_ns + slack_ns - STEP_NS - clock.now_ns())
@@ -130,7 +130,7 @@ def test_time_goes_on_by_the_slack_of_one_that_works(metronome: Metronome, folde
 
 def test_a_sleep_ends_at_its_deadline_and_not_later(metronome: Metronome, folder: Path) -> None:
     clock = TwinClock(folder)
-    clock.join(Role(name="control", order=0), os.getpid())
+    clock.join(TimeRole(name="control", order=0), os.getpid())
     for ahead_ns in (1, STEP_NS // 3, STEP_NS, 7 * STEP_NS + 5):
         due_ns = clock.now_ns() + ahead_ns
         clock.sleep_until(due_ns)
@@ -143,7 +143,7 @@ def test_members_that_are_due_at_once_work_one_after_the_other_in_their_order(
     log, names = [], ["control", "executor", "planner"]
 
     def step(name: str) -> None:
-        clock.join(Role(name=name, order=names.index(name)), os.getpid())
+        clock.join(TimeRole(name=name, order=names.index(name)), os.getpid())
         clock.sleep_until(at_ns)
         for _ in range(5):
             log.append(name)
@@ -191,8 +191,8 @@ def test_one_that_hangs_holds_time_for_as_long_as_its_patience(
 def test_a_child_that_loads_holds_time_at_what_was_declared_and_begins_there(
     metronome: Metronome, folder: Path
 ) -> None:
-    clock, role = TwinClock(folder), Role(name="planner", order=3)
-    clock.join(Role(name="supervisor", order=9), os.getpid())
+    clock, role = TwinClock(folder), TimeRole(name="planner", order=3)
+    clock.join(TimeRole(name="supervisor", order=9), os.getpid())
     now_ns = clock.now_ns()
     with subprocess.Popen(
         [sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=-1
@@ -219,7 +219,7 @@ def test_a_child_that_is_quicker_than_its_announcement_freezes_nobody(
 ) -> None:
     clock = TwinClock(folder)
     child.send_signal(signal.SIGSTOP)  # one that has joined, and is waited for no more
-    clock.expect(child.pid, Role(name="child", order=1), 10 * MS)
+    clock.expect(child.pid, TimeRole(name="child", order=1), 10 * MS)
     assert passes(clock)
 
 
@@ -249,7 +249,7 @@ def test_work_in_a_thread_is_done_when_declared_whatever_it_took(
     metronome: Metronome, folder: Path
 ) -> None:
     clock, took_s = TwinClock(folder), iter((0.15, 0.0))
-    clock.join(Role(name="perception", order=2), os.getpid())
+    clock.join(TimeRole(name="perception", order=2), os.getpid())
     with beside("network", clock, 0.1) as network:
         assert isinstance(network, TwinWorker)
         for _ in range(2):
@@ -324,7 +324,7 @@ def test_a_twin_that_dies_or_is_stopped_freezes_nobody(
 ) -> None:
     clock = TwinClock(folder)
     if joined:
-        clock.join(Role(name="control", order=0), os.getpid())
+        clock.join(TimeRole(name="control", order=0), os.getpid())
     slept_s(clock, 0.01)
     before_ns = clock.now_ns()
     timer = threading.Timer(0.1, apart.process.send_signal, [number])
@@ -339,7 +339,7 @@ def test_a_twin_that_is_continued_takes_time_over_where_it_is_by_then(
     apart: Apart, folder: Path
 ) -> None:
     clock = TwinClock(folder)
-    clock.join(Role(name="control", order=0), os.getpid())
+    clock.join(TimeRole(name="control", order=0), os.getpid())
     slept_s(clock, 0.01)
     apart.process.send_signal(signal.SIGSTOP)
     slept_s(clock, 0.8)
@@ -356,7 +356,7 @@ def test_a_twin_that_is_continued_takes_time_over_where_it_is_by_then(
 
 def test_another_twin_takes_time_over_from_one_that_died(apart: Apart, folder: Path) -> None:
     clock = TwinClock(folder)
-    clock.join(Role(name="control", order=0), os.getpid())
+    clock.join(TimeRole(name="control", order=0), os.getpid())
     slept_s(clock, 0.01)
     apart.process.kill()
     slept_s(clock, 0.3)

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from drivers.twin_page import Pace
+from drivers.twin_page import TwinPace
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
@@ -85,8 +85,8 @@ def add_twin_arguments(command: argparse.ArgumentParser, *, twin: str, headless:
         "--fast",
         dest="pace",
         action="store_const",
-        const=Pace.FAST,
-        default=Pace.REAL,
+        const=TwinPace.FAST,
+        default=TwinPace.REAL,
         help="let the twin's time go as fast as this computer can (default: as the wall clock, "
         "or slower where the robot's processes need longer)",
     )
@@ -94,7 +94,7 @@ def add_twin_arguments(command: argparse.ArgumentParser, *, twin: str, headless:
         "--wall",
         dest="pace",
         action="store_const",
-        const=Pace.WALL,
+        const=TwinPace.WALL,
         help="let the wall clock be the twin's time, whoever is late: for real-time measurements",
     )
 
@@ -114,7 +114,7 @@ def main(arguments: argparse.Namespace) -> int:
     asked = {
         "viewer": arguments.viewer,
         "paced": arguments.paced,
-        arguments.pace.value: arguments.pace is not Pace.REAL,
+        arguments.pace.value: arguments.pace is not TwinPace.REAL,
     }
     for option in (name for name, is_asked in asked.items() if is_asked and not arguments.twin):
         sys.stderr.write(f"run: --{option} is about the twin; add --twin\n")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from drivers.clock import NS_PER_S
-from drivers.twin_page import Role
+from drivers.twin_page import TimeRole
 
 _SLACK_NS: Final = NS_PER_S // 5
 
@@ -17,12 +17,12 @@ class Membership:
     only watches lets it go on for a moment, beside the others.
     """
 
-    role: Role
+    role: TimeRole
     loading_s: float
 
 
 def _member(name: str, order: int, loading_s: float, slack_ns: int | None = 0) -> Membership:
-    return Membership(role=Role(name=name, order=order, slack_ns=slack_ns), loading_s=loading_s)
+    return Membership(role=TimeRole(name=name, order=order, slack_ns=slack_ns), loading_s=loading_s)
 
 
 MEMBERSHIPS: Final = {
@@ -41,4 +41,4 @@ MEMBERSHIPS: Final = {
 WATCHERS: Final = frozenset(name for name, one in MEMBERSHIPS.items() if one.role.slack_ns is None)
 """Live by the wall clock while they run; their end takes `STOPPING_NS` at most."""
 STOPPING_NS: Final = NS_PER_S
-SUPERVISOR: Final = Role(name="supervisor", order=100, patience_s=60.0)
+SUPERVISOR: Final = TimeRole(name="supervisor", order=100, patience_s=60.0)

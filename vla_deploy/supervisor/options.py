@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.twin_page import Pace
+from drivers.twin_page import TwinPace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +24,7 @@ class RunOptions:
     twin: bool = False
     viewer: bool = False
     paced: bool = False
-    pace: Pace = Pace.REAL
+    pace: TwinPace = TwinPace.REAL
     seed: int = 0
     world: str = "flat"
     devices_dir: Path | None = None
@@ -40,7 +40,7 @@ class RunOptions:
     @property
     def has_twin_time(self) -> bool:
         """Return whether the run lives on the twin's time."""
-        return self.twin and self.pace is not Pace.WALL
+        return self.twin and self.pace is not TwinPace.WALL
 
     @property
     def takes_devices(self) -> bool:

@@ -1,4 +1,4 @@
-"""Tell the world as one document for scripts, and read it back: `docs/world-model.md` lists it."""
+"""Write the world as one document for scripts, and read it back: `docs/world-model.md` lists it."""
 
 import math
 from collections.abc import Mapping, Sequence

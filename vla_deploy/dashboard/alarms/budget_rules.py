@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from drivers.twin_page import Pace
+from drivers.twin_page import TwinPace
 from vla_deploy.dashboard.alarms.finding import Finding, Severity
 from vla_deploy.dashboard.alarms.told import Document, Told
 
@@ -52,7 +52,7 @@ def slow_twin(told: Told) -> Iterator[Finding]:
     status = told.document("twin_status")
     factor = None if status is None else status["real_time_factor"]
     if status is not None and factor is not None and factor < _REAL_TIME:
-        waits = status["pace"] != Pace.WALL
+        waits = status["pace"] != TwinPace.WALL
         yield Finding(
             process="twin",
             field="real_time_factor",
