@@ -16,7 +16,7 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotReady
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.readiness import refusal_of
+from vla_deploy.client.readiness import refusal_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription
 from vla_deploy.world import SceneUnreadable, Snapshot, Viewpoint, read_snapshot
