@@ -3,6 +3,7 @@
 import logging
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final
 
 from vla_deploy.client.link import RobotLink
@@ -65,8 +66,7 @@ class RosGatewayNode:
         self._time.refresh()
         self._guarded("inbox", self._graph.take)
         for part in self._parts:
-            now_ns = self._context.clock.now_ns()
-            self._guarded(type(part).__name__, lambda step=part.step, at=now_ns: step(at))
+            self._guarded(type(part).__name__, partial(part.step, self._context.clock.now_ns()))
         if self._tell_due.is_now(self._context.clock.now_ns()):
             self._tell(self._graph)
 

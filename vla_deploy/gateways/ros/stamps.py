@@ -38,8 +38,8 @@ class RosTime:
 
     def run_ns(self, stamp: Time) -> int:
         """Return a message's stamp as a moment of the run."""
-        return stamp.sec * NS_PER_S + stamp.nanosec - self._offset_ns
+        return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) - self._offset_ns
 
     def is_unset(self, stamp: Time) -> bool:
         """Tell whether a sender has left the stamp out."""
-        return stamp.sec == 0 and stamp.nanosec == 0
+        return not (stamp.sec or stamp.nanosec)
