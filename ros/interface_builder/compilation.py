@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from interface_builder.errors import CompilationFailed, ToolMissing
+from interface_builder.errors import BuildToolMissing, CompilationFailed
 from interface_builder.generation import DISPATCHER, FAST, INTROSPECTION, GeneratedPackage
 
 COMPILERS: Mapping[str, tuple[str, ...]] = {
@@ -60,7 +60,7 @@ class Toolchain:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Objects:
+class ObjectFiles:
     """Hold the object files of one package, by the shared object they go into."""
 
     introspection: tuple["Future[Path]", ...]
@@ -72,23 +72,25 @@ def find_toolchain(prefix: Path) -> Toolchain:
     """Check that everything that the build needs is installed.
 
     Raises:
-        ToolMissing: a compiler, the headers of Python or of ROS, or NumPy is not.
+        BuildToolMissing: a compiler, the headers of Python or of ROS, or NumPy is not.
     """
     for command, *_ in COMPILERS.values():
         if shutil.which(command) is None:
-            raise ToolMissing(f"no {command} in PATH; {_INSTALL}")
+            raise BuildToolMissing(f"no {command} in PATH; {_INSTALL}")
     include = Path(sysconfig.get_paths()["include"])
     if not (include / "Python.h").is_file():
-        raise ToolMissing(f"no {include}/Python.h, the headers of this Python; {_INSTALL}")
+        raise BuildToolMissing(f"no {include}/Python.h, the headers of this Python; {_INSTALL}")
     headers = prefix / "include" / "rosidl_runtime_c"
     if not headers.is_dir():
-        raise ToolMissing(
+        raise BuildToolMissing(
             f"no folder {headers}, the headers of ROS; pip install -r requirements-ros.lock"
         )
     try:
         import numpy
     except ImportError as error:
-        raise ToolMissing(f"no NumPy in this environment: {error}; pip install numpy") from error
+        raise BuildToolMissing(
+            f"no NumPy in this environment: {error}; pip install numpy"
+        ) from error
     return Toolchain(prefix=prefix, python_include=include, numpy_include=Path(numpy.get_include()))
 
 
@@ -97,7 +99,7 @@ def compile_sources(
     siblings: Mapping[str, GeneratedPackage],
     toolchain: Toolchain,
     pool: ThreadPoolExecutor,
-) -> Objects:
+) -> ObjectFiles:
     """Start to compile every source of a package; `siblings` were generated before it."""
     include = toolchain.prefix / "include"
     others = [name for name in package.needs if name not in siblings]
@@ -116,7 +118,7 @@ def compile_sources(
     sources = _sources(package.root)
     fast = [source for source in sources if source.name.endswith("__type_support_c.cpp")]
     own = [source for source in sources if source.parent.name == "detail" and source not in fast]
-    return Objects(
+    return ObjectFiles(
         introspection=submit([*_sources(package.introspection_root), *own]),
         fast=submit(fast),
         extension=submit(source for source in sources if source not in fast and source not in own),
@@ -133,7 +135,7 @@ def _compile(source: Path, options: Sequence[str]) -> Path:
     return target
 
 
-def link(package: GeneratedPackage, objects: Objects, out: Path, toolchain: Toolchain) -> None:
+def link(package: GeneratedPackage, objects: ObjectFiles, out: Path, toolchain: Toolchain) -> None:
     """Link the shared objects of a package into `out/<package>` and copy its Python modules there.
 
     Packages that it needs and that were built before are in `out`, too.

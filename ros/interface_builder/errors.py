@@ -2,7 +2,7 @@
 
 InterfaceBuildError
 ├── DefinitionsInvalid   a package folder, or a definition in it, cannot be used: mend the file
-├── ToolMissing          a compiler, a header or a wheel is not installed: install it
+├── BuildToolMissing     a compiler, a header or a wheel is not installed: install it
 └── CompilationFailed    the compiler or the linker refused generated code: its own words are told
 """
 
@@ -15,7 +15,7 @@ class DefinitionsInvalid(InterfaceBuildError):
     """Say which file is wrong, and how."""
 
 
-class ToolMissing(InterfaceBuildError):
+class BuildToolMissing(InterfaceBuildError):
     """Say what is not installed, where it was looked for, and the command that installs it."""
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from interface_builder.definitions import InterfacePackage
-from interface_builder.errors import DefinitionsInvalid, ToolMissing
+from interface_builder.errors import BuildToolMissing, DefinitionsInvalid
 
 FAST: Final = "rosidl_typesupport_fastrtps_c"
 INTROSPECTION: Final = "rosidl_typesupport_introspection_c"
@@ -77,13 +77,13 @@ def generator_module(name: str) -> Any:
     """Import one of ROS's generators.
 
     Raises:
-        ToolMissing: its wheel is not installed in this environment.
+        BuildToolMissing: its wheel is not installed in this environment.
     """
     try:
         return importlib.import_module(name)
     except ImportError as error:
         wheel = f"ros-{name.replace('_', '-')}"
-        raise ToolMissing(
+        raise BuildToolMissing(
             f"no Python module {name} in this environment ({error}); it is of the wheel {wheel}: "
             "pip install -r requirements-ros.lock"
         ) from error
@@ -100,7 +100,7 @@ def generate(
 
     Raises:
         DefinitionsInvalid: a definition cannot be parsed.
-        ToolMissing: a generator is not installed.
+        BuildToolMissing: a generator is not installed.
     """
     generation = _Generation(
         package=package,

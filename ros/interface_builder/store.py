@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from interface_builder.compilation import Objects, compile_sources, find_toolchain, link
+from interface_builder.compilation import ObjectFiles, compile_sources, find_toolchain, link
 from interface_builder.definitions import InterfacePackage, in_build_order, needed_packages
 from interface_builder.generation import GeneratedPackage, generate
 
@@ -31,14 +31,14 @@ _KEY_CHARACTERS: Final = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Build:
+class InterfaceBuild:
     """Say where the packages are, and whether they had to be built."""
 
     folder: Path
     is_new: bool
 
 
-def build_packages(packages: Sequence[InterfacePackage], folder: Path, jobs: int) -> Build:
+def build_packages(packages: Sequence[InterfacePackage], folder: Path, jobs: int) -> InterfaceBuild:
     """Build packages for this interpreter into `folder/<key>`, or find them there.
 
     Raises:
@@ -48,7 +48,7 @@ def build_packages(packages: Sequence[InterfacePackage], folder: Path, jobs: int
     target = folder / fingerprint(packages)
     with _locked(folder / _LOCK):
         if target.is_dir():
-            return Build(folder=target, is_new=False)
+            return InterfaceBuild(folder=target, is_new=False)
         building = folder / _BUILDING
         shutil.rmtree(building, ignore_errors=True)
         try:
@@ -56,10 +56,10 @@ def build_packages(packages: Sequence[InterfacePackage], folder: Path, jobs: int
             (building / "out").rename(target)
         finally:
             shutil.rmtree(building, ignore_errors=True)
-    return Build(folder=target, is_new=True)
+    return InterfaceBuild(folder=target, is_new=True)
 
 
-def use_build(build: Build, path_file: Path) -> None:
+def use_build(build: InterfaceBuild, path_file: Path) -> None:
     """Let the interpreter that reads `path_file` import the packages; remove all other builds.
 
     The build that was in use until now stays: a process may run that has not loaded all of it.
@@ -98,7 +98,7 @@ def _build(packages: Sequence[InterfacePackage], work: Path, out: Path, jobs: in
     toolchain = find_toolchain(prefix)
     folders = {share.name: share for share in (prefix / "share").iterdir() if share.is_dir()}
     generated: dict[str, GeneratedPackage] = {}
-    compiled: dict[str, Objects] = {}
+    compiled: dict[str, ObjectFiles] = {}
     pool = ThreadPoolExecutor(jobs)
     try:
         for package in packages:
