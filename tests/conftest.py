@@ -1,13 +1,23 @@
+import contextlib
 import errno
+import fcntl
+import json
 import os
+import subprocess
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
+
+from vla_deploy.gateways.ros.environment import RosEnvironment, find_environment, link_packages
+from vla_deploy.gateways.ros.errors import RosNotFound
+from vla_deploy.gateways.ros.shared_memory import remove_leftovers
 
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile(
@@ -76,3 +86,100 @@ def board_tree(tmp_path: Path, failing_reads: dict[Path, int]) -> Callable[[str]
         return root
 
     return lay_out
+
+
+ROS_DOMAINS = range(40, 102)
+"""Domains that tests take, one for each of them; 101 is the last that Linux leaves alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosGraph:
+    """A ROS graph of its own on this computer, and the way to take part in it.
+
+    `variables` is the whole environment of a process in it: it can import our packages, too.
+    """
+
+    python: Path
+    variables: Mapping[str, str]
+    folder: Path
+    started: list["subprocess.Popen[str]"] = field(default_factory=list)
+
+    def run(self, script: str, *arguments: str, timeout_s: float = 40.0) -> Any:
+        """Run a script to its end; return the JSON document of its last line."""
+        process = self.start(script, *arguments)
+        try:
+            out, err = process.communicate(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            out, err = process.communicate()
+            pytest.fail(f"the script did not end within {timeout_s:g} s:\n{out}\n{err}")
+        assert process.returncode == 0, f"ended with {process.returncode}:\n{out}\n{err}"
+        return json.loads(out.splitlines()[-1])
+
+    def start(self, script: str, *arguments: str) -> "subprocess.Popen[str]":
+        """Start a script that ends with the test at the latest; its output is in pipes."""
+        file = self.folder / f"script_{len(self.started)}.py"
+        file.write_text(script)
+        process = subprocess.Popen(
+            [self.python, file, *arguments],
+            env=dict(self.variables),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.started.append(process)
+        return process
+
+
+@pytest.fixture(scope="session")
+def ros_environment() -> RosEnvironment:
+    """Skip the test where this computer has no ROS."""
+    try:
+        return find_environment()
+    except RosNotFound as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def ros_domain() -> Iterator[int]:
+    """Take a domain that no other run of tests on this computer has."""
+    for domain in ROS_DOMAINS:
+        lock = Path(f"/tmp/vla-deploy-ros-domain-{domain}.lock")
+        with contextlib.suppress(OSError), lock.open("w") as held:  # taken, or another user's
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            yield domain
+            return
+    pytest.fail(f"every ROS domain from {ROS_DOMAINS.start} to {ROS_DOMAINS.stop - 1} is taken")
+
+
+@pytest.fixture
+def ros_graph(
+    ros_environment: RosEnvironment, ros_domain: int, tmp_path: Path
+) -> Iterator[RosGraph]:
+    folder = tmp_path / "ros_graph"
+    packages = link_packages(folder / "packages")
+    python_path = [str(packages), ros_environment.variables.get("PYTHONPATH", "")]
+    graph = RosGraph(
+        python=ros_environment.python,
+        variables={
+            **os.environ,
+            **ros_environment.variables,
+            "PYTHONPATH": os.pathsep.join(path for path in python_path if path),
+            "ROS_DOMAIN_ID": str(ros_domain),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "ROS_LOG_DIR": str(folder / "log"),
+            "ROS_PYTHON_CHECK_FIELDS": "1",  # else a wrong type passes silently
+        },
+        folder=folder,
+    )
+    yield graph
+    for process in graph.started:
+        process.terminate()
+    for process in graph.started:
+        try:
+            process.communicate(timeout=5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+    if any(process.returncode for process in graph.started):
+        remove_leftovers(young_s=0.0)

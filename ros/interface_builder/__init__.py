@@ -1,0 +1,1 @@
+"""Build ROS 2 interface packages against the wheels of ROS, without colcon and CMake."""
