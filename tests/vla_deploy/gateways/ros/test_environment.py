@@ -9,6 +9,7 @@ from vla_deploy.gateways.ros.environment import (
     PACKAGES,
     SYSTEM_PYTHON,
     VARIABLE,
+    WORKSPACE_VARIABLE,
     find_environment,
     link_packages,
 )
@@ -100,9 +101,13 @@ def test_a_workspace_is_laid_over_the_systems_ros_even_where_wheels_are(tmp_path
     make_wheels(tmp_path / "checkout" / ".venv-ros")
     make_setup(tmp_path / "opt" / "setup.bash", "jazzy")
     make_setup(tmp_path / "ws" / "install" / "setup.bash", "ws")
-    found = find(workspace=str(tmp_path / "ws"))
-    assert found.python == SYSTEM_PYTHON
-    assert found.variables["PYTHONPATH"] == "/ws/python:/jazzy/python"
+    for found in (
+        find(workspace=str(tmp_path / "ws")),
+        find(workspace=str(tmp_path / "ws" / "install")),
+        find(**{WORKSPACE_VARIABLE: str(tmp_path / "ws")}),
+    ):
+        assert found.python == SYSTEM_PYTHON
+        assert found.variables["PYTHONPATH"] == "/ws/python:/jazzy/python"
 
 
 def test_an_interpreter_without_wheels_gets_the_systems_setup(tmp_path, find) -> None:
