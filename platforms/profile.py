@@ -114,6 +114,7 @@ class Profile:
     control is silent. `realtime_priority` is the SCHED_FIFO priority of control, 0 for none; unless
     `realtime_required`, control quietly does without where the computer does not permit it.
     `power_mode` is a name of the board's nvpmodel.conf; empty leaves the mode as it is.
+    `ros` puts every robot on this computer into a ROS 2 graph.
     """
 
     name: str
@@ -127,6 +128,7 @@ class Profile:
     realtime_required: bool
     memory_lock: bool
     power_mode: str
+    ros: bool
     board: BoardLimits
     processes: Mapping[str, ProcessSettings]
     speech: SpeechSettings

@@ -17,6 +17,7 @@ PROCESSES: Final[tuple[str, ...]] = (
     "executor",
     "recorder",
     "dashboard",
+    "ros",
     "twin",
 )
 NODES: Final[tuple[str, ...]] = (
@@ -27,6 +28,7 @@ NODES: Final[tuple[str, ...]] = (
     "executor",
     "recorder",
     "dashboard",
+    "ros",
 )
 ROLES: Final = (
     "detector",
@@ -138,6 +140,7 @@ _TOP: Keys = {
     "realtime_required": _Flag(),
     "memory_lock": _Flag(),
     "power_mode": _Text(),
+    "ros": _Flag(),
 }
 _SPEECH: Keys = {
     "shortest_phrase_s": _Range(0.05, 2, "s"),

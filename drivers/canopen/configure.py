@@ -177,5 +177,7 @@ def configure_drive(
 def _ramps(spec: DriveSpec, cycle_ms: int) -> tuple[Step, ...]:
     if spec.mode is OperatingMode.CYCLIC_SYNCHRONOUS_VELOCITY:
         return (INTERPOLATION_PERIOD, 1, cycle_ms), (INTERPOLATION_PERIOD, 2, MILLISECONDS)
-    ramp = round(spec.acceleration_rad_s2 * abs(spec.counts_per_rad))
-    return (PROFILE_ACCELERATION, 0, ramp), (PROFILE_DECELERATION, 0, ramp)
+    # Control's own ramps are the slower ones; where it must brake, the drive is not in its way.
+    faster = round(spec.acceleration_rad_s2 * abs(spec.counts_per_rad))
+    slower = round(spec.quick_stop_rad_s2 * abs(spec.counts_per_rad))
+    return (PROFILE_ACCELERATION, 0, faster), (PROFILE_DECELERATION, 0, slower)

@@ -80,7 +80,7 @@ def test_ten_faults_are_reported_as_ten(faults_of):
         [
             "colour: unknown key, expected control_rate_hz, bus_watchdog_s, can_heartbeat_s, "
             "camera_rate_hz, perception_rate_hz, executor_rate_hz, realtime_priority, "
-            "realtime_required, memory_lock, power_mode",
+            "realtime_required, memory_lock, power_mode, ros",
             "control_rate_hz: expected a number from 50 to 1000 Hz, got 'fast'",
             "bus_watchdog_s: expected a number from 0.02 to 2.54 s, got 3.0",
             "camera_rate_hz: expected a number from 1 to 60 Hz, got True",

@@ -46,6 +46,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "operate", "end the run in order, as Ctrl-C does; power goes off, so support the arms"
     ),
     "profile": Command("profile", "choose how the stack uses this computer"),
+    "robot": Command("robot", "write the robot's description as URDF, for ROS"),
     "servo": Command("servo", "find, look at, set up and calibrate servos"),
     "camera": Command("camera", "calibrate the camera: its lens, and how it sits on the head"),
     "can": Command("can", "find CAN nodes and watch the traffic"),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from drivers.clock import Clock
 from vla_deploy.cli.errors import CommandFailed
-from vla_deploy.planning.following import ANSWER_TIMEOUT_S, Event, Following, Newest
+from vla_deploy.client.following import ANSWER_TIMEOUT_S, Event, Following, Newest
 
 NO_ANSWER = (
     f"no answer from planner or executor within {ANSWER_TIMEOUT_S:g} s, the command is not carried "

@@ -24,6 +24,7 @@ EXAMPLES = """  vla-deploy run --twin                 the robot butler in the fl
   vla-deploy run --twin --headless      without a window, as without --viewer
   vla-deploy run --twin --paced         its buses as slow as the real ones
   vla-deploy run --twin --fast          as fast as this computer can
+  vla-deploy run --twin --ros           in a ROS 2 graph: see docs/ros.md
   vla-deploy run --robot butler         the real robot; arm it when it is safe: vla-deploy arm
 """
 
@@ -54,6 +55,7 @@ def register(commands: Any) -> None:
         default=None,
         help="arm once everything is ready (default: only with --twin)",
     )
+    add_ros_argument(run)
     run.set_defaults(run=main, profile=None)
 
 
@@ -96,6 +98,13 @@ def add_twin_arguments(command: argparse.ArgumentParser, *, twin: str, headless:
         action="store_const",
         const=TwinPace.WALL,
         help="let the wall clock be the twin's time, whoever is late: for real-time measurements",
+    )
+
+
+def add_ros_argument(command: argparse.ArgumentParser) -> None:
+    """Add what puts the robot into a ROS 2 graph."""
+    command.add_argument(
+        "--ros", action="store_true", help="run the ROS 2 gateway, whatever the robot file says"
     )
 
 
@@ -144,6 +153,7 @@ def main(arguments: argparse.Namespace) -> int:
         world=arguments.world,
         runtime_base=arguments.runtime_base,
         arm=arm,
+        ros=arguments.ros,
     )
     try:
         _keep_running(options)

@@ -6,7 +6,7 @@ from typing import Any
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.cli.errors import UsageError
-from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import RingReader
 from vla_deploy.supervisor.runtime import default_base, running
 

@@ -15,6 +15,7 @@ class BaseLimits:
     turn_rad_s: float
     acceleration_m_s2: float
     turn_acceleration_rad_s2: float
+    stop_deceleration_m_s2: float
 
 
 def base_limits(robot: RobotDescription) -> BaseLimits:
@@ -25,6 +26,7 @@ def base_limits(robot: RobotDescription) -> BaseLimits:
         turn_rad_s=base.max_turn_rad_s,
         acceleration_m_s2=base.max_acceleration_m_s2,
         turn_acceleration_rad_s2=base.max_turn_acceleration_rad_s2,
+        stop_deceleration_m_s2=base.stop_deceleration_m_s2 or base.max_acceleration_m_s2,
     )
 
 
@@ -44,10 +46,22 @@ class BaseRamp:
     def advance(self, v_m_s: float, w_rad_s: float, period_s: float) -> None:
         """Move towards a wanted velocity for one period; both parts reach it together."""
         limits = self._limits
-        dv = _clamp(v_m_s, limits.speed_m_s) - self.v_m_s
-        dw = _clamp(w_rad_s, limits.turn_rad_s) - self.w_rad_s
-        needed_s = max(
-            abs(dv) / limits.acceleration_m_s2, abs(dw) / limits.turn_acceleration_rad_s2
+        self._move(
+            _clamp(v_m_s, limits.speed_m_s), _clamp(w_rad_s, limits.turn_rad_s), 1.0, period_s
+        )
+
+    def brake(self, period_s: float) -> None:
+        """Move towards rest for one period, as fast as the robot can bear where it must stop."""
+        limits = self._limits
+        harder = max(1.0, limits.stop_deceleration_m_s2 / limits.acceleration_m_s2)
+        self._move(0.0, 0.0, harder, period_s)
+
+    def _move(self, v_m_s: float, w_rad_s: float, harder: float, period_s: float) -> None:
+        limits = self._limits
+        dv, dw = v_m_s - self.v_m_s, w_rad_s - self.w_rad_s
+        needed_s = (
+            max(abs(dv) / limits.acceleration_m_s2, abs(dw) / limits.turn_acceleration_rad_s2)
+            / harder
         )
         share = 1.0 if needed_s <= period_s else period_s / needed_s
         self.v_m_s += share * dv

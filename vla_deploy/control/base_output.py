@@ -3,7 +3,7 @@
 from vla_deploy.control.base_motion import BaseLimits, BaseRamp, base_limits, permitted
 from vla_deploy.control.wheels import Wheels
 from vla_deploy.robots import RobotDescription
-from vla_deploy.safety import Verdict
+from vla_deploy.safety import Reaction, Verdict
 
 
 class BaseOutput:
@@ -15,17 +15,22 @@ class BaseOutput:
         self.ramp = BaseRamp(self._limits)
 
     def follow(self, wanted: tuple[float, float], verdict: Verdict, period_s: float) -> None:
-        """Move towards what a verdict leaves of a wanted velocity."""
+        """Move towards what a verdict leaves of a wanted velocity; brake where it demands that."""
+        if verdict.reaction is Reaction.BASE_RAMP:
+            self.brake(period_s)
+            return
         v_m_s, w_rad_s = permitted(wanted, self._limits, verdict.speed_ratio, verdict.blocked)
-        self._move(v_m_s, w_rad_s, period_s)
+        if self._wheels.enabled:
+            self.ramp.advance(v_m_s, w_rad_s, period_s)
+        self._command()
 
     def brake(self, period_s: float) -> None:
         """Move towards rest."""
-        self._move(0.0, 0.0, period_s)
-
-    def _move(self, v_m_s: float, w_rad_s: float, period_s: float) -> None:
         if self._wheels.enabled:
-            self.ramp.advance(v_m_s, w_rad_s, period_s)
-        else:
+            self.ramp.brake(period_s)
+        self._command()
+
+    def _command(self) -> None:
+        if not self._wheels.enabled:
             self.ramp.halt()
         self._wheels.cycle(self.ramp.v_m_s, self.ramp.w_rad_s)

@@ -7,9 +7,12 @@ from vla_deploy.control.axes import Floats, any_of
 from vla_deploy.control.joint_steps import JointSteps
 from vla_deploy.control.servos import ServoLine
 from vla_deploy.control.wheels import Wheels
-from vla_deploy.ipc import CellReader, SharedSpace
+from vla_deploy.ipc import CellReader, Sample, SharedSpace
 from vla_deploy.safety import SafetyInputs, Surroundings
 
+REMOTE = "remote_base_command"
+BASE_COMMANDS = ("base_command", REMOTE)
+_OVER_S = 1.0
 _NO_REASON = "a budget is exhausted"
 
 
@@ -19,13 +22,13 @@ class Watch:
     def __init__(self, space: SharedSpace, servos: ServoLine, wheels: Wheels, clock: Clock) -> None:
         self.v_m_s = 0.0
         self.w_rad_s = 0.0
-        self._base_command = space.cell_reader("base_command")
+        self._base_commands = tuple(map(space.cell_reader, BASE_COMMANDS))
         self._process_table = space.cell_reader("process_table")
         self._budget = BudgetWatch(space.cell_reader("budget_stop"))
         self._servos = servos
         self._wheels = wheels
         self._clock = clock
-        self._base_sequence = 0
+        self._base_taken = ("", 0)
         self._base_age_s: float | None = None
         self._quiet = np.zeros(len(servos.state.torque_on), dtype=np.bool_)
         self._powered = self._quiet.copy()
@@ -34,12 +37,12 @@ class Watch:
     def refresh(self) -> None:
         """Take in the newest base command and what the joints have told."""
         self._steps.take(self._servos.state)
-        sample = self._base_command.latest()
+        sample = self._newest_base_command()
         if sample is None:
             return
-        self._base_age_s = sample.age_s(self._clock.now_ns())
-        if sample.sequence != self._base_sequence:
-            self._base_sequence = sample.sequence
+        self._base_age_s = _age_s(sample, self._clock.now_ns())
+        if (sample.topic, sample.sequence) != self._base_taken:
+            self._base_taken = (sample.topic, sample.sequence)
             v_m_s, w_rad_s = float(sample.data["v_m_s"]), float(sample.data["w_rad_s"])
             valid = np.isfinite(v_m_s) and np.isfinite(w_rad_s)
             self.v_m_s, self.w_rad_s = (v_m_s, w_rad_s) if valid else (0.0, 0.0)
@@ -97,6 +100,15 @@ class Watch:
             surroundings=surroundings,
         )
 
+    def _newest_base_command(self) -> Sample | None:
+        """Return the younger wish: one that moves the base holds its claim, and goes on telling."""
+        newest = None
+        for command in self._base_commands:
+            sample = command.latest()
+            if sample is not None and (newest is None or sample.stamp_ns > newest.stamp_ns):
+                newest = sample
+        return newest
+
     def _climate_age_s(self) -> Floats:
         """Return how old voltage and temperature are: polled servos tell them now and then."""
         state = self._servos.state
@@ -112,9 +124,17 @@ class Watch:
 
     def close(self) -> None:
         """Unmap the topics."""
-        self._base_command.close()
+        for command in self._base_commands:
+            command.close()
         self._process_table.close()
         self._budget.close()
+
+
+def _age_s(command: Sample, now_ns: int) -> float:
+    """Return how old a wish is; one that has outlived what it says of itself is too old."""
+    age_s = command.age_s(now_ns)
+    is_over = command.topic == REMOTE and age_s > float(command.data["valid_s"])
+    return max(age_s, _OVER_S) if is_over else age_s
 
 
 class BudgetWatch:

@@ -1,30 +1,10 @@
-"""Know by what control shows that an operator's act was carried out."""
+"""Wait for what an operator's act leads to."""
 
 import asyncio
-from collections.abc import Callable, Mapping
-from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.dashboard.link import RobotLink
-
-Status = Mapping[str, Any]
-
-REACHED: Final[Mapping[str, Callable[[Status], bool]]] = {
-    "estop": lambda status: bool(status["estop_latched"]),
-    "reset": lambda status: (
-        status["state"] in ("disarmed", "armed", "protective_stop") and not status["estop_latched"]
-    ),
-    "arm": lambda status: status["state"] == "armed",
-    "disarm": lambda status: status["state"] == "disarmed",
-}
-
-
-def why_not(status: Status | None) -> str:
-    """Return in words how control stands in the way of an act."""
-    if status is None:
-        return "control does not answer"
-    why = status["detail"] or status["cause"] or "no reason given"
-    return f"control is still {status['state']}: {why}"
+from vla_deploy.client.acts import REACHED, Status
+from vla_deploy.client.link import RobotLink
 
 
 async def carried_out(link: RobotLink, act: str, within_s: float) -> tuple[bool, Status | None]:

@@ -10,9 +10,9 @@ from typing import Any, Final
 
 from vla_deploy.analysis.document import SceneAnalysis
 from vla_deploy.analysis.question import Analyser, Image, Question, question_of
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access.rates import Buckets
 from vla_deploy.dashboard.errors import Refused
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.navigation.errors import MapInvalid
 from vla_deploy.navigation.place_judge import PlaceState
 from vla_deploy.robots import load_robot

@@ -2,11 +2,11 @@
 
 from fastapi import FastAPI
 
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Access, guard
 from vla_deploy.dashboard.analysing import Analyst
 from vla_deploy.dashboard.answers import add_error_answers
 from vla_deploy.dashboard.headers import SafeHeaders
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.page import add_page_files
 from vla_deploy.dashboard.parts import PARTS
 from vla_deploy.dashboard.routers import API_PREFIX, API_ROUTERS, ROOT_ROUTERS

@@ -7,10 +7,10 @@ from typing import Final
 from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Access, AccessRules
 from vla_deploy.dashboard.app import create_app
 from vla_deploy.dashboard.doors import SOCKET_NAME, open_port, open_socket
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.parts import Part
 from vla_deploy.dashboard.serving import Door
 from vla_deploy.dashboard.settings import DashboardSettings

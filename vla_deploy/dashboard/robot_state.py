@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import Sample
 from vla_deploy.navigation.place_judge import Doubt, PlaceState
 

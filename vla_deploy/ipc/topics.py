@@ -374,6 +374,28 @@ TOPICS: tuple[Topic, ...] = (
         fields=(Field("document", "json", 1024),),
     ),
     Topic(
+        name="ros_status",
+        kind=Kind.CELL,
+        owner="ros",
+        rate_hz=2,
+        deadline_s=3.0,
+        summary="the ROS 2 graph that the robot is in, what is under way for it, as JSON",
+        fields=(Field("document", "json", 4096),),
+    ),
+    Topic(
+        name="remote_base_command",
+        kind=Kind.CELL,
+        owner="ros",
+        rate_hz=20,
+        deadline_s=0.25,
+        summary="base velocity wanted from beyond the robot; control takes the younger of the two",
+        fields=(
+            Field("v_m_s", "f8", unit="m/s"),
+            Field("w_rad_s", "f8", unit="rad/s"),
+            Field("valid_s", "f8", unit="s, then it is stale"),
+        ),
+    ),
+    Topic(
         name="page_sound",
         kind=Kind.RECORD,
         owner="dashboard",

@@ -8,18 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field
 MOST_ACTIONS: Final = 100
 
 
-class ActionStatus(StrEnum):
-    """Tell how far an action has come; the last five are final."""
-
-    PENDING = "pending"
-    ACTIVE = "active"
-    SUCCEEDED = "succeeded"
-    CANCELLED = "cancelled"
-    ABORTED = "aborted"
-    REJECTED = "rejected"
-    LOST = "lost"
-
-
 class Priority(StrEnum):
     """Rank actions whose dependencies allow either order."""
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from drivers.camera.protocol import Intrinsics
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED, PlanBounds
 from vla_deploy.robots.protection import NOTHING_DECLARED, Protection
+from vla_deploy.robots.ros_settings import UNUSED, RosSettings
 
 
 class StopCategory(IntEnum):
@@ -102,6 +103,7 @@ class BaseGeometry:
     max_acceleration_m_s2: float
     max_turn_acceleration_rad_s2: float
     footprint_radius_m: float
+    stop_deceleration_m_s2: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -330,6 +332,7 @@ class RobotDescription:
     microphone: Audio | None = None
     speaker: Audio | None = None
     voice: VoiceSettings = VoiceSettings()
+    ros: RosSettings = UNUSED
     protection: Protection = NOTHING_DECLARED
     planning: PlanBounds = NOT_BOUNDED
 

@@ -20,13 +20,15 @@ Vector = tuple[float, ...]
 class Joint:
     """Turn ("hinge") or shift ("slide") a link about or along an axis of its own frame.
 
-    One that `follows` another has that one's value.
+    The axis of a hinge goes through `position_m`, in the link's frame. A joint that `follows`
+    another has that one's value.
     """
 
     name: str
     kind: str
     axis: Vector
     range: Vector | None
+    position_m: Vector = (0.0, 0.0, 0.0)
     follows: str | None = None
 
 
@@ -103,7 +105,9 @@ def _link_pose(link: Link, positions: Mapping[str, float]) -> Array:
         if joint.kind == "slide":
             moved[:3, 3] = value * axis
         else:
+            anchor = np.array(joint.position_m)
             moved[:3, :3] = matrix(turn(axis, value))
+            moved[:3, 3] = anchor - moved[:3, :3] @ anchor
         pose = pose @ moved
     return pose
 

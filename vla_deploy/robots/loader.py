@@ -35,6 +35,7 @@ from vla_deploy.robots.description import (
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.mjcf import mjcf_faults, read_mjcf_names
 from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
+from vla_deploy.robots.ros_settings import ROS, ros_settings
 from vla_deploy.robots.schema import Fault, Shape, check_record
 
 ROBOTS_DIR = Path(__file__).parent
@@ -52,6 +53,7 @@ SINGLE: Mapping[str, Shape] = {
     "microphone": schema.AUDIO,
     "speaker": schema.AUDIO,
     "voice": schema.VOICE,
+    "ros": ROS,
     "home": schema.HOME,
     "planning": schema.PLANNING,
     "clearance": protection_schema.CLEARANCE,
@@ -176,6 +178,7 @@ def _build(document: Document, directory: Path, camera: Camera) -> RobotDescript
         microphone=Audio(**document["microphone"]) if "microphone" in document else None,
         speaker=Audio(**document["speaker"]) if "speaker" in document else None,
         voice=VoiceSettings(**document.get("voice", {})),
+        ros=ros_settings(document.get("ros", {})),
         limits={name: JointLimits(**row) for name, row in document["limits"].items()},
         groups={name: _group(name, row) for name, row in document["groups"].items()},
         hands={name: Hand(name=name, **row) for name, row in document["hands"].items()},

@@ -54,9 +54,10 @@ def along(direction: Array) -> Array:
     """Return the least turn that brings z along a direction."""
     target = direction / np.linalg.norm(direction)
     axis = np.cross((0.0, 0.0, 1.0), target)
-    if np.linalg.norm(axis) < 1e-12:
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
         return np.array(UNTURNED if target[2] > 0 else (1.0, 0.0, 0.0, 0.0))
-    return turn(axis, math.acos(min(1.0, max(-1.0, float(target[2])))))
+    return turn(axis, math.atan2(sine, float(target[2])))
 
 
 def orientation(attributes: Attributes, radian: float, euler_order: str) -> Array:
@@ -81,11 +82,12 @@ def _from_axes(xy: Array, radian: float, order: str) -> Array:
     x = xy[:3] / np.linalg.norm(xy[:3])
     y = xy[3:] - x * (x @ xy[3:])
     y /= np.linalg.norm(y)
-    return _of_matrix(np.column_stack((x, y, np.cross(x, y))))
+    return quaternion_of(np.column_stack((x, y, np.cross(x, y))))
 
 
-def _of_matrix(rotation: Array) -> Array:
-    """Return the quaternion of a rotation: the row of its outer product that is largest."""
+def quaternion_of(rotation: Array) -> Array:
+    """Return the quaternion of a rotation, 3 x 3."""
+    # Of the quaternion's outer product with itself, the row that is largest is the most exact.
     xx, yy, zz = rotation.diagonal()
     square = np.array((1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz))
     (_, xy, xz), (yx, _, yz), (zx, zy, _) = rotation

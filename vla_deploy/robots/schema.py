@@ -91,6 +91,7 @@ ROBOT: Shape = {
     "microphone": OPTIONAL_TABLE,
     "speaker": OPTIONAL_TABLE,
     "voice": OPTIONAL_TABLE,
+    "ros": OPTIONAL_TABLE,
     "limits": TABLE,
     "groups": TABLE,
     "hands": TABLE,
@@ -153,6 +154,7 @@ BASE: Shape = {
     "max_turn_rad_s": POSITIVE,
     "max_acceleration_m_s2": POSITIVE,
     "max_turn_acceleration_rad_s2": POSITIVE,
+    "stop_deceleration_m_s2": OPTIONAL_POSITIVE,
     "footprint_radius_m": POSITIVE,
 }
 LIDAR: Shape = {

@@ -36,6 +36,7 @@ MEMBERSHIPS: Final = {
         _member("executor", 5, 2.0),
         _member("recorder", 6, 2.0, _SLACK_NS),
         _member("dashboard", 7, 2.0, None),
+        _member("ros", 8, 2.0, _SLACK_NS),
     )
 }
 WATCHERS: Final = frozenset(name for name, one in MEMBERSHIPS.items() if one.role.slack_ns is None)

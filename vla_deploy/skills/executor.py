@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.action_status import ActionStatus
+from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import Book, ClaimRefused, IpcError
 from vla_deploy.ipc.claims import obstacles
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.graph import execution_order
-from vla_deploy.planning.plan import Action, ActionStatus, Plan
-from vla_deploy.planning.readiness import refusal_of
+from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.recovery import Cause
 from vla_deploy.planning.symbolic.state import State
 from vla_deploy.skills.context import Rest, Skill, SkillContext

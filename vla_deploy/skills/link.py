@@ -1,6 +1,5 @@
 """Hold the executor's end of every topic: the state it reads, the motions it asks for."""
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import SharedSpace
+from vla_deploy.ipc.motion_ids import motion_ids
 from vla_deploy.navigation.follower import AT_REST, Twist
 from vla_deploy.navigation.place_judge import DOUBT_TEXT, Doubt, PlaceState
 from vla_deploy.robots import RobotDescription
@@ -52,7 +52,7 @@ class RobotLink:
         self._results_in = space.ring_reader("motion_result", from_start=False)
         self._commands = space.ring_writer("motion_command")
         self._base = space.cell_writer("base_command")
-        self._ids = itertools.count(clock.now_ns() // 1000 + 1)
+        self._ids = motion_ids(clock, "executor")
         self.acting = ""
         """Whose motions are sent now: one of several actions that go on side by side."""
         self._active: dict[int, str] = {}

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from vla_deploy.planning.readiness import refusal_of
+from vla_deploy.client.readiness import refusal_of
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import RobotNotReady, Touched, TryAgain
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
+from vla_deploy.client.action_status import ActionStatus
+from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import (
     Announcer,
     CellReader,
@@ -20,8 +22,7 @@ from vla_deploy.ipc import (
 from vla_deploy.manipulation.kinematics import ArmKinematics
 from vla_deploy.navigation.base_paths import base_planner
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.plan import ActionStatus, Plan
-from vla_deploy.planning.readiness import refusal_of
+from vla_deploy.planning.plan import Plan
 from vla_deploy.robots import RobotDescription
 from vla_deploy.skills.advice import Adviser
 from vla_deploy.skills.arms import believe_fingers, recall_hands

@@ -1,6 +1,7 @@
 """Start, watch and end the children that the decisions of `lifecycle` speak of."""
 
 import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +9,10 @@ from pathlib import Path
 from drivers.clock import NS_PER_S, Clock
 from drivers.twin_clock import TwinClock
 from platforms import load_profile
+from vla_deploy.gateways.ros.errors import RosGatewayError
+from vla_deploy.gateways.ros.launching import launch_environment
 from vla_deploy.logs import LOGS_DIR, RUN_ID_VARIABLE, journal_stream
+from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.runtime.twin_members import MEMBERSHIPS
 from vla_deploy.supervisor.lifecycle import Act, Action, Seen
 from vla_deploy.supervisor.liveness import Liveness, Vital
@@ -36,6 +40,7 @@ class Crew:
         readiness: Mapping[str, Readiness],
         liveness: Mapping[str, Liveness],
         clock: Clock,
+        ros: RosSettings,
     ) -> None:
         self.started: dict[str, tuple[int, int]] = {}
         """The pid of each child that was started last, and when; none where that was refused."""
@@ -49,6 +54,7 @@ class Crew:
         self._readiness = readiness
         self._liveness = liveness
         self._clock = clock
+        self._ros = ros
         self._children: dict[str, ChildProcess] = {}
         self._ready: set[str] = set()
         self._unswept: set[str] = set()
@@ -141,7 +147,7 @@ class Crew:
         self._refused.pop(name, None)
         try:
             child = self._new_child(name)
-        except OSError as error:
+        except (OSError, RosGatewayError) as error:
             self._refused[name] = str(error)
             self._children.pop(name, None)
             self.started.pop(name, None)
@@ -161,16 +167,25 @@ class Crew:
         command = spec.command + (spec.devices_command if self._options.takes_devices else ())
         command += spec.viewer_command if self._options.viewer else ()
         command += spec.paced_command if self._options.paced else ()
+        python, variables = self._interpreter(spec)
         return ChildProcess(
             replace(self._options, profile=self.profile).fill(command, self._run_dir),
             {
                 **self._environment,
                 **thread_limits(self.in_force, name),
+                **variables,
                 PROCESS_VARIABLE: name,
             },
             self._output_path(name),
             nice_of(self.in_force, name),
+            python,
         )
+
+    def _interpreter(self, spec: ProcessSpec) -> tuple[str, Mapping[str, str]]:
+        if not spec.in_ros_environment:
+            return sys.executable, {}
+        python, variables = launch_environment(self._ros, self._run_dir)
+        return str(python), variables
 
     def _output_path(self, name: str) -> Path:
         return self._run_dir / LOGS_DIR / f"{name}{OUTPUT_SUFFIX}"

@@ -1,7 +1,7 @@
 """Become another Python program that gets SIGTERM when the supervisor ends, however it ends.
 
-Run as a script, `launch.py SUPERVISOR_PID NICE COMMAND...`, before the program: so it holds for
-programs that know nothing of it, and no Python code runs between fork and exec of a threaded
+Run as a script, `launch.py SUPERVISOR_PID NICE PYTHON COMMAND...`, before the program: so it holds
+for programs that know nothing of it, and no Python code runs between fork and exec of a threaded
 process.
 """
 
@@ -16,7 +16,7 @@ _PR_SET_PDEATHSIG = 1
 
 def main() -> None:
     """Ask the kernel for the signal, then replace this program by the wanted one."""
-    supervisor_pid, nice, command = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:]
+    supervisor_pid, nice, program = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:]
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != supervisor_pid:  # it died before the request was in place
         sys.exit(f"the supervisor, pid {supervisor_pid}, has already ended")
@@ -25,7 +25,7 @@ def main() -> None:
     # To load a large program takes seconds, in which it is in the way of what matters more. Less
     # than the supervisor's own may be forbidden: the program asks for that itself, and tells if so.
     os.setpriority(os.PRIO_PROCESS, 0, max(nice, os.getpriority(os.PRIO_PROCESS, 0)))
-    os.execv(sys.executable, [sys.executable, *command])
+    os.execv(program[0], program)
 
 
 if __name__ == "__main__":

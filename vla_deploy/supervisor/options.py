@@ -15,6 +15,7 @@ class RunOptions:
 
     `viewer` shows the twin in a window; `paced` gives what is on its buses the time it takes;
     `pace` says how its time goes.
+    `ros` puts the robot into a ROS 2 graph, whatever its file and the profile say.
     `devices_dir` replaces the hardware by what is served there, as by a twin that runs by itself.
     """
 
@@ -30,6 +31,7 @@ class RunOptions:
     devices_dir: Path | None = None
     runtime_base: Path | None = None
     arm: bool = False
+    ros: bool = False
     probe_root: Path = Path("/")
 
     def __post_init__(self) -> None:

@@ -16,6 +16,7 @@ class RunContext:
     robot: RobotDescription
     profile: Profile
     suspended: Mapping[str, str] = field(default_factory=dict)
+    ros: bool = False
 
 
 Predicate = Callable[[RunContext], str]
@@ -50,6 +51,12 @@ def budgeted(process: str) -> Predicate:
         return "" if process in profile.budgets else f"profile {profile.name} has no budget for it"
 
     return judge
+
+
+def ros_asked(context: RunContext) -> str:
+    """Run where the run, the robot file or the profile asks for ROS 2."""
+    asked = context.ros or context.robot.ros.enabled or context.profile.ros
+    return "" if asked else "nobody asks for ROS 2: run --ros, or [ros] of the robot file"
 
 
 def not_suspended(process: str) -> Predicate:

@@ -25,11 +25,21 @@ class ChildProcess:
         environment: Mapping[str, str],
         output_path: Path,
         nice: int = 0,
+        python: str = sys.executable,
     ) -> None:
         output_path.parent.mkdir(parents=True, exist_ok=True)
         with output_path.open("ab") as output:
             self._popen = subprocess.Popen(
-                [sys.executable, "-I", "-S", _LAUNCH, str(os.getpid()), str(nice), *command],
+                [
+                    sys.executable,
+                    "-I",
+                    "-S",
+                    _LAUNCH,
+                    str(os.getpid()),
+                    str(nice),
+                    python,
+                    *command,
+                ],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=output,

@@ -16,6 +16,7 @@ from vla_deploy.aside import background
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.journal import JOURNAL_SOCKET
 from vla_deploy.logs import LOGS_DIR, LogOrigin, RunLog, journal_stream
+from vla_deploy.robots.ros_settings import RosSettings
 from vla_deploy.runtime.twin_members import SUPERVISOR
 from vla_deploy.supervisor.budgets import open_keeper
 from vla_deploy.supervisor.crash_reports import CrashReports, crash_folder
@@ -50,6 +51,7 @@ class Run:
         profile: Callable[[], Profile],
         notify: NotifyTarget,
         on_stop_signal: Callable[[], None],
+        ros: RosSettings,
     ) -> None:
         self._handlers = _handle_stop_signals(on_stop_signal)
         try:
@@ -60,7 +62,7 @@ class Run:
         try:
             self.clock = clock or _clock_of_run(options, self.runtime.run_dir)
             """The clock of the run, by which its processes live."""
-            self._open(options, table, self.clock, profile, notify)
+            self._open(options, table, self.clock, profile, notify, ros)
         except BaseException:
             self.runtime.close()
             self._give_signals_back()
@@ -73,6 +75,7 @@ class Run:
         clock: Clock,
         profile: Callable[[], Profile],
         notify: NotifyTarget,
+        ros: RosSettings,
     ) -> None:
         run_dir = self.runtime.run_dir
         self.space = SharedSpace(run_dir / "ipc", clock)
@@ -83,6 +86,7 @@ class Run:
             readiness_of(table, run_dir, self.space, clock),
             liveness_of(table, self.space, clock, profile),
             clock,
+            ros,
         )
         self.report = Report(self.runtime.run_id, options, self.space, clock)
         self.budgets = open_keeper(

@@ -124,6 +124,7 @@ class Supervisor:
             lambda: self.profile,
             self._notify,
             self.request_stop,
+            self._robot.ros,
         )
         try:
             self._wait_until_ready()
@@ -244,6 +245,7 @@ class Supervisor:
             robot=self._robot,
             profile=self.profile,
             suspended=run.directives.suspended,
+            ros=self._options.ros,
         )
         reasons = {spec.name: spec.when(context) for spec in self._table}
         return {

@@ -13,6 +13,7 @@ from vla_deploy.supervisor.predicates import (
     always,
     budgeted,
     not_suspended,
+    ros_asked,
     twin_only,
 )
 
@@ -68,7 +69,8 @@ class ProcessSpec:
     `paced_command` where buses take their time. It runs while `when` has nothing against it. It
     is ready when `ready_topic` is fresh from its own pid and all `ready_files`, relative to the run
     directory, exist. `watched` are the topics it writes whatever its devices do. `with_previous`
-    joins it to the row before: neither waits for the other.
+    joins it to the row before: neither waits for the other. `in_ros_environment` runs it by
+    ROS's own interpreter.
     """
 
     name: str
@@ -82,6 +84,7 @@ class ProcessSpec:
     ready_files: tuple[str, ...] = ()
     ready_timeout_s: float = 40.0
     watched: tuple[Watched, ...] = ()
+    in_ros_environment: bool = False
     stop_timeout_s: float = 3.0
     restart: RestartPolicy = RestartPolicy()
     giving_up: GivingUp = GivingUp.NO_COMMANDS
@@ -189,5 +192,18 @@ TABLE: tuple[ProcessSpec, ...] = (
         ready_timeout_s=60.0,
         watched=(Watched(topic="dashboard_status", silence_limit_s=15.0),),
         giving_up=GivingUp.CARRY_ON,  # the stop door and the command line go on
+    ),
+    ProcessSpec(
+        name="ros",
+        command=("-m", "vla_deploy.gateways.ros", *_NODE),
+        devices_command=_DEVICES,
+        when=all_of(ros_asked, budgeted("ros"), not_suspended("ros")),
+        with_previous=True,
+        ready_topic="ros_status",
+        ready_files=("ready/ros",),
+        ready_timeout_s=60.0,
+        watched=(Watched(topic="ros_status", silence_limit_s=10.0),),
+        in_ros_environment=True,
+        giving_up=GivingUp.CARRY_ON,  # nobody beyond the robot moves it then
     ),
 )

@@ -5,7 +5,7 @@ import pytest
 from drivers.clock import NS_PER_S
 from vla_deploy.cli.errors import CommandFailed, UsageError
 from vla_deploy.cli.session import attach
-from vla_deploy.planning.following import ANSWER_TIMEOUT_S, SILENCE_LIMIT_S
+from vla_deploy.client.following import ANSWER_TIMEOUT_S, SILENCE_LIMIT_S
 
 PLAN = {
     "actions": [

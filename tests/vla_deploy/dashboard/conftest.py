@@ -9,12 +9,12 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 
 from drivers.clock import NS_PER_S, MonotonicClock
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Access, AccessRules
 from vla_deploy.dashboard.access.accounts_file import AccountsFile
 from vla_deploy.dashboard.access.audit import AuditLog
 from vla_deploy.dashboard.access.audit_file import AuditFile
 from vla_deploy.dashboard.app import create_app
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.ipc import RingReader, SharedSpace
 

@@ -93,3 +93,21 @@ def test_shapes_have_the_size_place_and_colour_of_mujocos(tmp_path: Path) -> Non
     assert np.allclose(capsule.position_m, geom.pos)
     assert abs(np.dot(np.roll(capsule.quaternion, 1), geom.quat)) == pytest.approx(1.0, abs=1e-6)
     assert capsule.rgba == (1.0, 0.0, 0.0, 1.0)
+
+
+def test_a_hinge_beside_its_bodys_origin_turns_as_mujocos(tmp_path: Path) -> None:
+    path = tmp_path / "door.xml"
+    door = """<mujoco><worldbody><body name="root"><body name="door" pos="1 0 0" euler="0 0 30">
+      <joint name="post" axis="0 0.2 1" pos="0.3 -0.1 0.2"/>
+      <geom name="leaf" type="box" size="0.02" fromto="0 0 0 0.3 0.2 0.1"/>
+      <site name="knob" pos="0.4 0 0"/></body></body></worldbody></mujoco>"""
+    path.write_text(door)
+    tree, model = read_tree(path), mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.7
+    mujoco.mj_kinematics(model, data)
+    pose = tree.site_pose("knob", {"post": 0.7})
+    assert np.allclose(pose[:3, 3], data.site("knob").xpos, atol=1e-9)
+    assert np.allclose(pose[:3, :3].ravel(), data.site("knob").xmat, atol=1e-9)
+    (leaf,) = tree.links[1].shapes
+    assert np.allclose(leaf.size_m, model.geom("leaf").size)

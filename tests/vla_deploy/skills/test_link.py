@@ -5,10 +5,10 @@ from typing import cast
 import pytest
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import Announcer, CellWriter, ClaimBook, Event, SharedSpace
 from vla_deploy.navigation.follower import Twist
 from vla_deploy.navigation.path_planning import PathPlanner
-from vla_deploy.planning.readiness import refusal_of
 from vla_deploy.robots import load_robot
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.drive import BLOCKED_TIMEOUT_S, turn

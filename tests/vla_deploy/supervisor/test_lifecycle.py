@@ -325,11 +325,14 @@ def test_the_robots_table_starts_the_twin_first_and_control_before_who_commands_
         "executor",
         "recorder",
         "dashboard",
+        "ros",
     ]
     assert [row.name for row in TABLE if row.when is twin_only] == ["twin"]
     assert all(row.ready_files or row.ready_topic for row in TABLE)
     together = [row.name for row in TABLE if row.with_previous]
-    assert together == ["stop_door", "speech", "planner", "executor", "recorder", "dashboard"]
+    assert together == [
+        *("stop_door", "speech", "planner", "executor", "recorder", "dashboard", "ros"),
+    ]
 
 
 def test_a_ready_process_that_falls_silent_is_aborted_and_started_again_with_that_reason():

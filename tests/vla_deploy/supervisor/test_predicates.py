@@ -73,9 +73,19 @@ def test_predicates_compose(predicate, reason):
 
 
 def test_the_whole_table_runs_on_the_twin_and_all_but_the_twin_on_the_robot():
-    assert [row.name for row in TABLE if row.when(CONTEXT)] == []
-    real = replace(CONTEXT, twin=False)
+    asked = replace(CONTEXT, ros=True)
+    assert [row.name for row in TABLE if row.when(asked)] == []
+    real = replace(asked, twin=False)
     assert [row.name for row in TABLE if row.when(real)] == ["twin"]
+
+
+def test_ros_runs_where_run_robot_or_profile_asks_for_it():
+    (ros,) = (row for row in TABLE if row.name == "ros")
+    robot = replace(CONTEXT.robot, ros=replace(CONTEXT.robot.ros, enabled=True))
+    assert "nobody asks for ROS 2" in ros.when(CONTEXT)
+    assert ros.when(replace(CONTEXT, ros=True)) == ""
+    assert ros.when(replace(CONTEXT, robot=robot)) == ""
+    assert ros.when(replace(CONTEXT, profile=replace(CONTEXT.profile, ros=True))) == ""
 
 
 def test_control_cannot_be_suspended():

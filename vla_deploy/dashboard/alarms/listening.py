@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from drivers.clock import NS_PER_S
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.alarms.told import Document, Told, Word
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.ipc import TOPICS, Kind, Sample
 from vla_deploy.navigation.place_judge import Doubt, PlaceState
 

@@ -5,11 +5,11 @@ from typing import Final
 
 from fastapi import FastAPI
 
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.alarms.alarm_file import AlarmFile
 from vla_deploy.dashboard.alarms.desk import AlarmDesk
 from vla_deploy.dashboard.alarms.listening import Listener
 from vla_deploy.dashboard.alarms.live_feed import AlarmFeed
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.state_dir import state_dir_of
 
 _FILE: Final = "dashboard/alarms.json"

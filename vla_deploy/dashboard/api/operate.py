@@ -6,8 +6,9 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from vla_deploy.client.acts import why_not
 from vla_deploy.dashboard.access import Role, note, require
-from vla_deploy.dashboard.acts import carried_out, why_not
+from vla_deploy.dashboard.acts import carried_out
 from vla_deploy.dashboard.errors import Refused
 from vla_deploy.ipc.stop_button import ESTOP
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
-from vla_deploy.dashboard.commands.record import CommandRecord, Kind, record_of
-from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.client.command_record import CommandRecord, Kind, record_of
+from vla_deploy.client.following import ANSWER_TIMEOUT_S, Following
+from vla_deploy.client.link import RobotLink
 from vla_deploy.ipc import Event
-from vla_deploy.planning.following import ANSWER_TIMEOUT_S, Following
 
 MOST_COMMANDS: Final = 200
 _JUDGE_PERIOD_NS: Final = NS_PER_S // 2

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Operator
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.live.turn import (
     SILENT_S,
     Floor,

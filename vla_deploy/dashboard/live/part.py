@@ -6,7 +6,7 @@ from typing import Final
 from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.live.camera import CameraFeed
 from vla_deploy.dashboard.live.detections import Detections
 from vla_deploy.dashboard.live.hub import LiveHub

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import cv2
 
@@ -10,6 +10,8 @@ from vla_deploy.navigation.map_file import MapFile, read_map_file
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.kinematic_tree import KinematicTree
 from vla_deploy.robots.tree_reader import read_tree
+
+_DIGITS: Final = 6
 
 
 class Still:
@@ -34,7 +36,7 @@ class Still:
             "name": robot.name,
             "joint_names": robot.joint_names,
             "footprint_m": robot.base.footprint_radius_m,
-            "links": [asdict(link) for link in self.tree.links],
+            "links": [_rounded(asdict(link)) for link in self.tree.links],
             "zones": [
                 {"name": zone.name, "kind": zone.kind, "polygon_m": zone.polygon_m}
                 for zone in robot.protection.zones
@@ -74,3 +76,12 @@ class Still:
     @cached_property
     def _map_file(self) -> MapFile:
         return read_map_file(self.robot.home.map_path)
+
+
+def _rounded(value: Any) -> Any:
+    """Return a document whose numbers are as fine as a page can draw them."""
+    if isinstance(value, dict):
+        return {key: _rounded(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(one) for one in value]
+    return round(value, _DIGITS) if isinstance(value, float) else value

@@ -10,7 +10,7 @@ from typing import Final
 from fastapi import FastAPI
 
 from drivers.clock import NS_PER_S
-from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.client.link import RobotLink
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.state_dir import state_dir_of

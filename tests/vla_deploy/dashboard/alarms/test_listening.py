@@ -1,5 +1,5 @@
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.alarms.listening import Listener
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.ipc import SharedSpace
 
 

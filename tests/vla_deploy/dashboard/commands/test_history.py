@@ -2,9 +2,9 @@
 
 import pytest
 
+from vla_deploy.client.command_record import MOST_EVENTS
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.commands.history import MOST_COMMANDS, CommandHistory
-from vla_deploy.dashboard.commands.record import MOST_EVENTS
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.ipc import SharedSpace
 
 PLAN = {"actions": [{"id": "a1", "skill": "wave", "parameters": {}}]}

@@ -12,8 +12,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from drivers.clock import MonotonicClock
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Identity, Role, Way, require
-from vla_deploy.dashboard.link import RobotLink
 from vla_deploy.dashboard.live import microphone
 from vla_deploy.dashboard.live.microphone import PageMicrophones
 from vla_deploy.ipc import SharedSpace

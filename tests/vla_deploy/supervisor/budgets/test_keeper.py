@@ -240,7 +240,7 @@ def test_a_full_disk_is_warned_of_and_slows_nobody(world, caplog):
 
 def test_models_may_claim_what_the_other_processes_leave_of_the_total(world, profile):
     book = ClaimBook(world.space, world.clock)
-    others_mb = 80 + 250 + 60 + 250 + 250 + 150
+    others_mb = 80 + 250 + 60 + 250 + 250 + 150 + 150
     assert book.look().capacities == {"ram_mb": int(profile.total.memory_mb) - others_mb}
     world.profile = replace(profile, total=replace(profile.total, gpu_memory_mb=800))
     world.go(0.5)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import NS_PER_S
-from vla_deploy.dashboard.link import RobotLink
+from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.robot_state import collect
 from vla_deploy.ipc import ReplayOnly, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours, depths_mm

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
+from vla_deploy.client.action_status import ActionStatus
 from vla_deploy.ipc import Sample
-from vla_deploy.planning.plan import ActionStatus
 
 ANSWER_TIMEOUT_S: Final = 5.0
 SILENCE_LIMIT_S: Final = 5.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Final
 
-from vla_deploy.planning.following import Event
+from vla_deploy.client.following import Event
 
 MOST_EVENTS: Final = 400
 _CANCELLED: Final = "cancelled on request"

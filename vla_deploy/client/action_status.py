@@ -1,0 +1,15 @@
+"""Name how an action of a plan stands."""
+
+from enum import StrEnum
+
+
+class ActionStatus(StrEnum):
+    """Tell how far an action has come; the last five are final."""
+
+    PENDING = "pending"
+    ACTIVE = "active"
+    SUCCEEDED = "succeeded"
+    CANCELLED = "cancelled"
+    ABORTED = "aborted"
+    REJECTED = "rejected"
+    LOST = "lost"

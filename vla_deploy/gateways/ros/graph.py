@@ -1,0 +1,147 @@
+"""Join the ROS 2 graph: one node, one executor in a thread of its own, one queue for what comes in.
+
+What comes in is handled in the node's step, in the order of arrival, so that only one thread
+deals with the robot. A press of the stop does not wait for that.
+"""
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final, Protocol
+
+import rclpy
+from rclpy.action import ActionServer
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+NODE_NAME: Final = "vla_deploy"
+MOST_WAITING: Final = 256
+"""Of what comes in between two steps; what is more is dropped, and counted."""
+_JOIN_S: Final = 2.0
+_log = logging.getLogger(__name__)
+
+RELIABLE: Final = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE
+)
+SENSOR: Final = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
+)
+LATCHED: Final = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+# A subscription that takes from publishers of either reliability.
+ANY: Final = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.BEST_EFFORT
+)
+
+
+class Publisher(Protocol):
+    """Send messages of one topic."""
+
+    def publish(self, message: Any) -> None:
+        """Send one."""
+        ...
+
+    def get_subscription_count(self) -> int:
+        """Return how many listen."""
+        ...
+
+
+class _Waking(Future):  # type: ignore[misc]  # rclpy tells no types
+    """Wake the executor with the result: rclpy 7 looks at what awaits only when something comes."""
+
+    def __init__(self, executor: SingleThreadedExecutor) -> None:
+        super().__init__(executor=executor)
+        self._waiting = executor
+
+    def set_result(self, result: Any) -> None:
+        """Set the result, and have what waits for it go on."""
+        super().set_result(result)
+        self._waiting.wake()
+
+
+class Graph:
+    """Hold the node's end of the ROS 2 graph."""
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        self._inbox: deque[Callable[[], None]] = deque()
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self.node: Final = Node(NODE_NAME, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._servers: list[ActionServer] = []
+        self._spinning = threading.Thread(target=self._spin, name="ros-spin", daemon=True)
+
+    def begin(self) -> None:
+        """Let in what comes from the graph."""
+        self._spinning.start()
+
+    def publisher(self, kind: type, topic: str, qos: QoSProfile = RELIABLE) -> Publisher:
+        """Return a publisher."""
+        made: Publisher = self.node.create_publisher(kind, topic, qos)
+        return made
+
+    def listen(
+        self, kind: type, topic: str, take: Callable[[Any], None], qos: QoSProfile = ANY
+    ) -> None:
+        """Have each message of a topic taken in a step."""
+        self.node.create_subscription(kind, topic, lambda got: self.put(lambda: take(got)), qos)
+
+    def serve(self, kind: type, name: str, answer: Callable[[Any], Future]) -> None:
+        """Have requests of a service answered by what the future holds that `answer` returns."""
+
+        async def respond(request: Any, _response: Any) -> Any:
+            return await answer(request)
+
+        self.node.create_service(kind, name, respond)
+
+    def act(self, server: ActionServer) -> None:
+        """Keep an action server until the end."""
+        self._servers.append(server)
+
+    def future(self) -> Future:
+        """Return a future whose result wakes what waits for it in the graph's thread."""
+        return _Waking(self._executor)
+
+    def put(self, work: Callable[[], None]) -> bool:
+        """Have something done in the next step; return whether there is room for it."""
+        if len(self._inbox) >= MOST_WAITING:
+            self.dropped += 1
+            return False
+        self._inbox.append(work)
+        return True
+
+    def take(self) -> None:
+        """Do in order what has come in since the last step."""
+        for _ in range(len(self._inbox)):
+            self._inbox.popleft()()
+
+    def close(self) -> None:
+        """Leave the graph; the thread ends before what it uses."""
+        self._executor.shutdown()
+        if self._spinning.ident is not None:
+            self._spinning.join(_JOIN_S)
+        for server in self._servers:
+            server.destroy()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            _log.info("left the ROS graph")

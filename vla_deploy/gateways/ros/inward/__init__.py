@@ -1,0 +1,1 @@
+"""Take what the ROS graph asks for, to the same judges as everything else."""

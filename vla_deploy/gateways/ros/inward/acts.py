@@ -1,0 +1,92 @@
+"""Serve the operator's acts: estop, reset, arm, disarm, each an act of its own.
+
+A press of the stop does not wait for a step of the gateway.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from rclpy.task import Future
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from drivers.clock import NS_PER_S
+from vla_deploy.client.acts import REACHED, why_not
+from vla_deploy.client.link import RobotLink
+from vla_deploy.gateways.ros.part import Gateway
+from vla_deploy.ipc.stop_button import ESTOP
+
+EMERGENCY_STOP: Final = "/emergency_stop"
+WAIT_S: Final = 5.0
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    act: str
+    answer: Future
+    deadline_ns: int
+
+
+class Acts:
+    """Hand acts to control, and answer when control shows them."""
+
+    def __init__(self, gateway: Gateway, acts: tuple[str, ...]) -> None:
+        graph, link = gateway.graph, gateway.link
+        self._gateway = gateway
+        # Of the graph's thread alone: what a thread writes with is its own.
+        self._presses = RobotLink(link.run_dir, link.clock, source=link.source, robot=link.robot)
+        self._asked: list[_Asked] = []
+        for act in acts:
+            graph.serve(Trigger, f"/vla_deploy/{act}", self._handler(act))
+        if ESTOP in acts:
+            graph.serve(Trigger, EMERGENCY_STOP, self._handler(ESTOP))
+            graph.node.create_subscription(Bool, EMERGENCY_STOP, self._pressed, 10)
+
+    def step(self, now_ns: int) -> None:
+        """Answer what control shows, or has not shown in time."""
+        status = self._gateway.control_status()
+        for asked in list(self._asked):
+            done = status is not None and REACHED[asked.act](status)
+            if done or now_ns >= asked.deadline_ns:
+                self._asked.remove(asked)
+                asked.answer.set_result(
+                    Trigger.Response(success=done, message="" if done else why_not(status))
+                )
+
+    def stop(self) -> None:
+        """Leave nobody without an answer."""
+        for asked in self._asked:
+            asked.answer.set_result(
+                Trigger.Response(success=False, message="the gateway was stopped")
+            )
+        self._asked.clear()
+        self._presses.close()
+
+    def _handler(self, act: str) -> Callable[[Any], Future]:
+        def handle(_request: Any) -> Future:
+            answer = self._gateway.graph.future()
+            if act == ESTOP:
+                self._press("the service of the ROS graph")
+            deadline_ns = self._gateway.link.clock.now_ns() + round(WAIT_S * NS_PER_S)
+            asked = _Asked(act=act, answer=answer, deadline_ns=deadline_ns)
+            if not self._gateway.graph.put(lambda: self._take(asked)):
+                answer.set_result(Trigger.Response(success=False, message="too many requests"))
+            return answer
+
+        return handle
+
+    def _take(self, asked: _Asked) -> None:
+        if asked.act != ESTOP:
+            self._gateway.link.operate(asked.act, "over ROS")
+        self._asked.append(asked)
+
+    def _pressed(self, message: Bool) -> None:
+        if message.data:
+            self._press(f"the topic {EMERGENCY_STOP}")
+
+    def _press(self, reason: str) -> None:
+        _log.warning("stop pressed: %s", reason)
+        self._presses.operate(ESTOP, reason)

@@ -1,0 +1,125 @@
+"""Send motions to control as the executor does, and learn how each ended."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc.motion_ids import motion_ids
+
+Floats = NDArray[np.float64]
+_JOINT_AGE_S = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ended:
+    """Tell how a motion ended: done, touched, cancelled, refused, stopped, and why."""
+
+    status: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointView:
+    """Hold what control told of some joints at one moment, in their order."""
+
+    stamp_ns: int
+    position: Floats
+    velocity: Floats
+    setpoint: Floats
+    effort_ratio: Floats
+
+
+class Motions:
+    """Hold the gateway's end of the topics of motions."""
+
+    def __init__(self, link: RobotLink, joint_index: Mapping[str, int]) -> None:
+        self._link = link
+        self._index = joint_index
+        self._ids = motion_ids(link.clock, "ros")
+        self._results = link.events("motion_result")
+        self._ended: dict[int, Ended] = {}
+        self._active: set[int] = set()
+
+    def step(self) -> None:
+        """Take in what has ended."""
+        for event in self._results.drain():
+            told = event.payload
+            if told["motion_id"] in self._active:
+                self._active.remove(told["motion_id"])
+                self._ended[told["motion_id"]] = Ended(
+                    status=str(told["status"]), reason=str(told["reason"])
+                )
+
+    def follow(self, joints: Sequence[str], times_s: Floats, positions: Floats) -> int:
+        """Ask control to pass timed points, and return the motion's id.
+
+        Raises:
+            BadPayload: it is longer than control takes.
+        """
+        return self._send(
+            {
+                "kind": "trajectory",
+                "joints": list(joints),
+                "times_s": np.round(times_s, 6).tolist(),
+                "positions": np.round(positions, 6).tolist(),
+            }
+        )
+
+    def go(self, targets: Mapping[str, float], effort_ratio: Mapping[str, float]) -> int:
+        """Ask control to bring joints to targets, and return the motion's id."""
+        return self._send(
+            {
+                "kind": "goal",
+                "targets": dict(targets),
+                "speed_ratio": 1.0,
+                "effort_ratio": dict(effort_ratio),
+            }
+        )
+
+    def cancel(self, motion_id: int) -> None:
+        """Ask control to end a motion, its joints on a ramp; its result follows."""
+        self._link.publish("motion_command", {"kind": "cancel", "motion_id": motion_id})
+
+    def forget(self, motion_id: int) -> None:
+        """Take no more interest in how a motion ends."""
+        self._active.discard(motion_id)
+        self._ended.pop(motion_id, None)
+
+    def ended(self, motion_id: int) -> Ended | None:
+        """Return how a motion ended, once, or None while it goes on."""
+        return self._ended.pop(motion_id, None)
+
+    def look(self, joints: Sequence[str]) -> JointView | None:
+        """Return how some joints are, or None where control is silent."""
+        sample = self._link.fresh("joint_state", _JOINT_AGE_S)
+        if sample is None:
+            return None
+        chosen = [self._index[joint] for joint in joints]
+        data = sample.data
+
+        def of(field: str) -> Floats:
+            return np.asarray(data[field], dtype=np.float64)[chosen]
+
+        return JointView(
+            stamp_ns=sample.stamp_ns,
+            position=of("position"),
+            velocity=of("velocity"),
+            setpoint=of("setpoint"),
+            effort_ratio=of("effort_ratio"),
+        )
+
+    def close(self) -> None:
+        """Have every motion ended that was begun here."""
+        for motion_id in self._active:
+            self.cancel(motion_id)
+        self._results.close()
+
+    def _send(self, command: dict[str, Any]) -> int:
+        motion_id = next(self._ids)
+        self._link.publish("motion_command", command | {"motion_id": motion_id})
+        self._active.add(motion_id)
+        return motion_id

@@ -1,0 +1,120 @@
+"""Give commands to the planner as everybody does, and follow them to their end."""
+
+import json
+from collections import deque
+from collections.abc import Mapping
+from typing import Any, Final
+
+from vla_deploy.client.following import ANSWER_TIMEOUT_S, Event, Following
+from vla_deploy.client.link import RobotLink
+from vla_deploy.ipc.errors import BadPayload
+
+CANCELLED: Final = "cancelled on request"
+_STATUS_AGE_S: Final = 2.0
+
+
+class Order:
+    """Follow one command; `news` holds what has not been looked at yet."""
+
+    def __init__(self, link: RobotLink, command_id: str) -> None:
+        self.command_id = command_id
+        self.news: deque[Event] = deque()
+        self.last: Event | None = None
+        self._link = link
+        self._following = Following(
+            command_id,
+            lambda: link.fresh("planner_status", _STATUS_AGE_S),
+            lambda: link.fresh("executor_status", _STATUS_AGE_S),
+            link.clock,
+        )
+
+    @property
+    def has_ended(self) -> bool:
+        """Tell whether the last event is there."""
+        return self.last is not None
+
+    def cancel(self) -> None:
+        """Have it ended; its last event follows."""
+        self._link.utter(command_id=self._following.command_id, cancel=True)
+
+    def take(self, events: list[Event]) -> None:
+        """Take what was told since the last step, and find out whether nobody works on it."""
+        if self.has_ended:
+            return
+        why = self._following.why_lost()
+        self.news.extend(self._following.take(events))
+        lost = self._following.conclude(why)
+        if lost is not None:
+            self.news.append(lost)
+        if self._following.has_ended and self.news:
+            self.last = self.news[-1]
+        elif self._following.is_unanswered:
+            self.last = {
+                "command_id": self.command_id,
+                "event": "rejected",
+                "reason": f"no answer from planner or executor within {ANSWER_TIMEOUT_S:g} s",
+            }
+            self.news.append(self.last)
+
+
+class Orders:
+    """Give commands and hand each what was told of it."""
+
+    def __init__(self, link: RobotLink) -> None:
+        self._link = link
+        self._events = link.events("task_event")
+        self._orders: list[Order] = []
+
+    def give(self, *, text: str = "", plan: Any = None) -> Order:
+        """Give a command in words, or a plan, to the planner.
+
+        Raises:
+            OrderRefused: it is longer than the planner takes.
+        """
+        utterance: dict[str, Any] = {"text": text} if plan is None else {"plan": plan}
+        try:
+            order = Order(self._link, self._link.utter(**utterance))
+        except BadPayload as error:
+            raise OrderRefused(f"too long for a command: {error}") from error
+        self._orders.append(order)
+        return order
+
+    def step(self) -> None:
+        """Hand out what was told."""
+        events = [event.payload for event in self._events.drain()]
+        for order in list(self._orders):
+            order.take(events)
+            if order.has_ended:
+                self._orders.remove(order)
+
+    def close(self) -> None:
+        """Take back what is under way."""
+        for order in self._orders:
+            order.cancel()
+        self._events.close()
+
+
+class OrderRefused(ValueError):
+    """Say why something is no command."""
+
+
+def error_of(last: Event) -> str:
+    """Return in words why a command failed; "" where it did not."""
+    if last["event"] == "rejected":
+        return str(last.get("reason") or "rejected")
+    return "" if last.get("success") else str(last.get("error") or "failed")
+
+
+def parsed_plan(text: str) -> Mapping[str, Any] | list[Any]:
+    """Return a plan's JSON.
+
+    Raises:
+        OrderRefused: it is no JSON object or list.
+    """
+    try:
+        plan = json.loads(text)
+    except ValueError as error:
+        raise OrderRefused(f"the plan is no JSON: {error}") from error
+    if not isinstance(plan, dict | list):
+        raise OrderRefused(f"the plan: expected an object or a list, got {type(plan).__name__}")
+    return plan

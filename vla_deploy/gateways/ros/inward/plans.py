@@ -1,0 +1,140 @@
+"""Serve ExecutePlan: a command in words, or a plan, carried out as one from anybody else."""
+
+import json
+from typing import Any, Final
+
+from vla_deploy_msgs.action import ExecutePlan
+
+from vla_deploy.client.following import Event
+from vla_deploy.client.readiness import refusal_of
+from vla_deploy.gateways.ros.inward.orders import (
+    Order,
+    OrderRefused,
+    Orders,
+    error_of,
+    parsed_plan,
+)
+from vla_deploy.gateways.ros.inward.pursuing import Begin, Ending, Feedback, Outcome
+from vla_deploy.gateways.ros.part import Gateway
+
+Result: Final = ExecutePlan.Result
+Told: Final = ExecutePlan.Feedback
+_BUSY: Final = "the robot is busy"
+_STATES: Final = {
+    "queued": Told.PLANNING,
+    "planning": Told.PLANNING,
+    "asked": Told.ASKED,
+    "accepted": Told.EXECUTING,
+    "plan": Told.EXECUTING,
+    "action": Told.EXECUTING,
+    "said": Told.EXECUTING,
+    "setback": Told.RECOVERING,
+}
+
+
+class PlanServer:
+    """Judge what is to be carried out, and hand it to the planner."""
+
+    def __init__(self, gateway: Gateway, orders: Orders) -> None:
+        self._gateway = gateway
+        self._orders = orders
+
+    def judge(self, goal: Any) -> Begin | Outcome:
+        """Return how to begin with a goal, or why not at all."""
+        if bool(goal.command.strip()) == bool(goal.plan_json.strip()):
+            return _refused(Result.INVALID_PLAN, "fill in one of command and plan_json")
+        status = self._gateway.control_status()
+        why = refusal_of(status)
+        if why:
+            disarmed = status is not None and status["state"] == "disarmed"
+            return _refused(Result.NOT_ARMED if disarmed else Result.REJECTED, why)
+        try:
+            plan = parsed_plan(goal.plan_json) if goal.plan_json.strip() else None
+        except OrderRefused as error:
+            return _refused(Result.INVALID_PLAN, str(error))
+        return lambda feedback: self._begin(goal.command, plan, feedback)
+
+    def _begin(self, text: str, plan: Any, feedback: Feedback) -> "Carrying | Outcome":
+        try:
+            order = self._orders.give(text=text, plan=plan)
+        except OrderRefused as error:
+            return _refused(Result.INVALID_PLAN, str(error))
+        return Carrying(order, feedback, of_plan=plan is not None)
+
+
+class Carrying:
+    """Pursue one command, and tell each action's news."""
+
+    def __init__(self, order: Order, feedback: Feedback, *, of_plan: bool) -> None:
+        self._order = order
+        self._feedback = feedback
+        self._of_plan = of_plan
+        self._cancelled = ""
+        self._places: dict[str, int] = {}
+
+    def step(self, now_ns: int) -> Outcome | None:
+        """Tell what is new; return the outcome once the command has ended."""
+        while self._order.news:
+            event = self._order.news.popleft()
+            if event["event"] == "plan":
+                actions = event["plan"]["actions"]
+                self._places = {one["id"]: place for place, one in enumerate(actions)}
+            state = _STATES.get(event["event"])
+            if state is not None:
+                self._feedback(self._told(state, event))
+        return None if self._order.last is None else self._finish(self._order.last)
+
+    def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
+        """Have the command cancelled; the robot comes to rest, and then the outcome is told."""
+        self._cancelled = reason
+        self._order.cancel()
+        if not superseded:
+            return None
+        result = Result(error_code=Result.CANCELLED, error=reason)
+        return Outcome(ending=Ending.CANCELED, result=result)
+
+    def _told(self, state: str, event: Event) -> Any:
+        action_id = str(event.get("action_id") or "")
+        return Told(
+            state=state,
+            action_id=action_id,
+            skill=str(event.get("skill") or ""),
+            status=str(event.get("status") or ""),
+            index=self._places.get(action_id, 0),
+            total=len(self._places),
+            text=str(event.get("question") or event.get("text") or event.get("error") or ""),
+            choices=[str(one) for one in event.get("choices") or ()],
+        )
+
+    def _finish(self, last: Event) -> Outcome:
+        why, actions = error_of(last), list(last.get("actions") or ())
+        succeeded = sum(one["status"] == "succeeded" for one in actions)
+        total = len(actions)
+        result = Result(
+            success=not why and not self._cancelled,
+            error_code=self._code(last, why),
+            error=self._cancelled or why,
+            total_actions=total,
+            successful_actions=succeeded,
+            failed_actions=total - succeeded,
+            success_rate=succeeded / total if total else 0.0,
+            results_json=json.dumps(actions),
+        )
+        if self._cancelled:
+            return Outcome(ending=Ending.CANCELED, result=result)
+        return Outcome(ending=Ending.ABORTED if why else Ending.SUCCEEDED, result=result)
+
+    def _code(self, last: Event, why: str) -> int:
+        if self._cancelled or why.endswith("cancelled on request"):
+            return int(Result.CANCELLED)
+        if not why:
+            return int(Result.OK)
+        if last["event"] == "rejected":
+            if why.startswith(_BUSY):
+                return int(Result.BUSY)
+            return int(Result.INVALID_PLAN if self._of_plan else Result.REJECTED)
+        return int(Result.LOST if why.startswith("lost") else Result.ABORTED)
+
+
+def _refused(code: int, why: str) -> Outcome:
+    return Outcome(ending=Ending.ABORTED, result=Result(error_code=code, error=why))

@@ -1,0 +1,195 @@
+"""Serve FollowJointTrajectory as joint_trajectory_controller does, one server for each group."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from control_msgs.action import FollowJointTrajectory
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from drivers.clock import NS_PER_S
+from vla_deploy.client.readiness import refusal_of
+from vla_deploy.gateways.ros.inward.claiming import Claimed
+from vla_deploy.gateways.ros.inward.motions import Ended, JointView, Motions
+from vla_deploy.gateways.ros.inward.pursuing import Begin, Ending, Feedback, Outcome
+from vla_deploy.gateways.ros.inward.trajectory_goal import (
+    GoalRefused,
+    Result,
+    TrajectoryGoal,
+    judged_goal,
+)
+from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.ipc.errors import BadPayload
+
+FEEDBACK_HZ: Final = 20.0
+GOAL_TOLERANCE: Final = 0.05
+"""Where a goal names none, in rad, or in m for a finger: what the arms hold under their weight."""
+
+
+def _outcome(ending: Ending, code: int, text: str = "") -> Outcome:
+    return Outcome(ending=ending, result=Result(error_code=code, error_string=text))
+
+
+class TrajectoryServer:
+    """Judge the goals for some joints, and begin those that are sound."""
+
+    def __init__(
+        self,
+        gateway: Gateway,
+        motions: Motions,
+        name: str,
+        joints: Sequence[str],
+        *,
+        partial: bool = False,
+    ) -> None:
+        self.joints = tuple(joints)
+        self._gateway = gateway
+        self._motions = motions
+        self._name = name
+        self._partial = partial
+        self._claim: Claimed | None = None
+
+    def judge(self, goal: Any) -> Begin | Outcome:
+        """Return how to begin with a goal, or why not at all."""
+        try:
+            sound = judged_goal(
+                goal,
+                self.joints,
+                partial=self._partial,
+                time=self._gateway.time,
+                goal_tolerance=GOAL_TOLERANCE,
+            )
+        except GoalRefused as error:
+            return _outcome(Ending.ABORTED, error.code, str(error))
+        why = refusal_of(self._gateway.control_status())
+        if why:
+            return _outcome(Ending.ABORTED, Result.INVALID_GOAL, why)
+        return lambda feedback: self._begin(sound, feedback)
+
+    def _begin(self, goal: TrajectoryGoal, feedback: Feedback) -> "Following | Outcome":
+        groups = [
+            name
+            for name, group in self._gateway.robot.groups.items()
+            if set(group.joints) & set(goal.joints)
+        ]
+        if self._claim is not None:
+            self._claim.release()
+        self._claim = Claimed(self._gateway.link, f"ros/{self._name}", groups)
+        why = self._claim.why_not_taken()
+        if why:
+            return _outcome(Ending.ABORTED, Result.INVALID_GOAL, why)
+        return Following(self._gateway, self._motions, goal, feedback, self._claim)
+
+
+class Following:
+    """Pursue one trajectory: wait for its start, watch its tolerances, settle at its end."""
+
+    def __init__(
+        self,
+        gateway: Gateway,
+        motions: Motions,
+        goal: TrajectoryGoal,
+        feedback: Feedback,
+        claim: Claimed,
+    ) -> None:
+        self._gateway = gateway
+        self._motions = motions
+        self._goal = goal
+        self._feedback = feedback
+        self._claim = claim
+        self._due = Due(FEEDBACK_HZ)
+        self._motion_id: int | None = None
+        self._settle_by_ns: int | None = None
+        self._ends_as: tuple[Ending, int, str] | None = None
+
+    def step(self, now_ns: int) -> Outcome | None:
+        """Go on; return the outcome once there is one."""
+        view = self._motions.look(self._goal.joints)
+        if self._motion_id is None:
+            return None if view is None else self._start(view, now_ns)
+        ended = self._motions.ended(self._motion_id)
+        if ended is not None and (self._ends_as is not None or ended.status != "done"):
+            return self._finish(*self._ending_of(ended))
+        if view is None:
+            return None
+        if ended is not None:
+            self._settle_by_ns = now_ns + round(self._goal.goal_time_s * NS_PER_S)
+        if self._settle_by_ns is not None:
+            return self._settle(view, now_ns)
+        if self._due.is_now(now_ns):
+            self._feedback(self._told(view))
+        self._watch(view)
+        return None
+
+    def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
+        """End it; control ramps its joints to rest, or its successor takes them over."""
+        code = Result.INVALID_GOAL if superseded else Result.SUCCESSFUL
+        if superseded and self._motion_id is not None:
+            self._motions.forget(self._motion_id)
+        if superseded or self._motion_id is None or self._settle_by_ns is not None:
+            return self._finish(Ending.CANCELED, code, reason, keep_claim=superseded)
+        self._ends_as = (Ending.CANCELED, code, reason)
+        self._motions.cancel(self._motion_id)
+        return None
+
+    def _start(self, view: JointView, now_ns: int) -> Outcome | None:
+        goal = self._goal
+        if now_ns < goal.start_ns:
+            return None
+        times_s, positions = goal.times_s, goal.positions
+        if times_s[0] > 0.0:  # control wants the way from where the joints are held
+            times_s = np.concatenate([[0.0], times_s])
+            positions = np.concatenate([view.setpoint[None], positions])
+        try:
+            self._motion_id = self._motions.follow(goal.joints, times_s, positions)
+        except BadPayload as error:
+            return self._finish(Ending.ABORTED, Result.INVALID_GOAL, f"too long: {error}")
+        return None
+
+    def _watch(self, view: JointView) -> None:
+        """End a motion that has left its path; its end is told when the joints rest."""
+        error = np.abs(view.setpoint - view.position)
+        if self._ends_as is None and (error > self._goal.path_tolerance).any():
+            self._ends_as = (
+                Ending.ABORTED,
+                Result.PATH_TOLERANCE_VIOLATED,
+                self._exceeded(error, self._goal.path_tolerance, "off its path"),
+            )
+            self._motions.cancel(self._motion_id or 0)
+
+    def _settle(self, view: JointView, now_ns: int) -> Outcome | None:
+        error = np.abs(self._goal.positions[-1] - view.position)
+        if (error <= self._goal.goal_tolerance).all():
+            return self._finish(Ending.SUCCEEDED, Result.SUCCESSFUL, "")
+        if now_ns < (self._settle_by_ns or 0):
+            return None
+        text = self._exceeded(error, self._goal.goal_tolerance, "off its goal")
+        return self._finish(Ending.ABORTED, Result.GOAL_TOLERANCE_VIOLATED, text)
+
+    def _ending_of(self, ended: Ended) -> tuple[Ending, int, str]:
+        if self._ends_as is not None:
+            return self._ends_as
+        text = f"{ended.status}: {ended.reason}" if ended.reason else ended.status
+        refused = ended.status == "refused"
+        code = Result.INVALID_GOAL if refused else Result.PATH_TOLERANCE_VIOLATED
+        return Ending.ABORTED, code, text
+
+    def _finish(self, ending: Ending, code: int, text: str, *, keep_claim: bool = False) -> Outcome:
+        if not keep_claim:
+            self._claim.release()
+        return _outcome(ending, code, text)
+
+    def _exceeded(self, error: Any, tolerance: Any, what: str) -> str:
+        worst = int(np.argmax(error - tolerance))
+        joint = self._goal.joints[worst]
+        return f"{joint} is {error[worst]:.4f} {what}, tolerance {tolerance[worst]:.4f}"
+
+    def _told(self, view: JointView) -> Any:
+        message = FollowJointTrajectory.Feedback(joint_names=list(self._goal.joints))
+        message.header.stamp = self._gateway.time.stamp(view.stamp_ns)
+        message.desired = JointTrajectoryPoint(positions=view.setpoint.tolist())
+        message.actual = JointTrajectoryPoint(
+            positions=view.position.tolist(), velocities=view.velocity.tolist()
+        )
+        message.error = JointTrajectoryPoint(positions=(view.setpoint - view.position).tolist())
+        return message

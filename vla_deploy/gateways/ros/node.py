@@ -1,0 +1,100 @@
+"""Run the gateway: parts that tell, parts that take, and a word about how it is."""
+
+import logging
+from collections import Counter
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Final
+
+from vla_deploy.client.link import RobotLink
+from vla_deploy.gateways.ros.graph import Graph
+from vla_deploy.gateways.ros.inward.parts import inward_parts
+from vla_deploy.gateways.ros.outward.parts import outward_parts
+from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
+from vla_deploy.gateways.ros.stamps import RosTime
+from vla_deploy.ipc import CellWriter
+from vla_deploy.node import NodeContext
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.ros_settings import Accepts
+
+SOURCE: Final = "ros"
+STATUS_TOPIC: Final = "ros_status"
+_TELL_HZ: Final = 2.0
+_MOST_RATE_HZ: Final = 100.0
+_TOLD_FAILURES: Final = frozenset({1, 10, 100, 1000, 10_000})
+_log = logging.getLogger(__name__)
+
+
+class RosGatewayNode:
+    """Step every part at the rate of the fastest, and tell twice a second how things are."""
+
+    def __init__(self, context: NodeContext) -> None:
+        self._context = context
+        self._robot = load_robot(context.robot)
+        settings = self._robot.ros
+        rate_hz = max(settings.joint_state_rate_hz, settings.odometry_rate_hz, 20.0)
+        self.period_s = 1.0 / min(rate_hz, _MOST_RATE_HZ)
+        self._link = RobotLink(context.run_dir, context.clock, source=SOURCE, robot=context.robot)
+        self._time = RosTime(context.clock)
+        self._parts: Sequence[GatewayPart] = ()
+        self._failures: Counter[str] = Counter()
+        self._tell_due = Due(_TELL_HZ)
+        self._graph: Graph | None = None
+        self._status: CellWriter
+
+    def start(self) -> None:
+        """Join the graph."""
+        self._status = self._link.space.cell_writer(STATUS_TOPIC)
+        self._graph = Graph()
+        gateway = Gateway(
+            graph=self._graph,
+            link=self._link,
+            time=self._time,
+            robot=self._robot,
+            settings=self._robot.ros,
+        )
+        self._parts = (*outward_parts(gateway), *inward_parts(gateway))
+        self._graph.begin()
+        accept = self._robot.ros.accept
+        if accept is not Accepts.ALL:
+            _log.info("what may be commanded over ROS: %s", accept.value)
+
+    def step(self) -> None:
+        """Handle what came in, then step every part."""
+        if self._graph is None:
+            return
+        self._time.refresh()
+        self._guarded("inbox", self._graph.take)
+        for part in self._parts:
+            self._guarded(type(part).__name__, partial(part.step, self._context.clock.now_ns()))
+        if self._tell_due.is_now(self._context.clock.now_ns()):
+            self._tell(self._graph)
+
+    def stop(self) -> None:
+        """End what is under way for the graph, tell it why, and leave."""
+        for part in self._parts:
+            part.stop()
+        if self._graph is not None:
+            self._graph.close()
+        self._link.close()
+
+    def _tell(self, graph: Graph) -> None:
+        node = graph.node
+        self._status.put_document(
+            {
+                "node": node.get_fully_qualified_name(),
+                "domain_id": node.context.get_domain_id(),
+                "accept": self._robot.ros.accept.value,
+                "simulated_time": self._time.is_simulated,
+                "dropped": graph.dropped,
+                "failures": dict(self._failures),
+            }
+        )
+
+    def _guarded(self, name: str, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception:  # this process' main loop: a broken part does not take the others
+            self._failures[name] += 1
+            if self._failures[name] in _TOLD_FAILURES:
+                _log.exception("%s has failed %d times", name, self._failures[name])

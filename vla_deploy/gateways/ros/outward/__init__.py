@@ -1,0 +1,1 @@
+"""Tell the ROS graph what the robot knows."""

@@ -1,0 +1,186 @@
+"""Tell joints, odometry and frames: /joint_states, /odom, /tf, /tf_static, /robot_description."""
+
+import math
+from array import array
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion, TransformStamped
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
+
+from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
+from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.gateways.ros.planar import inverse, joined, planar_of
+from vla_deploy.ipc import Sample
+from vla_deploy.robots.frame_tree import FrameTransform, FrameTree
+from vla_deploy.robots.urdf import urdf_of
+
+MAP: Final = "map"
+ODOM: Final = "odom"
+BASE: Final = "base_link"
+_TOLD_AGE_S: Final = 0.5
+_JOINT_AGE_S: Final = 0.25
+# Of wheel odometry, per metre and per radian driven, as REP-105 leaves to the robot: what the pose
+# filter reckons with is of the map; this says only that z, roll and pitch are not measured.
+_UNMEASURED: Final = 1e6
+
+
+class Frames:
+    """Publish the body's frames: the fixed ones once, the moving ones with every look.
+
+    Messages are filled in place: to make twenty anew, fifty times a second, costs as much as all
+    the rest.
+    """
+
+    def __init__(self, gateway: Gateway) -> None:
+        graph, robot = gateway.graph, gateway.robot
+        self._time = gateway.time
+        self._tree = FrameTree.of(robot)
+        self._names = robot.joint_names
+        self._moving = graph.publisher(TFMessage, "/tf", RELIABLE)
+        self._fixed = graph.publisher(TFMessage, "/tf_static", LATCHED)
+        self._description = graph.publisher(String, "/robot_description", LATCHED)
+        self._description.publish(String(data=urdf_of(robot)))
+        stamp = self._time.now()
+        self._fixed.publish(TFMessage(transforms=[_of(one, stamp) for one in self._tree.fixed]))
+        self._body = [_named(*one[:2]) for one in self._tree.transforms({})]
+        self._odom, self._map = _named(ODOM, BASE), _named(MAP, ODOM)
+
+    def tell(self, joints: Sample | None, base: Sample | None, pose: Sample | None) -> None:
+        """Publish where everything is, in one message."""
+        told = []
+        if joints is not None:
+            values = joints.data["position"][: len(self._names)].tolist()
+            found = self._tree.transforms(dict(zip(self._names, values, strict=True)))
+            stamp = self._time.stamp(joints.stamp_ns)
+            for message, one in zip(self._body, found, strict=True):
+                _fill(message, stamp, one.xyz, one.quaternion)
+            told += self._body
+        if base is not None:
+            odom, stamp = planar_of(base), self._time.stamp(base.stamp_ns)
+            _fill(self._odom, stamp, *_place(*odom))
+            told.append(self._odom)
+            if pose is not None:
+                _fill(self._map, stamp, *_place(*joined(planar_of(pose), inverse(odom))))
+                told.append(self._map)
+        if told:
+            self._moving.publish(TFMessage(transforms=told))
+
+
+class Body:
+    """Tell joints and odometry at their rates, and with odometry the frames."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        graph, settings = gateway.graph, gateway.settings
+        self._gateway = gateway
+        self._names = list(gateway.robot.joint_names)
+        self._stall_nm = _stall_torque(gateway)
+        self._joints = graph.publisher(JointState, "/joint_states", RELIABLE)
+        self._odometry = graph.publisher(Odometry, "/odom", SENSOR)
+        self._frames = Frames(gateway)
+        self._clock = (
+            graph.publisher(ClockMessage, "/clock", SENSOR) if gateway.time.is_simulated else None
+        )
+        self._joints_due = Due(settings.joint_state_rate_hz)
+        self._odometry_due = Due(settings.odometry_rate_hz)
+
+    def step(self, now_ns: int) -> None:
+        """Tell what is due."""
+        if self._clock is not None:
+            self._clock.publish(ClockMessage(clock=self._gateway.time.now()))
+        link = self._gateway.link
+        joints_due = self._joints_due.is_now(now_ns)
+        odometry_due = self._odometry_due.is_now(now_ns)
+        joints = link.fresh("joint_state", _JOINT_AGE_S) if joints_due or odometry_due else None
+        if joints_due and joints is not None:
+            self._tell_joints(joints)
+        if odometry_due:
+            base = link.fresh("base_state", _TOLD_AGE_S)
+            if base is not None:
+                self._tell_odometry(base)
+            self._frames.tell(joints, base, link.fresh("pose", _TOLD_AGE_S))
+
+    def stop(self) -> None:
+        """Leave nothing under way."""
+
+    def _tell_joints(self, sample: Sample) -> None:
+        count, data = len(self._names), sample.data
+        message = JointState()
+        message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
+        message.name = self._names
+        message.position = array("d", data["position"][:count].tobytes())
+        message.velocity = array("d", data["velocity"][:count].tobytes())
+        effort = data["effort_ratio"][:count].astype(np.float64) * self._stall_nm
+        message.effort = array("d", effort.tobytes())
+        self._joints.publish(message)
+
+    def _tell_odometry(self, sample: Sample) -> None:
+        data = sample.data
+        x_m, y_m, yaw_rad = planar_of(sample)
+        message = Odometry(child_frame_id=BASE)
+        message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
+        message.header.frame_id = ODOM
+        position = message.pose.pose.position
+        position.x, position.y = x_m, y_m
+        message.pose.pose.orientation = _turned(yaw_rad)
+        message.twist.twist.linear.x = float(data["v_m_s"])
+        message.twist.twist.angular.z = float(data["w_rad_s"])
+        message.pose.covariance = message.twist.covariance = _COVARIANCE
+        self._odometry.publish(message)
+
+
+def _covariance() -> np.ndarray:
+    diagonal = [1e-3, 1e-3, _UNMEASURED, _UNMEASURED, _UNMEASURED, 3e-3]
+    return np.diag(diagonal).ravel()
+
+
+_COVARIANCE: Final = _covariance()
+
+
+def _stall_torque(gateway: Gateway) -> np.ndarray:
+    """Return what each joint's effort ratio is of, in N m, or in N for a finger."""
+    robot = gateway.robot
+    return np.array(
+        [
+            robot.model_of(servo.joint).stall_torque_nm / servo.travel_per_rad
+            for servo in robot.servo_bus.servos
+        ]
+    )
+
+
+def _place(
+    x_m: float, y_m: float, yaw_rad: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    half = yaw_rad / 2.0
+    return (x_m, y_m, 0.0), (0.0, 0.0, math.sin(half), math.cos(half))
+
+
+def _turned(yaw_rad: float) -> Quaternion:
+    return Quaternion(z=math.sin(yaw_rad / 2.0), w=math.cos(yaw_rad / 2.0))
+
+
+def _named(parent: str, child: str) -> TransformStamped:
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id = parent
+    return message
+
+
+def _of(frame: FrameTransform, stamp: Time) -> TransformStamped:
+    message = _named(frame.parent, frame.child)
+    _fill(message, stamp, frame.xyz, frame.quaternion)
+    return message
+
+
+def _fill(
+    message: TransformStamped, stamp: Time, xyz: Sequence[float], quaternion: Sequence[float]
+) -> None:
+    message.header.stamp = stamp
+    translation, rotation = message.transform.translation, message.transform.rotation
+    translation.x, translation.y, translation.z = xyz
+    rotation.x, rotation.y, rotation.z, rotation.w = quaternion

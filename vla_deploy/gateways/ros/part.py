@@ -1,0 +1,56 @@
+"""Say what the parts of the gateway share: graph, robot, time, settings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from vla_deploy.client.link import RobotLink
+from vla_deploy.gateways.ros.graph import Graph
+from vla_deploy.gateways.ros.stamps import RosTime
+from vla_deploy.robots import RobotDescription
+from vla_deploy.robots.ros_settings import RosSettings
+
+_STATUS_AGE_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gateway:
+    """Hand each part what it works with."""
+
+    graph: Graph
+    link: RobotLink
+    time: RosTime
+    robot: RobotDescription
+    settings: RosSettings
+
+    def control_status(self) -> Mapping[str, Any] | None:
+        """Return how control is, or None where it is silent."""
+        return self.link.document("control_status", _STATUS_AGE_S)
+
+
+class GatewayPart(Protocol):
+    """Do one thing for the graph; steps are called at the gateway's pace."""
+
+    def step(self, now_ns: int) -> None:
+        """Tell or handle what is due."""
+        ...
+
+    def stop(self) -> None:
+        """End what is under way, with a reason."""
+        ...
+
+
+class Due:
+    """Tell at a steady pace whether something is due; a missed time is left out."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_ns = round(1e9 / rate_hz) if rate_hz > 0 else 0
+        self._at_ns = 0
+
+    def is_now(self, now_ns: int) -> bool:
+        """Tell whether it is due, at most once for each time."""
+        if self._period_ns == 0 or now_ns < self._at_ns:
+            return False
+        # A step that comes a little late does not move those after it.
+        self._at_ns = max(self._at_ns + self._period_ns, now_ns - self._period_ns // 2)
+        return True

@@ -1,0 +1,82 @@
+"""Declare how a robot takes part in a ROS 2 graph: the `[ros]` table of the robot file."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+from vla_deploy.robots.schema import NUMBER, OPTIONAL_TEXT, Check, Shape, is_number, one_of
+
+
+class Accepts(StrEnum):
+    """Name what may be commanded over ROS."""
+
+    NOTHING = "off"
+    STOP = "stop"
+    ALL = "all"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RosSettings:
+    """Say whether the gateway runs, in which environment, and what may be commanded through it.
+
+    `python` is an interpreter or an environment's folder, `workspace` a colcon workspace on top of
+    ROS; empty ones are looked for. No `domain_id` is ROS_DOMAIN_ID, else 0; `discovery` is
+    ROS_AUTOMATIC_DISCOVERY_RANGE. A robot whose `navigation` is "nav2" drives by a
+    `navigate_to_pose` server, and one whose `arms` are "follow_joint_trajectory" moves them by
+    servers of that action: both not the robot's own.
+    """
+
+    enabled: bool = False
+    accept: Accepts = Accepts.ALL
+    domain_id: int | None = None
+    discovery: str = "localhost"
+    python: str = ""
+    workspace: str = ""
+    cmd_vel_stamped: bool = False
+    joint_state_rate_hz: float = 50.0
+    odometry_rate_hz: float = 50.0
+    image_rate_hz: float = 5.0
+    navigation: str = "own"
+    arms: str = "own"
+
+
+UNUSED: Final = RosSettings()
+_OWN: Final = "own"
+NAV2: Final = "nav2"
+FOLLOW_JOINT_TRAJECTORY: Final = "follow_joint_trajectory"
+_FLAG: Final = one_of(False, True, is_optional=True)
+
+
+def _number(low: float, high: float, unit: str) -> Check:
+    return Check(
+        expected=f"a number in {low:g}..{high:g} {unit}",
+        holds=lambda value: is_number(value) and low <= value <= high,
+        is_optional=True,
+    )
+
+
+ROS: Final[Shape] = {
+    "enabled": _FLAG,
+    "accept": one_of(*(one.value for one in Accepts), is_optional=True),
+    # Domains above 101 meet the ports that Linux hands out by itself.
+    "domain_id": Check(
+        expected="an integer in 0..101",
+        holds=lambda value: isinstance(value, int) and NUMBER.holds(value) and 0 <= value <= 101,
+        is_optional=True,
+    ),
+    "discovery": one_of("localhost", "subnet", "off", "system_default", is_optional=True),
+    "python": OPTIONAL_TEXT,
+    "workspace": OPTIONAL_TEXT,
+    "cmd_vel_stamped": _FLAG,
+    "joint_state_rate_hz": _number(1, 250, "Hz"),
+    "odometry_rate_hz": _number(1, 100, "Hz"),
+    "image_rate_hz": _number(0, 30, "Hz"),
+    "navigation": one_of(_OWN, NAV2, is_optional=True),
+    "arms": one_of(_OWN, FOLLOW_JOINT_TRAJECTORY, is_optional=True),
+}
+
+
+def ros_settings(row: dict[str, object]) -> RosSettings:
+    """Return the settings of a `[ros]` table that has no faults."""
+    settings = RosSettings(**row)  # type: ignore[arg-type]  # checked by the shape `ROS`
+    return replace(settings, accept=Accepts(settings.accept))
