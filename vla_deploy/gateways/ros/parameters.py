@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import yaml
 
@@ -51,14 +51,14 @@ class RosParameter:
             return f"{_KINDS[type(self.default)]} in {self.low:g}..{self.high:g}"
         return _KINDS[type(self.default)]
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: object) -> bool:
         """Return whether a value is of the parameter's type and within its bounds."""
         kind = type(self.default)
         if not (type(value) is kind or (kind is float and type(value) is int)):
             return False
-        if kind is list:
+        if isinstance(value, list):
             return all(isinstance(one, str) for one in value)
-        if self.low is not None and self.high is not None:
+        if isinstance(value, int | float) and self.low is not None and self.high is not None:
             return self.low <= value <= self.high
         return not self.choices or value in self.choices
 
@@ -142,8 +142,11 @@ def handed_over_parameters(inherited: Mapping[str, str] = os.environ) -> dict[st
     known = [(declared[name], value) for name, value in values.items() if name in declared]
     if faults := [fault for parameter, value in known if (fault := _fault(parameter, value))]:
         raise ParametersUnusable(f"{file}: {'; '.join(faults)}")
-    as_numbers = {one.name: float(value) for one, value in known if isinstance(one.default, float)}
-    return {**values, **as_numbers}
+    return values | {
+        one.name: float(value)
+        for one, value in known
+        if isinstance(value, int) and isinstance(one.default, float)
+    }
 
 
 def _read(file: Path) -> dict[str, object]:
