@@ -14,6 +14,7 @@ LITTLE = {
     "msg/Speed.msg": "float64 value\n",
     "msg/Axes.msg": "Speed[] speeds\nstd_msgs/Header header\n",
 }
+TINY = {"msg/Speed.msg": "float64 value\n"}
 
 USE = """
 import importlib, json, sys
@@ -80,7 +81,7 @@ def test_what_is_built_is_imported_and_sent(define, build, ros_graph, tmp_path) 
 
 
 def test_it_is_built_anew_when_a_definition_changes_and_not_before(define, build, tmp_path) -> None:
-    package = define()
+    package = define(files=TINY)
     first, again = build(package), build(package)
     assert "built in" in first.stdout
     assert "up to date" in again.stdout
@@ -95,7 +96,7 @@ def test_it_is_built_anew_when_a_definition_changes_and_not_before(define, build
 def test_a_build_that_is_killed_leaves_nothing_that_looks_whole(
     define, build, command, ros_graph, tmp_path
 ) -> None:
-    package = define()
+    package = define(files=TINY)
     process = subprocess.Popen(
         [*command, str(package)],
         env={**ros_graph.variables, "PYTHONPATH": str(ROOT / "ros")},
@@ -112,7 +113,7 @@ def test_a_build_that_is_killed_leaves_nothing_that_looks_whole(
 
 
 def test_two_at_a_time_build_once(define, command, ros_graph) -> None:
-    package = define()
+    package = define(files=TINY)
     both = [
         subprocess.Popen(
             [*command, str(package)],
@@ -174,7 +175,9 @@ def test_what_the_compiler_says_is_told(define, build, tmp_path) -> None:
     compiler.chmod(0o755)
     found = shutil.which("g++")
     assert found
-    done = build(define(), PATH=f"{compiler.parent}:{Path(found).parent}:{os.environ['PATH']}")
+    done = build(
+        define(files=TINY), PATH=f"{compiler.parent}:{Path(found).parent}:{os.environ['PATH']}"
+    )
     assert done.returncode == 1
     assert "ended with 3:\nout of luck" in done.stderr
     assert not list(tmp_path.glob("built/*/little_msgs"))
