@@ -40,9 +40,7 @@ class Client(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         # On the twin, time is the twin's.
-        super().__init__(
-            "somebody", parameter_overrides=[Parameter("use_sim_time", value=True)]
-        )
+        super().__init__("somebody", parameter_overrides=[Parameter("use_sim_time", value=True)])
         self.joints: dict[str, float] = {}
         self._action_clients: dict[str, ActionClient] = {}
         self.speed_m_s = self.turn_rad_s = self.x_m = self.y_m = 0.0

@@ -9,6 +9,7 @@ import pytest
 
 from drivers.clock import NS_PER_S
 from sim_twin.process_stack import ProcessStack
+from vla_deploy.gateways.ros.shared_memory import find_leftovers
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]
 
@@ -141,11 +142,13 @@ def test_a_killed_gateway_leaves_a_safe_robot_comes_back_and_leaves_nothing_behi
     assert robot.wait_until(lambda: abs(base()["v_m_s"]) < 0.01)
     sender.kill()
     assert robot.wait_until(
-        lambda: robot.row("ros")["pid"] not in (None, gateway)
-        and robot.row("ros")["state"] == "ready"
+        lambda: (
+            robot.row("ros")["pid"] not in (None, gateway) and robot.row("ros")["state"] == "ready"
+        )
     )
     assert robot.state() == "armed"
     assert robot.document("control_status")["late_ticks"] == late
+    assert find_leftovers() == ()
     assert client("grippers")["classic"]["status"] == "succeeded"
 
 

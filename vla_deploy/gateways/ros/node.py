@@ -11,6 +11,7 @@ from vla_deploy.gateways.ros.graph import Graph
 from vla_deploy.gateways.ros.inward.parts import inward_parts
 from vla_deploy.gateways.ros.outward.parts import outward_parts
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
+from vla_deploy.gateways.ros.shared_memory import remove_leftovers
 from vla_deploy.gateways.ros.stamps import RosTime
 from vla_deploy.ipc import CellWriter
 from vla_deploy.node import NodeContext
@@ -45,6 +46,8 @@ class RosGatewayNode:
     def start(self) -> None:
         """Join the graph."""
         self._status = self._link.space.cell_writer(STATUS_TOPIC)
+        for leftover in remove_leftovers():
+            _log.info("removed %s, which a killed process of ROS has left", leftover.name)
         self._graph = Graph()
         gateway = Gateway(
             graph=self._graph,
