@@ -6,8 +6,8 @@ from typing import Final, Protocol
 
 from fastapi import FastAPI
 
+from vla_deploy.client.command_history import CommandHistory
 from vla_deploy.dashboard.alarms.part import alarm_desk
-from vla_deploy.dashboard.commands.history import CommandHistory
 from vla_deploy.dashboard.live import live
 from vla_deploy.dashboard.metering import metering
 

@@ -12,13 +12,13 @@ body would hit above or below it. To every other reader of the format both are o
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,6 +37,9 @@ MOST_CELLS: Final = 25_000_000
 MOST_ORIGIN_M: Final = 100_000.0
 UNKNOWN: Final = -1
 _RAW_MOST: Final = 100
+# A binary PGM of eight bits: comments may stand between all that its head holds.
+_GAP: Final = rb"(?:\s|#[^\n]*\n)+"
+_PGM: Final = re.compile(rb"P5" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"255\s")
 _SWITCH: Final = {"0": False, "1": True, "false": False, "true": True, "no": False, "yes": True}
 
 
@@ -186,15 +189,47 @@ def _read_shades(path: Path) -> Shades:
     expected = f"{path}: expected a grey image"
     if not path.is_file():
         raise MapInvalid(f"{expected}, found no such file")
+    image = _read_pgm(path)
+    if image is None:
+        image = _read_by_opencv(path, expected)
+    if image.size > MOST_CELLS:
+        raise MapInvalid(f"{path}: expected at most {MOST_CELLS} cells, got {image.size}")
+    return np.asarray(image, dtype=np.uint8)
+
+
+def _read_pgm(path: Path) -> Shades | None:
+    """Return the shades of a whole binary PGM of eight bits, None for any other file.
+
+    It needs no OpenCV, which the Python of ROS need not have.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None  # OpenCV says in its words what is wrong
+    head = _PGM.match(content)
+    if head is None:
+        return None
+    width, height = int(head[1]), int(head[2])
+    if width * height == 0 or len(content) - head.end() < width * height:
+        return None
+    shades = np.frombuffer(content, np.uint8, width * height, head.end())
+    return shades.reshape(height, width).copy()
+
+
+def _read_by_opencv(path: Path, expected: str) -> Shades:
+    try:
+        import cv2
+    except ImportError as error:
+        raise MapInvalid(
+            f"{path}: expected a binary PGM of eight bits: this Python has no OpenCV to read others"
+        ) from error
     try:
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     except cv2.error as error:
         raise MapInvalid(f"{expected}, found one that cannot be read: {error}") from error
     if image is None or image.size == 0:
         raise MapInvalid(f"{expected}, found one that cannot be read")
-    if image.size > MOST_CELLS:
-        raise MapInvalid(f"{path}: expected at most {MOST_CELLS} cells, got {image.size}")
-    if _has_transparent_cells(path):
+    if _has_transparent_cells(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)):
         raise MapInvalid(
             f"{expected}, found transparent cells, whose shade means nothing: draw what is unknown "
             f"in the shade {UNKNOWN_SHADE}, and without transparency"
@@ -202,9 +237,8 @@ def _read_shades(path: Path) -> Shades:
     return np.asarray(image, dtype=np.uint8)
 
 
-def _has_transparent_cells(path: Path) -> bool:
+def _has_transparent_cells(image: NDArray[Any] | None) -> bool:
     """Tell whether some cell shows what is behind the image; cv2 gives four channels then."""
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if image is None or image.ndim < 3 or image.shape[2] < 4:
         return False
     opaque = np.iinfo(image.dtype).max

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -202,4 +204,37 @@ def test_transparent_cells_are_refused_and_opaque_ones_read(tmp_path: Path) -> N
     pixels[1, 2] = 0
     cv2.imwrite(str(tmp_path / "flat.png"), pixels)
     with pytest.raises(MapInvalid, match=r"found transparent cells.*in the shade 205"):
+        read_map_file(path)
+
+
+WITHOUT_OPENCV = """
+import sys
+import subprocess
+import sys
+from pathlib import Path
+sys.modules["cv2"] = None
+from vla_deploy.navigation.errors import MapInvalid
+from vla_deploy.navigation.map_file import read_map_file
+try:
+    print(read_map_file(Path(sys.argv[1])).shades.tolist())
+except MapInvalid as error:
+    print(error)
+"""
+
+
+def test_a_binary_pgm_is_read_without_opencv_and_others_are_refused(tmp_path: Path) -> None:
+    def read(path: Path) -> str:
+        words = [sys.executable, "-c", WITHOUT_OPENCV, str(path)]
+        return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+
+    path = lay_out(tmp_path)
+    assert read(path) == str(SHADES.tolist())
+    (tmp_path / "map.pgm").write_text("P2 1 1 255 7")
+    assert read(path).endswith("binary PGM of eight bits: this Python has no OpenCV to read others")
+
+
+def test_a_pgm_that_ends_too_early_is_refused(tmp_path: Path) -> None:
+    path = lay_out(tmp_path)
+    (tmp_path / "map.pgm").write_bytes(b"P5 400 300 255\n" + bytes(7))
+    with pytest.raises(MapInvalid, match="cannot be read"):
         read_map_file(path)

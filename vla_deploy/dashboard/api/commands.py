@@ -6,9 +6,9 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Path, Query, Request
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from vla_deploy.client.command_history import MOST_COMMANDS, CommandHistory
 from vla_deploy.client.command_record import CommandRecord
 from vla_deploy.dashboard.access import Role, note, require
-from vla_deploy.dashboard.commands.history import MOST_COMMANDS, CommandHistory
 from vla_deploy.dashboard.errors import Refused
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 

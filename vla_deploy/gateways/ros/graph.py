@@ -7,10 +7,11 @@ deals with the robot. A press of the stop does not wait for that.
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final, Protocol
 
 import rclpy
+from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rclpy.action import ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -26,6 +27,9 @@ from rclpy.task import Future
 NODE_NAME: Final = "vla_deploy"
 MOST_WAITING: Final = 256
 """Of what comes in between two steps; what is more is dropped, and counted."""
+SOURCE: Final = "ros"
+_NAME_LETTERS: Final = 44
+_NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 _JOIN_S: Final = 2.0
 _log = logging.getLogger(__name__)
 
@@ -45,6 +49,12 @@ LATCHED: Final = QoSProfile(
 ANY: Final = QoSProfile(
     history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.BEST_EFFORT
 )
+
+
+def named(nodes: Iterable[str]) -> str:
+    """Return how a command from these nodes names its source."""
+    listed = ",".join(nodes)[:_NAME_LETTERS]
+    return f"{SOURCE}:{listed}" if listed else SOURCE
 
 
 class Publisher(Protocol):
@@ -100,6 +110,46 @@ class Graph:
     ) -> None:
         """Have each message of a topic taken in a step."""
         self.node.create_subscription(kind, topic, lambda got: self.put(lambda: take(got)), qos)
+
+    def hear(
+        self, kind: type, topic: str, take: Callable[[Any, str], None], qos: QoSProfile = RELIABLE
+    ) -> None:
+        """Have each message of a topic taken in a step, with who sent it."""
+
+        def receive(message: Any) -> None:
+            sender = self.sender(topic)  # now: whoever sends once may be gone in a moment
+            self.put(lambda: take(message, sender))
+
+        self.node.create_subscription(kind, topic, receive, qos)
+
+    def sender(self, topic: str) -> str:
+        """Return who publishes a topic beside us, for logs and the audit trail.
+
+        rclpy does not say which publisher a message came from: of several all are named.
+        """
+        try:
+            found = self.node.get_publishers_info_by_topic(topic)
+        except RuntimeError as error:  # rcl's errors; a press of the stop must not fail by a name
+            _log.warning("who publishes %s is not known: %s", topic, error)
+            return named(())
+        return named(self._others((one.node_name, one.node_namespace) for one in found))
+
+    def caller(self, service: str) -> str:
+        """Return who has a client of a service beside us: whoever called it is among them."""
+        callers = []
+        for name, namespace in self.node.get_node_names_and_namespaces():
+            try:
+                clients = self.node.get_client_names_and_types_by_node(name, namespace)
+            except (RuntimeError, NodeNameNonExistentError):
+                continue  # it has left the graph meanwhile
+            if any(one == service for one, _ in clients):
+                callers.append((name, namespace))
+        return named(self._others(callers))
+
+    def _others(self, nodes: Iterable[tuple[str, str]]) -> list[str]:
+        full = {f"{namespace.rstrip('/')}/{name}" for name, namespace in nodes}
+        own = self.node.get_fully_qualified_name()
+        return sorted(one for one in full if one != own and _NAMELESS not in one)
 
     def serve(self, kind: type, name: str, answer: Callable[[Any], Future]) -> None:
         """Have requests of a service answered by what the future holds that `answer` returns."""

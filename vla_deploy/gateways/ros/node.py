@@ -7,7 +7,9 @@ from functools import partial
 from typing import Final
 
 from vla_deploy.client.link import RobotLink
-from vla_deploy.gateways.ros.graph import Graph
+from vla_deploy.gateways.ros.commands import RobotCommands
+from vla_deploy.gateways.ros.feedback import CommandFeedback
+from vla_deploy.gateways.ros.graph import SOURCE, Graph
 from vla_deploy.gateways.ros.inward.parts import inward_parts
 from vla_deploy.gateways.ros.outward.parts import outward_parts
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
@@ -18,7 +20,6 @@ from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import Accepts
 
-SOURCE: Final = "ros"
 STATUS_TOPIC: Final = "ros_status"
 _TELL_HZ: Final = 2.0
 _MOST_RATE_HZ: Final = 100.0
@@ -55,6 +56,8 @@ class RosGatewayNode:
             time=self._time,
             robot=self._robot,
             settings=self._robot.ros,
+            commands=RobotCommands(self._link, self._time.now_ns),
+            feedback=CommandFeedback(self._graph),
         )
         self._parts = (*outward_parts(gateway), *inward_parts(gateway))
         self._graph.begin()

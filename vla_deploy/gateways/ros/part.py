@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from vla_deploy.client.link import RobotLink
+from vla_deploy.gateways.ros.commands import RobotCommands
+from vla_deploy.gateways.ros.feedback import CommandFeedback
 from vla_deploy.gateways.ros.graph import Graph
 from vla_deploy.gateways.ros.stamps import RosTime
 from vla_deploy.robots import RobotDescription
@@ -22,6 +24,8 @@ class Gateway:
     time: RosTime
     robot: RobotDescription
     settings: RosSettings
+    commands: RobotCommands
+    feedback: CommandFeedback
 
     def control_status(self) -> Mapping[str, Any] | None:
         """Return how control is, or None where it is silent."""

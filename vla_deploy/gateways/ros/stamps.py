@@ -36,6 +36,10 @@ class RosTime:
         """Return the present as a message's stamp."""
         return self.stamp(self.clock.now_ns())
 
+    def now_ns(self) -> int:
+        """Return the present in nanoseconds of ROS time."""
+        return self.clock.now_ns() + self._offset_ns
+
     def run_ns(self, stamp: Time) -> int:
         """Return a message's stamp as a moment of the run."""
         return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) - self._offset_ns

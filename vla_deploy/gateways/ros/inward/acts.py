@@ -26,6 +26,7 @@ _log = logging.getLogger(__name__)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Asked:
     act: str
+    service: str
     answer: Future
     deadline_ns: int
 
@@ -40,9 +41,9 @@ class Acts:
         self._presses = RobotLink(link.run_dir, link.clock, source=link.source, robot=link.robot)
         self._asked: list[_Asked] = []
         for act in acts:
-            graph.serve(Trigger, f"/vla_deploy/{act}", self._handler(act))
+            graph.serve(Trigger, f"/vla_deploy/{act}", self._handler(act, f"/vla_deploy/{act}"))
         if ESTOP in acts:
-            graph.serve(Trigger, EMERGENCY_STOP, self._handler(ESTOP))
+            graph.serve(Trigger, EMERGENCY_STOP, self._handler(ESTOP, EMERGENCY_STOP))
             graph.node.create_subscription(Bool, EMERGENCY_STOP, self._pressed, 10)
 
     def step(self, now_ns: int) -> None:
@@ -65,13 +66,13 @@ class Acts:
         self._asked.clear()
         self._presses.close()
 
-    def _handler(self, act: str) -> Callable[[Any], Future]:
+    def _handler(self, act: str, service: str) -> Callable[[Any], Future]:
         def handle(_request: Any) -> Future:
             answer = self._gateway.graph.future()
             if act == ESTOP:
-                self._press("the service of the ROS graph")
+                self._press(f"the service {service}", self._gateway.link.source)
             deadline_ns = self._gateway.link.clock.now_ns() + round(WAIT_S * NS_PER_S)
-            asked = _Asked(act=act, answer=answer, deadline_ns=deadline_ns)
+            asked = _Asked(act=act, service=service, answer=answer, deadline_ns=deadline_ns)
             if not self._gateway.graph.put(lambda: self._take(asked)):
                 answer.set_result(Trigger.Response(success=False, message="too many requests"))
             return answer
@@ -80,13 +81,15 @@ class Acts:
 
     def _take(self, asked: _Asked) -> None:
         if asked.act != ESTOP:
-            self._gateway.link.operate(asked.act, "over ROS")
+            caller = self._gateway.graph.caller(asked.service)
+            self._gateway.link.operate(asked.act, "over ROS", caller)
         self._asked.append(asked)
 
     def _pressed(self, message: Bool) -> None:
         if message.data:
-            self._press(f"the topic {EMERGENCY_STOP}")
+            sender = self._gateway.graph.sender(EMERGENCY_STOP)
+            self._press(f"the topic {EMERGENCY_STOP}", sender)
 
-    def _press(self, reason: str) -> None:
-        _log.warning("stop pressed: %s", reason)
-        self._presses.operate(ESTOP, reason)
+    def _press(self, reason: str, source: str) -> None:
+        self._presses.operate(ESTOP, reason, source)
+        _log.warning("stop pressed by %s: %s", source, reason)

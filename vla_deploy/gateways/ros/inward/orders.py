@@ -65,13 +65,22 @@ class Orders:
         self._events = link.events("task_event")
         self._orders: list[Order] = []
 
-    def give(self, *, text: str = "", plan: Any = None) -> Order:
+    def give(
+        self, *, text: str = "", plan: Any = None, source: str = "", is_answer: bool = False
+    ) -> Order:
         """Give a command in words, or a plan, to the planner.
+
+        `source` says who gives it, for logs and the audit trail; words that are an answer are no
+        command of their own.
 
         Raises:
             OrderRefused: it is longer than the planner takes.
         """
         utterance: dict[str, Any] = {"text": text} if plan is None else {"plan": plan}
+        if source:
+            utterance["source"] = source
+        if is_answer:
+            utterance["answer"] = True
         try:
             order = Order(self._link, self._link.utter(**utterance))
         except BadPayload as error:

@@ -8,12 +8,14 @@ from nav2_msgs.action import NavigateToPose
 from vla_deploy_msgs.action import ExecutePlan
 
 from vla_deploy.gateways.ros.inward.acts import Acts
+from vla_deploy.gateways.ros.inward.command_topics import CommandTopics
 from vla_deploy.gateways.ros.inward.grippers import gripper_desks
 from vla_deploy.gateways.ros.inward.motions import Motions
 from vla_deploy.gateways.ros.inward.navigation import NavigationServer
 from vla_deploy.gateways.ros.inward.orders import Orders
 from vla_deploy.gateways.ros.inward.plans import PlanServer
 from vla_deploy.gateways.ros.inward.pursuing import ActionDesk
+from vla_deploy.gateways.ros.inward.say_topic import SayTopic
 from vla_deploy.gateways.ros.inward.trajectories import TrajectoryServer
 from vla_deploy.gateways.ros.inward.velocity import Velocity
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
@@ -40,6 +42,8 @@ def inward_parts(gateway: Gateway) -> tuple[GatewayPart, ...]:
         Acts(gateway, ALL_ACTS),
         Velocity(gateway),
         Shared(motions, orders),
+        CommandTopics(gateway, orders),
+        SayTopic(gateway),
         *_trajectory_desks(gateway, motions),
         *gripper_desks(gateway, motions),
         ActionDesk(graph, NavigateToPose, "/navigate_to_pose", navigation.judge),

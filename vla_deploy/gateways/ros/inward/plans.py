@@ -7,6 +7,7 @@ from vla_deploy_msgs.action import ExecutePlan
 
 from vla_deploy.client.following import Event
 from vla_deploy.client.readiness import refusal_of
+from vla_deploy.gateways.ros.graph import named
 from vla_deploy.gateways.ros.inward.orders import (
     Order,
     OrderRefused,
@@ -15,6 +16,7 @@ from vla_deploy.gateways.ros.inward.orders import (
     parsed_plan,
 )
 from vla_deploy.gateways.ros.inward.pursuing import Begin, Ending, Feedback, Outcome
+from vla_deploy.gateways.ros.inward.words import shown
 from vla_deploy.gateways.ros.part import Gateway
 
 Result: Final = ExecutePlan.Result
@@ -52,11 +54,12 @@ class PlanServer:
             plan = parsed_plan(goal.plan_json) if goal.plan_json.strip() else None
         except OrderRefused as error:
             return _refused(Result.INVALID_PLAN, str(error))
-        return lambda feedback: self._begin(goal.command, plan, feedback)
+        source = named([shown(goal.source)] if goal.source else [])
+        return lambda feedback: self._begin(goal.command, plan, source, feedback)
 
-    def _begin(self, text: str, plan: Any, feedback: Feedback) -> "Carrying | Outcome":
+    def _begin(self, text: str, plan: Any, source: str, feedback: Feedback) -> "Carrying | Outcome":
         try:
-            order = self._orders.give(text=text, plan=plan)
+            order = self._orders.give(text=text, plan=plan, source=source)
         except OrderRefused as error:
             return _refused(Result.INVALID_PLAN, str(error))
         return Carrying(order, feedback, of_plan=plan is not None)

@@ -1,10 +1,38 @@
 """List what the gateway tells the graph."""
 
+from vla_deploy.gateways.ros.locator import Locator
 from vla_deploy.gateways.ros.outward.body import Body
+from vla_deploy.gateways.ros.outward.context_topics import ContextTopics
+from vla_deploy.gateways.ros.outward.environment_map import EnvironmentMap
+from vla_deploy.gateways.ros.outward.maps import StaticMap
+from vla_deploy.gateways.ros.outward.markers import SceneMarkers
+from vla_deploy.gateways.ros.outward.objects import SceneObjects
+from vla_deploy.gateways.ros.outward.planner_topics import PlannerTopics
+from vla_deploy.gateways.ros.outward.robot_events import EventsTopic
+from vla_deploy.gateways.ros.outward.robot_state import HealthTopic, StateTopic, SupplyTopic
 from vla_deploy.gateways.ros.outward.sensors import Images, Inertia, Scans
+from vla_deploy.gateways.ros.outward.voice import VoiceTopics
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
 
 
 def outward_parts(gateway: Gateway) -> tuple[GatewayPart, ...]:
-    """Return the parts that tell."""
-    return (Body(gateway), Scans(gateway), Inertia(gateway), Images(gateway))
+    """Return the parts that tell; the commands' news come first, since others read them."""
+    locator = Locator(gateway.link, gateway.robot)
+    return (
+        gateway.commands,
+        Body(gateway),
+        Scans(gateway),
+        Inertia(gateway),
+        Images(gateway),
+        StaticMap(gateway),
+        EnvironmentMap(gateway),
+        SceneObjects(gateway),
+        SceneMarkers(gateway, locator),
+        StateTopic(gateway),
+        SupplyTopic(gateway),
+        HealthTopic(gateway),
+        EventsTopic(gateway),
+        PlannerTopics(gateway, locator),
+        ContextTopics(gateway, locator),
+        VoiceTopics(gateway),
+    )

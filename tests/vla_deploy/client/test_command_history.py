@@ -2,13 +2,31 @@
 
 import pytest
 
+from drivers.clock import NS_PER_S
+from vla_deploy.client.command_history import MOST_COMMANDS, CommandHistory
 from vla_deploy.client.command_record import MOST_EVENTS
 from vla_deploy.client.link import RobotLink
-from vla_deploy.dashboard.commands.history import MOST_COMMANDS, CommandHistory
 from vla_deploy.ipc import SharedSpace
 
 PLAN = {"actions": [{"id": "a1", "skill": "wave", "parameters": {}}]}
 ACTION = {"action_id": "a1", "skill": "wave", "status": "active", "error": None, "retries": 0}
+
+
+class HandClock:
+    def __init__(self):
+        self.time_ns = 1000 * NS_PER_S
+
+    def now_ns(self):
+        return self.time_ns
+
+    def sleep_until(self, deadline_ns):
+        self.time_ns = max(self.time_ns, deadline_ns)
+
+    def pass_s(self, seconds):
+        self.time_ns += round(seconds * NS_PER_S)
+
+    def wall_ns(self):
+        return self.time_ns + 1_800_000_000 * NS_PER_S
 
 
 class Robot:
@@ -30,8 +48,8 @@ class Robot:
 
 
 @pytest.fixture
-def robot(tmp_path, hand_clock):
-    world = Robot(tmp_path / "run", hand_clock)
+def robot(tmp_path):
+    world = Robot(tmp_path / "run", HandClock())
     yield world
     world.history.stop()
     world.space.close()
@@ -145,3 +163,22 @@ def test_what_is_remembered_is_bounded(robot):
         robot.history.step()
     record = robot.history.find(ids[-1]).document()
     assert (len(record["events"]), record["lost_events"]) == (MOST_EVENTS, 600 - MOST_EVENTS)
+
+
+def test_a_follower_gets_each_new_event_with_its_command_and_none_of_before(robot):
+    before = robot.link.utter(text="wave")
+    robot.tell(before, "accepted")
+    followed = []
+    history = CommandHistory(
+        robot.link,
+        robot.clock.wall_ns,
+        follow=lambda record, event: followed.append((record.text, event["event"])),
+    )
+    robot.tell(before, "finished", success=True, error=None, actions=[])
+    robot.link.utter(text="nod")
+    history.step()
+    robot.clock.pass_s(5.5)
+    history.step()
+    assert followed == [("wave", "finished"), ("nod", "finished")]
+    assert history.find(before).given_s == pytest.approx(robot.clock.wall_ns() / 1e9 - 5.5)
+    history.stop()

@@ -1,4 +1,4 @@
-"""Remember the commands of every source and what became of them, for pages that come later."""
+"""Remember the commands of every source and what became of them, for those who come later."""
 
 import logging
 from collections import OrderedDict
@@ -20,6 +20,9 @@ _UNANSWERED: Final = (
 )
 _log = logging.getLogger(__name__)
 
+Follow = Callable[[CommandRecord, dict[str, Any]], None]
+"""Take a command's newest event, which the record holds already, with its moment `at_s`."""
+
 
 class CommandHistory:
     """Read the rings of commands and their events; what is still in them at the start counts.
@@ -27,7 +30,10 @@ class CommandHistory:
     A command that nobody works on any more ends here as `lost`: no command stays open for ever.
     """
 
-    def __init__(self, link: RobotLink, wall_ns: Callable[[], int]) -> None:
+    def __init__(
+        self, link: RobotLink, wall_ns: Callable[[], int], follow: Follow | None = None
+    ) -> None:
+        """Take what the rings hold; `follow` gets the events that come from now on."""
         self._link = link
         self._wall_ns = wall_ns
         self._utterances = link.events("utterance", from_start=True)
@@ -36,6 +42,9 @@ class CommandHistory:
         self._open: dict[str, Following] = {}
         self._lost = 0
         self._judge_due_ns = 0
+        self._follow: Follow | None = None
+        self.step()
+        self._follow = follow
 
     def step(self) -> None:
         """Take what is new, and look now and then for commands that nobody works on."""
@@ -97,6 +106,8 @@ class CommandHistory:
     def _finish(self, command_id: str, told: dict[str, Any], at_s: float) -> None:
         record = self._records[command_id]
         record.note(told, at_s)
+        if self._follow is not None:
+            self._follow(record, record.events[-1])
         if record.standing.is_final:
             self._open.pop(command_id, None)
 

@@ -1,0 +1,115 @@
+"""Follow the commands of every source, for the parts that tell the graph what becomes of them."""
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from vla_deploy.client.command_history import CommandHistory
+from vla_deploy.client.command_record import CommandRecord, Kind
+from vla_deploy.client.link import RobotLink
+
+MOST_RECENT: Final = 5
+"""Of the actions that ended last."""
+_FINAL: Final = frozenset({"succeeded", "cancelled", "aborted", "rejected", "lost"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandNews:
+    """Hold one event of a command, and the command as it stands since."""
+
+    record: CommandRecord
+    event: Mapping[str, Any]
+
+
+@dataclass(slots=True, kw_only=True)
+class _UnderWay:
+    text: str
+    plan: Mapping[str, Any]
+    statuses: dict[str, str]
+    has_begun: bool = False
+
+
+class RobotCommands:
+    """Hold the news of this step, the plan under way, and the actions that ended last."""
+
+    def __init__(self, link: RobotLink, ros_ns: Callable[[], int]) -> None:
+        """Begin now; `ros_ns` returns the present in ROS time."""
+        self.news: tuple[CommandNews, ...] = ()
+        self.recent: deque[dict[str, Any]] = deque(maxlen=MOST_RECENT)
+        self.has_succeeded: bool | None = None
+        self._ros_ns = ros_ns
+        self._ended_ns = 0
+        self._under_way: dict[str, _UnderWay] = {}
+        self._coming: list[CommandNews] = []
+        self._history = CommandHistory(link, ros_ns, self._follow)
+
+    @property
+    def ended_s(self) -> float:
+        """Return how long ago a command ended last."""
+        return (self._ros_ns() - self._ended_ns) / 1e9
+
+    @property
+    def text(self) -> str:
+        """Return what is under way in words, "" where nothing is."""
+        return "" if self._current is None else self._current.text
+
+    @property
+    def actions(self) -> Sequence[Mapping[str, Any]]:
+        """Return the actions of the plan under way."""
+        return () if self._current is None else self._current.plan["actions"]
+
+    @property
+    def statuses(self) -> Mapping[str, str]:
+        """Return how each action of the plan under way stands, by its id."""
+        return {} if self._current is None else self._current.statuses
+
+    @property
+    def actions_left(self) -> int:
+        """Return how many actions of the plan under way have not ended."""
+        return sum(status not in _FINAL for status in self.statuses.values())
+
+    def step(self, now_ns: int) -> None:
+        """Take what is new; `news` is of this step alone."""
+        self._history.step()
+        self.news, self._coming = tuple(self._coming), []
+
+    def stop(self) -> None:
+        """Close the topics."""
+        self._history.stop()
+
+    @property
+    def _current(self) -> _UnderWay | None:
+        """Return what the executor has begun; else what it was given."""
+        found = list(self._under_way.values())
+        return next((one for one in found if one.has_begun), found[0] if found else None)
+
+    def _follow(self, record: CommandRecord, event: dict[str, Any]) -> None:
+        self._coming.append(CommandNews(record=record, event=event))
+        name, command_id = event.get("event"), record.command_id
+        if name == "plan":
+            plan = event["plan"]
+            self._under_way[command_id] = _UnderWay(
+                text=record.text or str(plan["goal"]),
+                plan=plan,
+                statuses={one["id"]: "pending" for one in plan["actions"]},
+            )
+        elif name == "action":
+            self._note_action(command_id, event)
+        elif name in ("finished", "rejected") and record.kind is Kind.COMMAND:
+            self._end(command_id, event)
+
+    def _end(self, command_id: str, event: Mapping[str, Any]) -> None:
+        was_under_way = self._under_way.pop(command_id, None) is not None
+        success = bool(event.get("success"))
+        if was_under_way or not success:  # a stop succeeds, but completes nothing
+            self.has_succeeded, self._ended_ns = success, self._ros_ns()
+
+    def _note_action(self, command_id: str, event: Mapping[str, Any]) -> None:
+        under_way = self._under_way.get(command_id)
+        if under_way is not None:
+            under_way.has_begun = True
+            under_way.statuses[str(event.get("action_id"))] = str(event.get("status"))
+        if event.get("status") in _FINAL:
+            keys = ("skill", "parameters", "status", "execution_time_s", "error")
+            self.recent.append({key: event.get(key) for key in keys})

@@ -1,0 +1,82 @@
+"""Take commands from topics: words or plans go to the planner as everybody's do.
+
+Who sends is named in the command's source. What is no command is refused in words on the planners'
+feedback topics, and nothing else happens by it.
+"""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final
+
+from std_msgs.msg import String
+
+from vla_deploy.gateways.ros.graph import NODE_NAME, RELIABLE
+from vla_deploy.gateways.ros.inward.orders import Order, OrderRefused, Orders
+from vla_deploy.gateways.ros.inward.words import is_stop_word, read_message, shown
+from vla_deploy.gateways.ros.json_topic import PUBLISHED_BY
+from vla_deploy.gateways.ros.part import Gateway
+
+COMMAND_TOPICS: Final[Mapping[str, str]] = {
+    "/natural_language/command": "a command in words",
+    "/vla/command": "a command in words",
+    "/cognitive_planner/goal": "a goal in words",
+    "/voice_command/parsed": "JSON with original_command, from a recogniser of somebody else's",
+}
+"""Every topic that takes commands, and what it is for; each takes words and JSON alike."""
+MOST_OPEN: Final = 16
+"""Of commands from topics at a time; a stop is taken beyond that."""
+_OURS: Final = f"/{NODE_NAME}"
+_log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Open:
+    topic: str
+    order: Order
+    has_asked: bool = False
+
+
+class CommandTopics:
+    """Give what comes to the planner, and answers to what the robot has asked on that topic."""
+
+    def __init__(self, gateway: Gateway, orders: Orders) -> None:
+        self._gateway = gateway
+        self._orders = orders
+        self._open: list[_Open] = []
+        for topic in COMMAND_TOPICS:
+            gateway.graph.hear(String, topic, partial(self._take, topic), RELIABLE)
+
+    def step(self, now_ns: int) -> None:
+        """Follow the commands that are under way, to know which of them wait for an answer."""
+        for one in list(self._open):
+            while one.order.news:
+                one.has_asked = one.order.news.popleft()["event"] == "asked"
+            if one.order.has_ended:
+                self._open.remove(one)
+
+    def stop(self) -> None:
+        """Leave what is under way to the orders' end."""
+        self._open.clear()
+
+    def _take(self, topic: str, message: Any, sender: str) -> None:
+        try:
+            found = read_message(message.data)
+            if (found.stated or {}).get(PUBLISHED_BY) == _OURS:
+                return  # what the robot itself has heard, and is doing already
+            if len(self._open) >= MOST_OPEN and not is_stop_word(found.text):
+                raise OrderRefused(f"{MOST_OPEN} commands are under way or wait; try again later")
+            is_answer = found.plan is None and self._is_asked(topic)
+            order = self._orders.give(
+                text=found.text, plan=found.plan, source=sender, is_answer=is_answer
+            )
+        except OrderRefused as error:
+            _log.warning("%s from %s refused: %s", topic, sender, error)
+            self._gateway.feedback.refuse(shown(message.data), sender, topic, str(error))
+            return
+        _log.info("%s from %s: %s", topic, sender, shown(message.data))
+        self._open.append(_Open(topic=topic, order=order))
+
+    def _is_asked(self, topic: str) -> bool:
+        return any(one.topic == topic and one.has_asked for one in self._open)

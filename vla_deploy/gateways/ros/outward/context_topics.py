@@ -1,0 +1,170 @@
+"""Tell what planning nodes want to know beside plans: state, surroundings, what the robot does."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from vla_deploy.gateways.ros.json_topic import JsonTopic
+from vla_deploy.gateways.ros.locator import Locator
+from vla_deploy.gateways.ros.outward.activity import Activity
+from vla_deploy.gateways.ros.outward.maps import read_robot_map
+from vla_deploy.gateways.ros.outward.objects import described, latest_last
+from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
+from vla_deploy.gateways.ros.part import Due, Gateway
+from vla_deploy.gateways.ros.planar import planar_of
+from vla_deploy.gateways.ros.rotation import quaternion_of
+
+STATE: Final = "/robot/state"
+CONTEXT: Final = "/environment/context"
+PLAN_STATUS: Final = "/cognitive_planner/status"
+CAPSTONE: Final = "/capstone/status"
+STATE_HZ: Final = 1.0
+STATUS_HZ: Final = 2.0
+_AGE_S: Final = 1.0
+_STATUS_AGE_S: Final = 2.0
+_LOST: Final = 2
+
+
+class ContextTopics:
+    """Publish /robot/state and /environment/context every second, two statuses also on change."""
+
+    def __init__(self, gateway: Gateway, locator: Locator) -> None:
+        graph = gateway.graph
+        self._gateway = gateway
+        self._locator = locator
+        self._state = JsonTopic(graph, STATE)
+        self._context = JsonTopic(graph, CONTEXT)
+        self._plan = JsonTopic(graph, PLAN_STATUS)
+        self._capstone = JsonTopic(graph, CAPSTONE)
+        self._bounds = _map_bounds(gateway)
+        self._due = Due(STATE_HZ)
+        self._status_due = Due(STATUS_HZ)
+        self._told: tuple[Any, ...] = ()
+
+    def step(self, now_ns: int) -> None:
+        """Publish what is due or new."""
+        if self._due.is_now(now_ns):
+            state = self._robot_state()
+            self._state.tell(state)
+            self._context.tell(self._surroundings(state))
+        activity = self._activity()
+        commands = self._gateway.commands
+        key = (activity.capstone, activity.plan, tuple(commands.statuses.values()))
+        if key != self._told or self._status_due.is_now(now_ns):
+            self._told = key
+            self._tell_statuses(activity)
+
+    def stop(self) -> None:
+        """Say last that the robot is out of reach."""
+        self._tell_statuses(Activity())
+
+    def _activity(self) -> Activity:
+        link, commands = self._gateway.link, self._gateway.commands
+        return Activity.of(
+            self._gateway.control_status(),
+            link.document("executor_status", _AGE_S),
+            link.document("planner_status", _STATUS_AGE_S),
+            link.document("speech_status", _STATUS_AGE_S),
+            has_succeeded=commands.has_succeeded,
+            ended_s=commands.ended_s,
+        )
+
+    def _tell_statuses(self, activity: Activity) -> None:
+        commands = self._gateway.commands
+        self._capstone.tell_text(f"State: {activity.capstone}, Tasks: {commands.actions_left}")
+        statuses = list(commands.statuses.values())
+        index = next((i for i, one in enumerate(statuses) if one in ("active", "pending")), 0)
+        self._plan.tell(
+            {
+                "status": activity.plan,
+                "current_action_index": index,
+                "total_actions": len(statuses),
+                "robot_state": self._brief(),
+            }
+        )
+
+    def _brief(self) -> dict[str, Any]:
+        """Return the state that goes with a plan: place, gripper, what is held, battery."""
+        pose = self._gateway.link.fresh("pose", _AGE_S)
+        executor = self._gateway.link.document("executor_status", _AGE_S) or {}
+        held = [one for one in (executor.get("holding") or {}).values() if one]
+        place = "" if pose is None else self._locator.place_at(*planar_of(pose)[:2])
+        return {
+            "location": place or "unknown",
+            "gripper_state": "closed" if held else "open",
+            "held_object": held[0] if held else None,
+            "battery": None,
+        }
+
+    def _robot_state(self) -> dict[str, Any]:
+        gateway, commands = self._gateway, self._gateway.commands
+        position, orientation = self._place()
+        scene = self._locator.scene() or {}
+        hands = gateway.robot.hands.values()
+        return {
+            "position": position,
+            "orientation": orientation,
+            "detected_objects": [described(one) for one in latest_last(scene.get("objects", ()))],
+            "available_tools": [hand.gripper for hand in hands],
+            "battery_level": None,
+            "current_task": commands.text,
+            "recent_actions": [self._recent(one) for one in commands.recent],
+            **self._brief(),
+        }
+
+    def _recent(self, action: Mapping[str, Any]) -> dict[str, Any]:
+        given = action["parameters"] or {}
+        name, parameters = ranked_name(str(action["skill"]), given, self._locator.where)
+        return {
+            "action_type": name,
+            "parameters": parameters,
+            "status": action["status"],
+            "execution_time": action["execution_time_s"],
+            "error": action["error"],
+        }
+
+    def _place(self) -> tuple[list[float] | None, list[float] | None]:
+        """Return x, y, z in m of the map and a quaternion x, y, z, w; None for a lost robot."""
+        sample = self._gateway.link.fresh("pose", _AGE_S)
+        if sample is None or int(sample.data["state"]) >= _LOST:
+            return None, None
+        x_m, y_m, yaw_rad = planar_of(sample)
+        turned = quaternion_of(0.0, 0.0, yaw_rad)
+        return [x_m, y_m, 0.0], [turned.x, turned.y, turned.z, turned.w]
+
+    def _surroundings(self, state: Mapping[str, Any]) -> dict[str, Any]:
+        scene = self._locator.scene() or {}
+        things = state["detected_objects"]
+        return {
+            "detected_objects": things,
+            "object_locations": {one["name"]: one["position"] for one in things},
+            "known_locations": self._locator.places(),
+            "surfaces": [
+                {"name": one.get("name", ""), "height": one["height_m"]}
+                for one in scene.get("surfaces", ())
+            ],
+            "obstacles": [
+                {"class": one["class"], "position": list(one["position_m"])}
+                for one in scene.get("bystanders", ())
+            ],
+            "restricted_areas": [
+                {"name": zone.name, "reason": zone.reason, "polygon": list(zone.polygon_m)}
+                for zone in self._gateway.robot.home.zones
+            ],
+            "robot_position": state["position"],
+            "map_bounds": self._bounds,
+        }
+
+
+def _map_bounds(gateway: Gateway) -> dict[str, float] | None:
+    """Return how far the map reaches, in m of its frame."""
+    file = read_robot_map(gateway)
+    if file is None:
+        return None
+    height, width = file.shades.shape
+    x_m, y_m = file.origin_m
+    return {
+        "min_x": x_m,
+        "min_y": y_m,
+        "max_x": round(x_m + width * file.resolution_m, 3),
+        "max_y": round(y_m + height * file.resolution_m, 3),
+    }

@@ -1,0 +1,152 @@
+"""Tell how the robot is: /vla_deploy/state, /battery_state, /diagnostics."""
+
+import math
+import statistics
+from collections.abc import Mapping
+from typing import Any, Final
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from sensor_msgs.msg import BatteryState
+from vla_deploy_msgs.msg import RobotState
+
+from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
+from vla_deploy.gateways.ros.outward.health import TOPICS, PartHealth, health_of
+from vla_deploy.gateways.ros.part import Due, Gateway
+
+STATE_HZ: Final = 2.0
+DIAGNOSTICS_HZ: Final = 1.0
+BATTERY_HZ: Final = 1.0
+_EXECUTOR_AGE_S: Final = 1.0
+_POSE_AGE_S: Final = 0.5
+_PLACES: Final = ("tracking", "unsure", "lost")
+_UNMEASURED: Final = math.nan
+
+
+class StateTopic:
+    """Publish /vla_deploy/state twice a second, and at once when something of it changes."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._state = gateway.graph.publisher(RobotState, "/vla_deploy/state", LATCHED)
+        self._due = Due(STATE_HZ)
+        self._told: tuple[Any, ...] = ()
+
+    def step(self, now_ns: int) -> None:
+        """Publish what is due or new."""
+        control = self._gateway.control_status()
+        executor = self._gateway.link.document("executor_status", _EXECUTOR_AGE_S)
+        key = _what_changes(control or {}, executor or {})
+        if key != self._told or self._due.is_now(now_ns):
+            self._told = key
+            self._state.publish(self._message(control, executor or {}))
+
+    def stop(self) -> None:
+        """Say last that nobody tells how the robot is."""
+        self._state.publish(self._message(None, {}))
+
+    def _message(
+        self, control: Mapping[str, Any] | None, executor: Mapping[str, Any]
+    ) -> RobotState:
+        gateway, known = self._gateway, control or {}
+        pose = gateway.link.fresh("pose", _POSE_AGE_S)
+        return RobotState(
+            stamp=gateway.time.now(),
+            robot=gateway.robot.name,
+            control_state=RobotState.UNKNOWN if control is None else str(control["state"]),
+            armed=known.get("state") == RobotState.ARMED,
+            estop_latched=bool(known.get("estop_latched", False)),
+            cause=str(known.get("cause") or ""),
+            detail=str(known.get("detail") or ""),
+            speed_ratio=float(known.get("speed_ratio", 0.0)),
+            executor_state=str(executor.get("state") or RobotState.UNKNOWN),
+            command_id=str(executor.get("command_id") or ""),
+            action_id=str(executor.get("action_id") or ""),
+            skill=str(executor.get("skill") or ""),
+            battery_ratio=_UNMEASURED,  # no board or drive of ours measures a charge
+            localisation="" if pose is None else _PLACES[min(int(pose.data["state"]), 2)],
+        )
+
+
+def _what_changes(control: Mapping[str, Any], executor: Mapping[str, Any]) -> tuple[Any, ...]:
+    return (
+        *(control.get(key) for key in ("state", "estop_latched", "cause")),
+        *(executor.get(key) for key in ("state", "command_id", "action_id", "skill")),
+    )
+
+
+class SupplyTopic:
+    """Publish /battery_state where the servos measure their supply; nobody measures its charge."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._battery = gateway.graph.publisher(BatteryState, "/battery_state", SENSOR)
+        self._due = Due(BATTERY_HZ)
+
+    def step(self, now_ns: int) -> None:
+        """Publish what is due."""
+        if not self._due.is_now(now_ns):
+            return
+        control = self._gateway.control_status() or {}
+        measured = control.get("joints", {}).get("voltage_v", ())
+        volts = [float(one) for one in measured if one is not None]
+        if volts:
+            self._battery.publish(self._message(statistics.median(volts)))
+
+    def stop(self) -> None:
+        """Leave nothing under way."""
+
+    def _message(self, volts: float) -> BatteryState:
+        message = BatteryState(
+            voltage=volts,
+            temperature=_UNMEASURED,
+            current=_UNMEASURED,
+            charge=_UNMEASURED,
+            capacity=_UNMEASURED,
+            design_capacity=_UNMEASURED,
+            percentage=_UNMEASURED,
+            power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
+            power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
+            power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_UNKNOWN,
+            present=True,
+            location="supply of the servo bus",
+        )
+        message.header.stamp = self._gateway.time.now()
+        return message
+
+
+class HealthTopic:
+    """Publish /diagnostics once a second."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._array = gateway.graph.publisher(DiagnosticArray, "/diagnostics", RELIABLE)
+        self._due = Due(DIAGNOSTICS_HZ)
+
+    def step(self, now_ns: int) -> None:
+        """Publish what is due."""
+        if not self._due.is_now(now_ns):
+            return
+        gateway = self._gateway
+        found = health_of(
+            {topic: gateway.link.document(topic, age_s) for topic, age_s in TOPICS.items()}
+        )
+        message = DiagnosticArray(status=[_status(one, gateway.robot.name) for one in found])
+        message.header.stamp = gateway.time.now()
+        self._array.publish(message)
+
+    def stop(self) -> None:
+        """Leave nothing under way."""
+
+
+def _status(health: PartHealth, robot: str) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        level=bytes([health.level]),
+        name=f"vla_deploy: {health.name}",
+        message=health.message,
+        hardware_id=robot,
+        values=[KeyValue(key=key, value=_text(one)) for key, one in health.values.items()],
+    )
+
+
+def _text(value: Any) -> str:
+    return "none" if value is None else str(value)

@@ -1,0 +1,126 @@
+"""Tell what the robot hears as commands, and what it says.
+
+`/tts/say` carries what the robot has to say, for a voice of somebody else's; texts to be said by
+the robot are taken on another topic, else it would answer itself.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from vla_deploy.client.command_record import Kind
+from vla_deploy.gateways.ros.commands import CommandNews
+from vla_deploy.gateways.ros.graph import NODE_NAME
+from vla_deploy.gateways.ros.json_topic import PUBLISHED_BY, JsonTopic
+from vla_deploy.gateways.ros.part import Gateway
+
+PARSED: Final = "/voice_command/parsed"
+SAID: Final = "/tts/say"
+VOICE: Final = "voice"
+_STOP: Final = "stop"
+_UNKNOWN: Final = "unknown"
+_THING_KEYS: Final = ("object",)
+_PLACE_KEYS: Final = ("place", "destination")
+
+
+class VoiceTopics:
+    """Publish commands that came by voice once they are understood, and texts to be said."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        graph, link = gateway.graph, gateway.link
+        self._gateway = gateway
+        self._parsed = JsonTopic(graph, PARSED)
+        self._said = JsonTopic(graph, SAID)
+        self._say = link.events("say")
+        self._heard = link.events("heard")
+        self._confidence: dict[str, float | None] = {}
+
+    def step(self, now_ns: int) -> None:
+        """Publish what is new."""
+        for event in self._say.drain():
+            text = str(event.payload.get("text") or "")
+            if text and not event.payload.get("cancel"):
+                self._said.tell_text(text)
+        for event in self._heard.drain():
+            self._note(event.payload)
+        for news in self._gateway.commands.news:
+            record = news.record
+            if record.source == VOICE and record.kind is Kind.COMMAND:
+                self._tell(news)
+
+    def stop(self) -> None:
+        """Close the topics."""
+        self._say.close()
+        self._heard.close()
+
+    def _note(self, heard: Mapping[str, Any]) -> None:
+        """Keep how sure words are until they are understood; a stop needs no understanding."""
+        text = str(heard.get("text", ""))
+        self._confidence = {text: heard.get("confidence")}
+        if heard.get("verdict") == _STOP:
+            self._publish(text, intent=_STOP, things=[], location=None, stamp_s=None)
+
+    def _tell(self, news: CommandNews) -> None:
+        record, name = news.record, news.event.get("event")
+        if name == "plan":
+            plan = news.event["plan"]
+            given = [one["parameters"] for one in plan["actions"]]
+            self._publish(
+                record.text,
+                intent=intent_of(plan),
+                things=_named(given, _THING_KEYS),
+                location=next(iter(_named(given, _PLACE_KEYS)), None),
+                stamp_s=record.given_s,
+            )
+        elif name == "rejected":
+            self._publish(
+                record.text, intent=_UNKNOWN, things=[], location=None, stamp_s=record.given_s
+            )
+
+    def _publish(
+        self,
+        text: str,
+        *,
+        intent: str,
+        things: list[str],
+        location: str | None,
+        stamp_s: float | None,
+    ) -> None:
+        now = self._gateway.time.now()
+        self._parsed.tell(
+            {
+                "original_command": text,
+                "text": text,
+                "intent": intent,
+                "objects": things,
+                "location": location,
+                "confidence": self._confidence.get(text),
+                "timestamp": now.sec + now.nanosec / 1e9 if stamp_s is None else stamp_s,
+                PUBLISHED_BY: f"/{NODE_NAME}",
+            }
+        )
+
+
+def intent_of(plan: Mapping[str, Any]) -> str:
+    """Return what a plan is for: the planner's own word for it, else by its last skill."""
+    first = str(plan.get("summary", "")).partition(":")[0].split(",")[0].strip()
+    if first in _INTENTS:
+        return first
+    skills = [one["skill"] for one in plan["actions"]]
+    return next((_BY_SKILL[one] for one in reversed(skills) if one in _BY_SKILL), _UNKNOWN)
+
+
+_INTENTS: Final = frozenset(
+    {"navigation", "manipulation", "cleaning", "search", "assist", "stop", "question"}
+)
+_BY_SKILL: Final = {
+    **dict.fromkeys(("navigate_to", "move", "turn"), "navigation"),
+    **dict.fromkeys(("pick_up", "place", "open_gripper", "close_gripper"), "manipulation"),
+    **dict.fromkeys(("find_object", "look_at"), "search"),
+    **dict.fromkeys(("speak", "hand_over", "wait"), "assist"),
+    "stop": "stop",
+}
+
+
+def _named(given: list[Mapping[str, Any]], keys: tuple[str, ...]) -> list[str]:
+    found = [str(one[key]) for one in given for key in keys if key in one]
+    return list(dict.fromkeys(found))
