@@ -9,6 +9,8 @@ from typing import Final
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.graph import Graph
 from vla_deploy.gateways.ros.inward.parts import inward_parts
+from vla_deploy.gateways.ros.outgoing.courier import Courier
+from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.outward.parts import outward_parts
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.gateways.ros.stamps import RosTime
@@ -53,7 +55,13 @@ class RosGatewayNode:
             robot=self._robot,
             settings=self._robot.ros,
         )
-        self._parts = (*outward_parts(gateway), *inward_parts(gateway))
+        lending = Lending(self._link)
+        # What is lent no longer is known before anything is taken from the graph.
+        self._parts = (
+            *outward_parts(gateway),
+            Courier(gateway, lending),
+            *inward_parts(gateway, lending),
+        )
         self._graph.begin()
         accept = self._robot.ros.accept
         if accept is not Accepts.ALL:
