@@ -299,10 +299,9 @@ def acts(client: Client) -> dict[str, Any]:
     )
     told["arm"] = client.act("/vla_deploy/arm")
     press = client.create_publisher(Bool, "/emergency_stop", 10)
-    client.until(lambda: press.get_subscription_count() > 0)
-    press.publish(Bool(data=True))
-    # A press that was heard keeps the robot from being armed.
-    told["arm_again"] = client.act("/vla_deploy/arm")
+    for _ in range(20):  # one that the robot has not found yet is not heard
+        press.publish(Bool(data=True))
+        client.until(lambda: False, 0.1)
     told["arm_pressed"] = client.act("/vla_deploy/arm")
     told["reset_again"] = client.act("/vla_deploy/reset")
     told["arm_at_last"] = client.act("/vla_deploy/arm")

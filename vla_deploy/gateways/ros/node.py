@@ -11,6 +11,8 @@ from vla_deploy.gateways.ros.commands import RobotCommands
 from vla_deploy.gateways.ros.feedback import CommandFeedback
 from vla_deploy.gateways.ros.graph import SOURCE, Graph
 from vla_deploy.gateways.ros.inward.parts import inward_parts
+from vla_deploy.gateways.ros.outgoing.courier import Courier
+from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.outward.parts import outward_parts
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.gateways.ros.shared_memory import remove_leftovers
@@ -59,7 +61,13 @@ class RosGatewayNode:
             commands=RobotCommands(self._link, self._time.now_ns),
             feedback=CommandFeedback(self._graph),
         )
-        self._parts = (*outward_parts(gateway), *inward_parts(gateway))
+        lending = Lending(self._link)
+        # What is lent no longer is known before anything is taken from the graph.
+        self._parts = (
+            *outward_parts(gateway),
+            Courier(gateway, lending),
+            *inward_parts(gateway, lending),
+        )
         self._graph.begin()
         accept = self._robot.ros.accept
         if accept is not Accepts.ALL:
