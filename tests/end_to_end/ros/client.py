@@ -336,6 +336,28 @@ def bad_velocity(client: Client) -> dict[str, Any]:
     return {"moved_m": client.x_m - x_m}
 
 
+def joint_commands(client: Client) -> dict[str, Any]:
+    """Stream positions as ros2_control does, then such as no joint takes."""
+    publisher = client.create_publisher(JointState, "/robot_joint_commands", 10)
+    client.until(lambda: publisher.get_subscription_count() > 0)
+    began = client.joints["head_pan"]
+    for i in range(60):
+        value = began + (0.4 - began) * min(i / 40, 1.0)
+        publisher.publish(JointState(name=["head_pan"], position=[value]))
+        client.until(lambda: False, 0.05)
+    client.until(lambda: abs(client.joints["head_pan"] - 0.4) < 0.02, 20.0)
+    reached = client.joints["head_pan"]
+    for bad in (
+        JointState(name=["head_pan"], position=[math.nan]),
+        JointState(name=["head_pan"], position=[9.0]),
+        JointState(name=["head_pan", "head_tilt"], position=[0.0]),
+        JointState(name=["tail"], position=[0.0]),
+    ):
+        publisher.publish(bad)
+        client.until(lambda: False, 0.3)
+    return {"reached": reached, "then": client.joints["head_pan"]}
+
+
 def watched_goal(client: Client) -> dict[str, Any]:
     """Follow a long trajectory to whatever end, which may be that nobody answers any more."""
     action = ActionClient(client, FollowJointTrajectory, HEAD_ACTION)
@@ -351,7 +373,7 @@ CASES = {
     case.__name__: case
     for case in (
         *(trajectories, refusals, grippers, navigation, pick_and_place, acts),
-        *(velocity, bad_velocity, watched_goal),
+        *(joint_commands, velocity, bad_velocity, watched_goal),
     )
 }
 

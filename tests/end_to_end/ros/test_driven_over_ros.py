@@ -98,6 +98,14 @@ def test_both_gripper_actions_move_the_hand(client: Callable[[str], Any]) -> Non
     assert told["gap_then_m"] == pytest.approx(0.03, abs=0.004)
 
 
+def test_streamed_positions_are_followed_and_bad_ones_are_not(
+    client: Callable[[str], Any],
+) -> None:
+    told = client("joint_commands")
+    assert told["reached"] == pytest.approx(0.4, abs=0.03)
+    assert told["then"] == pytest.approx(told["reached"], abs=0.01)
+
+
 def test_a_pose_is_driven_to_with_feedback_and_cancelled_on_the_way(
     client: Callable[[str], Any],
 ) -> None:

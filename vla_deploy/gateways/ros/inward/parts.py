@@ -11,6 +11,7 @@ from vla_deploy.gateways.ros.inward.acts import Acts
 from vla_deploy.gateways.ros.inward.claiming import Borrowed, Claimed, PartsHold
 from vla_deploy.gateways.ros.inward.command_topics import CommandTopics
 from vla_deploy.gateways.ros.inward.grippers import gripper_desks
+from vla_deploy.gateways.ros.inward.joint_commands import JointCommands
 from vla_deploy.gateways.ros.inward.motions import Motions
 from vla_deploy.gateways.ros.inward.navigation import NavigationServer
 from vla_deploy.gateways.ros.inward.orders import Orders
@@ -59,6 +60,8 @@ def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
         parts.append(ActionDesk(graph, NavigateToPose, navigating, navigation.judge))
         parts.append(ActionDesk(graph, ExecutePlan, f"{OWN}/execute_plan", plans.judge))
         parts += [CommandTopics(gateway, orders), SayTopic(gateway)]
+        if not settings.are_arms_beyond:
+            parts.append(JointCommands(gateway, motions))
     return tuple(parts)
 
 

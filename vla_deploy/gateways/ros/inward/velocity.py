@@ -30,7 +30,7 @@ class Velocity:
         self._clock = gateway.link.clock
         self._command: CellWriter = gateway.link.space.cell_writer("remote_base_command")
         self._claim = claim
-        self._last_ns = 0
+        self._last_ns = self._stamp_ns = 0
         self._told_ns = -NS_PER_S * 10
         self.refused = 0
         if gateway.settings.cmd_vel_stamped:
@@ -59,6 +59,10 @@ class Velocity:
                 hint = "; do both go by the same time (use_sim_time)?" if abs(age_s) > 5 else ""
                 self._refuse(f"its stamp is {age_s:.2f} s old, expected 0 to {MOST_AGE_S}{hint}")
                 return
+            if time.run_ns(stamp) < self._stamp_ns:
+                self._refuse("its stamp is older than that of the one before")
+                return
+            self._stamp_ns = time.run_ns(stamp)
         self._take(message.twist)
 
     def _take(self, twist: Twist) -> None:
