@@ -29,16 +29,16 @@ settings.load_profile("any machine")
 # Whichever test loads onnxruntime first: it phones home otherwise.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
-BROWSER = "browser"
-"""The folder whose tests share one robot and one browser."""
+SHARING = ("end_to_end/browser", "end_to_end/ros")
+"""Folders whose tests share one robot."""
 
 
 class FileScheduling(LoadScopeScheduling):
-    """Give each file to one worker, and all files of the browser: they share one robot."""
+    """Give each file to one worker, and the files that share a robot together to one."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.partition("::")[0]
-        return BROWSER if f"/{BROWSER}/" in file else file
+        return next((folder for folder in SHARING if f"{folder}/" in file), file)
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadScopeScheduling | None:

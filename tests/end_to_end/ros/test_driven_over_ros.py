@@ -1,7 +1,6 @@
 """A program that knows nothing of ours drives the twin over ROS 2: real rclpy, real processes."""
 
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,24 +18,6 @@ JOINTS = -2
 OLD = -3
 PATH = -4
 GOAL = -5
-
-
-@pytest.fixture(scope="module")
-def robot(
-    ros_environment: object, ros_domain: int, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[ProcessStack]:
-    before = os.environ.get("ROS_DOMAIN_ID")
-    os.environ["ROS_DOMAIN_ID"] = str(ros_domain)
-    stack = ProcessStack(tmp_path_factory.mktemp("ros"), "--ros")
-    try:
-        stack.wait_until_armed()
-        yield stack
-    finally:
-        stack.close()
-        if before is None:
-            del os.environ["ROS_DOMAIN_ID"]
-        else:
-            os.environ["ROS_DOMAIN_ID"] = before
 
 
 @pytest.fixture

@@ -1,0 +1,24 @@
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from sim_twin.process_stack import ProcessStack
+
+
+@pytest.fixture(scope="package")
+def robot(
+    ros_environment: object, ros_domain: int, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[ProcessStack]:
+    before = os.environ.get("ROS_DOMAIN_ID")
+    os.environ["ROS_DOMAIN_ID"] = str(ros_domain)
+    stack = ProcessStack(tmp_path_factory.mktemp("ros"), "--ros")
+    try:
+        stack.wait_until_armed()
+        yield stack
+    finally:
+        stack.close()
+        if before is None:
+            del os.environ["ROS_DOMAIN_ID"]
+        else:
+            os.environ["ROS_DOMAIN_ID"] = before
