@@ -10,6 +10,7 @@ from platforms import load_profile
 from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import read_plan
+from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.dialects import parse_plan
 from vla_deploy.planning.knowledge import world_of
@@ -45,6 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Check what was named; a fault ends in one message and exit code 2."""
     robot = load_robot(arguments.robot)
     profile = load_profile(arguments.profile)
+    require_environment(robot)
     print(f"robot {robot.name}: {len(robot.joint_names)} servos, {len(robot.places)} places: ok")
     print(f"profile {profile.name}: ok")
     if arguments.plan:

@@ -9,6 +9,7 @@ from drivers.twin_clock import TwinClock
 from platforms import load_profile
 from platforms.profile_schema import NODES
 from vla_deploy.exit_codes import EXIT_CONFIGURATION, EXIT_DEVICE_ABSENT
+from vla_deploy.gateways.ros.launching import require_environment
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.power_off import ask_power_off
 from vla_deploy.robots import load_robot
@@ -116,7 +117,9 @@ class Supervisor:
             StartFailed: a process refused to start; everything is stopped again.
             DeviceAbsent: a device did not appear in all tries; everything is stopped again.
             StartCrashed: a process was given up before it was ready; all is stopped again.
+            RosNotFound: the robot is driven or moved over ROS, and this computer has none.
         """
+        require_environment(self._robot)
         self._run = Run(
             self._options,
             self._table,

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from vla_deploy.gateways.ros.environment import find_environment, link_packages
+from vla_deploy.gateways.ros.errors import RosNotFound
+from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.ros_settings import RosSettings
 
 DOMAIN: Final = "ROS_DOMAIN_ID"
@@ -36,3 +38,21 @@ def launch_environment(
     profile = inherited.get("FASTRTPS_DEFAULT_PROFILES_FILE", str(TRANSPORT_PROFILE))
     variables["FASTRTPS_DEFAULT_PROFILES_FILE"] = profile
     return found.python, variables
+
+
+def require_environment(robot: RobotDescription) -> None:
+    """See that a robot which is driven or moved over ROS can be.
+
+    Raises:
+        RosNotFound: it is, and this computer has no ROS 2 Jazzy, or not where the robot file says.
+    """
+    settings = robot.ros
+    if not settings.is_needed:
+        return
+    try:
+        find_environment(settings.python, settings.workspace)
+    except RosNotFound as error:
+        raise RosNotFound(
+            f"robot {robot.name}: [ros] says navigation = {settings.navigation!r} and arms = "
+            f'{settings.arms!r}, which needs ROS; set both to "own", or: {error}'
+        ) from error

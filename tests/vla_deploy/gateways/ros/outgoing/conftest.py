@@ -3,7 +3,6 @@
 Nothing of the robot runs besides: a test is the executor, and where it says so, control.
 """
 
-import os
 import shutil
 import signal
 import subprocess
@@ -195,7 +194,7 @@ def reach() -> Callable[..., GoalRequest]:
     return make
 
 
-def kill(process: "subprocess.Popen[str]") -> None:
-    """End a process as `kill -9` does."""
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
+@pytest.fixture(scope="session")
+def make_robot_folder() -> Callable[[Path, str], Path]:
+    """Make a butler that servers beyond it drive and move, with further keys of `[ros]`."""
+    return lambda folder, keys: robot_beyond(folder, BEYOND + keys)
