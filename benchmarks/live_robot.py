@@ -21,14 +21,17 @@ class NotReached(Exception):
 
 
 @contextmanager
-def live_stack(folder: Path, profile: str) -> Iterator[tuple[ProcessStack, Session]]:
+def live_stack(folder: Path, profile: str, *options: str) -> Iterator[tuple[ProcessStack, Session]]:
     """Give the processes of a robot by the text of a profile, which lies in `PROFILE_FILE`.
+
+    `options` are further words for `vla-deploy run`.
 
     Raises:
         StackFailed: the processes do not come up.
     """
     (folder / PROFILE_FILE).write_text(profile, encoding="utf-8")
-    stack = ProcessStack(folder / "run", "--wall", "--profile", str(folder / PROFILE_FILE))
+    chosen = ("--wall", "--profile", str(folder / PROFILE_FILE), *options)
+    stack = ProcessStack(folder / "run", *chosen)
     try:
         stack.wait_until_ready()
         with closing(Session(stack.run_dir)) as session:

@@ -130,9 +130,14 @@ class ProcessStack:
 
     def document(self, topic: str, age_limit_s: float | None = None) -> dict[str, Any]:
         """Return the newest document of a cell, empty when there is none that young."""
+        return self.session.document(topic, age_limit_s) or {}
+
+    @property
+    def session(self) -> Session:
+        """Return the way to the run's shared memory."""
         if self._session is None:
             self._session = Session(self.run_dir, self.clock)
-        return self._session.document(topic, age_limit_s) or {}
+        return self._session
 
     def speak(self, text: str, voice: str = "en-gb", snr_db: float | None = None) -> dict[str, Any]:
         """Let somebody in the room say a text; return when the words begin and end, host's time.

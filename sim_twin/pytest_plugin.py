@@ -36,6 +36,9 @@ MARKERS = (
 )
 _CHOICES = ("robot", "world", "seed", "profile", "speech")
 
+# The contracts are tests: a failed assertion shows its values.
+pytest.register_assert_rewrite("sim_twin.contracts")
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add what a real robot needs."""

@@ -95,7 +95,9 @@ class Renderer:
     def _metres(self, buffer: NDArray[np.float32]) -> NDArray[np.float32]:
         """Turn the reversed depth buffer (1 is near, 0 is far) into metres."""
         near, far = self._near_m, self._far_m
-        metres: NDArray[np.float32] = near * far / (near + buffer * np.float32(far - near))
+        metres = buffer * np.float32(far - near)
+        metres += np.float32(near)
+        np.divide(np.float32(near * far), metres, out=metres)
         return metres
 
 

@@ -1,6 +1,7 @@
 import contextlib
 import errno
 import fcntl
+import gc
 import json
 import os
 import subprocess
@@ -49,6 +50,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for path in sorted({item.path for item in items if item.get_closest_marker("stack")}):
         if "mark.stack" not in path.read_text(encoding="utf-8"):
             raise pytest.UsageError(f"{path}: tests marked `stack`; write pytest.mark.stack here")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_finish() -> None:
+    """Keep ten thousand collected tests out of every later collection of garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 TREES = Path(__file__).parent / "platforms" / "trees"

@@ -107,7 +107,12 @@ def compile_sources(
         *(package.root.parent, package.introspection_root),
         *(toolchain.python_include, toolchain.numpy_include),
         *(include / name for name in (*_ALWAYS_INCLUDED, *others)),
-        *(siblings[name].root.parent for name in package.needs if name in siblings),
+        *(
+            folder
+            for name in package.needs
+            if name in siblings
+            for folder in (siblings[name].root.parent, siblings[name].introspection_root)
+        ),
         include,
     ]
     options = [*_FLAGS, *os.environ.get("CFLAGS", "").split(), *(f"-I{one}" for one in folders)]

@@ -60,8 +60,12 @@ _BACKED_UP_RAM: Final = (
 
 _RESTORE_AT_START: Final = 0x02
 
-_FORMATS: Final = {1: "b", 2: "h", 4: "i"}
-"""The struct code of a signed register by its bytes; an unsigned one has the capital."""
+_FORMATS: Final = {
+    (size, signed): struct.Struct("<" + (code if signed else code.upper()))
+    for size, code in ((1, "b"), (2, "h"), (4, "i"))
+    for signed in (False, True)
+}
+"""How a register is laid out, by its bytes and by whether it has a sign."""
 
 _KEPT_BY_RESET: Final = {0xFF: (), 0x01: ("id",), 0x02: ("id", "baud_rate")}
 """What each factory reset option keeps."""
@@ -294,6 +298,5 @@ def _too_new(model: Model, firmware: int) -> frozenset[str]:
 
 
 def _unpacker(register: Register, memory: memoryview) -> Callable[[], tuple[Any, ...]]:
-    code = _FORMATS[register.size]
-    form = struct.Struct("<" + (code if register.signed else code.upper()))
+    form = _FORMATS[register.size, register.signed]
     return partial(form.unpack_from, memory, register.address)

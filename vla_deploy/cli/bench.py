@@ -17,6 +17,7 @@ BENCHMARKS = {
     "perception": "how well, how fast and at what cost the robot sees; int8 beside fp32; --part",
     "planner": "commands understood, other talk left alone, attacks refused, time to plan; --part",
     "recorder": "what the flight recorder costs: per control tick, per look, per flight",
+    "ros": "the ROS gateway: its share of a core, its latency, late ticks with and without it",
     "serial": "a serial port's bytes on busy cores, with the kernel's workers raised and not",
     "speech": "words understood by voice and noise, from speech to text, what it costs; --part",
     "ticks": "late control ticks, idle and under load, with and without SCHED_FIFO",

@@ -46,6 +46,8 @@ class BodyShapes:
         self._neutral = pinocchio.neutral(self._model)
         mimics = read_mjcf_names(robot.mjcf_path).mimics
         self._leaders = {**{name: name for name in robot.joint_names}, **mimics}
+        self._parents = list(self._model.parents)
+        self._movers = [self._servos_to(joint) for joint in range(self._model.njoints)]
         index = robot.joint_index
         moved = [(self._model.getJointId(n), index[of]) for n, of in self._leaders.items()]
         self._places = np.array([self._model.idx_qs[joint] for joint, _ in moved])
@@ -69,7 +71,7 @@ class BodyShapes:
         self._covers = [
             _cover(shape)
             for shape in self._shapes.geometryObjects
-            if self._movers(shape.parentJoint)
+            if self._movers[shape.parentJoint]
         ]
         self._radii_m = np.concatenate([np.full(len(c), r) for _, c, r in self._covers])
         names = [shape.name for shape in self._shapes.geometryObjects]
@@ -136,11 +138,17 @@ class BodyShapes:
         allowed = {frozenset(pair) for pair in robot.protection.clearance.allow}
         excluded = set(_excluded_bodies(robot))
         objects = list(shapes.geometryObjects)
-        for second, other in enumerate(objects):
-            for first, shape in enumerate(objects[:second]):
-                bodies = frozenset((self._body(shape), self._body(other)))
-                names = frozenset((shape.name, other.name))
-                if self._may_collide(shape, other) and not (bodies in excluded or names in allowed):
+        # Read once: each look at pinocchio's own lists copies what it returns.
+        bodies = [str(self._model.frames[shape.parentFrame].name) for shape in objects]
+        names = [str(shape.name) for shape in objects]
+        joints = [int(shape.parentJoint) for shape in objects]
+        for second in range(len(objects)):
+            for first in range(second):
+                if (
+                    self._may_collide(joints[first], joints[second])
+                    and frozenset((bodies[first], bodies[second])) not in excluded
+                    and frozenset((names[first], names[second])) not in allowed
+                ):
                     shapes.addCollisionPair(pinocchio.CollisionPair(first, second))
         self._add_floor(shapes, objects)
         return shapes
@@ -152,31 +160,26 @@ class BodyShapes:
         below = pinocchio.GeometryObject(FLOOR, 0, pinocchio.SE3.Identity(), plane)
         floor = shapes.addGeometryObject(below)
         for index, shape in enumerate(objects):
-            if self._movers(shape.parentJoint):
+            if self._movers[shape.parentJoint]:
                 shapes.addCollisionPair(pinocchio.CollisionPair(index, floor))
 
-    def _may_collide(
-        self, shape: pinocchio.GeometryObject, other: pinocchio.GeometryObject
-    ) -> bool:
-        first, second = shape.parentJoint, other.parentJoint
-        parents = self._model.parents
+    def _may_collide(self, first: int, second: int) -> bool:
+        """Return whether shapes that these joints carry are moved against each other."""
+        parents = self._parents
         if first == second or parents[first] == second or parents[second] == first:
             return False
-        between = self._movers(first) ^ self._movers(second)
+        between = self._movers[first] ^ self._movers[second]
         return len(between) > 1
 
-    def _movers(self, joint: int) -> frozenset[str]:
+    def _servos_to(self, joint: int) -> frozenset[str]:
         """Return the servo joints between the base and a joint, that joint included."""
         found = set()
         while joint > 0:
             name = self._model.names[joint]
             if name in self._leaders:
                 found.add(self._leaders[name])
-            joint = self._model.parents[joint]
+            joint = self._parents[joint]
         return frozenset(found)
-
-    def _body(self, shape: pinocchio.GeometryObject) -> str:
-        return str(self._model.frames[shape.parentFrame].name)
 
 
 def _cover(shape: pinocchio.GeometryObject) -> tuple[int, Array, float]:

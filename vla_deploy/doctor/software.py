@@ -110,19 +110,6 @@ def open_gl(context: Context) -> Iterator[Finding]:
         yield warn("OpenGL (EGL)", f"{missing_egl}; the twin draws nothing", GL_PACKAGES)
 
 
-def ros(context: Context) -> Iterator[Finding]:
-    """Tell which ROS is installed; only the ROS gateway needs it."""
-    found = context.tree.names("/opt/ros")
-    if not found:
-        remedy = "sudo apt-get install -y ros-jazzy-ros-base   # only for the ROS gateway"
-        yield missing("ROS", "not installed", remedy)
-    elif context.is_live and importlib.util.find_spec("rclpy") is None:
-        measured = f"{', '.join(found)}, but this shell has no rclpy"
-        yield missing("ROS", measured, f"source /opt/ros/{found[-1]}/setup.bash")
-    else:
-        yield ok("ROS", ", ".join(found))
-
-
 def service(context: Context) -> Iterator[Finding]:
     """Tell how the systemd unit is, if it is installed."""
     if not any(context.tree.exists(f"{folder}/{UNIT}") for folder in UNIT_FOLDERS):

@@ -14,6 +14,7 @@ from vla_deploy.doctor import (
     limits,
     power,
     realtime,
+    ros,
     software,
     speech,
     storage,
@@ -70,9 +71,12 @@ CHECKS: tuple[Check, ...] = (
     Check("Software", "packages", software.packages, live=True),
     Check("Software", "models", software.models, live=True),
     Check("Software", "OpenGL (EGL)", software.open_gl, live=True),
-    Check("Software", "ROS", software.ros),
     Check("Software", "service", software.service),
     Check("Software", "dashboard", dashboard.dashboard, live=True),
+    Check("ROS", "use", ros.usage),
+    Check("ROS", "interpreter", ros.environment, live=True),
+    Check("ROS", "DDS leftovers", ros.leftovers, live=True),
+    Check("ROS", "ROS logs", ros.logs, live=True),
 )
 
 

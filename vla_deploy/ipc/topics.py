@@ -383,6 +383,22 @@ TOPICS: tuple[Topic, ...] = (
         fields=(Field("document", "json", 4096),),
     ),
     Topic(
+        name="ros_request",
+        kind=Kind.RING,
+        owner="executor",
+        summary="goals for servers beyond the robot, their cancels, and leave to drive",
+        slots=32,
+        slot_bytes=65536,
+    ),
+    Topic(
+        name="ros_answer",
+        kind=Kind.RING,
+        owner="ros",
+        summary="how a goal stands with its server: accepted, feedback, cancelling, how it ended",
+        slots=64,
+        slot_bytes=2048,
+    ),
+    Topic(
         name="remote_base_command",
         kind=Kind.CELL,
         owner="ros",

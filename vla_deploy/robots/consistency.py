@@ -218,6 +218,15 @@ def places_are_distinct(document: Document) -> Iterator[Fault]:
     yield from _repeats(words)
 
 
+def ros_is_on_where_needed(document: Document) -> Iterator[Fault]:
+    """Yield a fault for each part that is moved over ROS by a robot that is in no ROS graph."""
+    ros = table(document, "ros")
+    for key in ("navigation", "arms"):
+        if ros.get(key, "own") != "own" and ros.get("enabled") is not True:
+            expected = 'enabled = true in [ros], or "own"'
+            yield Fault(key=f"ros.{key}", got=f"{ros[key]!r} while ROS is off", expected=expected)
+
+
 CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
     nothing_used_twice,
     drives_fit_protocol,
@@ -228,6 +237,7 @@ CHECKS: tuple[Callable[[Document], Iterator[Fault]], ...] = (
     hands_name_groups,
     poses_are_reachable,
     places_are_distinct,
+    ros_is_on_where_needed,
 )
 
 

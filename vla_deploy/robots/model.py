@@ -33,6 +33,7 @@ class RobotModel:
         locked = [i for i in range(1, whole.njoints) if whole.names[i] not in moving]
         self._model = pinocchio.buildReducedModel(whole, locked, pinocchio.neutral(whole))
         self._data = self._model.createData()
+        self._frames: dict[str, int] = {}
         self.joint_names = robot.joint_names
         self.total_mass_kg = float(pinocchio.computeTotalMass(whole))
         self._camera_site = robot.camera.site
@@ -99,9 +100,12 @@ class RobotModel:
         return pose
 
     def _frame(self, site: str) -> int:
-        if not self._model.existFrame(site):
-            raise KeyError(f"the MJCF has no site {site!r}")
-        return int(self._model.getFrameId(site))
+        frame = self._frames.get(site)
+        if frame is None:
+            if not self._model.existFrame(site):
+                raise KeyError(f"the MJCF has no site {site!r}")
+            frame = self._frames[site] = int(self._model.getFrameId(site))
+        return frame
 
     def _couple(self, mimics: Mapping[str, str]) -> Array:
         """Return the matrix that turns joint positions into pinocchio's, followers included."""

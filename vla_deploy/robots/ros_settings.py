@@ -23,7 +23,8 @@ class RosSettings:
     ROS; empty ones are looked for. No `domain_id` is ROS_DOMAIN_ID, else 0; `discovery` is
     ROS_AUTOMATIC_DISCOVERY_RANGE. A robot whose `navigation` is "nav2" drives by a
     `navigate_to_pose` server, and one whose `arms` are "follow_joint_trajectory" moves them by
-    servers of that action: both not the robot's own.
+    servers of that action: both not the robot's own. Each arm has its server,
+    `<group>_controller/follow_joint_trajectory`, unless `trajectory_server` names one for all.
     """
 
     enabled: bool = False
@@ -38,6 +39,26 @@ class RosSettings:
     image_rate_hz: float = 5.0
     navigation: str = "own"
     arms: str = "own"
+    trajectory_server: str = ""
+
+    @property
+    def is_driven_by_nav2(self) -> bool:
+        """Tell whether a `navigate_to_pose` server drives the base to poses."""
+        return self.navigation == NAV2
+
+    @property
+    def are_arms_beyond(self) -> bool:
+        """Tell whether servers of FollowJointTrajectory move the arms."""
+        return self.arms == FOLLOW_JOINT_TRAJECTORY
+
+    @property
+    def is_needed(self) -> bool:
+        """Tell whether the robot cannot do its work without the ROS gateway."""
+        return self.is_driven_by_nav2 or self.are_arms_beyond
+
+    def server_of(self, group: str) -> str:
+        """Return the name of the server that moves an arm."""
+        return self.trajectory_server or f"{group}_controller/{FOLLOW_JOINT_TRAJECTORY}"
 
 
 UNUSED: Final = RosSettings()
@@ -73,6 +94,7 @@ ROS: Final[Shape] = {
     "image_rate_hz": _number(0, 30, "Hz"),
     "navigation": one_of(_OWN, NAV2, is_optional=True),
     "arms": one_of(_OWN, FOLLOW_JOINT_TRAJECTORY, is_optional=True),
+    "trajectory_server": OPTIONAL_TEXT,
 }
 
 

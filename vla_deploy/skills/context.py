@@ -13,6 +13,7 @@ from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.robots import RobotDescription
 from vla_deploy.skills.errors import NotPossible
 from vla_deploy.skills.link import RobotLink
+from vla_deploy.skills.ros_goals import RosGoals
 
 Skill = Generator[None, None, None]
 """A skill yields once per executor step, returns on success, raises SkillFailed otherwise."""
@@ -41,7 +42,8 @@ class SkillContext:
     `say` shows a text, `voice` has it heard; `notes` are what results say beside their status;
     `rests` tell of relative motions, by the actions' ids, what is left of them;
     `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
-    follows none.
+    follows none. `holder` is the claim of the acting action, `ros` the way to servers beyond the
+    robot, where the robot file names any.
     """
 
     robot: RobotDescription
@@ -55,6 +57,8 @@ class SkillContext:
     notes: dict[str, str] = field(default_factory=dict)
     rests: dict[str, Rest] = field(default_factory=dict)
     way_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    holder: str = ""
+    ros: RosGoals | None = None
 
     def note(self, text: str) -> None:
         """Have the result of the acting action say something, whatever its status."""

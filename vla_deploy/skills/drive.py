@@ -21,6 +21,7 @@ from vla_deploy.navigation.obstacles import is_blocked, scan_points
 from vla_deploy.navigation.place_judge import MATCH_RATIO, PlaceState
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.bearings import find_myself
+from vla_deploy.skills.beyond import navigation_request, pursue, server_drives
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.frames import on_floor, to_map
@@ -31,6 +32,8 @@ STOP_DISTANCE_M = 0.12
 BLOCKED_TIMEOUT_S = 5.0
 STRAIGHT_TOLERANCE_M = 0.01
 LOOK_AHEAD_M = 0.06
+# How far from a pose Nav2 may leave the robot and say that it is there: its goal checker is finer.
+ARRIVED_M, ARRIVED_RAD = 0.3, 0.5
 
 
 def limits_of(context: SkillContext, speed_m_s: float | None = None) -> DriveLimits:
@@ -54,9 +57,12 @@ def drive_to(
 ) -> Skill:
     """Drive to a pose of the map along a planned path; halt on the way when `until()` holds.
 
+    Where Nav2 drives the base, it plans a path of its own: no pose is asked for that has none here.
+
     Raises:
         NotPossible: no path leads there.
         TryAgain: the robot is lost, or something blocks the way for too long.
+        SkillFailed: Nav2 rejected the pose or gave it up, or nobody knows how it ended.
     """
     yield from find_myself(context)
     pose = context.link.pose
@@ -64,7 +70,54 @@ def drive_to(
         points = context.planner.plan((pose.x_m, pose.y_m), (goal.x_m, goal.y_m))
     except NavigationError as error:
         raise NotPossible(str(error)) from error
+    if server_drives(context):
+        target = goal if turn else _arriving(points, goal)
+        yield from _have_driven(context, target, turn, until, speed_m_s)
+        return
     yield from follow(context, points, goal.yaw_rad if turn else None, until, speed_m_s)
+
+
+def _arriving(points: NDArray[np.float64], goal: FloorPose) -> FloorPose:
+    """Return the goal with the yaw in which a path arrives there: Nav2 wants one."""
+    far = np.hypot(*(points[:-1] - points[-1]).T) > STOP_DISTANCE_M
+    if not far.any():
+        return goal
+    dx_m, dy_m = points[-1] - points[:-1][far][-1]
+    return FloorPose(x_m=goal.x_m, y_m=goal.y_m, yaw_rad=math.atan2(dy_m, dx_m))
+
+
+def _have_driven(
+    context: SkillContext,
+    target: FloorPose,
+    turn: bool,
+    until: Callable[[], bool],
+    speed_m_s: float | None,
+) -> Skill:
+    """Have Nav2 drive to a pose; see that the robot knows its place meanwhile, and is there then.
+
+    What stands in the way is for Nav2 and for control to see.
+
+    Raises:
+        TryAgain: the robot did not know its place for too long, or is elsewhere in the end.
+        SkillFailed: Nav2 rejected the pose or gave it up, or nobody knows how it ended.
+    """
+    patience = _Patience(context)
+
+    def hindrance() -> str:
+        why = _why_blind(context)
+        patience.bear(why)
+        return why
+
+    request = navigation_request(context, target, speed_m_s)
+    yield from pursue(context, request, hindrance, until)
+    yield from stand_still(context)
+    pose = context.link.pose
+    off_m = math.hypot(pose.x_m - target.x_m, pose.y_m - target.y_m)
+    off_rad = abs(wrap_angle(pose.yaw_rad - target.yaw_rad)) if turn else 0.0
+    if not until() and (off_m > ARRIVED_M or off_rad > ARRIVED_RAD):
+        raise TryAgain(
+            f"Nav2 says that the robot is there, but it is {off_m:.2f} m and {off_rad:.2f} rad off"
+        )
 
 
 def follow(
@@ -207,15 +260,24 @@ class _Patience:
         Raises:
             TryAgain: the hindrance stayed; the base is at rest.
         """
+        try:
+            self.bear(hindrance or self._link.held_by_control(twist))
+        except TryAgain:
+            self._link.drive(AT_REST)
+            raise
+        return AT_REST if hindrance else twist
+
+    def bear(self, reason: str) -> None:
+        """Note whether something hinders the base now; no reason is "".
+
+        Raises:
+            TryAgain: something has for too long.
+        """
         now_ns = self._link.clock.now_ns()
-        reason = hindrance or self._link.held_by_control(twist)
         if not reason:
             self._clear_ns = now_ns
-            return twist
-        if now_ns - self._clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
-            self._link.drive(AT_REST)
+        elif now_ns - self._clear_ns > BLOCKED_TIMEOUT_S * NS_PER_S:
             raise TryAgain(reason)
-        return AT_REST if hindrance else twist
 
 
 def _hindrance(
@@ -227,13 +289,9 @@ def _hindrance(
     """
     if abs(twist.v_m_s) < 1e-3:
         return ""
-    ranges_m = context.link.ranges_m
-    if ranges_m is None:
-        return "the lidar tells nothing, and without it the robot does not drive"
-    if context.link.match_ratio < MATCH_RATIO:
-        return "what the lidar sees does not fit the map, so the robot may be elsewhere"
-    if context.link.place_state is not PlaceState.TRACKING:
-        return f"the robot is not sure where it is: {context.link.place_doubt}"
+    why, ranges_m = _why_blind(context), context.link.ranges_m
+    if why or ranges_m is None:
+        return why
     points = scan_points(ranges_m)
     mapped = context.planner.is_mapped(on_floor(context.link.pose, points))
     blocked = is_blocked(
@@ -243,6 +301,17 @@ def _hindrance(
         radius_m=context.robot.base.footprint_radius_m,
     )
     return "something stands in the way" if blocked else ""
+
+
+def _why_blind(context: SkillContext) -> str:
+    """Say why the robot does not know where it drives: no scan, or one off the map; else ""."""
+    if context.link.ranges_m is None:
+        return "the lidar tells nothing, and without it the robot does not drive"
+    if context.link.match_ratio < MATCH_RATIO:
+        return "what the lidar sees does not fit the map, so the robot may be elsewhere"
+    if context.link.place_state is not PlaceState.TRACKING:
+        return f"the robot is not sure where it is: {context.link.place_doubt}"
+    return ""
 
 
 def _leaves_free_floor(context: SkillContext, sign: float) -> bool:

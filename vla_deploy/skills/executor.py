@@ -107,6 +107,8 @@ class PlanExecution:
         self._command_id = command_id
         self._world = WorldCheck(context)
         self._branches: dict[str, _Branch] = {}
+        self._leaving: dict[str, tuple[ActionStatus, str]] = {}
+        """How actions end as soon as servers beyond the robot have ended their goals."""
         self._asked: set[str] = set()
 
     @property
@@ -126,25 +128,58 @@ class PlanExecution:
 
     @property
     def active(self) -> ActionRecord | None:
-        """Return the action that has been under way for longest."""
-        return next((branch.record for branch in self._branches.values()), None)
+        """Return the action that has been under way for longest, or still has to end."""
+        under_way = (branch.record for branch in self._branches.values())
+        return next(under_way, None) or next(map(self._record, self._leaving), None)
 
     def step(self) -> None:
         """Start what may start, and advance every action under way."""
         now_ns = self._context.link.clock.now_ns()
+        self._end_left()
         self._start_ready(now_ns)
-        for branch in list(self._branches.values()):
-            if branch.record.status not in FINAL and now_ns >= branch.resume_ns:
+        for name, branch in list(self._branches.items()):
+            is_open = branch.record.status not in FINAL and name not in self._leaving
+            if is_open and now_ns >= branch.resume_ns:
                 self._step_branch(branch, now_ns)
 
     def cancel(self, reason: str) -> None:
-        """Stop every motion now and cancel what has not ended."""
+        """Stop every motion now and cancel what has not ended.
+
+        What servers beyond the robot do ends when they have answered, in one of the next steps.
+        """
         for branch in self._branches.values():
             _drop(branch)
         self._context.link.halt()
         for record in self.records:
-            if record.status not in FINAL:
-                self._end(record, ActionStatus.CANCELLED, reason)
+            if record.status not in FINAL and record.action.id not in self._leaving:
+                self._leave(record, ActionStatus.CANCELLED, reason)
+
+    def abandon(self) -> None:
+        """End what is left without the word of servers that have not answered yet."""
+        for action_id, (status, error) in list(self._leaving.items()):
+            self._context.notes[action_id] = "not waited for its server to end its goal"
+            self._end(self._record(action_id), status, error)
+
+    def _leave(self, record: ActionRecord, status: ActionStatus, error: str) -> None:
+        """End an action, at once or as soon as no server has a goal of it any more."""
+        if not self._is_ending(record.action):
+            self._end(record, status, error)
+            return
+        self._branches.pop(record.action.id, None)
+        self._leaving[record.action.id] = status, error
+
+    def _end_left(self) -> None:
+        for action_id, (status, error) in list(self._leaving.items()):
+            record = self._record(action_id)
+            if not self._is_ending(record.action):
+                self._end(record, status, error)
+
+    def _is_ending(self, action: Action) -> bool:
+        ros = self._context.ros
+        return ros is not None and ros.is_ending(action.id)
+
+    def _record(self, action_id: str) -> ActionRecord:
+        return next(one for one in self.records if one.action.id == action_id)
 
     def _start_ready(self, now_ns: int) -> None:
         done = {one.action.id for one in self.records if one.status is ActionStatus.SUCCEEDED}
@@ -191,6 +226,7 @@ class PlanExecution:
         record = branch.record
         record.execution_time_s = (now_ns - record.started_ns) / NS_PER_S
         self._context.link.acting = record.action.id
+        self._context.holder = self._holder(record.action)
         try:
             self._advance(branch)
         except StopIteration:
@@ -215,6 +251,8 @@ class PlanExecution:
         if branch.done_ns:
             self._look_for_effect(branch, self._context.link.clock.now_ns())
             return
+        if branch.skill is None and self._is_ending(action):
+            return  # a server has still to end what was tried before
         if branch.skill is None:
             if self._lacks_need(branch, self._context.link.clock.now_ns()):
                 return
@@ -266,24 +304,33 @@ class PlanExecution:
             branch.resume_ns = now_ns + round(BACK_OFF_S * NS_PER_S)
             return
         record.cause = next((cause for kind, cause in CAUSES if isinstance(error, kind)), None)
-        self._give_up(record, str(error))
+        self._give_up(record, str(error), error.status)
 
-    def _give_up(self, record: ActionRecord, error: str) -> None:
+    def _give_up(
+        self, record: ActionRecord, error: str, status: ActionStatus = ActionStatus.ABORTED
+    ) -> None:
         """End an action without success, and with it the rest of the plan."""
-        self._end(record, ActionStatus.ABORTED, error)
+        self._leave(record, status, error)
         self.cancel(f"{record.action.id} failed")
 
     def _end(self, record: ActionRecord, status: ActionStatus, error: str) -> None:
         self._branches.pop(record.action.id, None)
+        self._leaving.pop(record.action.id, None)
         if record.action.id in self._asked:
             self._context.claims.release(self._holder(record.action))
         record.status = status
         record.error = error
-        record.note = self._context.notes.pop(record.action.id, "")
+        record.note = self._note_of(record.action.id)
         rest = self._context.rests.pop(record.action.id, None)
         if rest is not None and status is not ActionStatus.SUCCEEDED:
             record.left = _told(rest)
         self._tell(record)
+
+    def _note_of(self, action_id: str) -> str:
+        """Return what the result says beside its status: of its skill, and of servers' cancels."""
+        note = self._context.notes.pop(action_id, "")
+        said = "" if self._context.ros is None else self._context.ros.words_of(action_id)
+        return "; ".join(one for one in (note, said) if one)
 
     def _holder(self, action: Action) -> str:
         return f"{action.skill} ({self._command_id or 'a plan'}, {action.id})"

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.readiness import refusal_of
+from vla_deploy.ipc.ros_goals import GoalRequest
+from vla_deploy.skills.beyond import arms_beyond, pursue_all, trajectory_requests
 from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import RobotNotReady, Touched, TryAgain
 
@@ -48,14 +50,30 @@ def move_joints(
     speed_ratio: float = 1.0,
     effort_ratio: Mapping[str, float] | None = None,
 ) -> Skill:
-    """Bring joints to targets, all arriving together.
+    """Bring joints to targets, all that control moves arriving together.
+
+    Arms that servers beyond the robot move get there in their own time, side by side with these.
 
     Raises:
         TryAgain: control refused or cancelled the motion, or a stop that ends by itself ended it.
         RobotNotReady: another stop ended it.
+        SkillFailed: a server rejected or gave up its part, or nobody knows how it ended.
     """
-    motion_id = context.link.send_goal(targets, speed_ratio, effort_ratio)
-    yield from _finish(context, motion_id, f"moving {_named(targets)}")
+
+    def timed(joints: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        here = context.link.setpoints[[context.robot.joint_index[name] for name in joints]]
+        there = [targets.get(name, place) for name, place in zip(joints, here, strict=True)]
+        return _timed(context, joints, np.stack([here, np.array(there)]), speed_ratio)
+
+    arms = arms_beyond(context.robot, tuple(targets))
+    requests = trajectory_requests(context, arms, timed) if arms else []
+    beyond = {joint for request in requests for joint in request.joints}
+    own = {joint: value for joint, value in targets.items() if joint not in beyond}
+    motion_id = context.link.send_goal(own, speed_ratio, effort_ratio) if own else None
+    if requests:
+        yield from pursue_all(context, requests)
+    if motion_id is not None:
+        yield from _finish(context, motion_id, f"moving {_named(own)}")
 
 
 def follow_joints(
@@ -67,19 +85,55 @@ def follow_joints(
 ) -> Skill:
     """Move through joint waypoints (n, joints) from rest to rest with minimum-jerk timing.
 
+    An arm that a server beyond the robot moves is moved by control where it feels its way: no
+    trajectory controller does that.
+
     Raises:
         Touched: with a `contact_ratio`, the joints have met something, and rest before it.
         TryAgain: control refused or cancelled the motion, or a stop that ends by itself ended it.
         RobotNotReady: another stop ended it.
+        SkillFailed: a server rejected or gave up its part, or nobody knows how it ended.
     """
+    times_s, positions = _timed(context, joints, waypoints, speed_ratio)
+    requests = _requests_along(context, joints, times_s, positions) if contact_ratio is None else []
+    if requests:
+        yield from pursue_all(context, requests)
+        return
+    motion_id = context.link.send_trajectory(joints, times_s, positions, contact_ratio)
+    yield from _finish(context, motion_id, f"moving {_named(joints)}")
+
+
+def _timed(
+    context: SkillContext,
+    joints: Sequence[str],
+    waypoints: NDArray[np.float64],
+    speed_ratio: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     limits = [context.robot.limits[name] for name in joints]
-    times_s, positions = minimum_jerk(
+    return minimum_jerk(
         waypoints,
         speed_ratio * np.array([limit.velocity for limit in limits]),
         np.array([limit.acceleration for limit in limits]),
     )
-    motion_id = context.link.send_trajectory(joints, times_s, positions, contact_ratio)
-    yield from _finish(context, motion_id, f"moving {_named(joints)}")
+
+
+def _requests_along(
+    context: SkillContext,
+    joints: Sequence[str],
+    times_s: NDArray[np.float64],
+    positions: NDArray[np.float64],
+) -> list[GoalRequest]:
+    """Return the goals that have servers follow a way of arms; none where control follows it."""
+    arms = arms_beyond(context.robot, joints)
+    columns = {name: positions[:, place] for place, name in enumerate(joints)}
+
+    def timed(all_joints: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        here = context.link.setpoints
+        rest = {name: here[context.robot.joint_index[name]] for name in all_joints}
+        ways = [columns.get(name, np.full(len(times_s), rest[name])) for name in all_joints]
+        return times_s, np.stack(ways, axis=1)
+
+    return trajectory_requests(context, arms, timed) if arms else []
 
 
 def stay(

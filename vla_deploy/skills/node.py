@@ -31,11 +31,13 @@ from vla_deploy.skills.executor import ActionRecord, PlanExecution
 from vla_deploy.skills.link import RobotLink
 from vla_deploy.skills.recovery import Recovery
 from vla_deploy.skills.resources import body_of
+from vla_deploy.skills.ros_goals import RosGoals
 
 STATUS_PERIOD_NS = NS_PER_S // 10
 _SHOWN_POINTS = 200
 PLANNER_AGE_S = 2.0
 _IDLE = {False: "idle", True: "recovering"}
+_FAILED = frozenset({ActionStatus.ABORTED, ActionStatus.REJECTED, ActionStatus.LOST})
 
 
 def _told_hands(before: Sample | None) -> dict[str, Held]:
@@ -78,6 +80,7 @@ class ExecutorNode:
             say=self._say,
             voice=Announcer(self._space, "speak", self._clock),
             claims=ClaimBook(self._space, self._clock),
+            ros=RosGoals(self._space, self._clock) if self._robot.ros.is_needed else None,
         )
         self._adviser = Adviser(self._skills)
         self._skills.claims.declare(body_of(self._robot))
@@ -91,6 +94,8 @@ class ExecutorNode:
     def step(self) -> None:
         """Take new plans, advance the running one, tell the status."""
         self._skills.link.refresh()
+        if self._skills.ros is not None:
+            self._skills.ros.refresh()
         if not self._knows_hands:
             self._knows_hands = recall_hands(self._skills, self._told_hands)
         for event in self._plans.drain():
@@ -109,6 +114,11 @@ class ExecutorNode:
     def stop(self) -> None:
         """Cancel what runs, so that nothing moves without its executor."""
         self._call_off("the executor was stopped")
+        if self._execution is not None:
+            self._execution.abandon()
+            self._conclude()
+        if self._skills.ros is not None:
+            self._skills.ros.close()
         self._space.close()
 
     def prepare(self, profile: Profile, model_tier: int) -> float:
@@ -190,7 +200,7 @@ class ExecutorNode:
         """
         records, self._recovery = self._recovery.records, Recovery()
         self._execution = None
-        errors = [one.error for one in reversed(records) if one.status is ActionStatus.ABORTED]
+        errors = [one.error for one in reversed(records) if one.status in _FAILED]
         errors += [one.error for one in records if one.error]
         advice = "" if success else self._advice(records)
         told = ". ".join(one.rstrip(".?") for one in (*errors[:1], advice) if one)
@@ -205,7 +215,7 @@ class ExecutorNode:
 
     def _advice(self, records: Sequence[ActionRecord]) -> str:
         """Return what to do about the action that the last plan failed by, "" where nothing."""
-        aborted = [one for one in records if one.status is ActionStatus.ABORTED]
+        aborted = [one for one in records if one.status in _FAILED]
         if not aborted or aborted[-1].cause is None:
             return ""
         return self._adviser.advice_on(aborted[-1].action)

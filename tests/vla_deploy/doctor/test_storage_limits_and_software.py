@@ -204,11 +204,3 @@ def test_without_egl_the_packages_are_named(computer) -> None:
     computer.answers[sys.executable] = "EGL 1.5\n"
     (finding,) = software.open_gl(computer.context())
     assert (finding.level, finding.measured) == (Level.OK, "EGL 1.5")
-
-
-def test_ros_without_its_setup_is_told(computer) -> None:
-    (absent,) = software.ros(computer.context())
-    assert absent.level is Level.MISSING
-    computer.write("/opt/ros/jazzy/setup.bash")
-    (finding,) = software.ros(computer.context())
-    assert finding.remedy == "source /opt/ros/jazzy/setup.bash"

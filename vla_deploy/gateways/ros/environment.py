@@ -16,6 +16,7 @@ from typing import Final
 from vla_deploy.gateways.ros.errors import RosNotFound
 
 VARIABLE: Final = "VLA_DEPLOY_ROS_PYTHON"
+WORKSPACE_VARIABLE: Final = "VLA_DEPLOY_ROS_WORKSPACE"
 WHEELS: Final = ".venv-ros"
 PACKAGES: Final = ("vla_deploy", "drivers", "platforms")
 SETUP: Final = Path("/opt/ros/jazzy/setup.bash")
@@ -51,13 +52,15 @@ def find_environment(
     """Return the environment of ROS: configured, or named by a variable, or found.
 
     `configured` is an interpreter or the folder of a virtual environment, `workspace` a colcon
-    workspace on top of the ROS that `setup` sets up; both come from the robot file. `places` are
-    the folders in which an environment of wheels is looked for.
+    workspace on top of the ROS that `setup` sets up, or its folder `install`; both come from the
+    robot file, else from variables. `places` are the folders in which an environment of wheels is
+    looked for.
 
     Raises:
         RosNotFound: there is none, or what was named cannot be used.
     """
     named = configured or inherited.get(VARIABLE, "")
+    workspace = workspace or inherited.get(WORKSPACE_VARIABLE, "")
     if named:
         origin = "the robot file" if configured else f"the variable {VARIABLE}"
         python = _interpreter(Path(named).expanduser(), origin)
@@ -134,18 +137,23 @@ def _of_setup(
     python: Path, layers: list[Path], workspace: str, inherited: Mapping[str, str], whose: str
 ) -> RosEnvironment:
     if workspace:
-        overlay = Path(workspace).expanduser() / "install" / "setup.bash"
-        if not overlay.is_file():
-            raise RosNotFound(
-                f"no {overlay}: the robot file names {workspace} as a colcon workspace; "
-                f"build it: cd {workspace} && colcon build"
-            )
-        layers = [*layers, overlay]
+        layers = [*layers, _overlay(Path(workspace).expanduser())]
     words = " and ".join(map(str, layers)) or "no setup.bash"
     return RosEnvironment(
         python=python,
         variables=_sourced(layers, inherited),
         origin=f"{python} ({whose}) with {words}",
+    )
+
+
+def _overlay(workspace: Path) -> Path:
+    files = [workspace / "install" / "setup.bash", workspace / "setup.bash"]
+    for file in files:
+        if file.is_file():
+            return file
+    raise RosNotFound(
+        f"no {' and no '.join(map(str, files))}: [ros] workspace of the robot file, or "
+        f"{WORKSPACE_VARIABLE}, names {workspace}; build it: cd {workspace} && colcon build"
     )
 
 

@@ -1,4 +1,9 @@
-"""Declare what can go wrong with the ROS 2 gateway."""
+"""Declare what can go wrong with the ROS 2 gateway.
+
+RosGatewayError
+├── RosNotFound          no environment of ROS 2, or one that lacks a part: install it, or name it
+└── ParametersUnusable   the node's parameter file cannot be used: mend it, or leave it out
+"""
 
 
 class RosGatewayError(Exception):
@@ -7,3 +12,7 @@ class RosGatewayError(Exception):
 
 class RosNotFound(RosGatewayError):
     """Report that no environment of ROS 2 was found, or one that lacks a part."""
+
+
+class ParametersUnusable(RosGatewayError):
+    """Report which file of parameters cannot be used, and why."""

@@ -12,7 +12,7 @@ from typing import Any, Final, Protocol
 
 import rclpy
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
-from rclpy.action import ActionServer
+from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import (
@@ -93,7 +93,7 @@ class Graph:
         self.node: Final = Node(NODE_NAME, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._servers: list[ActionServer] = []
+        self._servers: list[ActionServer | ActionClient] = []
         self._spinning = threading.Thread(target=self._spin, name="ros-spin", daemon=True)
 
     def begin(self) -> None:
@@ -159,13 +159,17 @@ class Graph:
 
         self.node.create_service(kind, name, respond)
 
-    def act(self, server: ActionServer) -> None:
-        """Keep an action server until the end."""
+    def act(self, server: ActionServer | ActionClient) -> None:
+        """Keep a server or a client of an action until the end."""
         self._servers.append(server)
 
     def future(self) -> Future:
         """Return a future whose result wakes what waits for it in the graph's thread."""
         return _Waking(self._executor)
+
+    def perform(self, work: Callable[[], None]) -> None:
+        """Have something done in the graph's thread; it must not raise, else that thread ends."""
+        self._executor.create_task(work)
 
     def put(self, work: Callable[[], None]) -> bool:
         """Have something done in the next step; return whether there is room for it."""

@@ -11,8 +11,11 @@ from vla_deploy.gateways.ros.commands import RobotCommands
 from vla_deploy.gateways.ros.feedback import CommandFeedback
 from vla_deploy.gateways.ros.graph import SOURCE, Graph
 from vla_deploy.gateways.ros.inward.parts import inward_parts
+from vla_deploy.gateways.ros.outgoing.courier import Courier
+from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.outward.parts import outward_parts
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
+from vla_deploy.gateways.ros.shared_memory import remove_leftovers
 from vla_deploy.gateways.ros.stamps import RosTime
 from vla_deploy.ipc import CellWriter
 from vla_deploy.node import NodeContext
@@ -46,6 +49,8 @@ class RosGatewayNode:
     def start(self) -> None:
         """Join the graph."""
         self._status = self._link.space.cell_writer(STATUS_TOPIC)
+        for leftover in remove_leftovers():
+            _log.info("removed %s, which a killed process of ROS has left", leftover.name)
         self._graph = Graph()
         gateway = Gateway(
             graph=self._graph,
@@ -56,7 +61,13 @@ class RosGatewayNode:
             commands=RobotCommands(self._link, self._time.now_ns),
             feedback=CommandFeedback(self._graph),
         )
-        self._parts = (*outward_parts(gateway), *inward_parts(gateway))
+        lending = Lending(self._link)
+        # What is lent no longer is known before anything is taken from the graph.
+        self._parts = (
+            *outward_parts(gateway),
+            Courier(gateway, lending),
+            *inward_parts(gateway, lending),
+        )
         self._graph.begin()
         accept = self._robot.ros.accept
         if accept is not Accepts.ALL:

@@ -1,4 +1,5 @@
 import os
+import select
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from vla_deploy.gateways.ros.environment import (
     PACKAGES,
     SYSTEM_PYTHON,
     VARIABLE,
+    WORKSPACE_VARIABLE,
     find_environment,
     link_packages,
 )
@@ -100,9 +102,13 @@ def test_a_workspace_is_laid_over_the_systems_ros_even_where_wheels_are(tmp_path
     make_wheels(tmp_path / "checkout" / ".venv-ros")
     make_setup(tmp_path / "opt" / "setup.bash", "jazzy")
     make_setup(tmp_path / "ws" / "install" / "setup.bash", "ws")
-    found = find(workspace=str(tmp_path / "ws"))
-    assert found.python == SYSTEM_PYTHON
-    assert found.variables["PYTHONPATH"] == "/ws/python:/jazzy/python"
+    for found in (
+        find(workspace=str(tmp_path / "ws")),
+        find(workspace=str(tmp_path / "ws" / "install")),
+        find(**{WORKSPACE_VARIABLE: str(tmp_path / "ws")}),
+    ):
+        assert found.python == SYSTEM_PYTHON
+        assert found.variables["PYTHONPATH"] == "/ws/python:/jazzy/python"
 
 
 def test_an_interpreter_without_wheels_gets_the_systems_setup(tmp_path, find) -> None:
@@ -154,3 +160,33 @@ def test_links_show_our_packages_and_nothing_else_of_ours(tmp_path) -> None:
     code = f"import {', '.join(PACKAGES)}, importlib.util as u; assert not u.find_spec('numpy')"
     command = [sys.executable, "-S", "-c", code]
     subprocess.run(command, env={"PYTHONPATH": str(folder)}, check=True)
+
+
+LAUNCHER = """
+import os, subprocess, sys
+command = "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 15, 0, 0, 0); "
+command += "os.execv(sys.argv[1], sys.argv[1:])"
+subprocess.Popen([sys.executable, "-I", "-S", "-c", command, *sys.argv[1:]])
+sys.stdin.readline()
+"""
+CHILD = "import os, time; print(os.getpid(), flush=True); time.sleep(60)"
+
+
+def test_the_kernels_signal_at_the_parents_end_outlives_the_restart_of_the_interpreter(
+    ros_environment,
+) -> None:
+    """The wheels' interpreter executes itself anew, and is still told when the supervisor ends."""
+    parent = subprocess.Popen(
+        [sys.executable, "-c", LAUNCHER, ros_environment.python, "-c", CHILD],
+        env={**os.environ, **ros_environment.variables},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert parent.stdout is not None
+    child = os.pidfd_open(int(parent.stdout.readline()))
+    parent.kill()
+    parent.communicate()
+    ended, _, _ = select.select([child], [], [], 20)
+    os.close(child)
+    assert ended == [child]

@@ -1,6 +1,6 @@
 """List what the gateway takes from the graph, as far as the robot file permits it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from control_msgs.action import FollowJointTrajectory
@@ -8,8 +8,10 @@ from nav2_msgs.action import NavigateToPose
 from vla_deploy_msgs.action import ExecutePlan
 
 from vla_deploy.gateways.ros.inward.acts import Acts
+from vla_deploy.gateways.ros.inward.claiming import Borrowed, Claimed, PartsHold
 from vla_deploy.gateways.ros.inward.command_topics import CommandTopics
 from vla_deploy.gateways.ros.inward.grippers import gripper_desks
+from vla_deploy.gateways.ros.inward.joint_commands import JointCommands
 from vla_deploy.gateways.ros.inward.motions import Motions
 from vla_deploy.gateways.ros.inward.navigation import NavigationServer
 from vla_deploy.gateways.ros.inward.orders import Orders
@@ -18,37 +20,49 @@ from vla_deploy.gateways.ros.inward.pursuing import ActionDesk
 from vla_deploy.gateways.ros.inward.say_topic import SayTopic
 from vla_deploy.gateways.ros.inward.trajectories import TrajectoryServer
 from vla_deploy.gateways.ros.inward.velocity import Velocity
+from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.part import Gateway, GatewayPart
 from vla_deploy.ipc.stop_button import ESTOP
 from vla_deploy.robots.ros_settings import Accepts
 
 ALL_ACTS: Final = (ESTOP, "reset", "arm", "disarm")
 WHOLE_BODY: Final = "joint_trajectory_controller"
+OWN: Final = "/vla_deploy"
+"""Before the names of the robot's own servers where servers beyond it have theirs."""
+BASE: Final = "base"
 
 
-def inward_parts(gateway: Gateway) -> tuple[GatewayPart, ...]:
-    """Return the parts that take; which they are is the robot file's `accept`."""
-    accept = gateway.settings.accept
-    if accept is Accepts.NOTHING:
-        return ()
-    if accept is Accepts.STOP:
-        return (Acts(gateway, (ESTOP,)),)
-    motions = Motions(gateway.link, gateway.robot.joint_index)
-    orders = Orders(gateway.link)
-    graph = gateway.graph
-    navigation = NavigationServer(gateway, orders)
-    plans = PlanServer(gateway, orders)
-    return (
-        Acts(gateway, ALL_ACTS),
-        Velocity(gateway),
-        Shared(motions, orders),
-        CommandTopics(gateway, orders),
-        SayTopic(gateway),
-        *_trajectory_desks(gateway, motions),
-        *gripper_desks(gateway, motions),
-        ActionDesk(graph, NavigateToPose, "/navigate_to_pose", navigation.judge),
-        ActionDesk(graph, ExecutePlan, "/vla_deploy/execute_plan", plans.judge),
-    )
+def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
+    """Return the parts that take; which they are is the robot file's `accept`.
+
+    Where servers beyond the robot drive it or move its arms, these parts take from them what moves
+    what they are lent, whatever is accepted from others, and nothing else.
+    """
+    accept, settings = gateway.settings.accept, gateway.settings
+    graph, link = gateway.graph, gateway.link
+    motions = Motions(link, gateway.robot.joint_index)
+    orders = Orders(link)
+    acts = {Accepts.STOP: (ESTOP,), Accepts.ALL: ALL_ACTS}.get(accept)
+    parts: list[GatewayPart] = [] if acts is None else [Acts(gateway, acts)]
+    takes_all = accept is Accepts.ALL
+    if settings.is_driven_by_nav2:
+        parts.append(Velocity(gateway, Borrowed(lending, (BASE,), driving=True)))
+    elif takes_all:
+        parts.append(Velocity(gateway, Claimed(link, "ros/cmd_vel", (BASE,))))
+    if takes_all or settings.are_arms_beyond:
+        parts.append(Shared(motions, orders))
+        parts += _trajectory_desks(gateway, motions, lending)
+    if takes_all:
+        navigation = NavigationServer(gateway, orders)
+        plans = PlanServer(gateway, orders)
+        navigating = f"{OWN if settings.is_driven_by_nav2 else ''}/navigate_to_pose"
+        parts += gripper_desks(gateway, motions)
+        parts.append(ActionDesk(graph, NavigateToPose, navigating, navigation.judge))
+        parts.append(ActionDesk(graph, ExecutePlan, f"{OWN}/execute_plan", plans.judge))
+        parts += [CommandTopics(gateway, orders), SayTopic(gateway)]
+        if not settings.are_arms_beyond:
+            parts.append(JointCommands(gateway, motions))
+    return tuple(parts)
 
 
 class Shared:
@@ -69,17 +83,32 @@ class Shared:
         self._orders.close()
 
 
-def _trajectory_desks(gateway: Gateway, motions: Motions) -> Iterator[ActionDesk]:
-    robot = gateway.robot
-    known = set(robot.joint_names)
+def _trajectory_desks(gateway: Gateway, motions: Motions, lending: Lending) -> Iterator[ActionDesk]:
+    """Yield a server for each group, and one for all joints.
+
+    Where servers beyond the robot move its arms, those have the names: ours go by another one, and
+    move an arm only while it is lent to such a server.
+    """
+    robot, settings = gateway.robot, gateway.settings
+    arms = {hand.arm for hand in robot.hands.values()} if settings.are_arms_beyond else set()
+
+    def hold(holder: str, groups: Sequence[str]) -> PartsHold:
+        if arms.isdisjoint(groups):
+            return Claimed(gateway.link, holder, groups)
+        return Borrowed(lending, groups)
+
+    joints = {name: group.joints for name, group in robot.groups.items()}
+    named = {f"{name}_controller": (name, of) for name, of in joints.items()}
+    if settings.accept is not Accepts.ALL:
+        named = {name: row for name, row in named.items() if row[0] in arms}
     servers = {
-        f"{name}_controller": TrajectoryServer(gateway, motions, name, group.joints)
-        for name, group in robot.groups.items()
-        if set(group.joints) <= known
+        name: TrajectoryServer(gateway, motions, name, of, hold)
+        for name, (_, of) in named.items()
+        if set(of) <= set(robot.joint_names)
     }
     servers[WHOLE_BODY] = TrajectoryServer(
-        gateway, motions, WHOLE_BODY, robot.joint_names, partial=True
+        gateway, motions, WHOLE_BODY, robot.joint_names, hold, partial=True
     )
     for name, server in servers.items():
-        action = f"/{name}/follow_joint_trajectory"
+        action = f"{OWN if arms else ''}/{name}/follow_joint_trajectory"
         yield ActionDesk(gateway.graph, FollowJointTrajectory, action, server.judge)

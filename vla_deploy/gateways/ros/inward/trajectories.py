@@ -1,6 +1,6 @@
 """Serve FollowJointTrajectory as joint_trajectory_controller does, one server for each group."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -9,7 +9,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.inward.claiming import Claimed
+from vla_deploy.gateways.ros.inward.claiming import PartsHold
 from vla_deploy.gateways.ros.inward.motions import Ended, JointView, Motions
 from vla_deploy.gateways.ros.inward.pursuing import Begin, Ending, Feedback, Outcome
 from vla_deploy.gateways.ros.inward.trajectory_goal import (
@@ -39,15 +39,18 @@ class TrajectoryServer:
         motions: Motions,
         name: str,
         joints: Sequence[str],
+        hold: Callable[[str, Sequence[str]], PartsHold],
         *,
         partial: bool = False,
     ) -> None:
+        """Serve some joints; `hold` makes what holds their groups, by its name and theirs."""
         self.joints = tuple(joints)
         self._gateway = gateway
         self._motions = motions
         self._name = name
         self._partial = partial
-        self._claim: Claimed | None = None
+        self._hold = hold
+        self._claim: PartsHold | None = None
 
     def judge(self, goal: Any) -> Begin | Outcome:
         """Return how to begin with a goal, or why not at all."""
@@ -74,7 +77,7 @@ class TrajectoryServer:
         ]
         if self._claim is not None:
             self._claim.release()
-        self._claim = Claimed(self._gateway.link, f"ros/{self._name}", groups)
+        self._claim = self._hold(f"ros/{self._name}", groups)
         why = self._claim.why_not_taken()
         if why:
             return _outcome(Ending.ABORTED, Result.INVALID_GOAL, why)
@@ -90,7 +93,7 @@ class Following:
         motions: Motions,
         goal: TrajectoryGoal,
         feedback: Feedback,
-        claim: Claimed,
+        claim: PartsHold,
     ) -> None:
         self._gateway = gateway
         self._motions = motions
@@ -110,6 +113,7 @@ class Following:
         ended = self._motions.ended(self._motion_id)
         if ended is not None and (self._ends_as is not None or ended.status != "done"):
             return self._finish(*self._ending_of(ended))
+        self._end_with_claim()
         if view is None:
             return None
         if ended is not None:
@@ -145,6 +149,13 @@ class Following:
         except BadPayload as error:
             return self._finish(Ending.ABORTED, Result.INVALID_GOAL, f"too long: {error}")
         return None
+
+    def _end_with_claim(self) -> None:
+        """End a motion whose joints may be moved no longer."""
+        why = self._claim.why_over() if self._ends_as is None else ""
+        if why and self._settle_by_ns is None:
+            self._ends_as = Ending.ABORTED, Result.INVALID_GOAL, why
+            self._motions.cancel(self._motion_id or 0)
 
     def _watch(self, view: JointView) -> None:
         """End a motion that has left its path; its end is told when the joints rest."""

@@ -8,7 +8,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.inward.claiming import Claimed
+from vla_deploy.gateways.ros.inward.claiming import PartsHold
 from vla_deploy.gateways.ros.part import Gateway
 from vla_deploy.ipc import CellWriter
 
@@ -23,14 +23,14 @@ _log = logging.getLogger(__name__)
 
 
 class Velocity:
-    """Pass on what is wanted of the base while nobody else drives it."""
+    """Pass on what is wanted of the base while nobody else drives it, or the executor lends it."""
 
-    def __init__(self, gateway: Gateway) -> None:
+    def __init__(self, gateway: Gateway, claim: PartsHold) -> None:
         self._gateway = gateway
         self._clock = gateway.link.clock
         self._command: CellWriter = gateway.link.space.cell_writer("remote_base_command")
-        self._claim = Claimed(gateway.link, "ros/cmd_vel", ("base",))
-        self._last_ns = 0
+        self._claim = claim
+        self._last_ns = self._stamp_ns = 0
         self._told_ns = -NS_PER_S * 10
         self.refused = 0
         if gateway.settings.cmd_vel_stamped:
@@ -39,8 +39,10 @@ class Velocity:
             gateway.graph.listen(Twist, TOPIC, self._take)
 
     def step(self, now_ns: int) -> None:
-        """Let others have the base when nobody drives it any more."""
-        if self._claim.is_held and now_ns - self._last_ns > round(_REST_S * NS_PER_S):
+        """Let others have the base when nobody drives it any more, or nobody may."""
+        if self._claim.is_held and self._claim.why_over():
+            self.stop()
+        elif self._claim.is_held and now_ns - self._last_ns > round(_REST_S * NS_PER_S):
             self._claim.release()
 
     def stop(self) -> None:
@@ -57,6 +59,10 @@ class Velocity:
                 hint = "; do both go by the same time (use_sim_time)?" if abs(age_s) > 5 else ""
                 self._refuse(f"its stamp is {age_s:.2f} s old, expected 0 to {MOST_AGE_S}{hint}")
                 return
+            if time.run_ns(stamp) < self._stamp_ns:
+                self._refuse("its stamp is older than that of the one before")
+                return
+            self._stamp_ns = time.run_ns(stamp)
         self._take(message.twist)
 
     def _take(self, twist: Twist) -> None:
@@ -75,9 +81,10 @@ class Velocity:
             self._refuse(why)
             return
         self._last_ns = self._clock.now_ns()
-        self._command.put(
-            v_m_s=float(twist.linear.x), w_rad_s=float(twist.angular.z), valid_s=HOLDS_S
-        )
+        v_m_s, w_rad_s = float(twist.linear.x), float(twist.angular.z)
+        # Both by the same ratio: the curve stays.
+        ratio = min(1.0, self._claim.most_m_s() / abs(v_m_s)) if v_m_s else 1.0
+        self._command.put(v_m_s=v_m_s * ratio, w_rad_s=w_rad_s * ratio, valid_s=HOLDS_S)
 
     def _refuse(self, why: str) -> None:
         self.refused += 1
