@@ -7,13 +7,12 @@ deals with the robot. A press of the stop does not wait for that.
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
 import rclpy
 from rclpy.action import ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -22,6 +21,8 @@ from rclpy.qos import (
 )
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+
+from vla_deploy.gateways.ros.declaring import SteadyNode
 
 NODE_NAME: Final = "vla_deploy"
 MOST_WAITING: Final = 256
@@ -75,12 +76,13 @@ class _Waking(Future):  # type: ignore[misc]  # rclpy tells no types
 class Graph:
     """Hold the node's end of the ROS 2 graph."""
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        """Join with these values of the parameters."""
         self.dropped = 0
         self._inbox: deque[Callable[[], None]] = deque()
         self._context = rclpy.Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self.node: Final = Node(NODE_NAME, context=self._context)
+        self.node: Final = SteadyNode(NODE_NAME, parameters, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._servers: list[ActionServer] = []
