@@ -48,7 +48,7 @@ def read_source(name_or_path: str | Path) -> Source:
     origins: dict[str, Path] = {}
     for file, document in reversed(chain):
         own = {key: value for key, value in document.items() if key != "inherits"}
-        values = _merged(values, own)
+        values = merged(values, own)
         origins |= dict.fromkeys((key for key, _ in flat(own)), file)
     parents = tuple(file.stem for file, _ in chain[1:])
     return Source(name=path.stem, path=path, values=values, origins=origins, parents=parents)
@@ -110,10 +110,10 @@ def _known(folder: Path) -> str:
     return ", ".join(sorted(names))
 
 
-def _merged(below: Table, above: Table) -> dict[str, Any]:
-    """Let tables melt together, and every other value above replace the one below."""
-    merged = dict(below)
+def merged(below: Table, above: Table) -> dict[str, Any]:
+    """Merge tables key by key; every other value above, lists too, replaces the one below."""
+    whole = dict(below)
     for key, value in above.items():
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
-        merged[key] = _merged(merged[key], value) if both else value
-    return merged
+        both = isinstance(value, dict) and isinstance(whole.get(key), dict)
+        whole[key] = merged(whole[key], value) if both else value
+    return whole

@@ -1,6 +1,7 @@
 """Every settings file that the documentation shows is one that the program takes."""
 
 import re
+import shutil
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from platforms import load_profile
 from vla_deploy.dashboard.settings import faults_of
 from vla_deploy.inference.manifest_schema import manifest_faults
 from vla_deploy.model_servers.servers_file import read_servers
-from vla_deploy.robots import schema
-from vla_deploy.robots.loader import NAMED, SINGLE
+from vla_deploy.robots import load_robot, schema
+from vla_deploy.robots.loader import NAMED, ROBOTS_DIR, SINGLE
+from vla_deploy.robots.overrides import OVERRIDES_FILE
+from vla_deploy.robots.ros_settings import ROS
 from vla_deploy.telemetry.recording.settings import TelemetrySettings
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -63,7 +66,7 @@ def test_manifests(page: str, name: str) -> None:
     assert faults == []
 
 
-@pytest.mark.parametrize("page", ["sensors", "voice", "zones", "can"])
+@pytest.mark.parametrize("page", ["sensors", "voice", "zones", "can", "ros"])
 def test_tables_of_robot_toml(page: str) -> None:
     files = shown(page)
     assert files
@@ -73,6 +76,16 @@ def test_tables_of_robot_toml(page: str) -> None:
             for record in records:
                 shape = SINGLE.get(key) or NAMED[key]
                 assert schema.check_record(record, key, shape) == ()
+
+
+def test_overrides_toml_and_every_key_of_ros(tmp_path: Path) -> None:
+    files = shown("robots")
+    for number, (text, _) in enumerate(files):
+        folder = shutil.copytree(ROBOTS_DIR / "butler", tmp_path / str(number))
+        (folder / OVERRIDES_FILE).write_text(text)
+        load_robot(folder)
+    (ros,) = [document["ros"] for _, document in files if "ros" in document]
+    assert set(ros) == set(ROS)
 
 
 def test_every_table_of_robot_toml_is_told() -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from sim_twin.stack import LockstepStack
-from vla_deploy.planning.recovery import MOST_RECOVERIES
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 pytestmark = pytest.mark.gl
 
@@ -35,7 +35,7 @@ def test_a_cup_that_is_taken_from_the_hand_is_fetched_again(coarse_at_table: Loc
     setbacks = [one for one in stack.events if one["event"] == "setback"]
     assert setbacks[0]["error"] == "the left hand has lost the cup before it was put down"
     # What is known of a thing that was snatched is where it was last: that may have to be unlearnt.
-    assert len(setbacks) <= MOST_RECOVERIES
+    assert len(setbacks) <= NOT_BOUNDED.further_plans
     plans = [one for one in stack.events if one["event"] == "plan"]
     assert [(one["rung"], one.get("origin")) for one in plans[:2]] == [
         ("rules", None),

@@ -11,6 +11,7 @@ from typing import Any
 from drivers.twin_page import TwinPace
 from vla_deploy.cli.errors import CommandFailed
 from vla_deploy.cli.example import add_top_command
+from vla_deploy.cli.run_parameters import with_parameters
 from vla_deploy.exit_codes import EXIT_DEVICE_ABSENT
 from vla_deploy.logs import journal_stream
 from vla_deploy.supervisor.errors import DeviceAbsent, ProcessGivenUp, StartCrashed
@@ -56,6 +57,12 @@ def register(commands: Any) -> None:
         help="arm once everything is ready (default: only with --twin)",
     )
     add_ros_argument(run)
+    run.add_argument(
+        "--params-file",
+        type=Path,
+        metavar="FILE",
+        help="YAML parameters, as of ROS, that hold for the whole robot: see docs/ros.md",
+    )
     run.set_defaults(run=main, profile=None)
 
 
@@ -155,6 +162,7 @@ def main(arguments: argparse.Namespace) -> int:
         arm=arm,
         ros=arguments.ros,
     )
+    options = with_parameters(options, arguments.params_file)
     try:
         _keep_running(options)
     except DeviceAbsent as error:

@@ -30,6 +30,7 @@ from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.planning.understanding import Outcome, Question, Reply, Turn, Verdict, described
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 MOST_WAITING: Final = 8
 CANCELLED: Final = "cancelled on request"
@@ -46,6 +47,7 @@ class Desk:
         telling: Telling,
         aside: Executor,
         clock: Clock,
+        further_plans: int = NOT_BOUNDED.further_plans,
     ) -> None:
         self.planner = planner
         self.dialogue = Dialogue(clock)
@@ -54,7 +56,7 @@ class Desk:
         self._beside = Beside(aside, clock)
         self._clock = clock
         self._queue: deque[Command] = deque()
-        self._under_way = UnderWay()
+        self._under_way = UnderWay(further_plans)
         self._rehearing = Rehearing(clock)
         self._conclusions = Conclusions(
             # Another profile brings another planner.

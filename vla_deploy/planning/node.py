@@ -70,7 +70,14 @@ class PlannerNode:
         situation = Situation(self._space, self._clock, self._robot, self._memory)
         if self._memory is not None:
             self._keeper = self._new_keeper(self._memory)
-        self._desk = Desk(self._planner, situation, self._telling, self._aside, self._clock)
+        self._desk = Desk(
+            self._planner,
+            situation,
+            self._telling,
+            self._aside,
+            self._clock,
+            self._robot.planning.further_plans,
+        )
         self._status = self._space.cell_writer("planner_status")
         self._take_up(before)
 

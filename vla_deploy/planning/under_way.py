@@ -8,15 +8,20 @@ from typing import Any, Final
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.recovery import MOST_RECOVERIES, RECOVERY, Carried, read_setback
+from vla_deploy.planning.recovery import RECOVERY, Carried, read_setback
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 _MOST_REMEMBERED: Final = 16
 
 
 class UnderWay:
-    """Hold command and plan of what is carried out, with all that failed before."""
+    """Hold command and plan of what is carried out, with all that failed before.
 
-    def __init__(self) -> None:
+    For one command, `further_plans` are made at most.
+    """
+
+    def __init__(self, further_plans: int = NOT_BOUNDED.further_plans) -> None:
+        self._further_plans = further_plans
         self._carried: OrderedDict[str, tuple[Command, Carried]] = OrderedDict()
 
     def carry(
@@ -56,11 +61,17 @@ class UnderWay:
         command, carried = known
         if carried.given:
             return "the plan was given, and is not changed"
-        if len(carried.setbacks) >= MOST_RECOVERIES:
-            return f"{MOST_RECOVERIES} other plans failed, too"
+        if len(carried.setbacks) >= self._further_plans:
+            return _no_more(self._further_plans)
         self._carried[command_id] = command, carried.after(setback)
         return command
 
     def ended(self, command_id: str) -> None:
         """Forget a command: it has come to its end."""
         self._carried.pop(command_id, None)
+
+
+def _no_more(further_plans: int) -> str:
+    if further_plans == 0:
+        return "this robot makes no other plan: [planning] further_plans is 0"
+    return f"{further_plans} other plan{'s' if further_plans > 1 else ''} failed, too"

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from platforms.profile_source import merged
 from vla_deploy.robots import protection_schema, schema
 from vla_deploy.robots.calibration import calibrated
 from vla_deploy.robots.camera_calibration import with_calibration
@@ -34,6 +35,7 @@ from vla_deploy.robots.description import (
 )
 from vla_deploy.robots.errors import RobotFileError
 from vla_deploy.robots.mjcf import mjcf_faults, read_mjcf_names
+from vla_deploy.robots.overrides import read_overrides, traced
 from vla_deploy.robots.plan_bounds import Confirm, PlanBounds
 from vla_deploy.robots.ros_settings import ROS, ros_settings
 from vla_deploy.robots.schema import Fault, Shape, check_record
@@ -78,15 +80,19 @@ LISTED: Mapping[tuple[str, str], Shape] = {
 def load_robot(name_or_path: str | Path) -> RobotDescription:
     """Return the robot of that name under `vla_deploy/robots`, or of that file or folder.
 
-    What `calibration.toml` in the same folder has measured replaces signs and offsets; the camera
+    What `overrides.toml` in the same folder says goes before the robot file, and what its
+    `calibration.toml` has measured replaces signs and offsets; the camera
     gets the lens of `camera.yaml` and the place of `camera_mounting.toml`, if they are there.
 
     Raises:
         RobotFileError: the file is missing, is not TOML, or has faults; all of them are listed.
     """
-    file = _find(name_or_path)
-    document, calibration_faults = calibrated(_parse(file), file.parent)
-    faults = (*calibration_faults, *_faults(document, file.parent))
+    file = robot_file(name_or_path)
+    own = _parse(file)
+    overrides, override_faults = read_overrides(file.parent)
+    document, calibration_faults = calibrated(merged(own, overrides), file.parent)
+    found = (traced(fault, overrides, own) for fault in _faults(document, file.parent))
+    faults = (*override_faults, *calibration_faults, *found)
     if faults:
         raise RobotFileError(file, faults)
     camera, faults = with_calibration(Camera(**document["camera"]), file.parent)
@@ -95,12 +101,12 @@ def load_robot(name_or_path: str | Path) -> RobotDescription:
     return _build(document, file.parent, camera)
 
 
-def robot_names() -> tuple[str, ...]:
-    """Return the names of the robots that come with the stack."""
-    return tuple(sorted(path.parent.name for path in ROBOTS_DIR.glob(f"*/{ROBOT_FILE}")))
+def robot_file(name_or_path: str | Path) -> Path:
+    """Return the file of a robot, given its name, its folder or the file itself.
 
-
-def _find(name_or_path: str | Path) -> Path:
+    Raises:
+        RobotFileError: there is none.
+    """
     given = Path(name_or_path)
     candidates = (given, given / ROBOT_FILE, ROBOTS_DIR / given / ROBOT_FILE)
     for candidate in candidates:
@@ -108,6 +114,11 @@ def _find(name_or_path: str | Path) -> Path:
             return candidate
     expected = f"a robot file, its folder, or one of {', '.join(robot_names())}"
     raise RobotFileError(given, (Fault(key="(file)", got="no such file", expected=expected),))
+
+
+def robot_names() -> tuple[str, ...]:
+    """Return the names of the robots that come with the stack."""
+    return tuple(sorted(path.parent.name for path in ROBOTS_DIR.glob(f"*/{ROBOT_FILE}")))
 
 
 def _parse(file: Path) -> Document:

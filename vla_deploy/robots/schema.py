@@ -222,6 +222,8 @@ PLANNING: Shape = {
     "max_actions": replace(_integer(1, 100), is_optional=True),
     "max_duration_s": OPTIONAL_POSITIVE,
     "require_confirmation": one_of("never", "risky", "always", is_optional=True),
+    "further_plans": replace(_integer(0, 20), is_optional=True),
+    "action_timeout_s": OPTIONAL_POSITIVE,
 }
 
 

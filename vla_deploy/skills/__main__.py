@@ -12,7 +12,12 @@ from vla_deploy.skills.node import ExecutorNode
 def build(context: NodeContext) -> ExecutorNode:
     """Build the node from what the process was started with."""
     profile = load_profile(context.profile)
-    return ExecutorNode(context, load_robot(context.robot), profile.executor_rate_hz)
+    return ExecutorNode(
+        context,
+        load_robot(context.robot),
+        profile.executor_rate_hz,
+        profile.planning.within_s,
+    )
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from vla_deploy.client.action_status import ActionStatus
@@ -38,6 +38,7 @@ CAUSES = (
     (TryAgain, Cause.SKILL),
     (NotPossible, Cause.SKILL),
 )
+_WAITING: Final = "wait"  # lasts as long as it was asked for
 FINAL = frozenset(ActionStatus) - {ActionStatus.PENDING, ActionStatus.ACTIVE}
 
 
@@ -242,7 +243,7 @@ class PlanExecution:
         refusal = refusal_of(self._context.link.control_status)
         if refusal:
             raise RobotNotReady(refusal)
-        timeout_s = SKILLS[action.skill].timeout_s
+        timeout_s = self._timeout_s(action)
         if branch.record.execution_time_s > timeout_s:
             raise TryAgain(f"{action.skill} took longer than {timeout_s:g} s")
         if self._context.link.is_blind or self._context.link.is_paused:
@@ -259,6 +260,12 @@ class PlanExecution:
             branch.before = self._world.state(action)
             branch.skill = SKILL_FUNCTIONS[action.skill](self._context, action.parameters)
         next(branch.skill)
+
+    def _timeout_s(self, action: Action) -> float:
+        own_s = SKILLS[action.skill].timeout_s
+        if action.skill == _WAITING:
+            return own_s
+        return min(own_s, self._context.robot.planning.action_timeout_s)
 
     def _lacks_need(self, branch: _Branch, now_ns: int) -> bool:
         """Tell whether to wait for what the world denies at first: one image may miss a thing.

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
 from drivers.clock import NS_PER_S
 from platforms import Profile
@@ -36,6 +36,9 @@ from vla_deploy.skills.ros_goals import RosGoals
 STATUS_PERIOD_NS = NS_PER_S // 10
 _SHOWN_POINTS = 200
 PLANNER_AGE_S = 2.0
+PLAN_WITHIN_S: Final = 20.0
+# Another plan is waited for as long as the planner may take, and a moment besides.
+_MOMENT_S: Final = 2.0
 _IDLE = {False: "idle", True: "recovering"}
 _FAILED = frozenset({ActionStatus.ABORTED, ActionStatus.REJECTED, ActionStatus.LOST})
 
@@ -52,8 +55,15 @@ class ExecutorNode:
     Where a plan fails, the planner is asked for another way to the same goal, and waited for.
     """
 
-    def __init__(self, context: NodeContext, robot: RobotDescription, rate_hz: float) -> None:
+    def __init__(
+        self,
+        context: NodeContext,
+        robot: RobotDescription,
+        rate_hz: float,
+        plan_within_s: float = PLAN_WITHIN_S,
+    ) -> None:
         self.period_s = 1.0 / rate_hz
+        self._plan_within_s = plan_within_s
         self._clock = context.clock
         self._robot = robot
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
@@ -121,17 +131,18 @@ class ExecutorNode:
             self._skills.ros.close()
         self._space.close()
 
-    def prepare(self, profile: Profile, model_tier: int) -> float:
-        """Return the period that a profile asks for; the executor has no model."""
-        return 1.0 / profile.executor_rate_hz
+    def prepare(self, profile: Profile, model_tier: int) -> tuple[float, float]:
+        """Return period and time for a plan as a profile has them; the executor has no model."""
+        return 1.0 / profile.executor_rate_hz, profile.planning.within_s
 
-    def commit(self, prepared: float) -> float:
-        """Change the period; skills reckon with the clock."""
-        before, self.period_s = self.period_s, prepared
+    def commit(self, prepared: tuple[float, float]) -> tuple[float, float]:
+        """Change both; skills reckon with the clock."""
+        before = self.period_s, self._plan_within_s
+        self.period_s, self._plan_within_s = prepared
         return before
 
-    def discard(self, prepared: float) -> None:
-        """Release nothing: a period is a number."""
+    def discard(self, prepared: tuple[float, float]) -> None:
+        """Release nothing: these are numbers."""
 
     def _take(self, message: Mapping[str, Any]) -> None:
         command_id = str(message["command_id"])
@@ -177,10 +188,12 @@ class ExecutorNode:
             return
         setback, self._execution = execution.setback, None
         self._recovery = self._recovery.after(execution.records)
-        if setback is None or not self._recovery.may_go_on or not self._planner_lives():
+        may_go_on = self._recovery.may_go_on(self._robot.planning.further_plans)
+        if setback is None or not may_go_on or not self._planner_lives():
             self._finish("", success=execution.succeeded)
             return
-        self._recovery = self._recovery.awaiting(self._clock.now_ns())
+        wait_ns = round((self._plan_within_s + _MOMENT_S) * NS_PER_S)
+        self._recovery = self._recovery.awaiting(self._clock.now_ns() + wait_ns)
         done = [one.action.id for one in execution.records if one.status is ActionStatus.SUCCEEDED]
         self._tell(
             self._command_id,

@@ -2,14 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
-from drivers.clock import NS_PER_S
-from vla_deploy.planning.recovery import MOST_RECOVERIES
 from vla_deploy.skills.executor import ActionRecord
-
-# A planner that asks servers takes this long at most, and needs a moment besides.
-WAIT_NS: Final = 22 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,10 +19,9 @@ class Recovery:
         """Tell whether the executor waits for another plan."""
         return self.until_ns > 0
 
-    @property
-    def may_go_on(self) -> bool:
-        """Tell whether another plan may be asked for."""
-        return self.plans <= MOST_RECOVERIES
+    def may_go_on(self, further_plans: int) -> bool:
+        """Return whether another plan may be asked for, of so many beside the first."""
+        return self.plans <= further_plans
 
     def is_overdue(self, now_ns: int) -> bool:
         """Tell whether it would come too late by now."""
@@ -38,9 +31,9 @@ class Recovery:
         """Return it with one plan more that has ended."""
         return replace(self, records=(*self.records, *records), plans=self.plans + 1)
 
-    def awaiting(self, now_ns: int) -> "Recovery":
-        """Wait for another plan from now on."""
-        return replace(self, until_ns=now_ns + WAIT_NS)
+    def awaiting(self, until_ns: int) -> "Recovery":
+        """Wait for another plan until then."""
+        return replace(self, until_ns=until_ns)
 
     def going_on(self) -> "Recovery":
         """Return it with another plan under way."""

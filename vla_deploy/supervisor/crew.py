@@ -174,6 +174,7 @@ class Crew:
                 **self._environment,
                 **thread_limits(self.in_force, name),
                 **variables,
+                **self._options.variables.get(name, {}),
                 PROCESS_VARIABLE: name,
             },
             self._output_path(name),

@@ -1,7 +1,8 @@
 """Say what one run of the robot is made of."""
 
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivers.twin_page import TwinPace
@@ -17,6 +18,8 @@ class RunOptions:
     `pace` says how its time goes.
     `ros` puts the robot into a ROS 2 graph, whatever its file and the profile say.
     `devices_dir` replaces the hardware by what is served there, as by a twin that runs by itself.
+    `variables` are added to the environment of single processes, and may hold keys; the run's log
+    begins with `notes`.
     """
 
     robot: str = "butler"
@@ -33,6 +36,8 @@ class RunOptions:
     arm: bool = False
     ros: bool = False
     probe_root: Path = Path("/")
+    variables: Mapping[str, Mapping[str, str]] = field(default_factory=dict, repr=False)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what only the twin can do."""

@@ -123,6 +123,8 @@ class Run:
         aside.submit(set_at_start, power, profile().power_mode)
         if options.profile_fault:
             _log.error("%s; the run takes %s", options.profile_fault, options.profile)
+        for note in options.notes:
+            _log.warning("%s", note)
         if self.runtime.orphans:
             _log.warning("ended what a dead run had left: pids %s", self.runtime.orphans)
 

@@ -60,6 +60,19 @@ def running(base: Path) -> Owner | None:
     return owner if owner is not None and owner.is_alive() else None
 
 
+def free_base(base: Path) -> None:
+    """Make the runtime directory where it is missing, for what a run is derived from.
+
+    Raises:
+        AlreadyRunning: a supervisor holds it.
+        RuntimeUnavailable: it cannot be made or belongs to someone else.
+    """
+    _make_private(base)
+    owner = running(base)
+    if owner is not None:
+        raise _already_running(base, owner)
+
+
 class Runtime:
     """Hold `<base>/<run_id>/` for one run, remove it at the end.
 
@@ -158,13 +171,16 @@ def _lock(base: Path) -> int:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(fd)
-        owner = _read_owner(path)
-        who = f"pid {owner.pid}, run {owner.run_id}" if owner else "it is just starting or stopping"
-        raise AlreadyRunning(
-            f"a supervisor already runs in {base} ({who}); end it with `vla-deploy shutdown`, "
-            "or choose another directory with --runtime-base"
-        ) from None
+        raise _already_running(base, _read_owner(path)) from None
     return fd
+
+
+def _already_running(base: Path, owner: Owner | None) -> AlreadyRunning:
+    who = f"pid {owner.pid}, run {owner.run_id}" if owner else "it is just starting or stopping"
+    return AlreadyRunning(
+        f"a supervisor already runs in {base} ({who}); end it with `vla-deploy shutdown`, "
+        "or choose another directory with --runtime-base"
+    )
 
 
 def old_logs(state_dir: Path) -> BoundedFolder:

@@ -4,12 +4,12 @@ It runs `vla-deploy run --ros`, which starts every process of the robot, and amo
 Only the gateway needs ROS. The others run in an environment of their own, so ROS's Python folders
 and libraries are hidden from them here.
 
-What the gateway gets is handed over by variables of the environment:
+What the robot gets is handed over by variables of the environment:
 
     VLA_DEPLOY_ROS_WORKSPACE    the installation that this file lies in; its setup.bash is sourced
                                 for the gateway, after the one of ROS. The robot file's [ros]
                                 workspace goes before it.
-    VLA_DEPLOY_ROS_PARAMS_FILE  params_file: a file of YAML parameters for the gateway's node
+    VLA_DEPLOY_ROS_PARAMS_FILE  params_file: a file of YAML parameters for the whole robot
     VLA_DEPLOY_ROS_VLM_API_KEY  vlm_api_key, if it is not empty: it goes before the one in the file;
                                 on a command line of the robot's anyone could read it.
 
@@ -88,7 +88,7 @@ def command_of(given: dict[str, str]) -> list[str]:
 
 
 def environment_of(given: dict[str, str]) -> dict[str, str]:
-    """Return what is handed over to the gateway, and hide ROS from the other processes."""
+    """Return what is handed over to the robot, and hide ROS from the other processes."""
     prefix = Path(get_package_prefix(PACKAGE))
     # A workspace has one setup.bash for all its packages: above their prefixes, or among them.
     installation = prefix if (prefix / "setup.bash").is_file() else prefix.parent

@@ -2,8 +2,14 @@
 
 from typing import Any
 
+import pytest
+
 from vla_deploy.planning.errors import Declined
-from vla_deploy.planning.recovery import MOST_RECOVERIES
+from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.under_way import UnderWay
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 
 def set_back(desk: Any, plan: dict[str, Any], **changes: Any) -> list[dict[str, Any]]:
@@ -59,12 +65,33 @@ def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_t
     desk.give(command_id="c2", text="sing two")
     desk.answers()
     (plan,) = desk.plans()
-    for _ in range(MOST_RECOVERIES):
+    for _ in range(NOT_BOUNDED.further_plans):
         (plan,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
         assert "plan" in plan
     (end,) = set_back(desk, plan)
-    assert end["give_up"] == f"{MOST_RECOVERIES} other plans failed, too"
+    assert end["give_up"] == f"{NOT_BOUNDED.further_plans} other plans failed, too"
     assert any("the way is blocked" in one for one in model.asked[-1].failed)
+
+
+@pytest.mark.parametrize(
+    ("further_plans", "words"),
+    [
+        (0, "this robot makes no other plan: [planning] further_plans is 0"),
+        (1, "1 other plan failed, too"),
+    ],
+)
+def test_no_more_plans_than_the_robot_file_allows(further_plans: int, words: str) -> None:
+    under_way = UnderWay(further_plans)
+    go = {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
+    plan = Plan.model_validate({"goal": "go", "actions": [go]})
+    command = Command(command_id="c1", text="go to the kitchen", told_ns=0)
+    told = {"action_id": "a1", "error": "blocked", "cause": "skill", "done": []}
+    under_way.carry(command, plan, Answer())
+    for _ in range(further_plans):
+        again = under_way.set_back("c1", told)
+        assert isinstance(again, Command)
+        under_way.carry(again, plan, Answer())
+    assert words in str(under_way.set_back("c1", told))
 
 
 HEARD = {"text": "go to the kitchen", "heard": {"confidence": 0.4}}

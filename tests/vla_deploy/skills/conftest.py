@@ -1,7 +1,7 @@
 """A skill context with a robot that stands where a test says, on an empty floor with one table."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,7 +14,7 @@ from vla_deploy.ipc import Announcer, ClaimBook, SharedSpace
 from vla_deploy.navigation.grid_map import GridMap
 from vla_deploy.navigation.path_planning import PathPlanner
 from vla_deploy.node import NodeContext
-from vla_deploy.robots import load_robot
+from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.context import SkillContext
 from vla_deploy.skills.link import RobotLink
@@ -50,13 +50,13 @@ class StepClock:
 class Executor:
     """The executor's node in a run of its own; control and perception are the test's to play."""
 
-    def __init__(self, run_dir: Path) -> None:
+    def __init__(self, run_dir: Path, robot: RobotDescription, plan_within_s: float) -> None:
         self.clock = StepClock()
         context = NodeContext(
             run_dir=run_dir, robot="butler", profile="desktop", devices_dir=None, clock=self.clock
         )
         self.space = SharedSpace(run_dir / "ipc", self.clock)
-        self.node = ExecutorNode(context, load_robot("butler"), 20.0)
+        self.node = ExecutorNode(context, robot, 20.0, plan_within_s)
         self.node.start()
         self.events = self.space.ring_reader("task_event", from_start=True)
 
@@ -122,8 +122,22 @@ def context(standing: StandingLink, tmp_path: Path) -> SkillContext:
 
 
 @pytest.fixture
-def executor(tmp_path: Path) -> Iterator[Executor]:
-    """The executor's node, on a clock that a test steps."""
-    made = Executor(tmp_path)
-    yield made
-    made.close()
+def new_executor(tmp_path: Path) -> Iterator[Callable[..., Executor]]:
+    """Make the executor's node, on a clock that a test steps, of a robot with these bounds."""
+    made: list[Executor] = []
+
+    def new_executor(plan_within_s: float = 20.0, **bounds: Any) -> Executor:
+        butler = load_robot("butler")
+        robot = replace(butler, planning=replace(butler.planning, **bounds))
+        made.append(Executor(tmp_path, robot, plan_within_s))
+        return made[-1]
+
+    yield new_executor
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def executor(new_executor: Callable[..., Executor]) -> Executor:
+    """The executor's node of the butler."""
+    return new_executor()

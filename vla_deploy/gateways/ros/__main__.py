@@ -15,6 +15,7 @@ def build(context: NodeContext) -> Node:
 
     Raises:
         RosNotFound: this interpreter has no ROS 2, or lacks a package of messages.
+        ParametersUnusable: the file of parameters that was handed over has faults.
     """
     try:
         from vla_deploy.gateways.ros.node import RosGatewayNode

@@ -7,14 +7,13 @@ deals with the robot. A press of the stop does not wait for that.
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final, Protocol
 
 import rclpy
 from rclpy._rclpy_pybind11 import NodeNameNonExistentError
 from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -23,6 +22,8 @@ from rclpy.qos import (
 )
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+
+from vla_deploy.gateways.ros.declaring import SteadyNode
 
 NODE_NAME: Final = "vla_deploy"
 MOST_WAITING: Final = 256
@@ -85,12 +86,13 @@ class _Waking(Future):  # type: ignore[misc]  # rclpy tells no types
 class Graph:
     """Hold the node's end of the ROS 2 graph."""
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        """Join with these values of the parameters."""
         self.dropped = 0
         self._inbox: deque[Callable[[], None]] = deque()
         self._context = rclpy.Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self.node: Final = Node(NODE_NAME, context=self._context)
+        self.node: Final = SteadyNode(NODE_NAME, parameters, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._servers: list[ActionServer | ActionClient] = []

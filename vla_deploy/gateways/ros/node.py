@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final
 
+from platforms import load_profile
 from vla_deploy.client.link import RobotLink
+from vla_deploy.gateways.ros.applying import holding
 from vla_deploy.gateways.ros.commands import RobotCommands
 from vla_deploy.gateways.ros.feedback import CommandFeedback
 from vla_deploy.gateways.ros.graph import SOURCE, Graph
@@ -14,6 +16,7 @@ from vla_deploy.gateways.ros.inward.parts import inward_parts
 from vla_deploy.gateways.ros.outgoing.courier import Courier
 from vla_deploy.gateways.ros.outgoing.lending import Lending
 from vla_deploy.gateways.ros.outward.parts import outward_parts
+from vla_deploy.gateways.ros.parameters import handed_over_parameters
 from vla_deploy.gateways.ros.part import Due, Gateway, GatewayPart
 from vla_deploy.gateways.ros.shared_memory import remove_leftovers
 from vla_deploy.gateways.ros.stamps import RosTime
@@ -43,6 +46,8 @@ class RosGatewayNode:
         self._parts: Sequence[GatewayPart] = ()
         self._failures: Counter[str] = Counter()
         self._tell_due = Due(_TELL_HZ)
+        given, profile = handed_over_parameters(), load_profile(context.profile)
+        self._parameters = holding(given, self._robot, profile)
         self._graph: Graph | None = None
         self._status: CellWriter
 
@@ -51,7 +56,7 @@ class RosGatewayNode:
         self._status = self._link.space.cell_writer(STATUS_TOPIC)
         for leftover in remove_leftovers():
             _log.info("removed %s, which a killed process of ROS has left", leftover.name)
-        self._graph = Graph()
+        self._graph = Graph(self._parameters)
         gateway = Gateway(
             graph=self._graph,
             link=self._link,

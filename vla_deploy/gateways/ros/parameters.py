@@ -1,7 +1,8 @@
 """List the parameters of the gateway's node, and read where their values were handed over.
 
 The names are an interface: users' parameter files have them. The launch file of the ROS package
-`vla_deploy` names a file and a key in two variables of the environment.
+`vla_deploy` names a file and a key in two variables of the environment; `vla-deploy run` takes both
+up before anything starts (`applying`), and passes the key on to the planner alone.
 """
 
 import os
@@ -18,7 +19,8 @@ PARAMS_FILE_VARIABLE: Final = "VLA_DEPLOY_ROS_PARAMS_FILE"
 API_KEY_VARIABLE: Final = "VLA_DEPLOY_ROS_VLM_API_KEY"
 # The gateway's node may be named by a file as in ROS's examples, or as our users' files name it.
 SECTIONS: Final = ("/**", "cognitive_robot", "cognitive_planner", "vla_deploy", "/vla_deploy")
-_PARAMETERS_KEY: Final = "ros__parameters"
+API_KEY: Final = "vlm_api_key"
+PARAMETERS_KEY: Final = "ros__parameters"
 Value = str | bool | int | float | list[str]
 
 
@@ -71,7 +73,7 @@ PARAMETERS: Final[tuple[RosParameter, ...]] = (
         choices=("anthropic", "openai", "local"),
     ),
     RosParameter(name="vlm_model", default="", description="its name at the provider"),
-    RosParameter(name="vlm_api_key", default="", description="key of the provider"),
+    RosParameter(name=API_KEY, default="", description="key of the provider; never shown"),
     RosParameter(
         name="local_vlm_url",
         default="http://localhost:11434",
@@ -93,14 +95,18 @@ PARAMETERS: Final[tuple[RosParameter, ...]] = (
         name="plan_timeout", default=30.0, description="for one plan, s", low=0.1, high=600.0
     ),
     RosParameter(
-        name="action_timeout", default=60.0, description="for one action, s", low=0.1, high=3600.0
+        name="action_timeout",
+        default=60.0,
+        description="for one action, s; 60 leaves each skill its own",
+        low=0.1,
+        high=3600.0,
     ),
     RosParameter(
         name="require_confirmation",
         default=True,
         description="ask before a risky plan is carried out",
     ),
-    RosParameter(name="max_speed", default=0.5, description="of the base, m/s", low=0.0, high=5.0),
+    RosParameter(name="max_speed", default=0.5, description="of the base, m/s", low=0.01, high=5.0),
     RosParameter(
         name="restricted_areas",
         default=["stairs", "outside"],
@@ -115,7 +121,7 @@ PARAMETERS: Final[tuple[RosParameter, ...]] = (
     RosParameter(
         name="planning_rate",
         default=1.0,
-        description="how often state is looked at for planning, Hz",
+        description="changes nothing: commands and setbacks are planned for as they come; Hz",
         low=0.01,
         high=50.0,
     ),
@@ -137,7 +143,7 @@ def handed_over_parameters(inherited: Mapping[str, str] = os.environ) -> dict[st
     file = inherited.get(PARAMS_FILE_VARIABLE, "")
     values = _read(Path(file)) if file else {}
     if key := inherited.get(API_KEY_VARIABLE, ""):
-        values["vlm_api_key"] = key
+        values[API_KEY] = key
     declared = {one.name: one for one in PARAMETERS}
     known = [(declared[name], value) for name, value in values.items() if name in declared]
     if faults := [fault for parameter, value in known if (fault := _fault(parameter, value))]:
@@ -155,25 +161,30 @@ def _read(file: Path) -> dict[str, object]:
         document = yaml.safe_load(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise ParametersUnusable(
-            f"{PARAMS_FILE_VARIABLE} names {file}, which cannot be read: {error}; "
-            "give the launch argument params_file another file, or none"
-        ) from error
+            f"{file}: cannot read this file of parameters: {_why(error)}; give another file, "
+            "or none, by the launch argument params_file or the option --params-file"
+        ) from None  # the cause may show a line with a key
     sections = document if isinstance(document, dict) else {}
     rows = [sections[name] for name in SECTIONS if name in sections]
-    found = [row.get(_PARAMETERS_KEY) if isinstance(row, dict) else None for row in rows]
+    found = [row.get(PARAMETERS_KEY) if isinstance(row, dict) else None for row in rows]
     if not found or not all(isinstance(row, dict) for row in found):
         names = ", ".join(map(str, sections)) or "nothing"
         raise ParametersUnusable(
             f"{file}: no parameters of this node; expected one of the sections "
-            f"{', '.join(SECTIONS)} with {_PARAMETERS_KEY} in it, got {names}"
+            f"{', '.join(SECTIONS)} with {PARAMETERS_KEY} in it, got {names}"
         )
     return {str(name): value for row in found if row for name, value in row.items()}
 
 
 def _fault(parameter: RosParameter, value: object) -> str:
     """Return what is wrong with a value, empty if nothing is."""
-    return (
-        ""
-        if parameter.allows(value)
-        else f"{parameter.name}: expected {parameter.expected}, got {value!r}"
-    )
+    if parameter.allows(value):
+        return ""
+    got = f"one of type {type(value).__name__}" if parameter.name == API_KEY else repr(value)
+    return f"{parameter.name}: expected {parameter.expected}, got {got}"
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        return f"line {error.problem_mark.line + 1}: {error.problem}"
+    return error.strerror or str(error) if isinstance(error, OSError) else type(error).__name__

@@ -11,7 +11,6 @@ from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.recovery.setback import Carried
 from vla_deploy.planning.recovery.strategies import STRATEGIES, Steps
 
-MOST_RECOVERIES: Final = 3
 RECOVERY: Final = "recovery"
 _CONFIDENCE: Final = 0.8
 _UNCLEAR: Final = "nobody knows how much of the way was done"

@@ -64,7 +64,7 @@ def test_all_faults_are_told_at_once(handed_over) -> None:
     for name in wrong:
         assert f"{name}: expected" in str(told.value)
     assert "one of anthropic, openai, local, got 'telepathy'" in str(told.value)
-    assert "max_speed: expected a number in 0..5, got -1.0" in str(told.value)
+    assert "max_speed: expected a number in 0.01..5, got -1.0" in str(told.value)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,72 @@
+"""Show in the graph which parameters hold; none of them changes while the robot runs."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from vla_deploy.gateways.ros.parameters import PARAMETERS, RosParameter
+
+_TYPES: Final[Mapping[type, Parameter.Type]] = {
+    bool: Parameter.Type.BOOL,
+    float: Parameter.Type.DOUBLE,
+    int: Parameter.Type.INTEGER,
+    list: Parameter.Type.STRING_ARRAY,
+    str: Parameter.Type.STRING,
+}
+_NAMES: Final = frozenset(one.name for one in PARAMETERS)
+_HOW: Final = "set it in the parameter file and start again"
+
+
+class SteadyNode(Node):  # type: ignore[misc]  # rclpy tells no types
+    """Be a node whose parameters, those of the table, are set before it starts."""
+
+    def __init__(self, name: str, values: Mapping[str, Any], **options: Any) -> None:
+        """Declare every parameter of the table that has a value."""
+        overrides = [
+            Parameter(one.name, _TYPES[type(one.default)], values[one.name])
+            for one in PARAMETERS
+            if one.name in values
+        ]
+        super().__init__(name, parameter_overrides=overrides, **options)
+        for one in PARAMETERS:
+            if one.name in values:
+                kind = _TYPES[type(one.default)]
+                self.declare_parameter(one.name, kind, _descriptor(one, values[one.name]))
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Refuse in words what sets a parameter of the table."""
+        refused = [one.name for one in parameter_list if one.name in _NAMES]
+        if refused:
+            reason = f"{', '.join(refused)}: read-only; {_HOW}"
+            return SetParametersResult(successful=False, reason=reason)
+        return super().set_parameters_atomically(parameter_list)
+
+
+def _descriptor(parameter: RosParameter, value: Any) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(description=parameter.description, read_only=True)
+    if parameter.choices:
+        descriptor.additional_constraints = parameter.expected
+    for kind, span in _ranges(parameter, value):
+        setattr(descriptor, kind, [span])
+    return descriptor
+
+
+def _ranges(parameter: RosParameter, value: Any) -> Iterator[tuple[str, Any]]:
+    """Return the range, if any; what a robot file has set may lie beyond it."""
+    if parameter.low is None or parameter.high is None:
+        return
+    low, high = min(parameter.low, value), max(parameter.high, value)
+    if isinstance(parameter.default, int):
+        span = IntegerRange(from_value=int(low), to_value=int(high), step=1)
+        yield "integer_range", span
+    else:
+        span = FloatingPointRange(from_value=float(low), to_value=float(high))
+        yield "floating_point_range", span
