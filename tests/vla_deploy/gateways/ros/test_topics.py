@@ -120,11 +120,13 @@ sender.publish(String(data=words))
 until(lambda: any(one["stage"] == "execution" for one in of_json("/llm_planner/feedback")),
       "the end", 120.0)
 until(lambda: "COMPLETED" in came["/capstone/status"][-1].data, "completed")
+until(lambda: of_json("/cognitive_planner/status")[-1]["status"] == "completed", "its status")
+until(lambda: came["/vla_deploy/events"][-1].kind == "finished", "the last event")
 finish({
     "on plan": {topic: of_json(topic) for topic in ON_PLAN},
     "feedback": of_json("/llm_planner/feedback"),
     "capstone": list(dict.fromkeys(one.data for one in came["/capstone/status"])),
-    "status": list(dict.fromkeys(one["status"] for one in of_json("/cognitive_planner/status"))),
+    "status": [one["status"] for one in of_json("/cognitive_planner/status")],
     "said": [one.data for one in came["/tts/say"]],
     "events": [[one.source, one.kind] for one in came["/vla_deploy/events"]],
 })
@@ -194,7 +196,7 @@ SAY = (
 listen(String, "/tts/say")
 sender = publisher("/vla_deploy/say")
 until(lambda: node.count_publishers("/tts/say"), "the robot")
-for text in ("", "good\\x00 morning", "good morning"):
+for text in ("", "good\\x07 morning", "good morning"):
     sender.publish(String(data=text))
 until(lambda: came["/tts/say"], "a word")
 finish([one.data for one in came["/tts/say"]])
@@ -226,7 +228,8 @@ def robot(ros_environment, ros_domain: int) -> Iterator[ProcessStack]:
         stack = ProcessStack(Path(folder) / "base", "--fast", "--ros")
         try:
             stack.wait_until_armed()
-            assert stack.say("turn right 35 degrees")["success"], "to see what is on the table"
+            ended = stack.say("turn right 35 degrees and look at the red cup")
+            assert ended["success"], ended
             yield stack
         finally:
             stack.close()
@@ -287,7 +290,8 @@ def check_context(documents, capstone: str) -> None:
     assert len(state["position"]) == 3
     assert len(state["orientation"]) == 4
     assert state["available_tools"] == ["left_gripper", "right_gripper"]
-    assert state["recent_actions"][-1]["action_type"] == "turn_right"
+    recent = [one["action_type"] for one in state["recent_actions"]]
+    assert (recent[0], recent[-1]) == ("turn_right", "look_at")
     assert context["known_locations"]["kitchen"][:2] == [6.2, 2.2]
     assert context["map_bounds"] == {"min_x": -0.35, "min_y": -0.35, "max_x": 8.4, "max_y": 6.35}
     assert documents["/cognitive_planner/status"]["status"] in ("completed", "failed")
