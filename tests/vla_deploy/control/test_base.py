@@ -11,7 +11,11 @@ from vla_deploy.control.odometry import DifferentialDrive, Odometry
 
 DRIVE = DifferentialDrive(wheel_radius_m=0.1, track_m=0.4)
 LIMITS = BaseLimits(
-    speed_m_s=0.5, turn_rad_s=1.5, acceleration_m_s2=0.5, turn_acceleration_rad_s2=2.0
+    speed_m_s=0.5,
+    turn_rad_s=1.5,
+    acceleration_m_s2=0.5,
+    turn_acceleration_rad_s2=2.0,
+    stop_deceleration_m_s2=2.4,
 )
 PERIOD_S = 0.004
 
@@ -93,4 +97,17 @@ def test_halting_forgets_the_velocity() -> None:
     ramp = BaseRamp(LIMITS)
     ramp.advance(0.5, 0.5, PERIOD_S)
     ramp.halt()
+    assert ramp.at_rest
+
+
+def test_where_it_must_stop_it_brakes_harder_and_stays_on_its_curve() -> None:
+    ramp = BaseRamp(LIMITS)
+    for _ in range(2000):
+        ramp.advance(0.4, 0.8, 0.004)
+    before = (ramp.v_m_s, ramp.w_rad_s)
+    ramp.brake(0.004)
+    assert before[0] - ramp.v_m_s == pytest.approx(0.004 * LIMITS.stop_deceleration_m_s2)
+    assert ramp.v_m_s / ramp.w_rad_s == pytest.approx(before[0] / before[1])
+    for _ in range(200):
+        ramp.brake(0.004)
     assert ramp.at_rest

@@ -8,7 +8,11 @@ from vla_deploy.control.base_motion import BaseLimits, permitted
 from vla_deploy.safety import Direction
 
 LIMITS = BaseLimits(
-    speed_m_s=0.5, turn_rad_s=1.5, acceleration_m_s2=0.6, turn_acceleration_rad_s2=2.5
+    speed_m_s=0.5,
+    turn_rad_s=1.5,
+    acceleration_m_s2=0.6,
+    turn_acceleration_rad_s2=2.5,
+    stop_deceleration_m_s2=2.4,
 )
 FORWARD, BACKWARD, LEFT, RIGHT = Direction
 speeds = st.floats(-2.0, 2.0, allow_nan=False)

@@ -38,7 +38,7 @@ def test_everything_ramps_within_its_limits_and_keeps_its_power(armed: Rig) -> N
     assert np.abs(velocity[-10:]).max() == 0.0
     assert abs(speeds[-1]) < 0.005
     stop_s = np.argmax(np.array(speeds) < 0.01) * period_s
-    assert 0.38 / limits.base.max_acceleration_m_s2 < stop_s < 1.0
+    assert 0.38 / limits.base.stop_deceleration_m_s2 < stop_s < 0.5
 
 
 def test_it_ends_by_itself_and_moves_nothing_on_its_own(armed: Rig) -> None:
