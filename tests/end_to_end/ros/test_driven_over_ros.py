@@ -12,7 +12,7 @@ from vla_deploy.gateways.ros.shared_memory import find_leftovers
 
 pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]
 
-CLIENT = Path(__file__).with_name("client.py").read_text(encoding="utf-8")
+CLIENT = (Path(__file__).parents[3] / "docs/examples/ros_client.py").read_text(encoding="utf-8")
 REFUSED = -1
 JOINTS = -2
 OLD = -3
@@ -149,6 +149,12 @@ def test_words_pick_up_and_put_down(robot: ProcessStack, client: Callable[[str],
     assert result["total_actions"] == result["successful_actions"] > 2
     assert ["pick_up", "succeeded"] in told["states"]
     assert robot.inside("red_cup", "box")["inside"]
+
+
+def test_words_become_a_plan_in_the_documents_form(client: Callable[[str], Any]) -> None:
+    (turn,) = client("words")["plan"]
+    assert turn["action_type"] == "turn_left"
+    assert turn["parameters"] == {"angle": 20.0}
 
 
 def test_each_act_is_its_own_and_no_goal_arms_the_robot(client: Callable[[str], Any]) -> None:

@@ -1,8 +1,10 @@
-"""Drive the robot from ROS's side as a program of somebody else would; run by ROS's interpreter.
+"""Drive the robot from ROS's side; it imports nothing of the robot's software but its messages.
 
-    client.py CASE
+    vla-deploy run --twin --ros                                   in one terminal
+    .venv-ros/bin/python docs/examples/ros_client.py navigation   in another, by ROS's interpreter
 
-prints one JSON document: what came back. It imports nothing of the robot's software.
+CASE is one of words, trajectories, refusals, grippers, joint_commands, navigation, pick_and_place,
+acts, velocity. One JSON document tells what came back. The tests run every case on the twin.
 """
 
 import json
@@ -24,7 +26,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
 from vla_deploy_msgs.action import ExecutePlan
@@ -336,6 +338,25 @@ def bad_velocity(client: Client) -> dict[str, Any]:
     return {"moved_m": client.x_m - x_m}
 
 
+def words(client: Client) -> dict[str, Any]:
+    """Give a command in words, and return the plan that is made of it."""
+    plans: list[str] = []
+    said = client.create_publisher(String, "/natural_language/command", 10)
+    client.create_subscription(
+        String, "/cognitive_planner/action_sequence", lambda told: plans.append(told.data), 10
+    )
+    client.until(
+        lambda: (
+            said.get_subscription_count() > 0
+            and client.count_publishers("/cognitive_planner/action_sequence") > 0
+        )
+    )
+    said.publish(String(data="turn left by 20 degrees"))
+    client.until(lambda: bool(plans))
+    client.until_still()
+    return {"plan": json.loads(plans[0]) if plans else None}
+
+
 def joint_commands(client: Client) -> dict[str, Any]:
     """Stream positions as ros2_control does, then such as no joint takes."""
     publisher = client.create_publisher(JointState, "/robot_joint_commands", 10)
@@ -373,7 +394,7 @@ CASES = {
     case.__name__: case
     for case in (
         *(trajectories, refusals, grippers, navigation, pick_and_place, acts),
-        *(joint_commands, velocity, bad_velocity, watched_goal),
+        *(words, joint_commands, velocity, bad_velocity, watched_goal),
     )
 }
 
