@@ -30,16 +30,15 @@ class SteadyNode(Node):  # type: ignore[misc]  # rclpy tells no types
 
     def __init__(self, name: str, values: Mapping[str, Any], **options: Any) -> None:
         """Declare every parameter of the table that has a value."""
-        overrides = [
-            Parameter(one.name, _TYPES[type(one.default)], values[one.name])
-            for one in PARAMETERS
-            if one.name in values
-        ]
+        declared = [(one, values[one.name]) for one in PARAMETERS if one.name in values]
+        overrides = [_typed(one, value) for one, value in declared if value != []]
         super().__init__(name, parameter_overrides=overrides, **options)
-        for one in PARAMETERS:
-            if one.name in values:
+        for one, value in declared:
+            if value == []:
+                self._declare_empty(one)
+            else:
                 kind = _TYPES[type(one.default)]
-                self.declare_parameter(one.name, kind, _descriptor(one, values[one.name]))
+                self.declare_parameter(one.name, kind, _descriptor(one, value))
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Refuse in words what sets a parameter of the table."""
@@ -49,9 +48,23 @@ class SteadyNode(Node):  # type: ignore[misc]  # rclpy tells no types
             return SetParametersResult(successful=False, reason=reason)
         return super().set_parameters_atomically(parameter_list)
 
+    def _declare_empty(self, parameter: RosParameter) -> None:
+        """Declare an empty list: rclpy takes it for bytes unless it replaces a list of texts."""
+        self.declare_parameter(parameter.name, [""])
+        super().set_parameters_atomically([_typed(parameter, [])])
+        self.set_descriptor(parameter.name, _descriptor(parameter, []))
+
+
+def _typed(parameter: RosParameter, value: Any) -> Parameter:
+    return Parameter(parameter.name, _TYPES[type(parameter.default)], value)
+
 
 def _descriptor(parameter: RosParameter, value: Any) -> ParameterDescriptor:
-    descriptor = ParameterDescriptor(description=parameter.description, read_only=True)
+    descriptor = ParameterDescriptor(
+        type=_TYPES[type(parameter.default)].value,
+        description=parameter.description,
+        read_only=True,
+    )
     if parameter.choices:
         descriptor.additional_constraints = parameter.expected
     for kind, span in _ranges(parameter, value):

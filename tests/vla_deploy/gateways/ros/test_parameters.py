@@ -75,6 +75,15 @@ def test_a_file_without_parameters_of_the_node_is_refused(handed_over, document)
         handed_over(document)
 
 
+@pytest.mark.parametrize(
+    "document", ["/**: {ros__parameters: {vlm_api_key: 5551234}}", "/**: {vlm_api_key: '5551234"]
+)
+def test_no_fault_shows_a_key(handed_over, document) -> None:
+    with pytest.raises(ParametersUnusable) as told:
+        handed_over(document)
+    assert "5551234" not in str(told.value)
+
+
 def test_a_file_that_is_not_there_is_refused() -> None:
     with pytest.raises(ParametersUnusable, match="/absent"):
         handed_over_parameters({PARAMS_FILE_VARIABLE: "/absent"})
