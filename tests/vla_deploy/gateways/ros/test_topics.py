@@ -398,6 +398,8 @@ def test_texts_for_the_robots_voice_are_said_once(run) -> None:
 def test_a_spoken_command_is_told_as_it_was_understood_and_not_taken_again(
     robot, ros_graph, link
 ) -> None:
+    assert robot.wait_until(lambda: not robot.document("speech_status")["speaking"])
+    assert robot.say("wait 2 seconds")["success"], "the echo of what it has said last is gone"
     utterances = link.events("utterance")
     listener = ros_graph.start(HEAR)
     assert listener.stdout.readline() == "up\n", listener.stderr.read()
