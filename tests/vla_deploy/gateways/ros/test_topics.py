@@ -1,5 +1,6 @@
 """A node of somebody else's sees, commands and stops a running robot by the topics of the docs."""
 
+import json
 import re
 import tempfile
 from collections.abc import Iterator
@@ -203,6 +204,17 @@ finish([one.data for one in came["/tts/say"]])
 """
 )
 
+HEAR = (
+    CLIENT
+    + """
+listen(String, "/voice_command/parsed")
+until(lambda: node.count_publishers("/voice_command/parsed"), "the robot")
+print("up", flush=True)
+until(lambda: came["/voice_command/parsed"], "a spoken command", 120.0)
+finish(of_json("/voice_command/parsed"))
+"""
+)
+
 GRAPH = (
     CLIENT
     + """
@@ -381,6 +393,26 @@ def test_stop_reset_and_arm_name_who_asked(run, link) -> None:
 
 def test_texts_for_the_robots_voice_are_said_once(run) -> None:
     assert run(SAY) == ["good morning"]
+
+
+def test_a_spoken_command_is_told_as_it_was_understood_and_not_taken_again(
+    robot, ros_graph, link
+) -> None:
+    assert robot.wait_until(lambda: not robot.document("speech_status")["speaking"])
+    assert robot.say("wait 2 seconds")["success"], "the echo of what it has said last is gone"
+    utterances = link.events("utterance")
+    listener = ros_graph.start(HEAR)
+    assert listener.stdout.readline() == "up\n", listener.stderr.read()
+    robot.speak("turn left twenty degrees", "en-gb-x-rp+m3")
+    out, err = listener.communicate(timeout=240.0)
+    assert listener.returncode == 0, err
+    (parsed,) = json.loads(out.splitlines()[-1])
+    assert (parsed["intent"], parsed["text"]) == ("navigation", "turn left twenty degrees"), parsed
+    assert 0.5 < parsed["confidence"] <= 1.0
+    assert parsed["published_by"] == "/vla_deploy"
+    assert [event.payload["source"] for event in utterances.drain()] == ["voice"]
+    utterances.close()
+    robot.operate("stop")
 
 
 def test_the_docs_list_what_the_node_publishes_takes_and_serves(run) -> None:

@@ -19,6 +19,8 @@ PLAN_STATUS: Final = "/cognitive_planner/status"
 CAPSTONE: Final = "/capstone/status"
 STATE_HZ: Final = 1.0
 STATUS_HZ: Final = 2.0
+LOOK_HZ: Final = 10.0
+"""How often a change of a status is looked for."""
 _AGE_S: Final = 1.0
 _STATUS_AGE_S: Final = 2.0
 _LOST: Final = 2
@@ -38,6 +40,7 @@ class ContextTopics:
         self._bounds = _map_bounds(gateway)
         self._due = Due(STATE_HZ)
         self._status_due = Due(STATUS_HZ)
+        self._look_due = Due(LOOK_HZ)
         self._told: tuple[Any, ...] = ()
 
     def step(self, now_ns: int) -> None:
@@ -46,6 +49,8 @@ class ContextTopics:
             state = self._robot_state()
             self._state.tell(state)
             self._context.tell(self._surroundings(state))
+        if not self._look_due.is_now(now_ns):
+            return
         activity = self._activity()
         commands = self._gateway.commands
         key = (activity.capstone, activity.plan, tuple(commands.statuses.values()))

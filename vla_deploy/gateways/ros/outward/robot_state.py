@@ -14,6 +14,8 @@ from vla_deploy.gateways.ros.outward.health import TOPICS, PartHealth, health_of
 from vla_deploy.gateways.ros.part import Due, Gateway
 
 STATE_HZ: Final = 2.0
+LOOK_HZ: Final = 10.0
+"""How often a change is looked for."""
 DIAGNOSTICS_HZ: Final = 1.0
 BATTERY_HZ: Final = 1.0
 _EXECUTOR_AGE_S: Final = 1.0
@@ -23,16 +25,19 @@ _UNMEASURED: Final = math.nan
 
 
 class StateTopic:
-    """Publish /vla_deploy/state twice a second, and at once when something of it changes."""
+    """Publish /vla_deploy/state twice a second, and when something of it changes."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
         self._state = gateway.graph.publisher(RobotState, "/vla_deploy/state", LATCHED)
         self._due = Due(STATE_HZ)
+        self._look_due = Due(LOOK_HZ)
         self._told: tuple[Any, ...] = ()
 
     def step(self, now_ns: int) -> None:
         """Publish what is due or new."""
+        if not self._look_due.is_now(now_ns):
+            return
         control = self._gateway.control_status()
         executor = self._gateway.link.document("executor_status", _EXECUTOR_AGE_S)
         key = _what_changes(control or {}, executor or {})
