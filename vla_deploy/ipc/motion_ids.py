@@ -19,3 +19,8 @@ def motion_ids(clock: Clock, sender: str) -> Iterator[int]:
     step = len(SENDERS)
     first = (clock.now_ns() // _US_NS + 1) * step + SENDERS.index(sender)
     return itertools.count(first, step)
+
+
+def sender_of(motion_id: int) -> str:
+    """Return who has sent a motion."""
+    return SENDERS[motion_id % len(SENDERS)]

@@ -116,8 +116,12 @@ def test_a_dead_sender_of_velocities_leaves_a_base_that_stands_within_half_a_sec
     assert robot.state() == "armed"
 
 
-def test_a_killed_gateway_leaves_a_safe_robot_comes_back_and_leaves_nothing_behind(
-    robot: ProcessStack, ros_graph: Any, client: Callable[[str], Any]
+@pytest.mark.parametrize("hit", [ProcessStack.kill, ProcessStack.freeze])
+def test_a_dead_or_frozen_gateway_leaves_a_safe_robot_and_comes_back(
+    robot: ProcessStack,
+    ros_graph: Any,
+    client: Callable[[str], Any],
+    hit: Callable[[ProcessStack, str], None],
 ) -> None:
     sender = ros_graph.start(CLIENT, "velocity", "0.4")
     assert sender.stdout.readline() == "driving\n"
@@ -127,7 +131,7 @@ def test_a_killed_gateway_leaves_a_safe_robot_comes_back_and_leaves_nothing_behi
     assert robot.wait_until(lambda: base()["v_m_s"] > 0.3)
     late = robot.document("control_status")["late_ticks"]
     gateway = robot.row("ros")["pid"]
-    robot.kill("ros")
+    hit(robot, "ros")
     assert robot.wait_until(lambda: abs(base()["v_m_s"]) < 0.01)
     sender.kill()
     assert robot.wait_until(
@@ -136,6 +140,7 @@ def test_a_killed_gateway_leaves_a_safe_robot_comes_back_and_leaves_nothing_behi
         )
     )
     assert robot.state() == "armed"
+    assert robot.wait_until(lambda: not robot.document("control_status")["active_motions"], 5.0)
     assert robot.document("control_status")["late_ticks"] == late
     assert find_leftovers() == ()
     assert client("grippers")["classic"]["status"] == "succeeded"

@@ -158,14 +158,13 @@ def _restricted_areas(given: Values, robot: RobotDescription, effects: Parameter
 
 
 def _remember(given: Values, profile: Profile, effects: ParameterEffects) -> None:
-    own = profile.planning.remembered
+    own, default = profile.planning.remembered, _DEFAULTS["max_memory_items"]
+    items = given.get("max_memory_items", default)
     if not given.get("enable_memory", True):
         remembered = 0
-    elif "max_memory_items" in given:
-        remembered = int(given["max_memory_items"])
-    elif given.get("enable_memory") and own == 0:
-        remembered = int(_DEFAULTS["max_memory_items"])  # type: ignore[arg-type]  # a whole number
-    else:
+    elif items != default or (given.get("enable_memory") and own == 0):
+        remembered = int(items)
+    else:  # what is forgotten does not come back: the default file must not cut a memory short
         return
     if 0 < remembered < own:
         effects.notes.append(

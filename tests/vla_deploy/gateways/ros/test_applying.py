@@ -36,14 +36,14 @@ def test_nothing_given_changes_nothing(effects) -> None:
     assert effects() == ParameterEffects()
 
 
-def test_the_defaults_change_times_and_memory_only_and_say_so(effects) -> None:
+def test_the_defaults_change_times_only_and_forget_nothing(effects) -> None:
     told = effects(**DEFAULTS)
     assert told.robot == {}
-    assert told.profile == {"within_s": 30.0, "remembered": 100}
+    assert told.profile == {"within_s": 30.0}
     assert told.faults == []
-    assert len(told.notes) == 2
-    assert told.notes[0].startswith(STAIRS)
-    assert "all but the newest 100 are forgotten" in told.notes[1]
+    (note,) = told.notes
+    assert note.startswith(STAIRS)
+    assert "all but the newest 99 are forgotten" in effects(max_memory_items=99).notes[0]
 
 
 def test_a_lower_speed_holds_and_a_higher_one_does_not(effects) -> None:

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.client.link import RobotLink
-from vla_deploy.ipc.motion_ids import motion_ids
+from vla_deploy.ipc.motion_ids import motion_ids, sender_of
 
+SENDER: Final = "ros"
 Floats = NDArray[np.float64]
 _JOINT_AGE_S = 0.25
 
@@ -39,10 +40,11 @@ class Motions:
     def __init__(self, link: RobotLink, joint_index: Mapping[str, int]) -> None:
         self._link = link
         self._index = joint_index
-        self._ids = motion_ids(link.clock, "ros")
+        self._ids = motion_ids(link.clock, SENDER)
         self._results = link.events("motion_result")
         self._ended: dict[int, Ended] = {}
         self._active: set[int] = set()
+        self._end_those_of_one_before()
 
     def step(self) -> None:
         """Take in what has ended."""
@@ -117,6 +119,13 @@ class Motions:
         for motion_id in self._active:
             self.cancel(motion_id)
         self._results.close()
+
+    def _end_those_of_one_before(self) -> None:
+        """Have motions ended whose gateway was killed: nobody watches their tolerances any more."""
+        status = self._link.document("control_status", _JOINT_AGE_S)
+        for motion_id in (status or {}).get("active_motions", ()):
+            if sender_of(motion_id) == SENDER:
+                self.cancel(motion_id)
 
     def _send(self, command: dict[str, Any]) -> int:
         motion_id = next(self._ids)
