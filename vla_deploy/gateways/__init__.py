@@ -1,1 +1,1 @@
-"""Let other systems reach the robot, each through a process of its own."""
+"""Connect other systems with the robot, each through a process of its own."""

@@ -17,7 +17,7 @@ class Accepts(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RosSettings:
-    """Say whether the gateway runs, in which environment, and what may be commanded through it.
+    """Declare whether the gateway runs, in which environment, and what may be commanded through it.
 
     `python` is an interpreter or an environment's folder, `workspace` a colcon workspace on top of
     ROS; empty ones are looked for. No `domain_id` is ROS_DOMAIN_ID, else 0; `discovery` is
@@ -43,17 +43,17 @@ class RosSettings:
 
     @property
     def is_driven_by_nav2(self) -> bool:
-        """Tell whether a `navigate_to_pose` server drives the base to poses."""
+        """Return whether a `navigate_to_pose` server drives the base to poses."""
         return self.navigation == NAV2
 
     @property
     def are_arms_beyond(self) -> bool:
-        """Tell whether servers of FollowJointTrajectory move the arms."""
+        """Return whether servers of FollowJointTrajectory move the arms."""
         return self.arms == FOLLOW_JOINT_TRAJECTORY
 
     @property
     def is_needed(self) -> bool:
-        """Tell whether the robot cannot do its work without the ROS gateway."""
+        """Return whether the robot cannot do its work without the ROS gateway."""
         return self.is_driven_by_nav2 or self.are_arms_beyond
 
     def server_of(self, group: str) -> str:

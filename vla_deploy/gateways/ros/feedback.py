@@ -1,4 +1,4 @@
-"""Tell on the planners' feedback topics what becomes of commands.
+"""Publish on the planners' feedback topics what becomes of commands.
 
 Each message has `status`: success, failure, timeout, error or question; `stage`: planning or
 execution; the `command`, its `command_id` and `source`.

@@ -99,7 +99,7 @@ class Graph:
         self._spinning = threading.Thread(target=self._spin, name="ros-spin", daemon=True)
 
     def begin(self) -> None:
-        """Let in what comes from the graph."""
+        """Admit what comes from the graph."""
         self._spinning.start()
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile = RELIABLE) -> Publisher:
@@ -110,13 +110,13 @@ class Graph:
     def listen(
         self, kind: type, topic: str, take: Callable[[Any], None], qos: QoSProfile = ANY
     ) -> None:
-        """Have each message of a topic taken in a step."""
+        """Subscribe; each message is taken in a step."""
         self.node.create_subscription(kind, topic, lambda got: self.put(lambda: take(got)), qos)
 
     def hear(
         self, kind: type, topic: str, take: Callable[[Any, str], None], qos: QoSProfile = RELIABLE
     ) -> None:
-        """Have each message of a topic taken in a step, with who sent it."""
+        """Subscribe; each message is taken in a step, with who sent it."""
 
         def receive(message: Any) -> None:
             sender = self.sender(topic)  # now: whoever sends once may be gone in a moment
@@ -154,7 +154,7 @@ class Graph:
         return sorted(one for one in full if one != own and _NAMELESS not in one)
 
     def serve(self, kind: type, name: str, answer: Callable[[Any], Future]) -> None:
-        """Have requests of a service answered by what the future holds that `answer` returns."""
+        """Serve; a request is answered by what the future holds that `answer` returns."""
 
         async def respond(request: Any, _response: Any) -> Any:
             return await answer(request)
@@ -170,11 +170,11 @@ class Graph:
         return _Waking(self._executor)
 
     def perform(self, work: Callable[[], None]) -> None:
-        """Have something done in the graph's thread; it must not raise, else that thread ends."""
+        """Queue work for the graph's thread; it must not raise, else that thread ends."""
         self._executor.create_task(work)
 
     def put(self, work: Callable[[], None]) -> bool:
-        """Have something done in the next step; return whether there is room for it."""
+        """Queue work for the next step; return whether there is room for it."""
         if len(self._inbox) >= MOST_WAITING:
             self.dropped += 1
             return False

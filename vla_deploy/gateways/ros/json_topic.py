@@ -20,7 +20,7 @@ class JsonTopic:
 
     @property
     def is_wanted(self) -> bool:
-        """Tell whether anybody listens."""
+        """Return whether anybody listens."""
         return self._publisher.get_subscription_count() > 0
 
     def tell(self, document: Any) -> None:

@@ -1,4 +1,4 @@
-"""Say how the gateway's process is started: by which interpreter, in which environment."""
+"""Decide how the gateway's process is started: by which interpreter, in which environment."""
 
 import os
 from collections.abc import Mapping

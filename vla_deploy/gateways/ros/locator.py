@@ -1,4 +1,4 @@
-"""Say where named places and things are, in the map's frame."""
+"""Find where named places and things are, in the map's frame."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Final

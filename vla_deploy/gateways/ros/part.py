@@ -1,4 +1,4 @@
-"""Say what the parts of the gateway share: graph, robot, time, settings."""
+"""Define what the parts of the gateway share: graph, robot, time, settings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _STATUS_AGE_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gateway:
-    """Hand each part what it works with."""
+    """Hold for each part what it works with."""
 
     graph: Graph
     link: RobotLink
@@ -36,7 +36,7 @@ class GatewayPart(Protocol):
     """Do one thing for the graph; steps are called at the gateway's pace."""
 
     def step(self, now_ns: int) -> None:
-        """Tell or handle what is due."""
+        """Publish or handle what is due."""
         ...
 
     def stop(self) -> None:
@@ -45,14 +45,14 @@ class GatewayPart(Protocol):
 
 
 class Due:
-    """Tell at a steady pace whether something is due; a missed time is left out."""
+    """Decide at a steady pace whether something is due; a missed time is left out."""
 
     def __init__(self, rate_hz: float) -> None:
         self._period_ns = round(1e9 / rate_hz) if rate_hz > 0 else 0
         self._at_ns = 0
 
     def is_now(self, now_ns: int) -> bool:
-        """Tell whether it is due, at most once for each time."""
+        """Return whether it is due, at most once for each time."""
         if self._period_ns == 0 or now_ns < self._at_ns:
             return False
         # A step that comes a little late does not move those after it.

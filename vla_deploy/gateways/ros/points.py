@@ -79,7 +79,7 @@ def thinned(points: Floats, most: int, cell_m: float = CELL_M) -> Floats:
 
 
 def near_segments(points: Floats, begins: Floats, ends: Floats, radius_m: float) -> Mask:
-    """Tell which points lie within a radius of any of the segments, m x 3 both."""
+    """Return which points lie within a radius of any of the segments, m x 3 both."""
     near = np.zeros(len(points), dtype=bool)
     for begin, end in zip(begins, ends, strict=True):
         along = end - begin

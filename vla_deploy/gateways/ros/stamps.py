@@ -45,5 +45,5 @@ class RosTime:
         return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) - self._offset_ns
 
     def is_unset(self, stamp: Time) -> bool:
-        """Tell whether a sender has left the stamp out."""
+        """Return whether a sender has left the stamp out."""
         return not (stamp.sec or stamp.nanosec)

@@ -58,7 +58,7 @@ class GripperJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GripperState:
-    """Say how far a hand's fingers are, and whether they rest on something."""
+    """Describe how far a hand's fingers are, and whether they rest on something."""
 
     gap_m: float
     speed_m_s: float

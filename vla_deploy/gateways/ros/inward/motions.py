@@ -17,7 +17,7 @@ _JOINT_AGE_S = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """Tell how a motion ended: done, touched, cancelled, refused, stopped, and why."""
+    """Describe how a motion ended: done, touched, cancelled, refused, stopped, and why."""
 
     status: str
     reason: str
@@ -115,13 +115,13 @@ class Motions:
         )
 
     def close(self) -> None:
-        """Have every motion ended that was begun here."""
+        """End every motion that was begun here."""
         for motion_id in self._active:
             self.cancel(motion_id)
         self._results.close()
 
     def _end_those_of_one_before(self) -> None:
-        """Have motions ended whose gateway was killed: nobody watches their tolerances any more."""
+        """End motions whose gateway was killed: nobody watches their tolerances any more."""
         status = self._link.document("control_status", _JOINT_AGE_S)
         for motion_id in (status or {}).get("active_motions", ()):
             if sender_of(motion_id) == SENDER:

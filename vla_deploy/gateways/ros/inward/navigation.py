@@ -112,7 +112,7 @@ class Driving:
         return None
 
     def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
-        """Have the command cancelled; the base comes to rest, and then the outcome is told."""
+        """Cancel the command; once the base has come to rest, `step` returns the outcome."""
         self._cancelled = reason
         self._order.cancel()
         return self._given_up(reason) if superseded else None

@@ -30,11 +30,11 @@ class Order:
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the last event is there."""
+        """Return whether the last event is there."""
         return self.last is not None
 
     def cancel(self) -> None:
-        """Have it ended; its last event follows."""
+        """Ask for its end; its last event follows."""
         self._link.utter(command_id=self._following.command_id, cancel=True)
 
     def take(self, events: list[Event]) -> None:
@@ -104,7 +104,7 @@ class Orders:
 
 
 class OrderRefused(ValueError):
-    """Say why something is no command."""
+    """Report why something is no command."""
 
 
 def error_of(last: Event) -> str:

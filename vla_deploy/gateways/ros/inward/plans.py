@@ -76,7 +76,7 @@ class Carrying:
         self._places: dict[str, int] = {}
 
     def step(self, now_ns: int) -> Outcome | None:
-        """Tell what is new; return the outcome once the command has ended."""
+        """Publish what is new; return the outcome once the command has ended."""
         while self._order.news:
             event = self._order.news.popleft()
             if event["event"] == "plan":
@@ -88,7 +88,7 @@ class Carrying:
         return None if self._order.last is None else self._finish(self._order.last)
 
     def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
-        """Have the command cancelled; the robot comes to rest, and then the outcome is told."""
+        """Cancel the command; once the robot has come to rest, `step` returns the outcome."""
         self._cancelled = reason
         self._order.cancel()
         if not superseded:

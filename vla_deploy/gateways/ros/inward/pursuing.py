@@ -27,7 +27,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """Say how a goal ended, and what its client gets."""
+    """Describe how a goal ended, and what its client gets."""
 
     ending: Ending
     result: Any

@@ -16,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 
 class SayTopic:
-    """Have the robot's voice say what comes on the topic."""
+    """Pass to the robot's voice what comes on the topic."""
 
     def __init__(self, gateway: Gateway) -> None:
         link = gateway.link

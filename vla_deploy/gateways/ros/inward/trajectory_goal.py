@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 class GoalRefused(ValueError):
-    """Say why a goal is not taken up, with the action's code."""
+    """Report why a goal is not taken up, with the action's code."""
 
     def __init__(self, code: int, text: str) -> None:
         super().__init__(text)

@@ -39,7 +39,7 @@ class Velocity:
             gateway.graph.listen(Twist, TOPIC, self._take)
 
     def step(self, now_ns: int) -> None:
-        """Let others have the base when nobody drives it any more, or nobody may."""
+        """Release the base when nobody drives it any more, or nobody may."""
         if self._claim.is_held and self._claim.why_over():
             self.stop()
         elif self._claim.is_held and now_ns - self._last_ns > round(_REST_S * NS_PER_S):

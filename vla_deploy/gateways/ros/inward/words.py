@@ -61,7 +61,7 @@ def checked_text(data: str) -> str:
 
 
 def is_stop_word(text: str) -> bool:
-    """Tell whether a text is a bare word to stop by, which nothing may keep from the planner."""
+    """Return whether a text is a bare word to stop by, which nothing may keep from the planner."""
     return text.lower().strip(" .!") in STOP_WORDS
 
 

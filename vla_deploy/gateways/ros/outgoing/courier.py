@@ -54,7 +54,7 @@ class Courier:
                 del self._goals[request_id]
 
     def stop(self) -> None:
-        """Have every goal cancelled, and give it up: nobody will hear how it ends."""
+        """Cancel every goal and give it up: nobody will hear how it ends."""
         for goal in self._goals.values():
             goal.give_up("the ROS gateway was stopped")
         self._goals.clear()

@@ -32,11 +32,11 @@ class GoalExchange:
         self._wants_cancel = False
 
     def send(self) -> None:
-        """Have the goal sent."""
+        """Queue the goal."""
         self._graph.perform(self._guarded(self._send))
 
     def cancel(self) -> None:
-        """Have the goal cancelled; one that is not answered yet, as soon as it is accepted."""
+        """Queue the cancel of the goal; one not answered yet is cancelled once it is accepted."""
         self._graph.perform(self._guarded(self._cancel))
 
     def _guarded(self, work: Callable[..., None]) -> Callable[..., None]:

@@ -61,7 +61,7 @@ class OutgoingGoal:
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether the final state is told."""
+        """Return whether the final state is told."""
         return self._stage is _Stage.ENDED
 
     def step(self, now_ns: int) -> None:
@@ -82,7 +82,7 @@ class OutgoingGoal:
             self._wait_for_end(now_ns)
 
     def cancel(self, reason: str, ends_as: GoalState = GoalState.CANCELLED) -> None:
-        """Have it cancelled; the server may move nothing from now on."""
+        """Cancel it; the server may move nothing from now on."""
         self._lending.end(self.request.request_id)
         if self._cancelled or self.has_ended:
             return

@@ -49,7 +49,7 @@ class Lending:
         return why
 
     def permit(self, request_id: str, *, drives: bool) -> None:
-        """Let a goal drive the base for a moment, or have it held."""
+        """Lend a goal the base for a moment, or hold it."""
         if request_id in self._loans:
             self._loans[request_id].permit_ns = self._clock.now_ns() if drives else -NS_PER_S
 

@@ -1,1 +1,1 @@
-"""Tell the ROS graph what the robot knows."""
+"""Publish what the robot knows in the ROS graph."""

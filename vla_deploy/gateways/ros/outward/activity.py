@@ -87,7 +87,7 @@ class Activity:
 
     @property
     def is_executing(self) -> bool:
-        """Tell whether a plan is under way."""
+        """Return whether a plan is under way."""
         return self.executor in ("executing", "recovering")
 
     @property

@@ -1,4 +1,4 @@
-"""Tell joints, odometry and frames: /joint_states, /odom, /tf, /tf_static, /robot_description."""
+"""Publish /joint_states, /odom, /tf, /tf_static, /robot_description, and the twin's /clock."""
 
 import math
 from array import array
@@ -74,7 +74,7 @@ class Frames:
 
 
 class Body:
-    """Tell joints and odometry at their rates, and with odometry the frames."""
+    """Publish joints and odometry at their rates, and with odometry the frames."""
 
     def __init__(self, gateway: Gateway) -> None:
         graph, settings = gateway.graph, gateway.settings
@@ -91,7 +91,7 @@ class Body:
         self._odometry_due = Due(settings.odometry_rate_hz)
 
     def step(self, now_ns: int) -> None:
-        """Tell what is due."""
+        """Publish what is due."""
         if self._clock is not None:
             self._clock.publish(ClockMessage(clock=self._gateway.time.now()))
         link = self._gateway.link

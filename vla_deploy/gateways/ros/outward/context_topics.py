@@ -1,4 +1,4 @@
-"""Tell what planning nodes want to know beside plans: state, surroundings, what the robot does."""
+"""Publish what planning nodes ask for beside plans: state, surroundings, what the robot does."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -59,7 +59,7 @@ class ContextTopics:
             self._tell_statuses(activity)
 
     def stop(self) -> None:
-        """Say last that the robot is out of reach."""
+        """Publish last that the robot is out of reach."""
         self._tell_statuses(Activity())
 
     def _activity(self) -> Activity:

@@ -1,4 +1,4 @@
-"""Tell what stands around the robot now: a point cloud, and the map with what is seen in it.
+"""Publish what stands around the robot now: a point cloud, and the map with what is seen in it.
 
 Both are made only while somebody listens.
 """

@@ -34,7 +34,7 @@ class HealthLevel(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartHealth:
-    """Say how one part does; `values` are shown beside it."""
+    """Describe how one part does; `values` are shown beside it."""
 
     name: str
     level: HealthLevel

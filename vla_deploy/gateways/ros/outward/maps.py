@@ -1,4 +1,4 @@
-"""Tell the map and its keep-out zones, once and for whoever comes later."""
+"""Publish the map and its keep-out zones, once and for whoever comes later."""
 
 import logging
 from array import array
@@ -42,7 +42,7 @@ class StaticMap:
             self._map.publish(grid_message(gateway, file.occupancy(), file))
 
     def step(self, now_ns: int) -> None:
-        """Tell nothing: a map does not change while a robot runs."""
+        """Publish nothing: a map does not change while a robot runs."""
 
     def stop(self) -> None:
         """Leave nothing under way."""

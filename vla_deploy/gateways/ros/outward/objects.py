@@ -1,4 +1,4 @@
-"""Tell what the robot sees and remembers: /detected_objects as JSON, the same with types."""
+"""Publish what the robot sees and remembers: /detected_objects as JSON, the same with types."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final

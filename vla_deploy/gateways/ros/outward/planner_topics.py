@@ -1,4 +1,4 @@
-"""Tell plans and what becomes of them on the topics of planning nodes, in their JSON.
+"""Publish plans and what becomes of them on the topics of planning nodes, in their JSON.
 
 `PLAN_TOPICS` is the table of topics that carry a plan; each is published when a plan was accepted.
 """

@@ -1,4 +1,4 @@
-"""Tell what happens: the events of the robot's own topics, each as JSON with a type of event."""
+"""Publish what happens: the events of the robot's own topics, each as JSON with a type of event."""
 
 import json
 from typing import Final

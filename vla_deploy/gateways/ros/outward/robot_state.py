@@ -1,4 +1,4 @@
-"""Tell how the robot is: /vla_deploy/state, /battery_state, /diagnostics."""
+"""Publish how the robot is: /vla_deploy/state, /battery_state, /diagnostics."""
 
 import math
 import statistics
@@ -46,7 +46,7 @@ class StateTopic:
             self._state.publish(self._message(control, executor or {}))
 
     def stop(self) -> None:
-        """Say last that nobody tells how the robot is."""
+        """Publish last that nobody tells how the robot is."""
         self._state.publish(self._message(None, {}))
 
     def _message(

@@ -1,4 +1,4 @@
-"""Tell what lidar, IMU and camera measure, in the field's own messages."""
+"""Publish what lidar, IMU and camera measure, in the field's own messages."""
 
 from array import array
 from typing import Final

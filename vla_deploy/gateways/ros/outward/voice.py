@@ -1,4 +1,4 @@
-"""Tell what the robot hears as commands, and what it says.
+"""Publish what the robot hears as commands, and what it says.
 
 `/tts/say` carries what the robot has to say, for a voice of somebody else's; texts to be said by
 the robot are taken on another topic, else it would answer itself.
