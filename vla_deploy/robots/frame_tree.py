@@ -45,7 +45,7 @@ class FrameTransform(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Coupling:
+class JointCoupling:
     """Give a joint's value: `offset + multiplier * value` of the joint `leader`."""
 
     leader: str
@@ -68,7 +68,7 @@ class FrameJoint:
     xyz: tuple[float, ...] = _ORIGIN
     quaternion: tuple[float, ...] = UNTURNED
     axis: tuple[float, ...] = _ORIGIN
-    coupling: Coupling | None = None
+    coupling: JointCoupling | None = None
 
 
 class FrameTree:
@@ -84,7 +84,7 @@ class FrameTree:
             if joint.kind == FIXED
         )
         count = len(self.moving)
-        coupled = [joint.coupling or Coupling(leader=joint.name) for joint in self.moving]
+        coupled = [joint.coupling or JointCoupling(leader=joint.name) for joint in self.moving]
         self._leaders = [one.leader for one in coupled]
         self._multipliers = np.array([one.multiplier for one in coupled])
         self._offsets = np.array([one.offset for one in coupled])
@@ -142,7 +142,7 @@ def joints_of(robot: RobotDescription, document: MjcfDocument) -> tuple[FrameJoi
         *_joint_faults(document, leads),
     ]
     _refuse(document, faults)
-    couplings = {leader: Coupling(leader=leader) for leader in leads} | _couplings(document)
+    couplings = {leader: JointCoupling(leader=leader) for leader in leads} | _couplings(document)
     root = tree.links[0].name
     found = [one for link in tree.links[1:] for one in _body_joints(link, couplings, robot)]
     found += _device_frames(robot, tree)
@@ -187,11 +187,11 @@ def _polynomial(couple: Element) -> Array:
     return numbers(couple.get("polycoef", "0 1 0 0 0"))
 
 
-def _couplings(document: MjcfDocument) -> dict[str, Coupling]:
+def _couplings(document: MjcfDocument) -> dict[str, JointCoupling]:
     couplings = {}
     for couple in document.root.findall("equality/joint"):
         offset, multiplier, *_ = map(float, _polynomial(couple))
-        couplings[couple.get("joint1", "")] = Coupling(
+        couplings[couple.get("joint1", "")] = JointCoupling(
             leader=couple.get("joint2", ""), multiplier=multiplier, offset=offset
         )
     return couplings
@@ -230,7 +230,7 @@ def _name_faults(joints: Sequence[FrameJoint]) -> Iterator[Fault]:
 
 
 def _body_joints(
-    link: Link, couplings: Mapping[str, Coupling], robot: RobotDescription
+    link: Link, couplings: Mapping[str, JointCoupling], robot: RobotDescription
 ) -> Iterator[FrameJoint]:
     """Yield what joins a body to its parent: a joint, or several with frames between them."""
     joints = [joint for joint in link.joints if joint.name in couplings]
@@ -256,7 +256,7 @@ def _body_joints(
         yield _fixed(parent, link.name, xyz - before, np.array(quaternion))
 
 
-def _kind(joint: Joint, coupling: Coupling, robot: RobotDescription) -> str:
+def _kind(joint: Joint, coupling: JointCoupling, robot: RobotDescription) -> str:
     if joint.kind == "slide":
         return "prismatic"
     return "continuous" if coupling.leader in _wheels(robot) else "revolute"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vla_deploy.robots.description import RobotDescription
-from vla_deploy.robots.frame_tree import BASE_FRAME, FIXED, Coupling, FrameJoint, joints_of
+from vla_deploy.robots.frame_tree import BASE_FRAME, FIXED, FrameJoint, JointCoupling, joints_of
 from vla_deploy.robots.inertia import LinkInertia, inertia_of
 from vla_deploy.robots.kinematic_tree import Shape, Vector
 from vla_deploy.robots.mjcf_document import BodyElement, MjcfDocument, read_document, vector
@@ -198,7 +198,7 @@ def _first(told: Attributes, name: str) -> float:
 
 def _limit(robot: RobotDescription, joint: FrameJoint, told: Attributes) -> dict[str, str] | None:
     """Return a joint's bounds; a follower's are what its leader's make of it."""
-    coupling = joint.coupling or Coupling(leader=joint.name)
+    coupling = joint.coupling or JointCoupling(leader=joint.name)
     if coupling.leader not in robot.joint_names:
         return _wheel_limit(robot, told)
     limits, factor = robot.limits[coupling.leader], coupling.multiplier
