@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from vla_deploy.gateways.ros.commands import CommandNews
-from vla_deploy.gateways.ros.graph import Graph
+from vla_deploy.gateways.ros.graph import GraphLink
 from vla_deploy.gateways.ros.json_topic import JsonTopic
 
 TOPICS: Final = ("/cognitive_planner/feedback", "/llm_planner/feedback")
@@ -19,7 +19,7 @@ _UNANSWERED: Final = "lost: no answer"
 class CommandFeedback:
     """Publish the same on both topics."""
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: GraphLink) -> None:
         self._topics = tuple(JsonTopic(graph, topic) for topic in TOPICS)
 
     def tell(self, document: Mapping[str, Any]) -> None:

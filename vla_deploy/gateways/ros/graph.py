@@ -83,7 +83,7 @@ class _Waking(Future):  # type: ignore[misc]  # rclpy tells no types
         self._waiting.wake()
 
 
-class Graph:
+class GraphLink:
     """Hold the node's end of the ROS 2 graph."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from std_msgs.msg import String
 
-from vla_deploy.gateways.ros.graph import RELIABLE, Graph
+from vla_deploy.gateways.ros.graph import RELIABLE, GraphLink
 
 PUBLISHED_BY: Final = "published_by"
 """Where a topic is published and subscribed here, the key by which we know our own."""
@@ -15,7 +15,7 @@ PUBLISHED_BY: Final = "published_by"
 class JsonTopic:
     """Publish one topic; numbers that JSON has no form for become null."""
 
-    def __init__(self, graph: Graph, topic: str) -> None:
+    def __init__(self, graph: GraphLink, topic: str) -> None:
         self._publisher = graph.publisher(String, topic, RELIABLE)
 
     @property

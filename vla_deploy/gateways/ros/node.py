@@ -11,7 +11,7 @@ from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.applying import holding
 from vla_deploy.gateways.ros.commands import RobotCommands
 from vla_deploy.gateways.ros.feedback import CommandFeedback
-from vla_deploy.gateways.ros.graph import SOURCE, Graph
+from vla_deploy.gateways.ros.graph import SOURCE, GraphLink
 from vla_deploy.gateways.ros.inward.parts import inward_parts
 from vla_deploy.gateways.ros.outgoing.courier import Courier
 from vla_deploy.gateways.ros.outgoing.lending import Lending
@@ -48,7 +48,7 @@ class RosGatewayNode:
         self._tell_due = Due(_TELL_HZ)
         given, profile = handed_over_parameters(), load_profile(context.profile)
         self._parameters = holding(given, self._robot, profile)
-        self._graph: Graph | None = None
+        self._graph: GraphLink | None = None
         self._status: CellWriter
 
     def start(self) -> None:
@@ -56,7 +56,7 @@ class RosGatewayNode:
         self._status = self._link.space.cell_writer(STATUS_TOPIC)
         for leftover in remove_leftovers():
             _log.info("removed %s, which a killed process of ROS has left", leftover.name)
-        self._graph = Graph(self._parameters)
+        self._graph = GraphLink(self._parameters)
         gateway = Gateway(
             graph=self._graph,
             link=self._link,
@@ -97,7 +97,7 @@ class RosGatewayNode:
             self._graph.close()
         self._link.close()
 
-    def _tell(self, graph: Graph) -> None:
+    def _tell(self, graph: GraphLink) -> None:
         node = graph.node
         self._status.put_document(
             {

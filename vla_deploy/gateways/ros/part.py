@@ -7,7 +7,7 @@ from typing import Any, Final, Protocol
 from vla_deploy.client.link import RobotLink
 from vla_deploy.gateways.ros.commands import RobotCommands
 from vla_deploy.gateways.ros.feedback import CommandFeedback
-from vla_deploy.gateways.ros.graph import Graph
+from vla_deploy.gateways.ros.graph import GraphLink
 from vla_deploy.gateways.ros.stamps import RosTime
 from vla_deploy.robots import RobotDescription
 from vla_deploy.robots.ros_settings import RosSettings
@@ -19,7 +19,7 @@ _STATUS_AGE_S: Final = 1.0
 class Gateway:
     """Hold for each part what it works with."""
 
-    graph: Graph
+    graph: GraphLink
     link: RobotLink
     time: RosTime
     robot: RobotDescription

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from vla_deploy.gateways.ros.inward.orders import OrderRefused
+from vla_deploy.gateways.ros.inward.orders import OrderInvalid
 from vla_deploy.gateways.ros.inward.words import is_stop_word, read_message, shown
 
 ACTION = {"action_type": "turn_left", "parameters": {"angle": 20}, "priority": 1}
@@ -60,7 +60,7 @@ def test_plans_are_found(document, plan) -> None:
     ],
 )
 def test_what_is_no_command_is_refused(data, why) -> None:
-    with pytest.raises(OrderRefused, match=why):
+    with pytest.raises(OrderInvalid, match=why):
         read_message(data)
 
 

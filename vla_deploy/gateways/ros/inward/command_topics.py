@@ -13,7 +13,7 @@ from typing import Any, Final
 from std_msgs.msg import String
 
 from vla_deploy.gateways.ros.graph import NODE_NAME, RELIABLE
-from vla_deploy.gateways.ros.inward.orders import Order, OrderRefused, Orders
+from vla_deploy.gateways.ros.inward.orders import CommandOrder, CommandOrders, OrderInvalid
 from vla_deploy.gateways.ros.inward.words import is_stop_word, read_message, shown
 from vla_deploy.gateways.ros.json_topic import PUBLISHED_BY
 from vla_deploy.gateways.ros.part import Gateway
@@ -34,14 +34,14 @@ _log = logging.getLogger(__name__)
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Open:
     topic: str
-    order: Order
+    order: CommandOrder
     has_asked: bool = False
 
 
 class CommandTopics:
     """Give what comes to the planner, and answers to what the robot has asked on that topic."""
 
-    def __init__(self, gateway: Gateway, orders: Orders) -> None:
+    def __init__(self, gateway: Gateway, orders: CommandOrders) -> None:
         self._gateway = gateway
         self._orders = orders
         self._open: list[_Open] = []
@@ -66,12 +66,12 @@ class CommandTopics:
             if (found.stated or {}).get(PUBLISHED_BY) == _OURS:
                 return  # what the robot itself has heard, and is doing already
             if len(self._open) >= MOST_OPEN and not is_stop_word(found.text):
-                raise OrderRefused(f"{MOST_OPEN} commands are under way or wait; try again later")
+                raise OrderInvalid(f"{MOST_OPEN} commands are under way or wait; try again later")
             is_answer = found.plan is None and self._is_asked(topic)
             order = self._orders.give(
                 text=found.text, plan=found.plan, source=sender, is_answer=is_answer
             )
-        except OrderRefused as error:
+        except OrderInvalid as error:
             _log.warning("%s from %s refused: %s", topic, sender, error)
             self._gateway.feedback.refuse(shown(message.data), sender, topic, str(error))
             return

@@ -18,9 +18,9 @@ from vla_deploy.gateways.ros.inward.motions import JointView, Motions
 from vla_deploy.gateways.ros.inward.pursuing import (
     ActionDesk,
     Begin,
-    Ending,
     Feedback,
-    Outcome,
+    GoalEnding,
+    GoalOutcome,
 )
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.robots import RobotDescription
@@ -179,7 +179,7 @@ class GripperServer:
         group = gateway.robot.hands[hand].gripper
         self._claim = Claimed(gateway.link, f"ros/{group}/{dialect.kind.__name__}", (group,))
 
-    def judge(self, goal: Any) -> Begin | Outcome:
+    def judge(self, goal: Any) -> Begin | GoalOutcome:
         """Return how to begin with a goal, or why not at all."""
         try:
             gap_m, force_n = self._dialect.wanted(goal)
@@ -191,7 +191,7 @@ class GripperServer:
             return self._refused(why)
         return lambda feedback: self._begin(gap_m, force_n, feedback)
 
-    def _begin(self, gap_m: float, force_n: float, feedback: Feedback) -> "Gripping | Outcome":
+    def _begin(self, gap_m: float, force_n: float, feedback: Feedback) -> "Gripping | GoalOutcome":
         why = self._claim.why_not_taken()
         if why:
             return self._refused(why)
@@ -211,9 +211,9 @@ class GripperServer:
         if not math.isfinite(force_n) or force_n < 0.0:
             raise ValueError(f"max_effort: expected 0 or more N, got {force_n}")
 
-    def _refused(self, why: str) -> Outcome:
+    def _refused(self, why: str) -> GoalOutcome:
         self._gateway.graph.node.get_logger().warning(f"{self._fingers.joint}: {why}")
-        return Outcome(ending=Ending.ABORTED, result=self._dialect.result(None))
+        return GoalOutcome(ending=GoalEnding.ABORTED, result=self._dialect.result(None))
 
 
 class Gripping:
@@ -241,9 +241,9 @@ class Gripping:
         self._done = False
         self._still_since_ns: int | None = None
         self._end_by_ns = now_ns + round(TIMEOUT_S * NS_PER_S)
-        self._ends_as: Ending | None = None
+        self._ends_as: GoalEnding | None = None
 
-    def step(self, now_ns: int) -> Outcome | None:
+    def step(self, now_ns: int) -> GoalOutcome | None:
         """Go on; fingers that meet something before their goal have stalled, which is success."""
         view = self._motions.look((self._fingers.joint,))
         ended = self._motions.ended(self._motion_id)
@@ -251,24 +251,24 @@ class Gripping:
         if ended is not None:
             self._done = ended.status in ("done", "touched")
             if self._ends_as is not None or not self._done:
-                return self._finish(self._ends_as or Ending.ABORTED, state)
+                return self._finish(self._ends_as or GoalEnding.ABORTED, state)
         if state is None:
             return None
         if self._done and (state.reached or state.stalled):
-            return self._finish(Ending.SUCCEEDED, state)
+            return self._finish(GoalEnding.SUCCEEDED, state)
         if now_ns > self._end_by_ns:
             self._motions.cancel(self._motion_id)
-            return self._finish(Ending.ABORTED, state)
+            return self._finish(GoalEnding.ABORTED, state)
         if self._due.is_now(now_ns):
             self._feedback(self._dialect.feedback(state))
         return None
 
-    def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
+    def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
         """End it where the fingers are, or leave them to its successor."""
         if superseded or self._done:
             self._motions.forget(self._motion_id)
-            return Outcome(ending=Ending.CANCELED, result=self._dialect.result(None))
-        self._ends_as = Ending.CANCELED
+            return GoalOutcome(ending=GoalEnding.CANCELED, result=self._dialect.result(None))
+        self._ends_as = GoalEnding.CANCELED
         self._motions.cancel(self._motion_id)
         return None
 
@@ -291,6 +291,6 @@ class Gripping:
             stalled=self._done and still and not reached,
         )
 
-    def _finish(self, ending: Ending, state: GripperState | None) -> Outcome:
+    def _finish(self, ending: GoalEnding, state: GripperState | None) -> GoalOutcome:
         self._claim.release()
-        return Outcome(ending=ending, result=self._dialect.result(state))
+        return GoalOutcome(ending=ending, result=self._dialect.result(state))

@@ -11,8 +11,13 @@ from nav2_msgs.action import NavigateToPose
 from drivers.clock import NS_PER_S
 from vla_deploy.client.following import Event
 from vla_deploy.client.readiness import refusal_of
-from vla_deploy.gateways.ros.inward.orders import Order, OrderRefused, Orders, error_of
-from vla_deploy.gateways.ros.inward.pursuing import Begin, Ending, Feedback, Outcome
+from vla_deploy.gateways.ros.inward.orders import (
+    CommandOrder,
+    CommandOrders,
+    OrderInvalid,
+    error_of,
+)
+from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
 from vla_deploy.gateways.ros.outward.body import BASE, MAP, ODOM
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.gateways.ros.planar import Planar, inverse, joined, planar_of
@@ -25,30 +30,30 @@ MOST_M: Final = 10_000.0
 _AGE_S: Final = 0.5
 
 
-def _failed(text: str) -> Outcome:
+def _failed(text: str) -> GoalOutcome:
     result = NavigateToPose.Result(error_code=FAILED, error_msg=text)
-    return Outcome(ending=Ending.ABORTED, result=result)
+    return GoalOutcome(ending=GoalEnding.ABORTED, result=result)
 
 
 class NavigationServer:
     """Judge poses to drive to, and give sound ones to the planner."""
 
-    def __init__(self, gateway: Gateway, orders: Orders) -> None:
+    def __init__(self, gateway: Gateway, orders: CommandOrders) -> None:
         self._gateway = gateway
         self._orders = orders
 
-    def judge(self, goal: Any) -> Begin | Outcome:
+    def judge(self, goal: Any) -> Begin | GoalOutcome:
         """Return how to begin with a goal, or why not at all."""
         try:
             target = self._target(goal)
-        except OrderRefused as error:
+        except OrderInvalid as error:
             return _failed(str(error))
         why = refusal_of(self._gateway.control_status())
         if why:
             return _failed(why)
         return lambda feedback: self._begin(target, feedback)
 
-    def _begin(self, target: Planar, feedback: Feedback) -> "Driving | Outcome":
+    def _begin(self, target: Planar, feedback: Feedback) -> "Driving | GoalOutcome":
         x_m, y_m, yaw_rad = target
         action = {
             "id": "navigate",
@@ -60,16 +65,16 @@ class NavigationServer:
 
     def _target(self, goal: Any) -> Planar:
         if goal.behavior_tree:
-            raise OrderRefused("behavior_tree: this robot has none; leave it empty")
+            raise OrderInvalid("behavior_tree: this robot has none; leave it empty")
         pose, frame = goal.pose.pose, goal.pose.header.frame_id
         numbers = (
             *(pose.position.x, pose.position.y, pose.position.z),
             *(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w),
         )
         if not all(math.isfinite(one) and abs(one) < MOST_M for one in numbers):
-            raise OrderRefused(f"pose: expected finite numbers below {MOST_M:g}")
+            raise OrderInvalid(f"pose: expected finite numbers below {MOST_M:g}")
         if not 0.9 < math.hypot(*numbers[3:]) < 1.1:
-            raise OrderRefused("pose.orientation: expected a quaternion of length 1")
+            raise OrderInvalid("pose.orientation: expected a quaternion of length 1")
         wanted = (pose.position.x, pose.position.y, yaw_of(pose.orientation))
         if frame in ("", MAP):
             return wanted
@@ -79,18 +84,20 @@ class NavigationServer:
         link = self._gateway.link
         pose, base = link.fresh("pose", _AGE_S), link.fresh("base_state", _AGE_S)
         if pose is None or base is None:
-            raise OrderRefused(f"the robot does not know its place now, by which {frame} is known")
+            raise OrderInvalid(f"the robot does not know its place now, by which {frame} is known")
         if frame == BASE:
             return planar_of(pose)
         if frame == ODOM:
             return joined(planar_of(pose), inverse(planar_of(base)))
-        raise OrderRefused(f"pose.header.frame_id: expected {MAP}, {ODOM} or {BASE}, got {frame!r}")
+        raise OrderInvalid(f"pose.header.frame_id: expected {MAP}, {ODOM} or {BASE}, got {frame!r}")
 
 
 class Driving:
     """Pursue one pose."""
 
-    def __init__(self, gateway: Gateway, order: Order, target: Planar, feedback: Feedback) -> None:
+    def __init__(
+        self, gateway: Gateway, order: CommandOrder, target: Planar, feedback: Feedback
+    ) -> None:
         self._gateway = gateway
         self._order = order
         self._target = target
@@ -100,7 +107,7 @@ class Driving:
         self._retries = 0
         self._cancelled = ""
 
-    def step(self, now_ns: int) -> Outcome | None:
+    def step(self, now_ns: int) -> GoalOutcome | None:
         """Go on; return the outcome once the command has ended."""
         for event in self._order.news:
             self._note(event)
@@ -111,7 +118,7 @@ class Driving:
             self._tell(now_ns)
         return None
 
-    def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
+    def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
         """Cancel the command; once the base has come to rest, `step` returns the outcome."""
         self._cancelled = reason
         self._order.cancel()
@@ -126,15 +133,15 @@ class Driving:
             self._cancelled = f"it needs a person's word: {event.get('question')}"
             self._order.cancel()
 
-    def _finish(self, last: Event) -> Outcome:
+    def _finish(self, last: Event) -> GoalOutcome:
         why = error_of(last)
         if not why and not self._cancelled:
-            return Outcome(ending=Ending.SUCCEEDED, result=NavigateToPose.Result())
+            return GoalOutcome(ending=GoalEnding.SUCCEEDED, result=NavigateToPose.Result())
         return self._given_up(self._cancelled) if self._cancelled else _failed(why)
 
-    def _given_up(self, reason: str) -> Outcome:
+    def _given_up(self, reason: str) -> GoalOutcome:
         result = NavigateToPose.Result(error_code=FAILED, error_msg=reason)
-        return Outcome(ending=Ending.CANCELED, result=result)
+        return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
 
     def _tell(self, now_ns: int) -> None:
         link = self._gateway.link

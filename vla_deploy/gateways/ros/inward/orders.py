@@ -13,7 +13,7 @@ CANCELLED: Final = "cancelled on request"
 _STATUS_AGE_S: Final = 2.0
 
 
-class Order:
+class CommandOrder:
     """Follow one command; `news` holds what has not been looked at yet."""
 
     def __init__(self, link: RobotLink, command_id: str) -> None:
@@ -57,24 +57,24 @@ class Order:
             self.news.append(self.last)
 
 
-class Orders:
+class CommandOrders:
     """Give commands and hand each what was told of it."""
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link
         self._events = link.events("task_event")
-        self._orders: list[Order] = []
+        self._orders: list[CommandOrder] = []
 
     def give(
         self, *, text: str = "", plan: Any = None, source: str = "", is_answer: bool = False
-    ) -> Order:
+    ) -> CommandOrder:
         """Give a command in words, or a plan, to the planner.
 
         `source` says who gives it, for logs and the audit trail; words that are an answer are no
         command of their own.
 
         Raises:
-            OrderRefused: it is longer than the planner takes.
+            OrderInvalid: it is longer than the planner takes.
         """
         utterance: dict[str, Any] = {"text": text} if plan is None else {"plan": plan}
         if source:
@@ -82,9 +82,9 @@ class Orders:
         if is_answer:
             utterance["answer"] = True
         try:
-            order = Order(self._link, self._link.utter(**utterance))
+            order = CommandOrder(self._link, self._link.utter(**utterance))
         except BadPayload as error:
-            raise OrderRefused(f"too long for a command: {error}") from error
+            raise OrderInvalid(f"too long for a command: {error}") from error
         self._orders.append(order)
         return order
 
@@ -103,7 +103,7 @@ class Orders:
         self._events.close()
 
 
-class OrderRefused(ValueError):
+class OrderInvalid(ValueError):
     """Report why something is no command."""
 
 
@@ -118,12 +118,12 @@ def parsed_plan(text: str) -> Mapping[str, Any] | list[Any]:
     """Return a plan's JSON.
 
     Raises:
-        OrderRefused: it is no JSON object or list.
+        OrderInvalid: it is no JSON object or list.
     """
     try:
         plan = json.loads(text)
     except ValueError as error:
-        raise OrderRefused(f"the plan is no JSON: {error}") from error
+        raise OrderInvalid(f"the plan is no JSON: {error}") from error
     if not isinstance(plan, dict | list):
-        raise OrderRefused(f"the plan: expected an object or a list, got {type(plan).__name__}")
+        raise OrderInvalid(f"the plan: expected an object or a list, got {type(plan).__name__}")
     return plan

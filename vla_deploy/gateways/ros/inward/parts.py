@@ -14,7 +14,7 @@ from vla_deploy.gateways.ros.inward.grippers import gripper_desks
 from vla_deploy.gateways.ros.inward.joint_commands import JointCommands
 from vla_deploy.gateways.ros.inward.motions import Motions
 from vla_deploy.gateways.ros.inward.navigation import NavigationServer
-from vla_deploy.gateways.ros.inward.orders import Orders
+from vla_deploy.gateways.ros.inward.orders import CommandOrders
 from vla_deploy.gateways.ros.inward.plans import PlanServer
 from vla_deploy.gateways.ros.inward.pursuing import ActionDesk
 from vla_deploy.gateways.ros.inward.say_topic import SayTopic
@@ -41,7 +41,7 @@ def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
     accept, settings = gateway.settings.accept, gateway.settings
     graph, link = gateway.graph, gateway.link
     motions = Motions(link, gateway.robot.joint_index)
-    orders = Orders(link)
+    orders = CommandOrders(link)
     acts = {Accepts.STOP: (ESTOP,), Accepts.ALL: ALL_ACTS}.get(accept)
     parts: list[GatewayPart] = [] if acts is None else [Acts(gateway, acts)]
     takes_all = accept is Accepts.ALL
@@ -68,7 +68,7 @@ def inward_parts(gateway: Gateway, lending: Lending) -> tuple[GatewayPart, ...]:
 class Shared:
     """Step what several servers share, before any of them."""
 
-    def __init__(self, motions: Motions, orders: Orders) -> None:
+    def __init__(self, motions: Motions, orders: CommandOrders) -> None:
         self._motions = motions
         self._orders = orders
 

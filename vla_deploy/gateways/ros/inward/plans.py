@@ -9,13 +9,13 @@ from vla_deploy.client.following import Event
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.graph import named
 from vla_deploy.gateways.ros.inward.orders import (
-    Order,
-    OrderRefused,
-    Orders,
+    CommandOrder,
+    CommandOrders,
+    OrderInvalid,
     error_of,
     parsed_plan,
 )
-from vla_deploy.gateways.ros.inward.pursuing import Begin, Ending, Feedback, Outcome
+from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
 from vla_deploy.gateways.ros.inward.words import shown
 from vla_deploy.gateways.ros.part import Gateway
 
@@ -37,11 +37,11 @@ _STATES: Final = {
 class PlanServer:
     """Judge what is to be carried out, and hand it to the planner."""
 
-    def __init__(self, gateway: Gateway, orders: Orders) -> None:
+    def __init__(self, gateway: Gateway, orders: CommandOrders) -> None:
         self._gateway = gateway
         self._orders = orders
 
-    def judge(self, goal: Any) -> Begin | Outcome:
+    def judge(self, goal: Any) -> Begin | GoalOutcome:
         """Return how to begin with a goal, or why not at all."""
         if bool(goal.command.strip()) == bool(goal.plan_json.strip()):
             return _refused(Result.INVALID_PLAN, "fill in one of command and plan_json")
@@ -52,15 +52,17 @@ class PlanServer:
             return _refused(Result.NOT_ARMED if disarmed else Result.REJECTED, why)
         try:
             plan = parsed_plan(goal.plan_json) if goal.plan_json.strip() else None
-        except OrderRefused as error:
+        except OrderInvalid as error:
             return _refused(Result.INVALID_PLAN, str(error))
         source = named([shown(goal.source)] if goal.source else [])
         return lambda feedback: self._begin(goal.command, plan, source, feedback)
 
-    def _begin(self, text: str, plan: Any, source: str, feedback: Feedback) -> "Carrying | Outcome":
+    def _begin(
+        self, text: str, plan: Any, source: str, feedback: Feedback
+    ) -> "Carrying | GoalOutcome":
         try:
             order = self._orders.give(text=text, plan=plan, source=source)
-        except OrderRefused as error:
+        except OrderInvalid as error:
             return _refused(Result.INVALID_PLAN, str(error))
         return Carrying(order, feedback, of_plan=plan is not None)
 
@@ -68,14 +70,14 @@ class PlanServer:
 class Carrying:
     """Pursue one command, and tell each action's news."""
 
-    def __init__(self, order: Order, feedback: Feedback, *, of_plan: bool) -> None:
+    def __init__(self, order: CommandOrder, feedback: Feedback, *, of_plan: bool) -> None:
         self._order = order
         self._feedback = feedback
         self._of_plan = of_plan
         self._cancelled = ""
         self._places: dict[str, int] = {}
 
-    def step(self, now_ns: int) -> Outcome | None:
+    def step(self, now_ns: int) -> GoalOutcome | None:
         """Publish what is new; return the outcome once the command has ended."""
         while self._order.news:
             event = self._order.news.popleft()
@@ -87,14 +89,14 @@ class Carrying:
                 self._feedback(self._told(state, event))
         return None if self._order.last is None else self._finish(self._order.last)
 
-    def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
+    def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
         """Cancel the command; once the robot has come to rest, `step` returns the outcome."""
         self._cancelled = reason
         self._order.cancel()
         if not superseded:
             return None
         result = Result(error_code=Result.CANCELLED, error=reason)
-        return Outcome(ending=Ending.CANCELED, result=result)
+        return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
 
     def _told(self, state: str, event: Event) -> Any:
         action_id = str(event.get("action_id") or "")
@@ -109,7 +111,7 @@ class Carrying:
             choices=[str(one) for one in event.get("choices") or ()],
         )
 
-    def _finish(self, last: Event) -> Outcome:
+    def _finish(self, last: Event) -> GoalOutcome:
         why, actions = error_of(last), list(last.get("actions") or ())
         succeeded = sum(one["status"] == "succeeded" for one in actions)
         total = len(actions)
@@ -124,8 +126,10 @@ class Carrying:
             results_json=json.dumps(actions),
         )
         if self._cancelled:
-            return Outcome(ending=Ending.CANCELED, result=result)
-        return Outcome(ending=Ending.ABORTED if why else Ending.SUCCEEDED, result=result)
+            return GoalOutcome(ending=GoalEnding.CANCELED, result=result)
+        return GoalOutcome(
+            ending=GoalEnding.ABORTED if why else GoalEnding.SUCCEEDED, result=result
+        )
 
     def _code(self, last: Event, why: str) -> int:
         if self._cancelled or why.endswith("cancelled on request"):
@@ -139,5 +143,5 @@ class Carrying:
         return int(Result.LOST if why.startswith("lost") else Result.ABORTED)
 
 
-def _refused(code: int, why: str) -> Outcome:
-    return Outcome(ending=Ending.ABORTED, result=Result(error_code=code, error=why))
+def _refused(code: int, why: str) -> GoalOutcome:
+    return GoalOutcome(ending=GoalEnding.ABORTED, result=Result(error_code=code, error=why))

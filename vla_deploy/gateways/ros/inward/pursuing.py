@@ -12,12 +12,12 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
-from vla_deploy.gateways.ros.graph import Graph
+from vla_deploy.gateways.ros.graph import GraphLink
 
 MOST_AT_A_TIME: Final = 8
 
 
-class Ending(Enum):
+class GoalEnding(Enum):
     """Name how a goal ends, in the words of action_msgs/GoalStatus."""
 
     SUCCEEDED = "succeed"
@@ -26,21 +26,21 @@ class Ending(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class GoalOutcome:
     """Describe how a goal ended, and what its client gets."""
 
-    ending: Ending
+    ending: GoalEnding
     result: Any
 
 
 class Pursuit(Protocol):
     """Pursue one goal."""
 
-    def step(self, now_ns: int) -> Outcome | None:
+    def step(self, now_ns: int) -> GoalOutcome | None:
         """Go on; return the outcome once there is one."""
         ...
 
-    def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
+    def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
         """End it for a reason; None where `step` tells the outcome later.
 
         One that is superseded leaves what it moves to its successor.
@@ -49,8 +49,8 @@ class Pursuit(Protocol):
 
 
 Feedback = Callable[[Any], None]
-Begin = Callable[[Feedback], "Pursuit | Outcome"]
-Judge = Callable[[Any], "Begin | Outcome"]
+Begin = Callable[[Feedback], "Pursuit | GoalOutcome"]
+Judge = Callable[[Any], "Begin | GoalOutcome"]
 """Return how to begin with a goal, or how it ended already: it was refused."""
 
 
@@ -65,7 +65,7 @@ class _Goal:
 class ActionDesk:
     """Take the goals of one action; a sound new goal ends the one before it, as usual in ROS."""
 
-    def __init__(self, graph: Graph, kind: Any, name: str, judge: Judge) -> None:
+    def __init__(self, graph: GraphLink, kind: Any, name: str, judge: Judge) -> None:
         self._graph = graph
         self._kind = kind
         self._judge = judge
@@ -108,17 +108,17 @@ class ActionDesk:
         if not self._graph.put(lambda: self._start(handle, done)):
             handle.abort()
             return self._kind.Result()
-        outcome: Outcome = await done
+        outcome: GoalOutcome = await done
         state = outcome.ending
         # A goal that ends by itself while its cancelling is asked for may end as it did.
-        if state is Ending.CANCELED and not handle.is_cancel_requested:
-            state = Ending.ABORTED
+        if state is GoalEnding.CANCELED and not handle.is_cancel_requested:
+            state = GoalEnding.ABORTED
         getattr(handle, state.value)()
         return outcome.result
 
     def _start(self, handle: ServerGoalHandle, done: Future) -> None:
         judged = self._judge(handle.request)
-        if isinstance(judged, Outcome):
+        if isinstance(judged, GoalOutcome):
             done.set_result(judged)
             return
         for before in list(self._goals):
@@ -126,11 +126,11 @@ class ActionDesk:
             if outcome is not None:
                 self._end(before, outcome)
         begun = judged(handle.publish_feedback)
-        if isinstance(begun, Outcome):
+        if isinstance(begun, GoalOutcome):
             done.set_result(begun)
             return
         self._goals.append(_Goal(handle=handle, done=done, pursuit=begun))
 
-    def _end(self, goal: _Goal, outcome: Outcome) -> None:
+    def _end(self, goal: _Goal, outcome: GoalOutcome) -> None:
         self._goals.remove(goal)
         goal.done.set_result(outcome)

@@ -6,7 +6,7 @@ from typing import Any, Final
 from std_msgs.msg import String
 
 from vla_deploy.gateways.ros.graph import RELIABLE
-from vla_deploy.gateways.ros.inward.orders import OrderRefused
+from vla_deploy.gateways.ros.inward.orders import OrderInvalid
 from vla_deploy.gateways.ros.inward.words import checked_text
 from vla_deploy.gateways.ros.part import Gateway
 from vla_deploy.ipc.announcer import Announcer
@@ -33,7 +33,7 @@ class SayTopic:
     def _take(self, message: Any, sender: str) -> None:
         try:
             text = checked_text(message.data)
-        except OrderRefused as error:
+        except OrderInvalid as error:
             _log.warning("%s from %s refused: %s", TOPIC, sender, error)
             return
         why = self._voice.why_silent()

@@ -11,7 +11,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.inward.claiming import PartsHold
 from vla_deploy.gateways.ros.inward.motions import Ended, JointView, Motions
-from vla_deploy.gateways.ros.inward.pursuing import Begin, Ending, Feedback, Outcome
+from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
 from vla_deploy.gateways.ros.inward.trajectory_goal import (
     GoalRefused,
     Result,
@@ -26,8 +26,8 @@ GOAL_TOLERANCE: Final = 0.05
 """Where a goal names none, in rad, or in m for a finger: what the arms hold under their weight."""
 
 
-def _outcome(ending: Ending, code: int, text: str = "") -> Outcome:
-    return Outcome(ending=ending, result=Result(error_code=code, error_string=text))
+def _outcome(ending: GoalEnding, code: int, text: str = "") -> GoalOutcome:
+    return GoalOutcome(ending=ending, result=Result(error_code=code, error_string=text))
 
 
 class TrajectoryServer:
@@ -52,7 +52,7 @@ class TrajectoryServer:
         self._hold = hold
         self._claim: PartsHold | None = None
 
-    def judge(self, goal: Any) -> Begin | Outcome:
+    def judge(self, goal: Any) -> Begin | GoalOutcome:
         """Return how to begin with a goal, or why not at all."""
         try:
             sound = judged_goal(
@@ -63,13 +63,13 @@ class TrajectoryServer:
                 goal_tolerance=GOAL_TOLERANCE,
             )
         except GoalRefused as error:
-            return _outcome(Ending.ABORTED, error.code, str(error))
+            return _outcome(GoalEnding.ABORTED, error.code, str(error))
         why = refusal_of(self._gateway.control_status())
         if why:
-            return _outcome(Ending.ABORTED, Result.INVALID_GOAL, why)
+            return _outcome(GoalEnding.ABORTED, Result.INVALID_GOAL, why)
         return lambda feedback: self._begin(sound, feedback)
 
-    def _begin(self, goal: TrajectoryGoal, feedback: Feedback) -> "Following | Outcome":
+    def _begin(self, goal: TrajectoryGoal, feedback: Feedback) -> "TrajectoryPursuit | GoalOutcome":
         groups = [
             name
             for name, group in self._gateway.robot.groups.items()
@@ -80,11 +80,11 @@ class TrajectoryServer:
         self._claim = self._hold(f"ros/{self._name}", groups)
         why = self._claim.why_not_taken()
         if why:
-            return _outcome(Ending.ABORTED, Result.INVALID_GOAL, why)
-        return Following(self._gateway, self._motions, goal, feedback, self._claim)
+            return _outcome(GoalEnding.ABORTED, Result.INVALID_GOAL, why)
+        return TrajectoryPursuit(self._gateway, self._motions, goal, feedback, self._claim)
 
 
-class Following:
+class TrajectoryPursuit:
     """Pursue one trajectory: wait for its start, watch its tolerances, settle at its end."""
 
     def __init__(
@@ -103,9 +103,9 @@ class Following:
         self._due = Due(FEEDBACK_HZ)
         self._motion_id: int | None = None
         self._settle_by_ns: int | None = None
-        self._ends_as: tuple[Ending, int, str] | None = None
+        self._ends_as: tuple[GoalEnding, int, str] | None = None
 
-    def step(self, now_ns: int) -> Outcome | None:
+    def step(self, now_ns: int) -> GoalOutcome | None:
         """Go on; return the outcome once there is one."""
         view = self._motions.look(self._goal.joints)
         if self._motion_id is None:
@@ -125,18 +125,18 @@ class Following:
         self._watch(view)
         return None
 
-    def cancel(self, reason: str, *, superseded: bool = False) -> Outcome | None:
+    def cancel(self, reason: str, *, superseded: bool = False) -> GoalOutcome | None:
         """End it; control ramps its joints to rest, or its successor takes them over."""
         code = Result.INVALID_GOAL if superseded else Result.SUCCESSFUL
         if superseded and self._motion_id is not None:
             self._motions.forget(self._motion_id)
         if superseded or self._motion_id is None or self._settle_by_ns is not None:
-            return self._finish(Ending.CANCELED, code, reason, keep_claim=superseded)
-        self._ends_as = (Ending.CANCELED, code, reason)
+            return self._finish(GoalEnding.CANCELED, code, reason, keep_claim=superseded)
+        self._ends_as = (GoalEnding.CANCELED, code, reason)
         self._motions.cancel(self._motion_id)
         return None
 
-    def _start(self, view: JointView, now_ns: int) -> Outcome | None:
+    def _start(self, view: JointView, now_ns: int) -> GoalOutcome | None:
         goal = self._goal
         if now_ns < goal.start_ns:
             return None
@@ -147,14 +147,14 @@ class Following:
         try:
             self._motion_id = self._motions.follow(goal.joints, times_s, positions)
         except BadPayload as error:
-            return self._finish(Ending.ABORTED, Result.INVALID_GOAL, f"too long: {error}")
+            return self._finish(GoalEnding.ABORTED, Result.INVALID_GOAL, f"too long: {error}")
         return None
 
     def _end_with_claim(self) -> None:
         """End a motion whose joints may be moved no longer."""
         why = self._claim.why_over() if self._ends_as is None else ""
         if why and self._settle_by_ns is None:
-            self._ends_as = Ending.ABORTED, Result.INVALID_GOAL, why
+            self._ends_as = GoalEnding.ABORTED, Result.INVALID_GOAL, why
             self._motions.cancel(self._motion_id or 0)
 
     def _watch(self, view: JointView) -> None:
@@ -162,30 +162,32 @@ class Following:
         error = np.abs(view.setpoint - view.position)
         if self._ends_as is None and (error > self._goal.path_tolerance).any():
             self._ends_as = (
-                Ending.ABORTED,
+                GoalEnding.ABORTED,
                 Result.PATH_TOLERANCE_VIOLATED,
                 self._exceeded(error, self._goal.path_tolerance, "off its path"),
             )
             self._motions.cancel(self._motion_id or 0)
 
-    def _settle(self, view: JointView, now_ns: int) -> Outcome | None:
+    def _settle(self, view: JointView, now_ns: int) -> GoalOutcome | None:
         error = np.abs(self._goal.positions[-1] - view.position)
         if (error <= self._goal.goal_tolerance).all():
-            return self._finish(Ending.SUCCEEDED, Result.SUCCESSFUL, "")
+            return self._finish(GoalEnding.SUCCEEDED, Result.SUCCESSFUL, "")
         if now_ns < (self._settle_by_ns or 0):
             return None
         text = self._exceeded(error, self._goal.goal_tolerance, "off its goal")
-        return self._finish(Ending.ABORTED, Result.GOAL_TOLERANCE_VIOLATED, text)
+        return self._finish(GoalEnding.ABORTED, Result.GOAL_TOLERANCE_VIOLATED, text)
 
-    def _ending_of(self, ended: Ended) -> tuple[Ending, int, str]:
+    def _ending_of(self, ended: Ended) -> tuple[GoalEnding, int, str]:
         if self._ends_as is not None:
             return self._ends_as
         text = f"{ended.status}: {ended.reason}" if ended.reason else ended.status
         refused = ended.status == "refused"
         code = Result.INVALID_GOAL if refused else Result.PATH_TOLERANCE_VIOLATED
-        return Ending.ABORTED, code, text
+        return GoalEnding.ABORTED, code, text
 
-    def _finish(self, ending: Ending, code: int, text: str, *, keep_claim: bool = False) -> Outcome:
+    def _finish(
+        self, ending: GoalEnding, code: int, text: str, *, keep_claim: bool = False
+    ) -> GoalOutcome:
         if not keep_claim:
             self._claim.release()
         return _outcome(ending, code, text)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from vla_deploy.gateways.ros.inward.orders import OrderRefused
+from vla_deploy.gateways.ros.inward.orders import OrderInvalid
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 
 MOST_BYTES: Final = 32_000
@@ -31,11 +31,11 @@ def read_message(data: str) -> CommandMessage:
     """Return what a message asks for; nothing of it is judged but its form.
 
     Raises:
-        OrderRefused: it is empty, too long, no text, or JSON that holds neither words nor a plan.
+        OrderInvalid: it is empty, too long, no text, or JSON that holds neither words nor a plan.
     """
     size = len(data.encode(errors="replace"))
     if size > MOST_BYTES:
-        raise OrderRefused(f"expected at most {MOST_BYTES} bytes, got {size}; say less at a time")
+        raise OrderInvalid(f"expected at most {MOST_BYTES} bytes, got {size}; say less at a time")
     if data.strip()[:1] in ("{", "["):
         _check_letters(data)
         return _read_json(data.strip())
@@ -46,13 +46,13 @@ def checked_text(data: str) -> str:
     """Return words without the blanks around them.
 
     Raises:
-        OrderRefused: there are none, or too many, or something that is no letter.
+        OrderInvalid: there are none, or too many, or something that is no letter.
     """
     text = data.strip()
     if not text:
-        raise OrderRefused("expected words, got nothing")
+        raise OrderInvalid("expected words, got nothing")
     if len(text) > MOST_CHARACTERS:
-        raise OrderRefused(
+        raise OrderInvalid(
             f"expected at most {MOST_CHARACTERS} characters of words, got {len(text)}; "
             "say less at a time"
         )
@@ -74,7 +74,7 @@ def shown(data: str) -> str:
 def _check_letters(data: str) -> None:
     strange = next((one for one in data if not _is_plain(one) and one not in _BLANKS), None)
     if strange is not None:
-        raise OrderRefused(f"expected letters, got the control character U+{ord(strange):04X}")
+        raise OrderInvalid(f"expected letters, got the control character U+{ord(strange):04X}")
 
 
 def _is_plain(letter: str) -> bool:
@@ -85,12 +85,12 @@ def _read_json(text: str) -> CommandMessage:
     try:
         found = json.loads(text, parse_constant=_refuse_constant)
     except RecursionError:
-        raise OrderRefused("the JSON is nested too deeply") from None
+        raise OrderInvalid("the JSON is nested too deeply") from None
     except ValueError as error:
-        raise OrderRefused(f"expected JSON, as it begins with {text[0]!r}: {error}") from error
+        raise OrderInvalid(f"expected JSON, as it begins with {text[0]!r}: {error}") from error
     if isinstance(found, list):
         if not found:
-            raise OrderRefused("expected a plan of one action or more, got an empty list")
+            raise OrderInvalid("expected a plan of one action or more, got an empty list")
         return CommandMessage(plan=found)
     if isinstance(found.get("plan"), dict):
         return CommandMessage(plan=found["plan"], stated=found)
@@ -99,7 +99,7 @@ def _read_json(text: str) -> CommandMessage:
     for key in WORDS_KEYS:
         if isinstance(found.get(key), str) and found[key].strip():
             return CommandMessage(text=checked_text(found[key]), stated=found)
-    raise OrderRefused(
+    raise OrderInvalid(
         f"expected words under one of {', '.join(WORDS_KEYS)}, or a list of actions under one of "
         f"{', '.join(PLAN_KEYS)}; got the keys {', '.join(map(repr, list(found)[:8])) or 'none'}"
     )

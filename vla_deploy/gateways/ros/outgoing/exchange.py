@@ -10,13 +10,13 @@ from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.task import Future
 
-from vla_deploy.gateways.ros.graph import Graph
+from vla_deploy.gateways.ros.graph import GraphLink
 
 
 class GoalExchange:
     """Send a goal and its cancel, and keep what the server says to them."""
 
-    def __init__(self, graph: Graph, client: ActionClient, goal: Any) -> None:
+    def __init__(self, graph: GraphLink, client: ActionClient, goal: Any) -> None:
         self.is_accepted: bool | None = None
         self.is_cancelling: bool | None = None
         """What the server said to the cancel, None before it said anything."""

@@ -73,7 +73,7 @@ class Frames:
             self._moving.publish(TFMessage(transforms=told))
 
 
-class Body:
+class BodyTopics:
     """Publish joints and odometry at their rates, and with odometry the frames."""
 
     def __init__(self, gateway: Gateway) -> None:

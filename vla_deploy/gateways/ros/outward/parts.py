@@ -1,7 +1,7 @@
 """List what the gateway tells the graph."""
 
 from vla_deploy.gateways.ros.locator import Locator
-from vla_deploy.gateways.ros.outward.body import Body
+from vla_deploy.gateways.ros.outward.body import BodyTopics
 from vla_deploy.gateways.ros.outward.context_topics import ContextTopics
 from vla_deploy.gateways.ros.outward.environment_map import EnvironmentMap
 from vla_deploy.gateways.ros.outward.maps import StaticMap
@@ -20,7 +20,7 @@ def outward_parts(gateway: Gateway) -> tuple[GatewayPart, ...]:
     locator = Locator(gateway.link, gateway.robot)
     return (
         gateway.commands,
-        Body(gateway),
+        BodyTopics(gateway),
         Scans(gateway),
         Inertia(gateway),
         Images(gateway),
