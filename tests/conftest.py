@@ -131,6 +131,7 @@ class RosGraph:
         process = subprocess.Popen(
             [self.python, file, *arguments],
             env=dict(self.variables),
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

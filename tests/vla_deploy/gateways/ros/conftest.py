@@ -1,4 +1,4 @@
-"""The gateway of a robot that servers beyond it drive and move, in a run of its own.
+"""The gateway in a run of its own, by default of a robot that servers beyond it drive and move.
 
 Nothing of the robot runs besides: a test is the executor, and where it says so, control.
 """
@@ -18,7 +18,7 @@ from vla_deploy.ipc import CellReader, ClaimBook, RingReader, RingWriter, Shared
 from vla_deploy.ipc.ros_goals import GoalAnswer, GoalKind, GoalRequest, GoalState, read_answer
 from vla_deploy.robots.loader import ROBOT_FILE, ROBOTS_DIR
 
-SERVER = Path(__file__).with_name("goal_server.py")
+SERVER = Path(__file__).parent / "outgoing" / "goal_server.py"
 BEYOND = """
 [ros]
 enabled = true
@@ -192,6 +192,12 @@ def reach() -> Callable[..., GoalRequest]:
         return GoalRequest(**(chosen | changed))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def make_robot() -> Callable[[Path, str], Path]:
+    """Make a butler with further keys of its file."""
+    return robot_beyond
 
 
 @pytest.fixture(scope="session")
