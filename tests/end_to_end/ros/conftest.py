@@ -15,6 +15,8 @@ def robot(
     stack = ProcessStack(tmp_path_factory.mktemp("ros"), "--ros")
     try:
         stack.wait_until_armed()
+        # A robot without its gateway would carry on, and each test wait for it in vain.
+        assert stack.wait_until(lambda: stack.row("ros")["state"] == "ready")
         yield stack
     finally:
         stack.close()
