@@ -29,7 +29,7 @@ settings.load_profile("any machine")
 # Whichever test loads onnxruntime first: it phones home otherwise.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
-SHARING = ("end_to_end/browser", "end_to_end/ros")
+SHARING = ("end_to_end/browser",)
 """Folders whose tests share one robot."""
 
 

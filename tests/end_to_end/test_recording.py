@@ -35,7 +35,7 @@ JOBS = [
     ),
 ]
 SPEED = 8
-# What nobody says while all goes well: stops, another profile, a replay, talk into the page.
+# What nobody says while all goes well, and without ROS: stops, another profile, a replay, talk.
 UNHEARD: Final = [
     "flight_event",
     "flight_request",
@@ -44,8 +44,12 @@ UNHEARD: Final = [
     "profile_answer",
     "profile_change",
     "profile_request",
+    "remote_base_command",
     "replay_request",
     "replay_status",
+    "ros_answer",
+    "ros_request",
+    "ros_status",
     "say",
     "voice_event",
 ]

@@ -6,7 +6,7 @@ import pytest
 from sim_twin.process_stack import ProcessStack
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")  # two robots in one domain would answer each other's callers
 def robot(
     ros_environment: object, ros_domain: int, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[ProcessStack]:

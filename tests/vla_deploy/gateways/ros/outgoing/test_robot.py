@@ -16,7 +16,8 @@ from sim_twin.process_stack import ProcessStack
 from vla_deploy.gateways.ros.environment import RosEnvironment
 from vla_deploy.robots import load_robot
 
-pytestmark = [pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]
+# Two robots and their servers, killed in turn: with `make campaign`, not with every test run.
+pytestmark = [pytest.mark.slow, pytest.mark.stack, pytest.mark.gl, pytest.mark.timeout(900)]
 
 STANDSTILL_RAD_S = 0.05
 MOVING_RAD_S = 1.0
