@@ -110,7 +110,7 @@ def _robot(folder: Path) -> Path:
 def _profile() -> str:
     with realtime() as permitted:
         priority = REALTIME_PRIORITY if permitted else 0
-    return f'inherits = "desktop"\nrealtime_priority = {priority}\ncamera_rate_hz = 10\n'
+    return f'inherits = "desktop"\nrealtime_priority = {priority}\ncamera_rate_hz = 10\nperception_rate_hz = 10\n'
 
 
 def _environment(folder: Path) -> tuple[Path, Mapping[str, str]]:
