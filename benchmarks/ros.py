@@ -110,7 +110,8 @@ def _robot(folder: Path) -> Path:
 def _profile() -> str:
     with realtime() as permitted:
         priority = REALTIME_PRIORITY if permitted else 0
-    return f'inherits = "desktop"\nrealtime_priority = {priority}\ncamera_rate_hz = 10\nperception_rate_hz = 10\n'
+    rates = "camera_rate_hz = 10\nperception_rate_hz = 10\n"
+    return f'inherits = "desktop"\nrealtime_priority = {priority}\n{rates}'
 
 
 def _environment(folder: Path) -> tuple[Path, Mapping[str, str]]:
