@@ -1,6 +1,7 @@
 """Name how an action of a plan stands."""
 
 from enum import StrEnum
+from typing import Final
 
 
 class ActionStatus(StrEnum):
@@ -13,3 +14,7 @@ class ActionStatus(StrEnum):
     ABORTED = "aborted"
     REJECTED = "rejected"
     LOST = "lost"
+
+
+UNFINISHED: Final = frozenset({ActionStatus.PENDING.value, ActionStatus.ACTIVE.value})
+FINAL: Final = frozenset(one.value for one in ActionStatus) - UNFINISHED

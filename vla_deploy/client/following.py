@@ -4,13 +4,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
-from vla_deploy.client.action_status import ActionStatus
+from vla_deploy.client.action_status import UNFINISHED, ActionStatus
 from vla_deploy.ipc import Sample
 
 ANSWER_TIMEOUT_S: Final = 5.0
 SILENCE_LIMIT_S: Final = 5.0
 LAST_EVENTS: Final = frozenset({"finished", "rejected"})
-_UNFINISHED: Final = frozenset({ActionStatus.PENDING.value, ActionStatus.ACTIVE.value})
 
 Event = dict[str, Any]
 Newest = Callable[[], Sample | None]
@@ -113,7 +112,7 @@ class Watch:
 def lost(command_id: str, why: str, actions: Mapping[str, Event]) -> Event:
     """Return the last event of a command that nobody carries out any more."""
     told = [
-        action | {"status": ActionStatus.LOST.value} if action["status"] in _UNFINISHED else action
+        action | {"status": ActionStatus.LOST.value} if action["status"] in UNFINISHED else action
         for action in actions.values()
     ]
     return {

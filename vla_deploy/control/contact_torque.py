@@ -30,9 +30,7 @@ class ContactTorque:
             [MODELS[servo.model].current_unit_a is not None for servo in servos], dtype=np.bool_
         )
         # Torque in the joint's own unit: a pinion turns torque into force.
-        self._stall = np.array(
-            [robot.servo_models[s.model].stall_torque_nm / s.travel_per_rad for s in servos]
-        )
+        self._stall = np.array([robot.stall_effort(servo.joint) for servo in servos])
         self._stamp_ns: int | None = None
         self._velocity: Floats = np.zeros(len(servos))
         self._torque: Floats = np.zeros(len(servos))

@@ -1,7 +1,6 @@
 """Keep the dashboard's own state, and tell how it is."""
 
 import logging
-from collections import Counter
 from typing import Final
 
 from fastapi import FastAPI
@@ -17,12 +16,12 @@ from vla_deploy.dashboard.settings import DashboardSettings
 from vla_deploy.dashboard.tls import server_context
 from vla_deploy.ipc import CellWriter
 from vla_deploy.node import NodeContext
+from vla_deploy.runtime.part_guard import PartGuard
 
 STATUS_TOPIC: Final = "dashboard_status"
 TCP: Final = "tcp"
 UNIX: Final = "unix"
 _TELL_NS: Final = NS_PER_S // 2
-_TOLD_FAILURES: Final = frozenset({1, 10, 100, 1000, 10_000})
 _EVERYWHERE: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 _log = logging.getLogger(__name__)
 
@@ -40,7 +39,7 @@ class DashboardNode:
         self.app: FastAPI
         self.doors: tuple[Door, ...] = ()
         self._parts: list[Part] = []
-        self._failures: Counter[str] = Counter()
+        self._guard = PartGuard(_log)
         self._access: Access | None = None
         self._status: CellWriter
         self._due_ns = 0
@@ -73,12 +72,12 @@ class DashboardNode:
     def step(self) -> None:
         """Step the parts, and tell twice a second where the page is."""
         for part in self._parts:
-            self._step(part)
+            self._guard.run(type(part).__name__, part.step)
         now_ns = self._clock.now_ns()
         if now_ns >= self._due_ns:
             self._due_ns = now_ns + _TELL_NS
             told = {"url": self._url, "port": self._port, "host": self._settings.host}
-            self._status.put_document(told | {"failures": dict(self._failures)})
+            self._status.put_document(told | {"failures": dict(self._guard.failures)})
 
     def stop(self) -> None:
         """Stop the parts and close everything."""
@@ -89,15 +88,6 @@ class DashboardNode:
         if self._access is not None:
             self._access.close()
         self.link.close()
-
-    def _step(self, part: Part) -> None:
-        try:
-            part.step()
-        except Exception:  # this process' main loop: a broken part takes neither page nor others
-            name = type(part).__name__
-            self._failures[name] += 1
-            if self._failures[name] in _TOLD_FAILURES:
-                _log.exception("%s has failed %d times", name, self._failures[name])
 
 
 def _rules(settings: DashboardSettings) -> AccessRules:

@@ -1,6 +1,6 @@
 """Describe one robot as immutable values: what it is wired to, how it may move, where it lives."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -403,6 +403,16 @@ class RobotDescription:
         """Return the datasheet of the servo that drives `joint`."""
         servo = self.servo_bus.servos[self.joint_index[joint]]
         return self.servo_models[servo.model]
+
+    def stall_effort(self, joint: str) -> float:
+        """Return a stalled servo's torque on its joint in N m; for a finger its force, in N."""
+        servo = self.servo_bus.servos[self.joint_index[joint]]
+        return self.servo_models[servo.model].stall_torque_nm / servo.travel_per_rad
+
+    def groups_moving(self, joints: Iterable[str]) -> tuple[str, ...]:
+        """Return the names of the groups that move any of these joints."""
+        moved = frozenset(joints)
+        return tuple(name for name, group in self.groups.items() if moved & set(group.joints))
 
     def device_path(self, name: str, devices_dir: Path | None = None) -> str:
         """Return where a device is reached: the file's own path, or `<devices_dir>/<name>`.

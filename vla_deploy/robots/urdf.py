@@ -207,14 +207,8 @@ def _limit(robot: RobotDescription, joint: FrameJoint, told: Attributes) -> dict
         "lower": _text(ends[:1]),
         "upper": _text(ends[1:]),
         "velocity": _text((abs(factor) * limits.velocity,)),
-        "effort": _text((_servo_effort(robot, coupling.leader),)),
+        "effort": _text((robot.stall_effort(coupling.leader),)),
     }
-
-
-def _servo_effort(robot: RobotDescription, joint: str) -> float:
-    """Return a stalled servo's torque on its joint in N m; for a finger its force, in N."""
-    servo = robot.servo_bus.servos[robot.joint_index[joint]]
-    return robot.servo_models[servo.model].stall_torque_nm / abs(servo.travel_per_rad)
 
 
 def _wheel_limit(robot: RobotDescription, told: Attributes) -> dict[str, str] | None:

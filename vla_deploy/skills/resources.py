@@ -1,6 +1,6 @@
 """Say which parts of the robot an action needs, and how much of each there is."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from vla_deploy.planning.catalogue import NAVIGATION_TIMEOUT_S, SKILLS
@@ -31,7 +31,7 @@ def needs_of(action: Action, robot: RobotDescription) -> dict[str, int]:
         needed |= dict.fromkeys(_parts(resource, action, robot), 1)
     posed = robot.poses.get(str(action.parameters.get("pose")), {})
     chosen = action.parameters.get("arm") is None
-    return needed | dict.fromkeys(_groups_of(posed, robot) if chosen else (), 1)
+    return needed | dict.fromkeys(robot.groups_moving(posed) if chosen else (), 1)
 
 
 def _parts(resource: str, action: Action, robot: RobotDescription) -> tuple[str, ...]:
@@ -42,11 +42,5 @@ def _parts(resource: str, action: Action, robot: RobotDescription) -> tuple[str,
         group
         for name, hand in robot.hands.items()
         if chosen in (None, name)
-        for group in (hand.arm, *_groups_of((hand.gripper,), robot))
+        for group in (hand.arm, *robot.groups_moving((hand.gripper,)))
     )
-
-
-def _groups_of(joints: Iterable[str], robot: RobotDescription) -> tuple[str, ...]:
-    """Return the groups that move any of these joints."""
-    moved = frozenset(joints)
-    return tuple(name for name, group in robot.groups.items() if moved & set(group.joints))

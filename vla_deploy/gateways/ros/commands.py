@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from vla_deploy.client.action_status import FINAL
 from vla_deploy.client.command_history import CommandHistory
 from vla_deploy.client.command_record import CommandRecord, Kind
 from vla_deploy.client.link import RobotLink
 
 MOST_RECENT: Final = 5
 """Of the actions that ended last."""
-_FINAL: Final = frozenset({"succeeded", "cancelled", "aborted", "rejected", "lost"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,7 @@ class RobotCommands:
     @property
     def actions_left(self) -> int:
         """Return how many actions of the plan under way have not ended."""
-        return sum(status not in _FINAL for status in self.statuses.values())
+        return sum(status not in FINAL for status in self.statuses.values())
 
     def step(self, now_ns: int) -> None:
         """Take what is new; `news` is of this step alone."""
@@ -110,6 +110,6 @@ class RobotCommands:
         if under_way is not None:
             under_way.has_begun = True
             under_way.statuses[str(event.get("action_id"))] = str(event.get("status"))
-        if event.get("status") in _FINAL:
+        if event.get("status") in FINAL:
             keys = ("skill", "parameters", "status", "execution_time_s", "error")
             self.recent.append({key: event.get(key) for key in keys})

@@ -1,8 +1,7 @@
 """Run the gateway: parts that tell, parts that take, and a word about how it is."""
 
 import logging
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
@@ -24,11 +23,11 @@ from vla_deploy.ipc import CellWriter
 from vla_deploy.node import NodeContext
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.ros_settings import Accepts
+from vla_deploy.runtime.part_guard import PartGuard
 
 STATUS_TOPIC: Final = "ros_status"
 _TELL_HZ: Final = 2.0
 _MOST_RATE_HZ: Final = 100.0
-_TOLD_FAILURES: Final = frozenset({1, 10, 100, 1000, 10_000})
 _log = logging.getLogger(__name__)
 
 
@@ -44,7 +43,7 @@ class RosGatewayNode:
         self._link = RobotLink(context.run_dir, context.clock, source=SOURCE, robot=context.robot)
         self._time = RosTime(context.clock)
         self._parts: Sequence[GatewayPart] = ()
-        self._failures: Counter[str] = Counter()
+        self._guard = PartGuard(_log)
         self._tell_due = Due(_TELL_HZ)
         given, profile = handed_over_parameters(), load_profile(context.profile)
         self._parameters = holding(given, self._robot, profile)
@@ -83,9 +82,9 @@ class RosGatewayNode:
         if self._graph is None:
             return
         self._time.refresh()
-        self._guarded("inbox", self._graph.take)
+        self._guard.run("inbox", self._graph.take)
         for part in self._parts:
-            self._guarded(type(part).__name__, partial(part.step, self._context.clock.now_ns()))
+            self._guard.run(type(part).__name__, partial(part.step, self._context.clock.now_ns()))
         if self._tell_due.is_now(self._context.clock.now_ns()):
             self._tell(self._graph)
 
@@ -106,14 +105,6 @@ class RosGatewayNode:
                 "accept": self._robot.ros.accept.value,
                 "simulated_time": self._time.is_simulated,
                 "dropped": graph.dropped,
-                "failures": dict(self._failures),
+                "failures": dict(self._guard.failures),
             }
         )
-
-    def _guarded(self, name: str, work: Callable[[], None]) -> None:
-        try:
-            work()
-        except Exception:  # this process' main loop: a broken part does not take the others
-            self._failures[name] += 1
-            if self._failures[name] in _TOLD_FAILURES:
-                _log.exception("%s has failed %d times", name, self._failures[name])

@@ -46,12 +46,11 @@ class GripperJoint:
         """Return what the robot file says of a hand."""
         described = robot.hands[hand]
         joint = robot.group(described.gripper).joints[0]
-        servo = next(one for one in robot.servo_bus.servos if one.joint == joint)
         limits, ratio = robot.limits[joint], described.opening_ratio
         return cls(
             joint=joint,
             gap_ratio=ratio,
-            most_n=robot.model_of(joint).stall_torque_nm / servo.travel_per_rad,
+            most_n=robot.stall_effort(joint),
             gap_m=(limits.min * ratio, limits.max * ratio),
         )
 

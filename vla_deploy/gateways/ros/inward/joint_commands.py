@@ -4,7 +4,6 @@ Each becomes a goal of control, which limits its jerk and brings it to rest: joi
 lag, and stand where the last message wanted them when the stream ends.
 """
 
-import logging
 import math
 from typing import Final
 
@@ -14,6 +13,7 @@ from drivers.clock import NS_PER_S
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.inward.claiming import Claimed
 from vla_deploy.gateways.ros.inward.motions import Motions
+from vla_deploy.gateways.ros.inward.refusals import Refusals
 from vla_deploy.gateways.ros.part import Due, Gateway
 
 TOPIC: Final = "/robot_joint_commands"
@@ -21,8 +21,6 @@ RATE_HZ: Final = 20.0
 """Goals for control at most so often; of what comes in between, the newest counts."""
 LET_GO_S: Final = 1.0
 _CHANGED: Final = 1e-4
-_TELL_S: Final = 2.0
-_log = logging.getLogger(__name__)
 
 
 class JointCommands:
@@ -37,7 +35,7 @@ class JointCommands:
         self._sent: dict[str, float] = {}
         self._motion_id: int | None = None
         self._heard_ns = 0
-        self._told_ns = -round(_TELL_S * NS_PER_S)
+        self._refusals = Refusals(TOPIC, gateway.link.clock)
         self._due = Due(RATE_HZ)
         gateway.graph.listen(JointState, TOPIC, self._take)
 
@@ -55,7 +53,7 @@ class JointCommands:
         why = refusal_of(self._gateway.control_status()) or self._why_not_held(changed)
         if why:
             self._wanted.clear()
-            self._refuse(why)
+            self._refusals.note(why)
             return
         if self._motion_id is not None:
             self._motions.forget(self._motion_id)
@@ -72,27 +70,24 @@ class JointCommands:
     def _take(self, message: JointState) -> None:
         limits = self._gateway.robot.limits
         if len(message.name) != len(message.position):
-            self._refuse(f"{len(message.name)} names and {len(message.position)} positions")
+            self._refusals.note(f"{len(message.name)} names and {len(message.position)} positions")
             return
         unknown = [name for name in message.name if name not in limits]
         if unknown:
-            self._refuse(f"unknown joints {', '.join(unknown[:8])}")
+            self._refusals.note(f"unknown joints {', '.join(unknown[:8])}")
             return
         wanted = dict(zip(message.name, map(float, message.position), strict=True))
         for joint, value in wanted.items():
             if not limits[joint].min - 1e-6 <= value <= limits[joint].max + 1e-6:
                 low, high = limits[joint].min, limits[joint].max
-                self._refuse(f"{joint}: expected {low:g}..{high:g}, got {value}")
+                self._refusals.note(f"{joint}: expected {low:g}..{high:g}, got {value}")
                 return
         self._heard_ns = self._gateway.link.clock.now_ns()
         self._wanted |= wanted
 
     def _why_not_held(self, joints: dict[str, float]) -> str:
         """Take the groups of these joints beside those that are held; return who has them else."""
-        groups = self._gateway.robot.groups
-        needed = frozenset(
-            name for name, group in groups.items() if set(group.joints) & joints.keys()
-        )
+        needed = frozenset(self._gateway.robot.groups_moving(joints))
         if self._claim is not None and needed <= self._claimed:
             return ""
         if self._claim is not None:
@@ -110,9 +105,3 @@ class JointCommands:
         self._claim, self._claimed = None, frozenset()
         self._wanted.clear()
         self._sent.clear()
-
-    def _refuse(self, why: str) -> None:
-        now_ns = self._gateway.link.clock.now_ns()
-        if now_ns - self._told_ns > _TELL_S * NS_PER_S:
-            self._told_ns = now_ns
-            _log.warning("%s refused: %s", TOPIC, why)

@@ -18,10 +18,11 @@ from vla_deploy.gateways.ros.inward.orders import (
     error_of,
 )
 from vla_deploy.gateways.ros.inward.pursuing import Begin, Feedback, GoalEnding, GoalOutcome
-from vla_deploy.gateways.ros.outward.body import BASE, MAP, ODOM
+from vla_deploy.gateways.ros.outward.body import MAP, ODOM
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.gateways.ros.planar import Planar, inverse, joined, planar_of
 from vla_deploy.gateways.ros.rotation import quaternion_of, yaw_of
+from vla_deploy.robots.frame_tree import BASE_FRAME
 
 FAILED: Final = 9000
 """Jazzy's NavigateToPose has no code but NONE; later ones call this UNKNOWN."""
@@ -85,11 +86,13 @@ class NavigationServer:
         pose, base = link.fresh("pose", _AGE_S), link.fresh("base_state", _AGE_S)
         if pose is None or base is None:
             raise OrderInvalid(f"the robot does not know its place now, by which {frame} is known")
-        if frame == BASE:
+        if frame == BASE_FRAME:
             return planar_of(pose)
         if frame == ODOM:
             return joined(planar_of(pose), inverse(planar_of(base)))
-        raise OrderInvalid(f"pose.header.frame_id: expected {MAP}, {ODOM} or {BASE}, got {frame!r}")
+        raise OrderInvalid(
+            f"pose.header.frame_id: expected {MAP}, {ODOM} or {BASE_FRAME}, got {frame!r}"
+        )
 
 
 class Driving:

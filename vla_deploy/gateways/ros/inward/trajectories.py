@@ -70,11 +70,7 @@ class TrajectoryServer:
         return lambda feedback: self._begin(sound, feedback)
 
     def _begin(self, goal: TrajectoryGoal, feedback: Feedback) -> "TrajectoryPursuit | GoalOutcome":
-        groups = [
-            name
-            for name, group in self._gateway.robot.groups.items()
-            if set(group.joints) & set(goal.joints)
-        ]
+        groups = self._gateway.robot.groups_moving(goal.joints)
         if self._claim is not None:
             self._claim.release()
         self._claim = self._hold(f"ros/{self._name}", groups)

@@ -1,6 +1,5 @@
 """Drive the base by /cmd_vel: each message holds for a moment, and nobody has to take it back."""
 
-import logging
 import math
 from typing import Final
 
@@ -9,6 +8,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from drivers.clock import NS_PER_S
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.gateways.ros.inward.claiming import PartsHold
+from vla_deploy.gateways.ros.inward.refusals import Refusals
 from vla_deploy.gateways.ros.part import Gateway
 from vla_deploy.ipc import CellWriter
 
@@ -18,8 +18,6 @@ HOLDS_S: Final = 0.2
 MOST_AGE_S: Final = 0.2
 MOST_AHEAD_S: Final = 0.1
 _REST_S: Final = 0.5
-_TELL_S: Final = 2.0
-_log = logging.getLogger(__name__)
 
 
 class Velocity:
@@ -31,8 +29,7 @@ class Velocity:
         self._command: CellWriter = gateway.link.space.cell_writer("remote_base_command")
         self._claim = claim
         self._last_ns = self._stamp_ns = 0
-        self._told_ns = -NS_PER_S * 10
-        self.refused = 0
+        self._refusals = Refusals(TOPIC, gateway.link.clock)
         if gateway.settings.cmd_vel_stamped:
             gateway.graph.listen(TwistStamped, TOPIC, self._take_stamped)
         else:
@@ -57,10 +54,12 @@ class Velocity:
             age_s = (self._clock.now_ns() - time.run_ns(stamp)) / NS_PER_S
             if not -MOST_AHEAD_S <= age_s <= MOST_AGE_S:
                 hint = "; do both go by the same time (use_sim_time)?" if abs(age_s) > 5 else ""
-                self._refuse(f"its stamp is {age_s:.2f} s old, expected 0 to {MOST_AGE_S}{hint}")
+                self._refusals.note(
+                    f"its stamp is {age_s:.2f} s old, expected 0 to {MOST_AGE_S}{hint}"
+                )
                 return
             if time.run_ns(stamp) < self._stamp_ns:
-                self._refuse("its stamp is older than that of the one before")
+                self._refusals.note("its stamp is older than that of the one before")
                 return
             self._stamp_ns = time.run_ns(stamp)
         self._take(message.twist)
@@ -71,24 +70,17 @@ class Velocity:
             *(twist.angular.x, twist.angular.y, twist.angular.z),
         )
         if not all(map(math.isfinite, parts)):
-            self._refuse("it holds numbers that are not finite")
+            self._refusals.note("it holds numbers that are not finite")
             return
         if any((twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y)):
-            self._refuse("this base moves along x and turns about z only")
+            self._refusals.note("this base moves along x and turns about z only")
             return
         why = refusal_of(self._gateway.control_status()) or self._claim.why_not_taken()
         if why:
-            self._refuse(why)
+            self._refusals.note(why)
             return
         self._last_ns = self._clock.now_ns()
         v_m_s, w_rad_s = float(twist.linear.x), float(twist.angular.z)
         # Both by the same ratio: the curve stays.
         ratio = min(1.0, self._claim.most_m_s() / abs(v_m_s)) if v_m_s else 1.0
         self._command.put(v_m_s=v_m_s * ratio, w_rad_s=w_rad_s * ratio, valid_s=HOLDS_S)
-
-    def _refuse(self, why: str) -> None:
-        self.refused += 1
-        now_ns = self._clock.now_ns()
-        if now_ns - self._told_ns > _TELL_S * NS_PER_S:
-            self._told_ns = now_ns
-            _log.warning("%s refused: %s", TOPIC, why)

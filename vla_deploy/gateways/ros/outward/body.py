@@ -18,12 +18,11 @@ from vla_deploy.gateways.ros.graph import LATCHED, RELIABLE, SENSOR
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.gateways.ros.planar import inverse, joined, planar_of
 from vla_deploy.ipc import Sample
-from vla_deploy.robots.frame_tree import FrameTransform, FrameTree
+from vla_deploy.robots.frame_tree import BASE_FRAME, FrameTransform, FrameTree
 from vla_deploy.robots.urdf import urdf_of
 
 MAP: Final = "map"
 ODOM: Final = "odom"
-BASE: Final = "base_link"
 _TOLD_AGE_S: Final = 0.5
 _JOINT_AGE_S: Final = 0.25
 # Of wheel odometry, per metre and per radian driven, as REP-105 leaves to the robot: what the pose
@@ -50,7 +49,7 @@ class Frames:
         stamp = self._time.now()
         self._fixed.publish(TFMessage(transforms=[_of(one, stamp) for one in self._tree.fixed]))
         self._body = [_named(*one[:2]) for one in self._tree.transforms({})]
-        self._odom, self._map = _named(ODOM, BASE), _named(MAP, ODOM)
+        self._odom, self._map = _named(ODOM, BASE_FRAME), _named(MAP, ODOM)
 
     def tell(self, joints: Sample | None, base: Sample | None, pose: Sample | None) -> None:
         """Publish where everything is, in one message."""
@@ -80,7 +79,9 @@ class BodyTopics:
         graph, settings = gateway.graph, gateway.settings
         self._gateway = gateway
         self._names = list(gateway.robot.joint_names)
-        self._stall_nm = _stall_torque(gateway)
+        self._stall_nm = np.array(
+            [gateway.robot.stall_effort(joint) for joint in gateway.robot.joint_names]
+        )
         self._joints = graph.publisher(JointState, "/joint_states", RELIABLE)
         self._odometry = graph.publisher(Odometry, "/odom", SENSOR)
         self._frames = Frames(gateway)
@@ -123,7 +124,7 @@ class BodyTopics:
     def _tell_odometry(self, sample: Sample) -> None:
         data = sample.data
         x_m, y_m, yaw_rad = planar_of(sample)
-        message = Odometry(child_frame_id=BASE)
+        message = Odometry(child_frame_id=BASE_FRAME)
         message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
         message.header.frame_id = ODOM
         position = message.pose.pose.position
@@ -141,17 +142,6 @@ def _covariance() -> np.ndarray:
 
 
 _COVARIANCE: Final = _covariance()
-
-
-def _stall_torque(gateway: Gateway) -> np.ndarray:
-    """Return what each joint's effort ratio is of, in N m, or in N for a finger."""
-    robot = gateway.robot
-    return np.array(
-        [
-            robot.model_of(servo.joint).stall_torque_nm / servo.travel_per_rad
-            for servo in robot.servo_bus.servos
-        ]
-    )
 
 
 def _place(

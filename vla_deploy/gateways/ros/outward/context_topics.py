@@ -6,12 +6,12 @@ from typing import Any, Final
 from vla_deploy.gateways.ros.json_topic import JsonTopic
 from vla_deploy.gateways.ros.locator import Locator
 from vla_deploy.gateways.ros.outward.activity import Activity
-from vla_deploy.gateways.ros.outward.maps import read_robot_map
 from vla_deploy.gateways.ros.outward.objects import described, latest_last
 from vla_deploy.gateways.ros.outward.plan_dialects import ranked_name
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.gateways.ros.planar import planar_of
 from vla_deploy.gateways.ros.rotation import quaternion_of
+from vla_deploy.navigation.map_file import MapFile
 
 STATE: Final = "/robot/state"
 CONTEXT: Final = "/environment/context"
@@ -29,7 +29,7 @@ _LOST: Final = 2
 class ContextTopics:
     """Publish /robot/state and /environment/context every second, two statuses also on change."""
 
-    def __init__(self, gateway: Gateway, locator: Locator) -> None:
+    def __init__(self, gateway: Gateway, locator: Locator, file: MapFile | None) -> None:
         graph = gateway.graph
         self._gateway = gateway
         self._locator = locator
@@ -37,7 +37,7 @@ class ContextTopics:
         self._context = JsonTopic(graph, CONTEXT)
         self._plan = JsonTopic(graph, PLAN_STATUS)
         self._capstone = JsonTopic(graph, CAPSTONE)
-        self._bounds = _map_bounds(gateway)
+        self._bounds = _map_bounds(file)
         self._due = Due(STATE_HZ)
         self._status_due = Due(STATUS_HZ)
         self._look_due = Due(LOOK_HZ)
@@ -160,9 +160,8 @@ class ContextTopics:
         }
 
 
-def _map_bounds(gateway: Gateway) -> dict[str, float] | None:
+def _map_bounds(file: MapFile | None) -> dict[str, float] | None:
     """Return how far the map reaches, in m of its frame."""
-    file = read_robot_map(gateway)
     if file is None:
         return None
     height, width = file.shades.shape

@@ -14,9 +14,8 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from vla_deploy.gateways.ros.body_frames import BODY_RADIUS_M, BodyFrames
 from vla_deploy.gateways.ros.graph import RELIABLE, SENSOR
-from vla_deploy.gateways.ros.outward.body import BASE, MAP
-from vla_deploy.gateways.ros.outward.maps import grid_message, read_robot_map
-from vla_deploy.gateways.ros.outward.sensors import LIDAR_FRAME, OPTICAL_FRAME
+from vla_deploy.gateways.ros.outward.body import MAP
+from vla_deploy.gateways.ros.outward.maps import grid_message
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.gateways.ros.planar import planar_of
 from vla_deploy.gateways.ros.points import (
@@ -29,6 +28,8 @@ from vla_deploy.gateways.ros.points import (
     thinned,
 )
 from vla_deploy.ipc.rgbd_image import depths_m
+from vla_deploy.navigation.map_file import MapFile
+from vla_deploy.robots.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
 
 CLOUD: Final = "/environment_map"
 GRID: Final = "/environment_map/grid"
@@ -55,13 +56,13 @@ class _Stance(NamedTuple):
 class EnvironmentMap:
     """Publish /environment_map and /environment_map/grid, both in the map's frame."""
 
-    def __init__(self, gateway: Gateway) -> None:
+    def __init__(self, gateway: Gateway, frames: BodyFrames, file: MapFile | None) -> None:
         graph = gateway.graph
         self._gateway = gateway
-        self._frames = BodyFrames(gateway.robot)
+        self._frames = frames
         self._cloud = graph.publisher(PointCloud2, CLOUD, SENSOR)
         self._grid = graph.publisher(OccupancyGrid, GRID, RELIABLE)
-        self._map = read_robot_map(gateway)
+        self._map = file
         self._stances: deque[_Stance] = deque(maxlen=_KEPT)
         self._due = Due(RATE_HZ)
         self._look_due = Due(_KEPT / 2.0)
@@ -123,7 +124,7 @@ class EnvironmentMap:
         if self._map is None:
             return
         cells = self._map.occupancy()
-        for sensor, seen in ((LIDAR_FRAME, self._seen_by_lidar()), (BASE, self._near())):
+        for sensor, seen in ((LIDAR_FRAME, self._seen_by_lidar()), (BASE_FRAME, self._near())):
             eye = self._stances[-1].map_from_base @ self._poses(self._stances[-1])[sensor]
             mark_seen(
                 cells,

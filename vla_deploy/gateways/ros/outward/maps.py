@@ -32,12 +32,11 @@ def read_robot_map(gateway: Gateway) -> MapFile | None:
 class StaticMap:
     """Publish /map and /keep_out_zones, latched."""
 
-    def __init__(self, gateway: Gateway) -> None:
+    def __init__(self, gateway: Gateway, file: MapFile | None) -> None:
         graph = gateway.graph
         self._zones = graph.publisher(MarkerArray, "/keep_out_zones", LATCHED)
         self._zones.publish(_zones(gateway))
         self._map = graph.publisher(OccupancyGrid, "/map", LATCHED)
-        file = read_robot_map(gateway)
         if file is not None:
             self._map.publish(grid_message(gateway, file.occupancy(), file))
 

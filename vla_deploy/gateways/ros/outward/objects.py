@@ -12,11 +12,11 @@ from vla_deploy.gateways.ros.body_frames import BodyFrames
 from vla_deploy.gateways.ros.graph import RELIABLE
 from vla_deploy.gateways.ros.json_topic import JsonTopic
 from vla_deploy.gateways.ros.outward.body import MAP
-from vla_deploy.gateways.ros.outward.sensors import OPTICAL_FRAME
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.gateways.ros.planar import planar_of
 from vla_deploy.gateways.ros.points import moved, pixels_of, planar_pose
 from vla_deploy.gateways.ros.rotation import quaternion_of
+from vla_deploy.robots.frame_tree import OPTICAL_FRAME
 
 RATE_HZ: Final = 5.0
 JSON_TOPIC: Final = "/detected_objects"
@@ -34,9 +34,9 @@ Thing = Mapping[str, Any]
 class SceneObjects:
     """Publish the scene's things whenever perception tells them, while somebody listens."""
 
-    def __init__(self, gateway: Gateway) -> None:
+    def __init__(self, gateway: Gateway, frames: BodyFrames) -> None:
         self._gateway = gateway
-        self._frames = BodyFrames(gateway.robot)
+        self._frames = frames
         self._json = JsonTopic(gateway.graph, JSON_TOPIC)
         self._typed = gateway.graph.publisher(DetectedObjectArray, TYPED_TOPIC, RELIABLE)
         self._due = Due(RATE_HZ)

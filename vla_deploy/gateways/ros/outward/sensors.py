@@ -8,15 +8,13 @@ from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import CameraInfo, Image, Imu, LaserScan
 
 from vla_deploy.gateways.ros.graph import SENSOR
-from vla_deploy.gateways.ros.outward.body import BASE
 from vla_deploy.gateways.ros.part import Due, Gateway
 from vla_deploy.gateways.ros.rotation import quaternion_of
 from vla_deploy.ipc import Frame, Sample
 from vla_deploy.ipc.rgbd_image import colours, depths_mm
 from vla_deploy.ipc.topics import SCAN_BEAMS
+from vla_deploy.robots.frame_tree import BASE_FRAME, LIDAR_FRAME, OPTICAL_FRAME
 
-LIDAR_FRAME: Final = "lidar_link"
-OPTICAL_FRAME: Final = "camera_color_optical_frame"
 # Datasheet of the LD19, table 2: 0.02 to 12 m.
 _RANGE_M: Final = (0.02, 12.0)
 _PLUMB_BOB: Final = 5
@@ -87,7 +85,9 @@ class Inertia:
         data = sample.data
         message = Imu()
         message.header.stamp = self._gateway.time.stamp(sample.stamp_ns)
-        message.header.frame_id = BASE  # perception turns what the sensor tells into this frame
+        message.header.frame_id = (
+            BASE_FRAME  # perception turns what the sensor tells into this frame
+        )
         message.orientation = quaternion_of(
             float(data["roll_rad"]), float(data["pitch_rad"]), float(data["yaw_rad"])
         )
