@@ -403,6 +403,7 @@ def main() -> None:
     rclpy.init()
     client = Client()
     assert client.until(lambda: bool(client.joints)), "no joint states"
+    assert client.until(lambda: client.get_clock().now().nanoseconds > 0), "no /clock"
     told = CASES[sys.argv[1]](client)
     print(json.dumps(told, default=lambda _message: None))
     client.destroy_node()

@@ -31,6 +31,8 @@ MOST_WAITING: Final = 256
 SOURCE: Final = "ros"
 _NAME_LETTERS: Final = 44
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
+_LOOKS: Final = 4
+"""Steps that a message waits for its sender's name: a stop in words may be among them."""
 _JOIN_S: Final = 2.0
 _log = logging.getLogger(__name__)
 
@@ -118,11 +120,14 @@ class GraphLink:
     ) -> None:
         """Subscribe; each message is taken in a step, with who sent it."""
 
-        def receive(message: Any) -> None:
+        def receive(message: Any, looks: int = _LOOKS) -> None:
             sender = self.sender(topic)  # now: whoever sends once may be gone in a moment
-            self.put(lambda: take(message, sender))
+            if sender == SOURCE and looks:  # DDS tells a node's name after its publishers
+                self.put(lambda: receive(message, looks - 1))
+            else:
+                self.put(lambda: take(message, sender))
 
-        self.node.create_subscription(kind, topic, receive, qos)
+        self.node.create_subscription(kind, topic, lambda message: receive(message), qos)
 
     def sender(self, topic: str) -> str:
         """Return who publishes a topic beside us, for logs and the audit trail.
