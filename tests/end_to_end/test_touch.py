@@ -58,9 +58,9 @@ def test_a_cup_that_is_nudged_under_the_hand_is_taken_all_the_same(stack: Lockst
 
 @pytest.mark.timeout(300)
 def test_a_cup_that_comes_down_on_the_rim_of_a_box_is_raised_and_put_into_it(
-    stack_at_table: LockstepStack,
+    coarse_at_table: LockstepStack,
 ) -> None:
-    stack = stack_at_table
+    stack = coarse_at_table
     engine = stack.lockstep.twin.engine
     command = stack.give(text="pick up the red cup and put it in the box")
     above = (0.15, 0.30)

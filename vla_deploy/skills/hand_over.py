@@ -26,7 +26,9 @@ PULL_RATIO: Final = 0.15
 PULL_EFFORT_RATIO: Final = 0.03
 """Of a joint's stall torque, more than before: 1 N at the thing; at rest it changes by 0.005."""
 PULLED_S: Final = 0.1
-"""A knock is over by then."""
+"""A knock is fading by then; whoever pulls for longer soon passes the limits of contact."""
+STILL_PULLED_RATIO: Final = 0.5
+"""Of the most that was felt."""
 AWAY_S: Final = 2.0
 """So long somebody may have their fingers between those of the hand; then it moves again."""
 
@@ -75,18 +77,25 @@ def _taken(context: SkillContext, hand: str, kind: str, alone: Efforts) -> Skill
 
 
 def _is_pulled_on(context: SkillContext, hand: str, alone: Efforts) -> Generator[None, None, bool]:
-    """Tell, after a moment, whether the arm has felt a pull all the while."""
+    """Tell, after a moment, whether the arm has felt a pull all the while that does not fade."""
     until_ns = context.link.clock.now_ns() + round(PULLED_S * NS_PER_S)
+    most = 0.0
     while context.link.clock.now_ns() < until_ns:
-        if not _is_pulled(context, hand, alone):
+        felt = _felt(context, hand, alone)
+        if felt <= PULL_EFFORT_RATIO:
             return False
+        most = max(most, felt)
         yield
-    return True
+    return _felt(context, hand, alone) > STILL_PULLED_RATIO * most
 
 
 def _is_pulled(context: SkillContext, hand: str, alone: Efforts) -> bool:
-    more = np.abs(_efforts(context, hand) - alone)
-    return bool(more.max() > PULL_EFFORT_RATIO)
+    return _felt(context, hand, alone) > PULL_EFFORT_RATIO
+
+
+def _felt(context: SkillContext, hand: str, alone: Efforts) -> float:
+    """Return the most that a joint bears on top of what it bore alone."""
+    return float(np.abs(_efforts(context, hand) - alone).max())
 
 
 def _is_gone(context: SkillContext, hand: str) -> bool:

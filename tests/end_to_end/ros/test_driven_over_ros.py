@@ -146,6 +146,7 @@ def test_a_dead_or_frozen_gateway_leaves_a_safe_robot_and_comes_back(
     assert client("grippers")["classic"]["status"] == "succeeded"
 
 
+@pytest.mark.slow
 def test_words_pick_up_and_put_down(robot: ProcessStack, client: Callable[[str], Any]) -> None:
     told = client("pick_and_place")
     assert told["done"]["status"] == "succeeded", told["done"]["result"]
