@@ -1,6 +1,7 @@
 import struct
 from collections.abc import Callable, Mapping, Sequence
 
+import dynamixel_sdk.port_handler
 import numpy as np
 import pytest
 
@@ -121,3 +122,9 @@ def make_bench() -> Callable[..., Bench]:
 @pytest.fixture
 def bench() -> Bench:
     return Bench()
+
+
+@pytest.fixture(autouse=True)
+def patient_host(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the vendor's library wait as for a slow adapter: it goes by the wall clock."""
+    monkeypatch.setattr(dynamixel_sdk.port_handler, "LATENCY_TIMER", 500)

@@ -133,9 +133,9 @@ def test_reboot_brings_a_servo_back_without_torque(port: Any, host: Any) -> None
 
 
 def test_an_armed_watchdog_trips_and_is_cleared_by_zero(port: Any, host: Any) -> None:
-    assert host.write1ByteTxRx(port, 5, 98, 5) == (COMM_SUCCESS, 0)
+    assert host.write1ByteTxRx(port, 5, 98, 50) == (COMM_SUCCESS, 0)
     assert host.write1ByteTxRx(port, 5, TORQUE, 1) == (COMM_SUCCESS, 0)
-    time.sleep(0.2)
+    time.sleep(1.2)  # any packet would feed it
     assert host.read1ByteTxRx(port, 5, 98) == (255, COMM_SUCCESS, 0)
     assert host.write4ByteTxRx(port, 5, GOAL, 2_000) == (COMM_SUCCESS, RANGE_ERROR)
     assert host.write1ByteTxRx(port, 5, 98, 0) == (COMM_SUCCESS, 0)

@@ -18,7 +18,6 @@ from vla_deploy.ipc import SharedSpace
 
 pytestmark = [pytest.mark.stack, pytest.mark.timeout(180)]
 
-expect.set_options(timeout=20_000)
 READY_NS = 30 * NS_PER_S
 CHROMIUM = Path("/usr/bin/chromium")
 STATIC = Path(str(files("vla_deploy.dashboard") / "static"))

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
+from drivers.clock import MonotonicClock
 from vla_deploy.client.link import RobotLink
 from vla_deploy.dashboard.access import Operator
 from vla_deploy.dashboard.live.turn import (
@@ -36,7 +37,8 @@ class PageMicrophones:
 
     def __init__(self, link: RobotLink) -> None:
         self.floor = Floor()
-        self.clock = link.clock
+        self.clock = MonotonicClock()
+        """By which people speak, whatever time the robot lives by."""
         self._link = link
         self._records: RecordWriter = link.space.record_writer("page_sound")
 
