@@ -31,8 +31,8 @@ MOST_WAITING: Final = 256
 SOURCE: Final = "ros"
 _NAME_LETTERS: Final = 44
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
-_LOOKS: Final = 4
-"""Steps that a message waits for its sender's name: a stop in words may be among them."""
+LOOKS: Final = 4
+"""Steps in which the name of who sent something is looked for: a stop in words may wait for it."""
 _JOIN_S: Final = 2.0
 _log = logging.getLogger(__name__)
 
@@ -120,7 +120,7 @@ class GraphLink:
     ) -> None:
         """Subscribe; each message is taken in a step, with who sent it."""
 
-        def receive(message: Any, looks: int = _LOOKS) -> None:
+        def receive(message: Any, looks: int = LOOKS) -> None:
             sender = self.sender(topic)  # now: whoever sends once may be gone in a moment
             if sender == SOURCE and looks:  # DDS tells a node's name after its publishers
                 self.put(lambda: receive(message, looks - 1))

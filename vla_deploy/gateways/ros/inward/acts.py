@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 from drivers.clock import NS_PER_S
 from vla_deploy.client.acts import REACHED, why_not
 from vla_deploy.client.link import RobotLink
+from vla_deploy.gateways.ros.graph import LOOKS, SOURCE
 from vla_deploy.gateways.ros.part import Gateway
 from vla_deploy.ipc.stop_button import ESTOP
 
@@ -79,9 +80,12 @@ class Acts:
 
         return handle
 
-    def _take(self, asked: _Asked) -> None:
+    def _take(self, asked: _Asked, looks: int = LOOKS) -> None:
         if asked.act != ESTOP:
             caller = self._gateway.graph.caller(asked.service)
+            if caller == SOURCE and looks:  # its client may not have been discovered yet
+                self._gateway.graph.put(lambda: self._take(asked, looks - 1))
+                return
             self._gateway.link.operate(asked.act, "over ROS", caller)
         self._asked.append(asked)
 
