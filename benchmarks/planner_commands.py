@@ -1,8 +1,9 @@
 """Measure how many commands in words end where they should, in a small world of symbols.
 
-Every case of `benchmarks/corpora/commands` is played with the robot's own planner node over its own
-topics. `goal_reached_ratio` counts the cases that end in a plan; a conversation counts when each of
-its turns is right. `asked_ratio` and `refused_ratio` count what must be asked back or refused.
+Every case of `benchmarks/corpora/judging` is played with the robot's own planner node over its own
+topics. `right_or_asked_ratio` counts the cases that end as they should, `goal_reached_ratio` those
+that should end in a plan; a conversation counts when each of its turns is right. `asked_ratio` and
+`refused_ratio` count what must be asked back or refused.
 Plans that are read back first count once the person has agreed: `confirmed_ratio` tells how many.
 Nobody listens to what they agree to: `moved_wrongly_ratio` counts wrong plans that were read back,
 too, `moved_wrongly_unasked_ratio` only those that ran at once.
@@ -21,7 +22,7 @@ from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import (
     ASK,
     COMMAND_CORPORA,
-    COMMANDS,
+    JUDGING,
     PLAN,
     REFUSE,
     command_kinds,
@@ -33,7 +34,7 @@ from vla_deploy.planning.plan import Plan
 
 
 def measure(
-    kinds: Sequence[str] = (), misses: bool = False, corpus: str = COMMANDS
+    kinds: Sequence[str] = (), misses: bool = False, corpus: str = JUDGING
 ) -> dict[str, Any]:
     """Return the figures of all commands, or of some kinds; `misses` lists what went wrong."""
     verdicts = [play_afresh(case) for case in commands(kinds, corpus)]
@@ -51,6 +52,7 @@ def report(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     return {
         "commands": len(verdicts),
         "kinds": len({one.case.kind for one in verdicts}),
+        "right_or_asked_ratio": _share(verdicts, lambda one: not one.wrong),
         "goal_reached_ratio": _share(aimed, lambda one: not one.wrong),
         "goal_reached_by_kind": _shares(aimed, lambda one: one.case.kind),
         "goal_reached_by_rung": _shares(
@@ -150,7 +152,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--kind", action="append", choices=command_kinds(), help="all by default"
     )
     arguments.add_argument("--misses", action="store_true", help="list what went wrong")
-    arguments.add_argument("--corpus", choices=COMMAND_CORPORA, default=COMMANDS)
+    arguments.add_argument("--corpus", choices=COMMAND_CORPORA, default=JUDGING)
     given = arguments.parse_args(argv)
     show(measure(given.kind or (), given.misses, given.corpus), as_json=given.json)
     return 0

@@ -15,21 +15,9 @@ from benchmarks.planner_goals import Goal, parse_goal
 from benchmarks.planner_world import World
 
 CORPORA: Final = Path(__file__).parent / "corpora"
-COMMANDS: Final = "commands"
-UNSEEN: Final = (COMMANDS, "strangers", "visitors")
-"""Of commands: what the planner is measured by, and what others said once; nothing may be learnt
-from them."""
-COMMAND_CORPORA: Final = (
-    *UNSEEN,
-    "everyday",
-    "neighbours",
-    "guests",
-    "lodgers",
-    "boarders",
-    "tenants",
-    "roommates",
-)
-"""Those, and seven that rules were written from."""
+JUDGING: Final = "judging"
+COMMAND_CORPORA: Final = (JUDGING, "development", "kept")
+"""What the planner is judged by, what whoever works on it may read, and what is kept aside."""
 PLAN, ASK, REFUSE, STOP = "plan", "ask", "refuse", "stop"
 MUSTS: Final = (PLAN, ASK, REFUSE, STOP)
 _ID: Final = re.compile(r"[a-z]+_\d+")
@@ -88,12 +76,12 @@ def scenes() -> Mapping[str, Scene]:
     return MappingProxyType({name: _scene(told) for name, told in tomllib.loads(text).items()})
 
 
-def command_kinds(corpus: str = COMMANDS) -> list[str]:
+def command_kinds(corpus: str = JUDGING) -> list[str]:
     """Return the kinds of commands of a corpus: a file each."""
     return sorted(path.stem for path in (CORPORA / corpus).glob("*.jsonl"))
 
 
-def commands(kinds: Sequence[str] = (), corpus: str = COMMANDS) -> list[Case]:
+def commands(kinds: Sequence[str] = (), corpus: str = JUDGING) -> list[Case]:
     """Return the commands of some kinds, of all by default."""
     return [
         case

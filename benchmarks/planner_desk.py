@@ -31,7 +31,7 @@ NOWHERE: Final = Path("/nonexistent/vla-deploy")
 _LOOK_NS: Final = NS_PER_S // 2000
 PROFILE: Final = "desktop"
 # Of a planner that names no rung: there was one only.
-FIRST_RUNG: Final = "rules"
+FIRST_RUNG: Final = "patterns"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -42,10 +42,10 @@ def test_what_was_carried_out_is_told_for_the_next_turn() -> None:
 
 
 def test_the_figures_of_one_kind_are_shares_and_times() -> None:
-    report = measure(["pick"])
+    report = measure(["put"])
     assert report["kinds"] == 1
     assert 0.0 < report["goal_reached_ratio"] <= 1.0
-    assert report["goal_reached_by_kind"]["pick"]["ratio"] == report["goal_reached_ratio"]
+    assert report["goal_reached_by_kind"]["put"]["ratio"] == report["goal_reached_ratio"]
     assert report["schema_valid_ratio"] == 1.0
     assert 0.0 < report["plan_p50_s"] <= report["plan_p95_s"]
 

@@ -92,6 +92,12 @@ def _mean(arguments: argparse.Namespace, _settings: Settings) -> None:
     mean(arguments.out, arguments.start_from, arguments.mean_into)
 
 
+def _unpack(arguments: argparse.Namespace, _settings: Settings) -> None:
+    from training.planner.unpacking import unpack
+
+    unpack(arguments.out)
+
+
 STEPS: dict[str, Step] = {
     "train": _train,
     "export": _export,
@@ -99,7 +105,7 @@ STEPS: dict[str, Step] = {
     "card": _card,
 }
 """What `all` does, in this order; shipping is a decision of its own."""
-OTHERS: dict[str, Step] = {"mean": _mean, "ship": _ship}
+OTHERS: dict[str, Step] = {"mean": _mean, "ship": _ship, "unpack": _unpack}
 
 if __name__ == "__main__":
     main()

@@ -83,7 +83,9 @@ class Composer:
 
     def _whole(self, random: Random) -> tuple[list[Clause], list[Said]]:
         clauses, sentence = random.choice(self._told).drawn(random)
-        called = _words(CALLS, random) if random.random() < 0.1 else []
+        # Whoever calls the robot speaks to nobody else.
+        is_ours = clauses[0].step["do"] != "unknown"
+        called = _words(CALLS, random) if is_ours and random.random() < 0.1 else []
         return clauses, self._remarked([*called, *sentence], clauses, random)
 
     def _alone(self, kind: str, random: Random) -> tuple[list[Clause], list[Said]]:

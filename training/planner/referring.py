@@ -13,9 +13,11 @@ from training.planner.describing import (
     Word,
     a_noun,
     description,
+    dropping,
     maybe_colour,
     maybe_place,
     maybe_size,
+    plural,
     said,
     unmeant,
 )
@@ -68,6 +70,26 @@ def any_thing(random: Random) -> list[Word]:
     """Return a thing of which any will do."""
     article = random.choice(("a", "any", "some", "a", "another"))
     return [*unmeant(article), *maybe_colour(random), *said(a_noun(random))]
+
+
+def all_things(random: Random) -> list[Word]:
+    """Return all of several things: "everything", "all the cups", "every book on the shelf"."""
+    chance = random.random()
+    if chance < 0.45:
+        return [*dropping(random.choice(_ALL)), *maybe_place(random, 0.25)]
+    if chance < 0.55:
+        quantity, noun = random.choice(("every", "every", "each", "every single")), a_noun(random)
+    else:
+        quantity, noun = random.choice(_ALL_THE), plural(a_noun(random))
+    return [*dropping(quantity), *maybe_colour(random), *said(noun), *maybe_place(random, 0.2)]
+
+
+def others(random: Random) -> list[Word]:
+    """Return what is left over: "everything else", "the others", "all the other cups"."""
+    if random.random() < 0.65:
+        return dropping(random.choice(_OTHERS))
+    other = random.choice(("all the other", "all my other", "the other", "the rest of the"))
+    return [*dropping(other), *said(plural(a_noun(random)))]
 
 
 def place(random: Random) -> list[Word]:
@@ -156,6 +178,16 @@ def saying(random: Random) -> list[Word]:
     return said(" ".join(words.invented(random) for _ in range(random.randint(1, 5))))
 
 
+_ALL: Final = ("everything",) * 8 + ("all of them", "all of it", "the lot", "all the things",
+                                     "all these things", "all the stuff", "all of these",
+                                     "all my things", "all of that", "all the toys")  # fmt: skip
+_ALL_THE: Final = ("all the",) * 5 + ("all my", "all of the", "all these", "all those", "all our",
+                                      "both", "both the", "all three", "the", "my")  # fmt: skip
+_OTHERS: Final = ("everything else", "everything else", "the rest", "the rest", "the others",
+                  "all the others", "all the rest", "the rest of it", "the rest of them",
+                  "all the other things", "the other things", "anything else")  # fmt: skip
+
+
 def _one_of(choices: tuple[str, ...]) -> Source:
     return lambda random: said(random.choice(choices))
 
@@ -168,6 +200,8 @@ SOURCES: Final[Mapping[str, Source]] = {
     "several": several,
     "which": which,
     "any": any_thing,
+    "all": all_things,
+    "others": others,
     "place": place,
     "where": target,
     "person": person,

@@ -90,9 +90,8 @@ def _all_but(random: Random) -> list[Word]:
         noun = "one" if random.random() < 0.25 else a_noun(random)
         return [*unmeant("the"), *said(noun), *_dropping_is(random.choice(pointing.BUT_COLOUR)),
                 *said(colour)]  # fmt: skip
-    several = random.random() < 0.5
-    noun = plural(a_noun(random)) if several else a_noun(random)
-    head = "all the" if several else random.choice(("any", "a", "any other"))
+    noun = a_noun(random)
+    head = random.choice(("any", "a", "any other"))
     out = random.choice((colour, colour, random.choice(pointing.COMPARED)))
     return [*dropping(head), *said(noun), *said(random.choice(pointing.BUT)), *unmeant("the"),
             *said(f"{out} one")]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Judge whether a goal in words can be reached, by planning it with rules and going through it.
+"""Judge whether a goal in words can be reached, by planning it with patterns and going through it.
 
 One action of a plan is judged in the same way, without the planning.
 """
@@ -12,8 +12,8 @@ from vla_deploy.analysis.question import Question
 from vla_deploy.analysis.steps import judge_step
 from vla_deploy.planning.errors import NotUnderstood, PlanningError
 from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.patterns.backend import plan_command
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.rules import plan_command
 
 _DIGITS: Final = 3
 

@@ -42,7 +42,7 @@ def _plan_line(event: Mapping[str, Any]) -> str:
     actions = event["plan"]["actions"]
     steps = "; ".join(action_words(one["skill"], one["parameters"]) for one in actions)
     rung = event.get("rung", "")
-    return f"plan: {steps}" + (f"  (by {rung})" if rung not in ("", "rules", "given") else "")
+    return f"plan: {steps}" + (f"  (by {rung})" if rung not in ("", "patterns", "given") else "")
 
 
 def _action_line(event: Mapping[str, Any]) -> str:

@@ -59,7 +59,9 @@ class Proposal:
     before the person agrees; both follow from `sureness`, where there is one, and from how well the
     words were heard. `saw_scene` tells that all of the scene may have shaped the plan, not only the
     words; `is_momentary` that it holds what nobody can compare with later: an answer, or what an
-    image showed. `origin` is the rung that made it first, where it was planned before.
+    image showed. `origin` is the rung that made it first, where it was planned before. `covers` are
+    the words that change the scope of a command and are represented in the plan, None for all;
+    `knows_grammar` tells that whoever made the plan has read the whole sentence.
     """
 
     plan: Plan
@@ -70,6 +72,8 @@ class Proposal:
     is_momentary: bool = False
     sureness: Sureness | None = None
     origin: str = ""
+    covers: frozenset[str] | None = frozenset()
+    knows_grammar: bool = False
 
     def as_heard(self, heard_confidence: float | None) -> "Proposal":
         """Return it as unsure as its words were heard; None for words that were typed.

@@ -10,13 +10,12 @@ from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.dialogue import Dialogue
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
-from vla_deploy.planning.gist_rung import GistRung
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.phrasing import Says, spoken_refusal
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery import numbered
-from vla_deploy.planning.rules_rung import RulesRung
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
@@ -124,15 +123,14 @@ class Conclusions:
             self._telling.aloud(command, Says.HEARD_BADLY)
 
 
-# What of a plan says the command in words that rules can read; other models sum it up freely.
+# What of a plan says the command in full words; other models sum it up freely.
 _IN_FULL: Final[Mapping[str, Callable[[Plan], str]]] = {
-    RulesRung.name: attrgetter("goal"),
-    GistRung.name: attrgetter("goal"),
+    Patterns.name: attrgetter("goal"),
     COMMAND_PARSER: attrgetter("summary"),
 }
 
 
 def _in_full(plan: Plan, answer: Answer) -> str:
-    """Return the words that stand for a command, "" where nobody gave any that rules can read."""
+    """Return the words that stand for a command, "" where nobody gave any."""
     rung = answer.proposal.rung if answer.proposal is not None else ""
     return _IN_FULL[rung](plan) if rung in _IN_FULL else ""

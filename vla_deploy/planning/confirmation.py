@@ -9,10 +9,9 @@ from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.phrasing import Says, steps_in_words
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import expected_s
-from vla_deploy.planning.understanding.grounding import PUT_IN
 from vla_deploy.robots.plan_bounds import Confirm
 
 Risk = Callable[[Plan, Request], str]

@@ -18,6 +18,7 @@ from vla_deploy.planning.errors import (
     PlanningError,
 )
 from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.scope import guarded
 
 _REASON_CHARACTERS: Final = 200
 
@@ -136,7 +137,7 @@ class Ladder:
         try:
             if share.left_s <= 0.0:
                 raise Declined("no time is left")
-            proposal = rung.propose(request, share)
+            proposal = guarded(rung.propose(request, share), request)
             plan = self._check(proposal.plan, request)
             if whole.left_s <= 0.0:
                 raise Declined("its plan came too late")

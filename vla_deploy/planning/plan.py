@@ -6,6 +6,8 @@ from typing import Any, Final
 from pydantic import BaseModel, ConfigDict, Field
 
 MOST_ACTIONS: Final = 100
+PUT_IN: Final = "put in"
+"""What the description of an action says that its author did not ask for."""
 
 
 class Priority(StrEnum):

@@ -11,11 +11,10 @@ from vla_deploy.planning.asking import Proposal, Request, Rung
 from vla_deploy.planning.correction import CORRECTED
 from vla_deploy.planning.dialects import Json, parse_plan
 from vla_deploy.planning.errors import Declined, NotUnderstood
-from vla_deploy.planning.gist_rung import GistRung
 from vla_deploy.planning.ladder import Answer, Check, Ladder
+from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
-from vla_deploy.planning.rules_rung import RulesRung
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
@@ -83,13 +82,12 @@ class Planner:
         self.away = dict(away or {})
         self._clock = clock
         self.check = check
-        self._quick = Ladder((RulesRung(), self.cache), check, clock)
+        self._quick = Ladder((Patterns(), self.cache), check, clock)
         self._slow = Ladder(slow, check, clock)
-        self._last = Ladder((GistRung(),), check, clock)
 
     @property
     def _ladders(self) -> tuple[Ladder, ...]:
-        return self._quick, self._slow, self._last
+        return self._quick, self._slow
 
     @property
     def rungs(self) -> tuple[str, ...]:
@@ -132,16 +130,11 @@ class Planner:
     def plan_at_once(self, request: Request, deadline: Deadline) -> Answer:
         """Return the answer of the rungs that take no time."""
         answer = self._quick.climb(request, deadline)
-        return answer if self._slow.rungs else self._at_last(request, deadline, answer)
+        return answer if self._slow.rungs else _worded(answer, request)
 
     def plan_slowly(self, request: Request, deadline: Deadline, before: Answer) -> Answer:
         """Return the answer of the others too; blocks until the deadline at most."""
-        answer = self._slow.climb(request, deadline, before)
-        return self._at_last(request, deadline, answer)
-
-    def _at_last(self, request: Request, deadline: Deadline, before: Answer) -> Answer:
-        """Leave something out where nobody has understood the whole."""
-        return _worded(self._last.climb(request, deadline, before), request)
+        return _worded(self._slow.climb(request, deadline, before), request)
 
     def check_given(self, document: Json | list[object] | str, request: Request) -> Answer:
         """Return the answer to a plan that somebody made elsewhere, in any dialect."""
@@ -149,7 +142,7 @@ class Planner:
         return Ladder((_GivenPlan(document),), self.check, self._clock).climb(request, deadline)
 
     def accepted(self, request: Request, answer: Answer) -> None:
-        """Remember a plan that was handed on; what rules make is made anew as fast."""
+        """Remember a plan that was handed on; what patterns make is made anew as fast."""
         proposal = answer.proposal
         if proposal is not None and proposal.rung not in _NOT_KEPT:
             self.cache.keep(request, proposal)
@@ -167,7 +160,7 @@ class _GivenPlan:
         return Proposal(plan=parse_plan(self.document), rung=self.name, confidence=1.0)
 
 
-_NOT_KEPT: Final = frozenset({RulesRung.name, PlanCache.name, GistRung.name, "given", CORRECTED})
+_NOT_KEPT: Final = frozenset({Patterns.name, PlanCache.name, "given", CORRECTED})
 
 
 def _worded(answer: Answer, request: Request) -> Answer:

@@ -2,25 +2,23 @@
 
 A recogniser that is unsure has several readings; the one with a plan in this room and this moment
 is the likeliest. It is read back before anything moves. Each is tried without its commas, too: a
-pause may be a thought's end, or only a breath; and with words apart that were run into one. A plan
-about things that nobody has seen gives way to one about things that are there, and what the command
-parser makes of unsure words to other words that the rules know.
+pause may be a thought's end, or only a breath. A plan about things that nobody has seen gives way
+to one about things that are there, and what the command parser makes of unsure words to other words
+that a pattern covers.
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.builders.steps import is_seen
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
-from vla_deploy.planning.gist_rung import GistRung
-from vla_deploy.planning.glued import parted
 from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.ladder import Answer
-from vla_deploy.planning.rules.building import is_seen
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to planners that take time, too."""
@@ -66,7 +64,6 @@ class Rehearing:
             return None
         first = self._of(command)
         makes_sense = answer.is_final if first is None else answer.plan is not None
-        makes_sense = makes_sense and not _is_gist(answer)
         gives_way = _is_unsure(command) and _gives_way(answer, request)
         if makes_sense and not gives_way:
             return None
@@ -74,15 +71,14 @@ class Rehearing:
             first = self._first = Heard(command=command, request=request, answer=answer)
             self._patience = Deadline.within(self._clock, PATIENCE_S)
             least = LEAST_INSTEAD if makes_sense else 0.0
-            readings = _readings(command, request.world.places)
+            readings = _readings(command)
             command = replace(command, others=tuple(one for one in readings if one[1] >= least))
-        return _in_other_words(command, first.command, request.world.places)
+        return _in_other_words(command, first.command)
 
     def concluded(self, command: Command, request: Request, answer: Answer) -> Heard:
         """Return what is to be concluded: of readings without a plan the first."""
         first, self._first = self._of(command), None
-        makes_sense = answer.plan is not None and not _is_gist(answer)
-        if first is None or (makes_sense and not _gives_way(answer, request)):
+        if first is None or (answer.plan is not None and not _gives_way(answer, request)):
             return Heard(command=command, request=request, answer=answer)
         return first
 
@@ -92,13 +88,8 @@ class Rehearing:
         return first if same else None
 
 
-def _is_gist(answer: Answer) -> bool:
-    """Tell whether words were left out for a plan: others may make sense as a whole."""
-    return answer.proposal is not None and answer.proposal.rung == GistRung.name
-
-
 def _gives_way(answer: Answer, request: Request) -> bool:
-    """Tell whether other words may make more sense: of things that are there, or to the rules.
+    """Tell whether other words may make more sense: of things that are there, or to a pattern.
 
     The command parser makes something of misheard words, too.
     """
@@ -120,20 +111,19 @@ def _is_unsure(command: Command) -> bool:
     return sure is not None and sure < WELL_HEARD
 
 
-def _readings(command: Command, places: Mapping[str, str]) -> Iterator[tuple[str, float]]:
-    """Yield all other readings of a command, and of each its words alone, and apart."""
+def _readings(command: Command) -> Iterator[tuple[str, float]]:
+    """Yield all other readings of a command, and of each its words alone."""
     tried = {_spoken(command.text)}
     for text, odds in ((command.text, 1.0), *command.others):
-        for reading in (text, *_same_sound(text, places)):
+        for reading in (text, _bare(text)):
             if _spoken(reading) not in tried:
                 tried.add(_spoken(reading))
                 yield reading, odds
 
 
-def _same_sound(text: str, places: Mapping[str, str]) -> tuple[str, str]:
-    """Return the words of a text alone, and with those apart that were run into one."""
-    bare = _MARKS.sub("", text)
-    return bare, parted(bare, places)
+def _bare(text: str) -> str:
+    """Return the words of a text alone."""
+    return _MARKS.sub("", text)
 
 
 def _spoken(text: str) -> str:
@@ -141,12 +131,12 @@ def _spoken(text: str) -> str:
     return text.lower().strip(" ,;:.!?")
 
 
-def _in_other_words(command: Command, first: Command, places: Mapping[str, str]) -> Command | None:
+def _in_other_words(command: Command, first: Command) -> Command | None:
     """Return a command in the next of its other readings, as sure as that is."""
     if not command.others:
         return None
     (text, odds), *rest = command.others
     sure = first.heard_confidence
-    if text not in _same_sound(first.text, places):
+    if text != _bare(first.text):
         sure = min(READ_BACK, odds * (1.0 if sure is None else sure))
     return replace(command, text=text, others=tuple(rest), heard_confidence=sure)

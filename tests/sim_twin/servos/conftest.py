@@ -127,4 +127,4 @@ def bench() -> Bench:
 @pytest.fixture(autouse=True)
 def patient_host(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the vendor's library wait as for a slow adapter: it goes by the wall clock."""
-    monkeypatch.setattr(dynamixel_sdk.port_handler, "LATENCY_TIMER", 500)
+    monkeypatch.setattr(dynamixel_sdk.port_handler, "LATENCY_TIMER", 1500)

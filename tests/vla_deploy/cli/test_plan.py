@@ -39,14 +39,14 @@ def plan(tmp_path, capsys):
 def test_a_plan_is_printed_with_who_made_it(plan):
     code, printed = plan("pick up the red cup")
     assert code == 0
-    assert printed.startswith("rules planned in ")
+    assert printed.startswith("patterns planned in ")
     assert "pick up red cup" in printed
 
 
 def test_scripts_get_plan_and_attempts(plan):
     code, printed = plan("pick up the red cup", "--json")
     told = json.loads(printed)
-    assert (code, told["rung"], told["question"]) == (0, "rules", None)
+    assert (code, told["rung"], told["question"]) == (0, "patterns", None)
     assert told["plan"]["actions"][-1]["skill"] == "pick_up"
 
 
@@ -60,7 +60,7 @@ def test_what_nobody_can_plan_is_refused_with_what_each_said(plan):
     code, printed = plan("sing a sea shanty")
     assert code == 2
     said = [line.split()[0] for line in printed.splitlines()]
-    assert said == ["rules", "cache", "command_parser", "gist"]
+    assert said == ["patterns", "cache", "command_parser"]
 
 
 def test_a_server_that_is_not_there_is_told(plan, tmp_path):

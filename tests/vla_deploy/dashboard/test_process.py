@@ -94,7 +94,7 @@ def test_it_serves_by_tcp_and_by_its_socket_and_ends_at_once_with_a_client_that_
     began_ns = CLOCK.now_ns()
     code, words = process.end()
     assert (code, words) == (0, "")
-    assert CLOCK.now_ns() - began_ns < 3 * NS_PER_S
+    assert CLOCK.now_ns() - began_ns < 9 * NS_PER_S  # the client would stay for ten
     staying.close()
     local.close()
 

@@ -49,13 +49,13 @@ def open_with(tmp_path, loopback):
 
 def test_nobody_else_is_asked_unless_configured(open_with):
     planner = open_with("within_s = 5.0")
-    assert planner.rungs == ("rules", "cache", "gist")
+    assert planner.rungs == ("patterns", "cache")
     assert planner.uses == frozenset()
 
 
 def test_servers_are_asked_after_rules_and_cache(open_with, loopback, ask):
     planner = open_with('servers = ["bench"]')
-    assert planner.rungs == ("rules", "cache", "server bench", "gist")
+    assert planner.rungs == ("patterns", "cache", "server bench")
     assert planner.uses == {Aid.MEMORY}
     loopback.then(loopback.says(json.dumps(ANSWER)))
     answer = planner.plan(ask("make it nice in here"))
@@ -70,7 +70,7 @@ def test_servers_are_asked_after_rules_and_cache(open_with, loopback, ask):
 
 def test_a_command_of_the_rules_asks_no_server(open_with, loopback, ask):
     planner = open_with('servers = ["bench"]')
-    assert planner.plan(ask("go to the kitchen")).proposal.rung == "rules"
+    assert planner.plan(ask("go to the kitchen")).proposal.rung == "patterns"
     assert loopback.heard == []
 
 

@@ -51,9 +51,9 @@ def test_a_stop_is_handed_on_however_old_it_is(desk, utterance):
 def test_what_planned_it_is_told(desk):
     desk.give(text="go to the kitchen")
     planned = desk.answers()[1]
-    assert (planned["rung"], planned["confidence"]) == ("rules", 1.0)
+    assert (planned["rung"], planned["confidence"]) == ("patterns", 1.0)
     (attempt,) = planned["attempts"]
-    assert (attempt["rung"], attempt["outcome"]) == ("rules", "planned")
+    assert (attempt["rung"], attempt["outcome"]) == ("patterns", "planned")
 
 
 def test_why_nobody_planned_it_is_told(desk):
@@ -61,7 +61,7 @@ def test_why_nobody_planned_it_is_told(desk):
     (refused,) = desk.answers()
     assert refused["event"] == "rejected"
     assert refused["reason"].startswith('I do not understand "sing a sea shanty"')
-    assert [one["rung"] for one in refused["attempts"]] == ["rules", "cache", "gist"]
+    assert [one["rung"] for one in refused["attempts"]] == ["patterns", "cache"]
 
 
 def test_a_plan_made_elsewhere_is_checked_and_handed_on(desk):
@@ -163,10 +163,10 @@ def test_the_status_tells_of_commands_rungs_and_the_cache(desk):
     desk.answers()
     status = desk.status()
     assert (status["heard"], status["planned"], status["refused"]) == (2, 1, 1)
-    assert status["by_rung"]["rules"]["planned"] == 1
-    assert status["by_rung"]["rules"]["declined"] == 1
+    assert status["by_rung"]["patterns"]["planned"] == 1
+    assert status["by_rung"]["patterns"]["declined"] == 1
     assert status["cache"]["misses"] == 1
-    assert status["rungs"] == ["rules", "cache", "gist"]
+    assert status["rungs"] == ["patterns", "cache"]
 
 
 def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(

@@ -149,14 +149,6 @@ def test_of_many_other_readings_only_the_likeliest_are_tried(open_desk, rung):
     assert len(model.asked) <= 9
 
 
-def test_words_that_were_run_into_one_are_parted(open_desk):
-    desk = open_desk()
-    desk.give(**spoken("go to thekitchen"))
-    assert "asked" not in [event for event, _ in events(desk.answers())]
-    (plan,) = desk.plans()
-    assert plan["plan"]["actions"][0]["parameters"]["place"] == "kitchen"
-
-
 @pytest.mark.parametrize(("confidence", "odds", "sought"), [
     (0.65, 0.4, "red cup"), (0.65, 0.1, "red can"), (0.9, 0.4, "red can"),
 ])  # fmt: skip

@@ -11,7 +11,7 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.planning.aids import OLDEST_S, Recall
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.assembly import open_memory
-from vla_deploy.planning.rules_rung import RulesRung
+from vla_deploy.planning.patterns.backend import Patterns
 
 BOUNDS = load_profile("desktop").planning
 
@@ -60,7 +60,7 @@ def test_where_a_thing_was_days_ago_is_said_before_it_is_looked_for(
     ask: Callable[..., Request],
 ) -> None:
     request = ask("where are my keys?", last_seen=(keys(unix_s() - 7200.0),))
-    plan = RulesRung().propose(request, deadline=None).plan
+    plan = Patterns().propose(request, deadline=None).plan
     said, looked = plan.actions
     assert said.parameters["text"] == (
         "I saw the grey keys at the bedside table, 2 hours ago. I will look for it."
@@ -70,7 +70,7 @@ def test_where_a_thing_was_days_ago_is_said_before_it_is_looked_for(
 
 def test_another_thing_than_asked_for_is_not_told(ask: Callable[..., Request]) -> None:
     request = ask("where is the phone?", last_seen=(keys(unix_s()),))
-    plan = RulesRung().propose(request, deadline=None).plan
+    plan = Patterns().propose(request, deadline=None).plan
     assert [one.skill for one in plan.actions] == ["find_object"]
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.inference.manifest import Certainty
+from vla_deploy.planning.command_parser.fillers import FILLERS
 from vla_deploy.planning.command_parser.grammar import IMPLIED, Step
 from vla_deploy.planning.command_parser.spans import copied_spans
 from vla_deploy.world.vocabulary import COLOURS, OBJECT_CLASSES, SYNONYMS
@@ -27,16 +28,18 @@ class Oddities:
     """Count what is odd: words never shown and not copied, words left out, words put together.
 
     `left_out` are colours and kinds of things that were said and are in no step, `jumps` words
-    between those that were copied as one.
+    between those that were copied as one, `uncovered` all words that no step has copied and that
+    are no fillers.
     """
 
     strange: int = 0
     left_out: int = 0
     jumps: int = 0
+    uncovered: int = 0
 
     @property
     def count(self) -> int:
-        """Return them all together."""
+        """Return those together by which doubt is weighed."""
         return self.strange + self.left_out + self.jumps
 
 
@@ -58,6 +61,7 @@ def oddities_of(steps: Sequence[Step], command: Sequence[str], known: Collection
         if is_corrected
         else sum(word in _TELLING and word not in copied for word in rest),
         jumps=0 if is_corrected else jumps,
+        uncovered=sum(word not in FILLERS and word not in copied for word in rest),
     )
 
 

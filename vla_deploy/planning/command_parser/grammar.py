@@ -11,7 +11,9 @@ from typing import Any, Final
 
 # Fields whose words are copied. A value begins with a space: then a word at its beginning is the
 # same token as in the command, which makes copying easy to learn.
-COPIED_FIELDS: Final = frozenset({"what", "where", "from", "to", "by", "text", "name"})
+COPIED_FIELDS: Final = frozenset(
+    {"what", "where", "from", "to", "by", "text", "name", "except", "else"}
+)
 # What stands for words that were not said: "come here" goes to "me".
 IMPLIED: Final = ("me", "back", "charging station")
 MOST_STEPS: Final = 6
@@ -32,12 +34,13 @@ SUBJECTS: Final = ("holding", "seeing", "place", "doing", "able")
 # The fields of each step in their order; those in brackets may be missing.
 STEPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
-        "go": ("where",),
-        "pick": ("what", "[from]", "[arm]"),
-        "put": ("what", "[from]", "[how]", "[where]"),
-        "bring": ("what", "[from]", "[to]"),
+        "go": ("where", "[else]"),
+        "pick": ("what", "[except]", "[else]", "[from]", "[arm]"),
+        "put": ("what", "[except]", "[else]", "[from]", "[how]", "[where]"),
+        "bring": ("what", "[except]", "[else]", "[from]", "[to]"),
         "give": (),
-        "find": ("what", "[from]"),
+        "find": ("what", "[else]", "[from]"),
+        "see": ("what", "[from]"),
         "where": ("what",),
         "look": ("[way]", "[what]"),
         "move": ("way", "[by]"),
@@ -49,7 +52,10 @@ STEPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "wait": ("[by]",),
         "stop": (),
         "ask": ("about",),
-        "tidy": ("[where]",),
+        "tidy": ("[where]", "[except]"),
+        "await": (),
+        "forbid": ("[what]", "[where]"),
+        "permit": ("[what]", "[where]"),
         "nothing": (),
         "impossible": (),
         "unknown": (),

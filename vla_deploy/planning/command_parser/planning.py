@@ -1,4 +1,4 @@
-"""Turn the steps of an answer into actions, by the builders that the rules use.
+"""Turn the steps of an answer into actions, by the builders that patterns use, too.
 
 What the steps refer to stays in the speaker's words: grounding resolves it and puts in ways,
 searches and free hands, for every planner alike (`vla_deploy.planning.understanding`).
@@ -10,13 +10,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.builders import answering, moving, placing, tidying
+from vla_deploy.planning.builders import steps as building
 from vla_deploy.planning.command_parser.amounts import METRES, RADIANS, SECONDS
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spoken import Spoken
 from vla_deploy.planning.errors import CannotBeDone, Declined, UnknownPlace
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.rules import building, cleaning, moving, placing, telling
 
 Skill = building.Step
 DEFAULT_MOVE_M: Final = moving.DRIVE_M
@@ -137,8 +138,16 @@ def _find(spoken: Spoken, step: Step) -> list[Skill]:
     return way + building.find({"object": things}, spoken.request)
 
 
+def _see(spoken: Spoken, step: Step) -> list[Skill]:
+    """Look for what must be there for the steps behind it, unless it is seen already."""
+    way, things = spoken.things(step)
+    if all(building.is_seen(one, spoken.request) for one in building.parts_of(things)):
+        return []
+    return way + building.find({"object": things}, spoken.request)
+
+
 def _where(spoken: Spoken, step: Step) -> list[Skill]:
-    return telling.tell_or_find({"object": spoken.spoken(step, "what")}, spoken.request)
+    return answering.tell_or_find({"object": spoken.spoken(step, "what")}, spoken.request)
 
 
 def _look(spoken: Spoken, step: Step) -> list[Skill]:
@@ -184,7 +193,7 @@ def _ask(spoken: Spoken, step: Step) -> list[Skill]:
 
 def _tidy(spoken: Spoken, step: Step) -> list[Skill]:
     place = {"place": spoken.spoken(step, "where")} if "where" in step else {}
-    return cleaning.tidy(place, spoken.request)
+    return tidying.tidy(place, spoken.request)
 
 
 def _doing(_: building.Groups, request: Request) -> list[Skill]:
@@ -201,10 +210,10 @@ def _refused(error: type[Declined | CannotBeDone], why: str) -> Handler:
 
 
 _ANSWERS: Final[Mapping[str, building.Builder]] = {
-    "holding": telling.tell_hands,
-    "seeing": telling.tell_sight,
-    "place": telling.tell_place,
-    "able": telling.tell_abilities,
+    "holding": answering.tell_hands,
+    "seeing": answering.tell_sight,
+    "place": answering.tell_place,
+    "able": answering.tell_abilities,
     "doing": _doing,
 }
 _HANDLERS: Final[Mapping[str, Handler]] = {
@@ -214,6 +223,7 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "bring": _bring,
     "give": _give,
     "find": _find,
+    "see": _see,
     "where": _where,
     "look": _look,
     "move": _move,
@@ -226,6 +236,9 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "stop": lambda _spoken, _step: [("stop", {})],
     "ask": _ask,
     "tidy": _tidy,
+    "await": lambda _spoken, _step: [],
+    "forbid": _refused(CannotBeDone, "I cannot keep such an order yet"),
+    "permit": _refused(CannotBeDone, "nothing was forbidden"),
     "nothing": _refused(CannotBeDone, "it says what not to do, so I leave it"),
     "impossible": _refused(CannotBeDone, "none of my skills does that"),
     "unknown": _refused(Declined, "it is no command that I know"),

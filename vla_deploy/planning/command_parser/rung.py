@@ -1,10 +1,11 @@
-"""Plan by the embedded command parser: the rung between rules and larger models.
+"""Plan by the embedded command parser: the rung between patterns and larger models.
 
 Its mistakes do not show in their form, so each answer is weighed: what is unsure is read back and
 waits for a yes, what is very unsure is left to the next rung.
 """
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -24,9 +25,9 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.passed_over import is_doubtful, refuse_passed_over
 from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
 from vla_deploy.planning.command_parser.read_back import question
+from vla_deploy.planning.command_parser.spans import copied_spans
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
     asks_about_speaker,
@@ -36,7 +37,7 @@ from vla_deploy.planning.command_parser.wording import (
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.understanding.purposes import without_purpose
+from vla_deploy.planning.scope import WORDS, Scope
 
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
@@ -90,7 +91,6 @@ class CommandParser:
             parsed = self.parse(request.text, deadline)
         except InferenceError as error:
             raise Declined(one_line(error)) from error
-        refuse_passed_over(parsed.steps, parsed.words)
         actions = Steps(parsed.words, request).actions(parsed.steps)
         if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
             # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.
@@ -113,12 +113,13 @@ class CommandParser:
             confidence=sureness.confidence,
             is_momentary=are_of_the_moment(parsed.steps),
             sureness=sureness,
+            covers=_covered(parsed),
         )
         return proposal.as_heard(request.heard_confidence)
 
     def _confidence(self, parsed: Parsed) -> float:
-        """Return how sure an answer is: never sure enough to go unasked where it is doubtful."""
-        if not is_doubtful(parsed.steps, parsed.words):
+        """Return how sure an answer is: too little to go unasked where it leaves words out."""
+        if not (parsed.oddities.uncovered or parsed.oddities.left_out):
             return parsed.confidence
         return min(parsed.confidence, self._weights.read_back_below - _DOUBT)
 
@@ -129,7 +130,7 @@ class CommandParser:
             Declined: the text is none that the model could know.
             InferenceError: there is no whole answer.
         """
-        words = plain_words(without_purpose(text.lower()))
+        words = plain_words(text)
         if not words or foreign_share(text) > MOST_FOREIGN:
             raise Declined("no words that I know")
         if len(words) > MOST_COMMAND_WORDS:
@@ -175,6 +176,35 @@ def known_words(folder: Path) -> frozenset[str]:
         return frozenset(file.read_text(encoding="utf-8").split())
     except (OSError, UnicodeDecodeError) as error:
         raise ModelMismatch(folder.name, (f"{KNOWN_WORDS}: {error}",)) from error
+
+
+# Which words that change a command's scope a field or a step stands for, besides what it copies.
+_STANDS_FOR: Final[Mapping[str, frozenset[str]]] = {
+    "except": WORDS[Scope.EXCEPTION] | WORDS[Scope.NEGATION],
+    "else": WORDS[Scope.ALTERNATIVE] | {"if"},
+    "see": frozenset({"if", "whether", "when"}),
+    "await": frozenset({"when", "until", "till", "before", "once"}),
+    "forbid": WORDS[Scope.NEGATION],
+    "permit": frozenset({"again"}),
+    "nothing": WORDS[Scope.NEGATION],
+}
+
+
+def _covered(parsed: Parsed) -> frozenset[str]:
+    """Return the words of a command that an answer has copied, or stands for otherwise."""
+    copied = (
+        word
+        for _, span in copied_spans(parsed.steps, parsed.words)
+        if span is not None
+        for word in (*span.spoken, *(parsed.words[place] for place in span.places))
+    )
+    stood_for = (
+        word
+        for step in parsed.steps
+        for name in (step["do"], *step)
+        for word in _STANDS_FOR.get(name, ())
+    )
+    return frozenset((*copied, *stood_for))
 
 
 def _stripped(step: Step) -> Step:

@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.builders import steps as building
 from vla_deploy.planning.command_parser.amounts import amount_of, amount_words, is_silent
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.command_parser.lending import kind_lent
 from vla_deploy.planning.command_parser.spans import find_span
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.rules import building
 from vla_deploy.planning.understanding.insertions import is_surface
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
@@ -69,8 +68,17 @@ class Spoken:
 
     def parts(self, step: Step) -> list[str]:
         """Return each thing that a step is about, without where it is to be taken from."""
-        spoken, _, _ = kind_lent(self.spoken(step, "what")).partition(" from ")
+        spoken, _, _ = self._chosen(step).partition(" from ")
+        if "except" in step:
+            return [f"{spoken} but {self.spoken(step, 'except')}"]
         return building.parts_of(spoken)
+
+    def _chosen(self, step: Step) -> str:
+        """Return what a step is about: of two choices the second where only that is seen."""
+        first = self.spoken(step, "what")
+        second = self.spoken(step, "else") if "else" in step else ""
+        is_second = bool(second) and not building.is_seen(first, self._request)
+        return second if is_second and building.is_seen(second, self._request) else first
 
     def _is_seen(self, step: Step, there: str) -> bool:
         """Tell whether each thing of a step is known to be at a place."""

@@ -11,7 +11,7 @@ from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.graph import dependency_faults, execution_order
-from vla_deploy.planning.plan import MOST_ACTIONS, Action, Plan
+from vla_deploy.planning.plan import MOST_ACTIONS, PUT_IN, Action, Plan
 from vla_deploy.planning.symbolic import LOGIC, after, state_of
 from vla_deploy.planning.symbolic.sharing import in_turn
 from vla_deploy.planning.understanding.conversation import Mention
@@ -25,8 +25,6 @@ from vla_deploy.planning.validator import action_faults
 
 # A free hand takes two steps, then the thing is looked for and driven to.
 MOST_INSERTED: Final = 6
-# What the description of an action says that its author did not ask for.
-PUT_IN: Final = "put in"
 # Doing these a second time at once changes nothing.
 IDEMPOTENT: Final = frozenset(
     {"navigate_to", "look_at", "find_object", "open_gripper", "close_gripper", "move_arm", "stop"}

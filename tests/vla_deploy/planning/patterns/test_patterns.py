@@ -1,0 +1,110 @@
+"""The commonest commands are planned by whole patterns, whose slots hold known names alone."""
+
+import pytest
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.patterns.backend import pattern_plan
+from vla_deploy.planning.patterns.stopping import is_stop
+from vla_deploy.planning.understanding import Conversation, Turn
+from vla_deploy.robots import load_robot
+
+WORLD = world_of(load_robot("butler"), {"left": None, "right": None})
+HERE = (1.0, 2.0, 0.5)
+
+
+def request_for(text: str, *turns: Turn) -> Request:
+    conversation = Conversation(turns=turns)
+    return Request(command_id="c", text=text, world=WORLD, here=HERE, conversation=conversation)
+
+
+def does(text: str, *turns: Turn) -> str:
+    actions = pattern_plan(request_for(text, *turns)).actions
+    told = (" ".join(map(str, (one.skill, *one.parameters.values()))) for one in actions)
+    return "; ".join(told)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("go to the kitchen", "navigate_to the kitchen"),
+        ("Could you please drive to the living room?", "navigate_to the living room"),
+        ("come here", "navigate_to here"),
+        ("dock", "navigate_to charging station"),
+        ("move back a bit", "move -0.2"),
+        ("drive forward 50 cm", "move 0.5"),
+        ("turn left 90 degrees", "turn 1.5707963267948966"),
+        ("look up", "look_at up"),
+        ("look at the blue cup", "look_at the blue cup"),
+        ("find my keys", "find_object my keys"),
+        ("pick up the red cup", "pick_up the red cup"),
+        ("grab the ball with your left hand", "pick_up the ball left"),
+        ("put it down", "place"),
+        ("put the cup in the box", "place the cup the box in"),
+        ("put the red cup next to the book", "place the red cup the book next to"),
+        ("empty your left hand", "place what is in your left hand left"),
+        ("open your right gripper", "open_gripper right"),
+        ("tuck your arms", "move_arm tuck"),
+        ("say good morning", "speak good morning"),
+        ("wait 5 seconds", "wait 5.0"),
+        (
+            "pick up the red cup and put it in the box, then go to the kitchen",
+            "pick_up the red cup; place it the box in; navigate_to the kitchen",
+        ),
+    ],
+)
+def test_a_common_command_is_planned_as_it_is_said(text: str, expected: str) -> None:
+    said = does(text)
+    assert said == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "don't go to the kitchen",
+        "go to the kitchen unless I am there",
+        "pick up the cup but not the blue one",
+        "bring me the cup or the ball",
+        "bring me the cup when I call",
+        "put everything except the cup in the box",
+        "go to the kitchen instead of the bedroom",
+        "tell Anna to go to the kitchen",
+        "pick up the cup that my sister gave me",
+        "colourless green ideas",
+        "x" * 5000,
+        "",
+    ],
+)
+def test_what_no_pattern_covers_whole_is_declined(text: str) -> None:
+    with pytest.raises(Declined):
+        pattern_plan(request_for(text))
+
+
+def test_a_place_that_nobody_knows_is_named() -> None:
+    with pytest.raises(UnknownPlace, match="narnia"):
+        pattern_plan(request_for("go to narnia"))
+
+
+def test_again_does_what_was_done_last() -> None:
+    plan = pattern_plan(request_for("turn left 30 degrees"))
+    last = Turn(said="turn left 30 degrees", plan=plan)
+    assert does("again", last) == does("do it once again", last) == does(last.said)
+    assert does("a bit more", last) == "turn 0.1309"
+    assert does("the other way", last) == "turn -0.5236"
+    with pytest.raises(NothingBefore):
+        pattern_plan(request_for("again"))
+
+
+@pytest.mark.parametrize(
+    ("text", "stops"),
+    [
+        ("stop", True), ("Stop!", True), ("no, stop it now", True), ("robot, halt", True),
+        ("stop stop stop", True), ("please don't move", True), ("never mind", True),
+        ("stop driving to the kitchen", True), ("freeze.", True),
+        ("stop at the kitchen", False), ("stop looking and come here", False),
+        ("go to the kitchen", False), ("", False), ("don't stop", False),
+    ],
+)  # fmt: skip
+def test_words_that_only_stop_are_known(text: str, stops: bool) -> None:
+    assert is_stop(text) is stops

@@ -1,0 +1,70 @@
+"""No word that changes what a command means is left out of a plan that runs unasked."""
+
+import re
+from typing import Final
+
+import pytest
+
+from benchmarks.planner_bounds import moves
+from benchmarks.planner_corpus import home, scenes
+from benchmarks.planner_desk import Answer, fresh_desk
+from vla_deploy.planning.scope import scope_words
+
+PLAIN: Final = ("go to the kitchen", "bring me the red cup", "put the ball in the box")
+CHANGES: Final = (
+    "don't {}", "do not {}", "never {}", "please do not {} yet", "no, don't {}",
+    "{} unless I am asleep", "if it rains, {}", "{} if Tom comes", "{} when the bell rings",
+    "{} later", "{} tomorrow", "until I am back {}", "{} before dinner", "{} after lunch",
+    "{} or the bedroom", "either {} or wait", "{} instead", "rather {} than that",
+    "everything except that: {}", "{} but not now", "without asking {}", "{} every evening",
+    "{} once the film is over", "in ten minutes {}", "as soon as mum calls {}",
+    "Anna, {}",
+)  # fmt: skip
+
+
+def asked(text: str) -> Answer:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["tidy"].world(home()))
+        return desk.say(text)[1]
+
+
+def runs(answer: Answer) -> bool:
+    return answer.outcome == "plan" and moves(answer.plan or {})
+
+
+@pytest.mark.parametrize("plain", PLAIN)
+def test_a_plain_command_runs_unasked(plain: str) -> None:
+    assert runs(asked(plain))
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("plain", PLAIN)
+def test_with_a_word_that_changes_it_the_same_plan_does_not_run_unasked(
+    plain: str, change: str
+) -> None:
+    answer = asked(change.format(plain))
+    assert not runs(answer), answer.plan
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("go to the kitchen", ()),
+        ("Don’t go to the kitchen", ("don't",)),
+        ("bring me both cups, not the ball", ("both", "not")),
+        ("stay away from the keys", ("avoid",)),
+        ("go there in five minutes", ("later",)),
+        ("mum, where is my phone", ("mum",)),
+        ("robot, where is my phone", ()),
+        ("could you go there if you don't mind", ()),
+        ("no rush, when you have a moment get the cup", ()),
+    ],
+)
+def test_scope_words_are_found_and_idioms_are_none(text: str, words: tuple[str, ...]) -> None:
+    assert scope_words(text) == words
+
+
+def test_the_question_names_what_may_not_be_understood() -> None:
+    answer = asked("go to the kitchen before dinner")
+    assert answer.outcome in ("ask", "refuse")
+    assert re.search(r"before|later|time|sure|leave out|understand", answer.text), answer.text

@@ -1,0 +1,163 @@
+"""Answer questions from what the robot knows now: what it sees, what it holds, where things are."""
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+
+from vla_deploy.memory.episode import unix_s
+from vla_deploy.memory.wording import place_words
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.builders.steps import Groups, Step, find
+from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.references import match_place
+from vla_deploy.planning.understanding.expressions import read_expression
+from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.insertions import is_surface
+from vla_deploy.planning.understanding.setting import Setting
+from vla_deploy.world import Thing
+from vla_deploy.world.memory import place_of, seen_words
+
+MOST_TOLD = 6
+_IN_ROOM = re.compile(r"\bin (?:the )?(.+)$")
+ABILITIES = (
+    "I can go to places, look for things, pick them up, put them in the box or on a table, "
+    "bring them to you, tidy up, tell you what I see, and stand still when you tell me to."
+)
+
+
+def tell_abilities(_: Groups, __: Request) -> list[Step]:
+    """Say what the robot can do."""
+    return _say(ABILITIES)
+
+
+def tell_sight(groups: Groups, request: Request) -> list[Step]:
+    """Say what is known, on a piece of furniture if one is named."""
+    things = [] if request.scene is None else list(request.scene.things)
+    where = ""
+    if "place" in groups:
+        place = match_place(groups["place"], request.world.places)
+        if place is None:
+            raise UnknownObject(groups["place"], sorted(set(request.world.places.values())))
+        things = [one for one in things if one.rests is not None and one.rests.of == place]
+        where = f" on the {place.replace('_', ' ')}"
+    if not things:
+        return _say(f"I see nothing{where}.")
+    return _say(f"I see {listed(things)}{where}.")
+
+
+def tell_hands(_: Groups, request: Request) -> list[Step]:
+    """Say what the hands hold."""
+    held = {one.held_by: str(one) for one in (request.scene.things if request.scene else ())}
+    full = [
+        f"{_a(held.get(hand, kind))} in my {hand.split('_')[0]} hand"
+        for hand, kind in request.world.holding.items()
+        if kind
+    ]
+    return _say(f"I hold {_and(full)}." if full else "My hands are empty.")
+
+
+def tell_place(_: Groups, request: Request) -> list[Step]:
+    """Say near which place the robot is."""
+    here = request.here
+    if here is None or not request.world.sites:
+        return _say("I do not know where I am.")
+    sites = request.world.sites.values()
+    nearest = min(sites, key=lambda one: math.dist((one.pose.x_m, one.pose.y_m), here[:2]))
+    return _say(f"I am near the {nearest.name.replace('_', ' ')}.")
+
+
+def tell_or_find(groups: Groups, request: Request) -> list[Step]:
+    """Say where a thing is if that is known, else where it was, and look for it."""
+    found = _known(groups["object"], request)
+    if not found or request.scene is None:
+        return [*_remembered(groups["object"], request), *find(groups, request)]
+    return _say(_places_of(found, request))
+
+
+def tell_whether(groups: Groups, request: Request) -> list[Step]:
+    """Say whether a thing is in sight."""
+    found = _known(groups["object"], request)
+    unsure = "" if found else _of_room(groups["object"], request)
+    if unsure:
+        elsewhere = _known(_IN_ROOM.sub("", groups["object"]), request)
+        return _say(_places_of(elsewhere, request) or unsure)
+    if not found:
+        return _say("No, I do not see that.")
+    return _say(f"Yes, I see {listed(found)}.")
+
+
+def tell_number(groups: Groups, request: Request) -> list[Step]:
+    """Say how many such things are known."""
+    count = len(_known(groups["object"], request))
+    unsure = "" if count else _of_room(groups["object"], request)
+    return _say(unsure or f"I see {count or 'none'}.")
+
+
+def listed(things: Sequence[Thing]) -> str:
+    """Return things as one says them: "a red cup, a blue ball and 3 more"."""
+    words = [_a(str(one)) for one in things[:MOST_TOLD]]
+    more = len(things) - len(words)
+    return _and([*words, f"{more} more"] if more > 0 else words)
+
+
+def _places_of(things: Sequence[Thing], request: Request) -> str:
+    """Return where things are, a sentence each."""
+    sites = request.world.sites.values()
+    places = {one.name: (one.pose.x_m, one.pose.y_m) for one in sites}
+    return " ".join(_where(one, place_of(one, places), request) for one in things[:MOST_TOLD])
+
+
+def _known(text: str, request: Request) -> list[Thing]:
+    if request.scene is None:
+        return []
+    setting = Setting(request)
+    return fitting(read_expression(text, setting.furniture), Use.SEE, setting)
+
+
+def _of_room(text: str, request: Request) -> str:
+    """Say that nobody knows all that is in a room, if words are about one, else ""."""
+    found = _IN_ROOM.search(text)
+    room = match_place(found[1], request.world.places) if found else None
+    if room is None or is_surface(room, request.world):
+        return ""
+    where = room.replace("_", " ")
+    return f"I know what I see on furniture, not all that is in the {where}; ask me to look there."
+
+
+def _remembered(text: str, request: Request) -> list[Step]:
+    """Say where such a thing was in earlier runs, if that is remembered."""
+    query = read_expression(text, Setting(request).furniture).query
+    for seen in request.last_seen:
+        if seen.kind == query.kind and query.colour in ("", seen.colour):
+            return _say(place_words(seen, unix_s()) + " I will look for it.")
+    return []
+
+
+def _where(thing: Thing, place: str, request: Request) -> str:
+    unseen_s = request.scene.unseen_s(thing) if request.scene is not None else 0.0
+    seen = seen_words(unseen_s)
+    where = place.replace("_", " ")
+    where = f"in my {where}" if thing.held_by else f"on the {where}"
+    if thing.rests is not None and thing.rests.relation == "in":
+        where = f"in the {place.rpartition('_')[0] or place}"
+    elif where.startswith("on the near"):
+        where = where.removeprefix("on the ").replace("near ", "near the ")
+    elif where.startswith("on the floor near"):
+        where = where.replace("near ", "near the ")
+    return f"The {thing} is {where}, {seen}."
+
+
+def _a(words: str) -> str:
+    if words.split()[-1:] == ["keys"]:
+        return words
+    return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
+
+
+def _and(words: Iterable[str]) -> str:
+    listed_words = list(words)
+    start = ", ".join(listed_words[:-1])
+    return " and ".join(part for part in (start, *listed_words[-1:]) if part)
+
+
+def _say(text: str) -> list[Step]:
+    return [("speak", {"text": text[:500]})]

@@ -1,0 +1,119 @@
+"""Clean with what there is: put things away, and drive over the floor in rows.
+
+There is no brush, cloth or suction; what needs one is refused (`refusals.py`).
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+from vla_deploy.planning.asking import Request
+from vla_deploy.planning.builders.placing import STORE
+from vla_deploy.planning.builders.steps import Groups, Step, look_around, parts_of
+from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
+from vla_deploy.planning.errors import NotAble, UnknownPlace
+from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.world import Thing
+
+MOST_THINGS: Final = 6
+EVERYWHERE: Final = frozenset({"", "up", "mess", "room", "place", "house", "flat", "home",
+                               "everything", "things", "apartment", "here"})  # fmt: skip
+# Half the side of the square around a place, and how far apart the rows are.
+REACH_M: Final = 1.0
+ROW_M: Final = 0.5
+MOST_POINTS: Final = 20
+
+
+def tidy(groups: Groups, request: Request) -> list[Step]:
+    """Put away what lies on a piece of furniture, or everywhere; look first where none is known."""
+    lying = _lying(groups.get("place", ""), request)
+    if not lying:
+        there = {"place": groups["place"]} if "place" in groups else {}
+        said = "I know of nothing there to put away. I look around."
+        return [("speak", {"text": said}), *look_around(there, request)]
+    steps: list[Step] = []
+    for thing in lying[:MOST_THINGS]:
+        where = {"destination": STORE, "relation": "in"}
+        steps.append(("place", {"object": thing.thing_id, **where}))
+    left = len(lying) - MOST_THINGS
+    said = f"{left} more things are left; tell me again." if left > 0 else "That is put away."
+    return [*steps, ("speak", {"text": said})]
+
+
+def _lying(place: str, request: Request) -> list[Thing]:
+    """Return what can be put away: not what is in a box already, nor what a hand cannot take.
+
+    Raises:
+        UnknownPlace: the place is none that the robot knows.
+    """
+    things = () if request.scene is None else request.scene.things
+    surfaces = _surfaces(place, request)
+    return [
+        one
+        for one in things
+        if one.kind in GRASPABLE_CLASSES
+        and not one.held_by
+        and (one.rests is None or one.rests.relation != "in")
+        and (not surfaces or (one.rests is not None and one.rests.of in surfaces))
+    ]
+
+
+def _surfaces(place: str, request: Request) -> frozenset[str]:
+    """Return the furniture of a place, or nothing where everywhere is meant."""
+    if " ".join(words_of(place)) in EVERYWHERE:
+        return frozenset()
+    world = request.world
+    name = match_place(place, world.places)
+    if name is None:
+        raise UnknownPlace(place, set(world.places.values()))
+    views = world.sites[name].viewpoints if name in world.sites else ()
+    return frozenset({name, *(one for one, site in world.sites.items() if site.pose in views)})
+
+
+def patrol(groups: Groups, request: Request) -> list[Step]:
+    """Drive over the free floor around a place in rows, or to each of several places.
+
+    Raises:
+        NotAble: no map is at hand, or no floor is free there.
+        UnknownPlace: one of several is none that the robot knows.
+    """
+    if len(parts_of(groups["place"])) > 1:
+        return visit(groups, request)
+    name = match_place(groups["place"], request.world.places)
+    site = request.world.sites.get(name or "")
+    if site is None:
+        raise NotAble(f'I do not know the area "{groups["place"]}"')
+    if request.world.is_free is None:
+        raise NotAble("without a map I cannot drive over an area")
+    points = list(rows(request, site.pose.x_m, site.pose.y_m))
+    if not points:
+        raise NotAble(f"the map shows no free floor around the {name}")
+    return [("navigate_to", {"x_m": x_m, "y_m": y_m}) for x_m, y_m in points[:MOST_POINTS]]
+
+
+def visit(groups: Groups, request: Request) -> list[Step]:
+    """Drive to each of the places that are listed.
+
+    Raises:
+        UnknownPlace: one of them is none that the robot knows.
+    """
+    steps: list[Step] = []
+    for part in parts_of(groups["place"]):
+        name = match_place(part, request.world.places)
+        if name is None:
+            raise UnknownPlace(part, set(request.world.places.values()))
+        steps.append(("navigate_to", {"place": name}))
+    return steps
+
+
+def rows(request: Request, x_m: float, y_m: float) -> Iterator[tuple[float, float]]:
+    """Yield the ends of rows of free floor in a square, each row begun where the last ended."""
+    is_free = request.world.is_free
+    count = round(2 * REACH_M / ROW_M) + 1
+    steps = [round(-REACH_M + ROW_M * step, 3) for step in range(count)]
+    for number, across_m in enumerate(steps):
+        row_y_m = round(y_m + across_m, 3)
+        row = [round(x_m + along_m, 3) for along_m in steps]
+        free = [at for at in row if is_free is not None and is_free(at, row_y_m)]
+        ends = sorted({free[0], free[-1]}) if free else []
+        for at in ends if number % 2 == 0 else reversed(ends):
+            yield at, row_y_m

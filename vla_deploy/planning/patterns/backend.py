@@ -1,0 +1,123 @@
+"""Plan the commonest commands at once: each clause fits a whole pattern, or nothing is planned."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from vla_deploy.action_words import action_words
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.builders.steps import Groups, Step
+from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
+from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
+from vla_deploy.planning.patterns.phrase import clauses
+from vla_deploy.planning.patterns.repeating import is_again, recalled, repeated
+from vla_deploy.planning.patterns.slots import is_place, is_thing
+from vla_deploy.planning.patterns.table import PATTERNS, Pattern
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.scope import scope_words
+from vla_deploy.planning.understanding.grounding import ground_plan
+
+NAME: Final = "patterns"
+_THERE: Final = frozenset({"there", "over there", "back there"})
+
+
+class Patterns:
+    """Plan what the table of patterns covers, the same every time."""
+
+    name: Final = NAME
+
+    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+        """Return the plan; a pattern fits or it does not, so there is no doubt about it.
+
+        Raises:
+            Declined: a clause fits none.
+            PlanningError: what a clause asks for cannot be done.
+        """
+        del deadline  # it takes no time
+        if request.failed:
+            raise Declined("patterns know words, not what was done of them")
+        plan = pattern_plan(request)
+        # What may stand in a slot has no words beside it that change anything.
+        return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None)
+
+
+def pattern_plan(request: Request) -> Plan:
+    """Return the plan of a command that patterns cover.
+
+    Raises:
+        Declined: a clause fits none.
+        PlanningError: what a clause asks for cannot be done, or there is nothing to repeat.
+    """
+    said = clauses(request.text)
+    if len(said) == 1 and is_again(said[0]):
+        return repeated(request)
+    full = recalled(said[0], request) if len(said) == 1 else None
+    said = clauses(full) if full is not None else said
+    if not said:
+        raise Declined("no clause that a pattern covers")
+    goal = full or request.text.strip()
+    request = replace(request, text=goal)
+    built: list[tuple[Step, Intent]] = []
+    for clause in said:
+        pattern, groups = _fitting(clause, request)
+        built += [(step, pattern.intent) for step in pattern.build(groups, request)]
+    return Plan(goal=goal, summary=_summary(built), actions=_chain(built))
+
+
+def plan_command(text: str, world: World, here: tuple[float, float, float] | None = None) -> Plan:
+    """Plan a command by patterns alone, grounded in what is known.
+
+    `here` is the robot's x, y (m) and yaw (rad) in the map, to which "bring me" returns.
+
+    Raises:
+        NotUnderstood: no pattern covers a clause.
+        PlanningError: what a clause asks for cannot be done, or is not known.
+    """
+    request = Request(command_id="", text=text, world=world, here=here)
+    try:
+        return ground_plan(pattern_plan(request), request).plan
+    except Declined as error:
+        raise NotUnderstood(text) from error
+
+
+def _fitting(clause: str, request: Request) -> tuple[Pattern, Groups]:
+    unknown: Groups = {}
+    for pattern in PATTERNS:
+        found = pattern.pattern.fullmatch(clause)
+        if found is not None:
+            groups = {name.rstrip("23"): text for name, text in found.groupdict().items() if text}
+            if _are_known(groups, request):
+                return pattern, groups
+            unknown = unknown or groups
+    place = unknown.get("place", "")
+    if place and "object" not in unknown and not scope_words(clause):
+        raise UnknownPlace(place, set(request.world.places.values()))
+    raise Declined(f'no pattern covers "{clause[:60]}"')
+
+
+def _are_known(groups: Groups, request: Request) -> bool:
+    places = request.world.places
+    named = [groups[name] for name in ("place", "destination") if name in groups]
+    return all(is_place(one, places) or is_thing(one) or one in _THERE for one in named)
+
+
+def _chain(built: Sequence[tuple[Step, Intent]]) -> tuple[Action, ...]:
+    return tuple(
+        Action(
+            id=f"a{number}",
+            skill=skill,
+            parameters=parameters,
+            depends_on=(f"a{number - 1}",) if number > 1 else (),
+            priority=PRIORITIES[intent],
+        )
+        for number, ((skill, parameters), intent) in enumerate(built, start=1)
+    )
+
+
+def _summary(built: Sequence[tuple[Step, Intent]]) -> str:
+    """Return the intents and the steps in words."""
+    intents = ", ".join(dict.fromkeys(intent.value for _, intent in built))
+    said = ", ".join(action_words(skill, parameters) for (skill, parameters), _ in built)
+    return f"{intents}: {said}"

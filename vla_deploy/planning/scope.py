@@ -1,0 +1,122 @@
+"""Find the words of a command that change its scope, and see that no plan leaves one of them out.
+
+One mechanism for every back end: a proposal says which of these words it covers. Of a plan that
+moves anything and covers less the person is asked, with the words that it leaves out; where they
+may turn the command round, it is declined.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from enum import StrEnum
+from typing import Final
+
+from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.errors import CannotBeDone
+
+
+class Scope(StrEnum):
+    """Group the words by what they do to a command."""
+
+    NEGATION = "negation"
+    EXCEPTION = "exception"
+    CONDITION = "condition"
+    ALTERNATIVE = "alternative"
+    QUANTITY = "quantity"
+    PERSON = "person"
+
+
+WORDS: Final[Mapping[Scope, frozenset[str]]] = {
+    Scope.NEGATION: frozenset(
+        {"not", "never", "no", "none", "nobody", "nothing", "nowhere", "without", "cannot", "avoid",
+         "refrain", "neither", "nor", "forbidden"}
+    ),
+    Scope.EXCEPTION: frozenset(
+        {"but", "except", "excepting", "excluding", "only", "instead", "rather", "besides", "apart",
+         "aside", "than"}
+    ),
+    Scope.CONDITION: frozenset(
+        {"if", "unless", "until", "till", "when", "whenever", "once", "before", "after", "while",
+         "whether", "provided", "later", "tomorrow", "tonight", "afterwards", "every", "always",
+         "o'clock", "noon", "midnight"}
+    ),
+    Scope.ALTERNATIVE: frozenset({"or", "either", "otherwise"}),
+    Scope.QUANTITY: frozenset(
+        {"all", "both", "each", "another", "again", "twice", "times", "everything"}
+    ),
+}  # fmt: skip
+_GROUP: Final = {word: group for group, words in WORDS.items() for word in words}
+IDIOMS: Final = re.compile(
+    r"\b(?:if you(?:'d| would| could| can| please| don't| do not| like| want| wouldn't| have| get|"
+    r"'re| are)(?: not)?(?: (?:mind|please|like|want|be so kind|a (?:moment|minute|second|chance)|"
+    r"time|able|free))?|if possible|if that's (?:ok|okay|all right)|"
+    r"if it(?:'s| is) (?:no|not too much) (?:trouble|bother)|no (?:problem|rush|hurry|worries|need "
+    r"to (?:rush|hurry))|don't (?:worry|rush|hurry|forget(?: to)?|drop (?:it|them|that)|spill "
+    r"(?:it|any|anything))(?! about)|do not (?:worry|hurry|forget to)|why don't you|"
+    r"(?:without|try not to|careful not to|be careful not to) (?:drop|spill|break)(?:ping|ing)?"
+    r"(?: (?:it|them|anything))?|when(?:ever)? you (?:can|have (?:a |the )?(?:moment|minute|second|"
+    r"time|chance)|get (?:a|the) chance|'re (?:ready|free)|are (?:ready|free))|"
+    r"all right|all the way|at once|once more|first of all|after all|or so|or something|"
+    r"more or less|not (?:too )?far|right away|straight away|rather (?:quickly|soon)|"
+    r"as soon as (?:possible|you can)|would rather you|put (?:\w+ ){1,4}away|away with)\b"
+)
+"""What asks nicely, or says how, with such words in it."""
+_PHRASES: Final = (
+    (re.compile(r"\b(?:away from|clear of|hands off|(?:stay|keep|get|go) out of)\b"), " avoid "),
+    (re.compile(r"\b(?:as long as|in case|as soon as)\b"), " if "),
+    (re.compile(r"\b(?:in|within|after) (?:\w+ ){1,3}(?:minutes?|hours?|seconds?)\b"), " later "),
+)
+"""Some words together, and the one that does the same."""
+_NOT: Final = re.compile(r"n't$|^dont$|^doesnt$|^cant$|^wont$|^isnt$")
+_WORD: Final = re.compile(r"[a-z']+")
+_CALLED: Final = re.compile(r"^\s*(?P<name>[a-z]+),\s")
+_NOT_NAMES: Final = frozenset(
+    {"robot", "butler", "please", "hey", "hello", "hi", "ok", "okay", "well", "so", "now", "no",
+     "yes", "yeah", "right", "oh", "ah", "um", "uh", "er", "listen", "sorry", "thanks", "great",
+     "good", "fine", "first", "then", "next", "actually", "also", "and", "wait", "look", "quick",
+     "love", "dear", "darling", "mate", "sweetheart", "honey", "buddy", "pal", "friend", "finally",
+     "today", "here", "alright", "perfect", "lovely", "stop", "left", "again", "one", "kitchen",
+     "bedroom", "cup", "ball", "book", "bottle", "phone", "keys", "box", "bowl", "can", "remote"}
+)  # fmt: skip
+_STILL: Final = frozenset({"speak", "wait", "stop", "look_at"})
+
+
+def scope_words(text: str) -> tuple[str, ...]:
+    """Return the words of a command that change its scope, in their order, idioms left out."""
+    said = text.lower().replace("’", "'")
+    called = _CALLED.match(said)
+    name = called["name"] if called and called["name"] not in _NOT_NAMES else ""
+    said = IDIOMS.sub(" ", said)
+    for phrase, word in _PHRASES:
+        said = phrase.sub(word, said)
+    words = [word for word in _WORD.findall(said) if group_of(word) is not None]
+    return (name, *words) if name else tuple(words)
+
+
+def group_of(word: str) -> Scope | None:
+    """Return what a word does to a command, None for nothing."""
+    return Scope.NEGATION if _NOT.search(word) else _GROUP.get(word)
+
+
+def guarded(proposal: Proposal, request: Request) -> Proposal:
+    """Return a proposal that asks about the words that it leaves out.
+
+    Raises:
+        CannotBeDone: without them it may be the very thing that was not to be done.
+    """
+    if all(action.skill in _STILL for action in proposal.plan.actions):
+        return proposal
+    left_out = _without(scope_words(request.text), proposal.covers)
+    if not left_out:
+        return proposal
+    groups = {group_of(word) or Scope.PERSON for word in left_out}
+    listed = " and ".join(f'"{word}"' for word in dict.fromkeys(left_out))
+    if Scope.NEGATION in groups and not proposal.knows_grammar:
+        raise CannotBeDone(f"I would leave out {listed}; say just what to do now")
+    question = proposal.read_back or f"Shall I {proposal.plan.summary or 'do that'}?"
+    asked = f"You said {listed}, which I may not have understood. {question}"
+    return replace(proposal, read_back=asked)
+
+
+def _without(words: Iterable[str], covered: frozenset[str] | None) -> tuple[str, ...]:
+    return () if covered is None else tuple(word for word in words if word not in covered)
