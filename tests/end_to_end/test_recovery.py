@@ -38,7 +38,7 @@ def test_a_cup_that_is_taken_from_the_hand_is_fetched_again(coarse_at_table: Loc
     assert len(setbacks) <= NOT_BOUNDED.further_plans
     plans = [one for one in stack.events if one["event"] == "plan"]
     assert [(one["rung"], one.get("origin")) for one in plans[:2]] == [
-        ("rules", None),
+        ("patterns", None),
         ("recovery", "take again"),
     ]
     assert len(plans) == 1 + len(setbacks)

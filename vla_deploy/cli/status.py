@@ -145,6 +145,7 @@ def _planner(status: dict[str, Any]) -> list[str]:
     counts = [f"{name} {made.get(name, 0)}" for name in planner["rungs"]]
     lines = [f"plans by: {', '.join(counts)}; refused {planner['refused']}"]
     lines += [f"  without {name}: {why}" for name, why in planner["away"].items()]
+    lines += [f"  told not to {one}" for one in planner.get("prohibitions", ())]
     return [*lines, f"asks: {planner['question']}"] if planner["question"] else lines
 
 

@@ -9,6 +9,7 @@ from vla_deploy.model_servers.picture import Image
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.prohibition import Order, Prohibition
 from vla_deploy.planning.understanding.conversation import Conversation
 from vla_deploy.world import Snapshot
 
@@ -22,7 +23,7 @@ class Request:
     things were before, the newest first. `heard_confidence`, 0 to 1, is how sure the recogniser is
     of the words; None for typed text. `image` (rows, columns, RGB) is what the robot sees now,
     where a rung can use it. `failed` tells plans for this command that were tried before, and what
-    went wrong.
+    went wrong. `prohibitions` are what people have forbidden for good.
     """
 
     command_id: str
@@ -36,6 +37,7 @@ class Request:
     heard_confidence: float | None = None
     image: Image | None = field(default=None, compare=False, repr=False)
     failed: tuple[str, ...] = ()
+    prohibitions: tuple[Prohibition, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +63,8 @@ class Proposal:
     words; `is_momentary` that it holds what nobody can compare with later: an answer, or what an
     image showed. `origin` is the rung that made it first, where it was planned before. `covers` are
     the words that change the scope of a command and are represented in the plan, None for all;
-    `knows_grammar` tells that whoever made the plan has read the whole sentence.
+    `knows_grammar` tells that whoever made the plan has read the whole sentence. An `order`
+    stands once the plan is handed on.
     """
 
     plan: Plan
@@ -74,6 +77,7 @@ class Proposal:
     origin: str = ""
     covers: frozenset[str] | None = frozenset()
     knows_grammar: bool = False
+    order: Order | None = None
 
     def as_heard(self, heard_confidence: float | None) -> "Proposal":
         """Return it as unsure as its words were heard; None for words that were typed.

@@ -11,10 +11,12 @@ from vla_deploy.world import Query, UnknownWord, parse_query
 
 CORRECTED: Final = "correction"
 _CORRECTION: Final = re.compile(
-    r"(?:no,? (?:wait|sorry)|wait,? no|no|nope|wrong|sorry|not that(?: one)?|not it)\b[,. ]*"
-    r"(?:(?:i (?:meant|mean|said|wanted|want)|rather|take|use|make it)\b)?[, ]*(?P<rest>.+)",
+    r"(?:(?:no,? (?:wait|sorry)|wait,? no|no|nope|wrong|sorry|not that(?: one)?|not it)\b[,. ]*"
+    r"(?:(?:i (?:meant|mean|said|wanted|want)|rather|take|use|make it)\b)?|i meant?\b)"
+    r"[, ]*(?P<rest>.+)",
     re.IGNORECASE,
 )
+_INSTEAD: Final = re.compile(r"[, ]+(?:instead|please|rather)$", re.IGNORECASE)
 _ONE: Final = re.compile(r"\bones?\b", re.IGNORECASE)
 _NAMES_THINGS: Final = ("object", "destination")
 _ARTICLE: Final = r"(?:the|an?|my|your)\b"
@@ -26,7 +28,7 @@ _CALLED: Final = re.compile(
 def correction_in(text: str) -> str:
     """Return what follows a no, "" where nothing does."""
     found = _CORRECTION.fullmatch(text.strip().strip(".!"))
-    return "" if found is None else found["rest"].strip()
+    return "" if found is None else _INSTEAD.sub("", found["rest"]).strip()
 
 
 def corrected_by(plan: Plan | None, text: str) -> Plan | None:

@@ -218,7 +218,8 @@ class Desk:
             self._conclusions.refuse(command, f"the planner failed: {type(error).__name__}")
 
     def _request(self, command: Command) -> Request:
-        return self._situation.request(command, self.dialogue.talk, of_use=self.planner.uses)
+        request = self._situation.request(command, self.dialogue.talk, of_use=self.planner.uses)
+        return replace(request, prohibitions=self.planner.prohibitions.items)
 
     # --- answers --------------------------------------------------------------------------------
 

@@ -78,6 +78,12 @@ _NOT_NAMES: Final = frozenset(
      "today", "here", "alright", "perfect", "lovely", "stop", "left", "again", "one", "kitchen",
      "bedroom", "cup", "ball", "book", "bottle", "phone", "keys", "box", "bowl", "can", "remote"}
 )  # fmt: skip
+_DENIED: Final = re.compile(
+    r"^(?:(?:please|robot|butler|hey|ok|okay|and|but|well|so|you|just|oh)[, ]+)*"
+    r"(?:(?:do|must|should|can|could|may|need|will|would|shall)(?:n't| not)|dont|never|"
+    r"no [a-z]+ing|not\b|avoid|refrain|stay|keep|hands off|nobody|nothing|neither)\b"
+)
+"""How a command begins that says what not to do."""
 _STILL: Final = frozenset({"speak", "wait", "stop", "look_at"})
 
 
@@ -111,7 +117,8 @@ def guarded(proposal: Proposal, request: Request) -> Proposal:
         return proposal
     groups = {group_of(word) or Scope.PERSON for word in left_out}
     listed = " and ".join(f'"{word}"' for word in dict.fromkeys(left_out))
-    if Scope.NEGATION in groups and not proposal.knows_grammar:
+    is_denied = Scope.NEGATION in groups and _DENIED.match(request.text.lower().replace("’", "'"))
+    if is_denied and not proposal.knows_grammar:
         raise CannotBeDone(f"I would leave out {listed}; say just what to do now")
     question = proposal.read_back or f"Shall I {proposal.plan.summary or 'do that'}?"
     asked = f"You said {listed}, which I may not have understood. {question}"

@@ -70,6 +70,11 @@ def go(groups: Groups, request: Request) -> list[Step]:
     return [("navigate_to", {"place": part, **speed}) for part in named]
 
 
+def approach(groups: Groups, request: Request) -> list[Step]:
+    """Drive to where a thing can be reached."""
+    return go({"place": groups["object"]}, request)
+
+
 def dock(_: Groups, __: Request) -> list[Step]:
     """Drive to where the battery is charged."""
     return [("navigate_to", {"place": "charging station"})]

@@ -11,6 +11,7 @@ from vla_deploy.planning.builders.placing import STORE
 from vla_deploy.planning.builders.steps import Groups, Step, look_around, parts_of
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
+from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.world import Thing
 
@@ -61,10 +62,14 @@ def _surfaces(place: str, request: Request) -> frozenset[str]:
     """Return the furniture of a place, or nothing where everywhere is meant."""
     if " ".join(words_of(place)) in EVERYWHERE:
         return frozenset()
-    world = request.world
-    name = match_place(place, world.places)
+    name = match_place(place, request.world.places)
     if name is None:
-        raise UnknownPlace(place, set(world.places.values()))
+        raise UnknownPlace(place, set(request.world.places.values()))
+    return surfaces_of(name, request.world)
+
+
+def surfaces_of(name: str, world: World) -> frozenset[str]:
+    """Return a place, and the furniture that one looks at there."""
     views = world.sites[name].viewpoints if name in world.sites else ()
     return frozenset({name, *(one for one, site in world.sites.items() if site.pose in views)})
 

@@ -8,6 +8,7 @@ from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.builders.steps import Groups, Step
+from vla_deploy.planning.correction import corrected_by, correction_in
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
@@ -16,6 +17,7 @@ from vla_deploy.planning.patterns.repeating import is_again, recalled, repeated
 from vla_deploy.planning.patterns.slots import is_place, is_thing
 from vla_deploy.planning.patterns.table import PATTERNS, Pattern
 from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.prohibitions import read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 
@@ -38,6 +40,11 @@ class Patterns:
         del deadline  # it takes no time
         if request.failed:
             raise Declined("patterns know words, not what was done of them")
+        order = read_order(request.text, request.world, request.prohibitions)
+        if order is not None:
+            said = Action(id="a1", skill="speak", parameters={"text": order.answer})
+            plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
+            return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None, order=order)
         plan = pattern_plan(request)
         # What may stand in a slot has no words beside it that change anything.
         return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None)
@@ -53,6 +60,10 @@ def pattern_plan(request: Request) -> Plan:
     said = clauses(request.text)
     if len(said) == 1 and is_again(said[0]):
         return repeated(request)
+    if correction_in(request.text) and request.conversation.turns:
+        plan = corrected_by(repeated(request), request.text)
+        if plan is not None:
+            return plan
     full = recalled(said[0], request) if len(said) == 1 else None
     said = clauses(full) if full is not None else said
     if not said:
@@ -99,8 +110,9 @@ def _fitting(clause: str, request: Request) -> tuple[Pattern, Groups]:
 
 def _are_known(groups: Groups, request: Request) -> bool:
     places = request.world.places
-    named = [groups[name] for name in ("place", "destination") if name in groups]
-    return all(is_place(one, places) or is_thing(one) or one in _THERE for one in named)
+    place, where = groups.get("place", "there"), groups.get("destination", "there")
+    is_known = is_place(place, places) or place in _THERE
+    return is_known and (is_place(where, places) or is_thing(where) or where in _THERE)
 
 
 def _chain(built: Sequence[tuple[Step, Intent]]) -> tuple[Action, ...]:

@@ -54,9 +54,9 @@ _ASK, _HELP, _TIDY = Intent.QUESTION, Intent.ASSIST, Intent.CLEANING
 _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (Intent.STOP, "stop|halt|freeze|stand still", steps.stop),
     # --- go
-    (_MOVE, rf"(?:go|drive|move|head|navigate|return|come|roll|get)(?: back| over)?"
+    (_MOVE, rf"(?:go|drive|move|head|navigate|return|come|roll)(?: back| over)?"
      rf"(?: to| into)? {_PLACE}", steps.go),
-    (_MOVE, rf"(?:go|drive|head|come)(?: over)? to (?P<place>{THING})", steps.go),
+    (_MOVE, rf"(?:go|drive|head|come)(?: over)? to {_THING}", steps.approach),
     (_MOVE, r"(?:go|drive|come) back|return", steps.go_back),
     (_MOVE, r"(?:come|go) (?:(?:back|over) )?(?:here|to me)", steps.come),
     (_MOVE, r"dock|recharge|charge(?: yourself)?|go (?:and )?(?:charge|dock)(?: yourself)?",
@@ -102,7 +102,9 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
      steps.bring),
     (_HOLD, rf"(?:can|could|may) i have {_OBJECT}", giving.give),
     # --- put, take
-    (_HOLD, rf"(?:{_PUT}|{_CARRY}) {_OBJECT}(?: down)? {_INTO} {_DESTINATION}", placing.put),
+    (_HOLD, rf"{_PUT} {_OBJECT}(?: down)? {_INTO} {_DESTINATION}", placing.put),
+    # What is taken "beside the ball" or "on the table" stands there.
+    (_HOLD, rf"{_CARRY} {_OBJECT} (?P<relation>to|into|onto) {_DESTINATION}", placing.put),
     (_HOLD, rf"{_TAKE} {_OBJECT}{_WITH}|(?:pick|lift) {_OBJECT} up", steps.pick),
     # --- tidy
     (_TIDY, r"(?:clean|tidy|clear)(?: up)?", tidying.tidy),

@@ -1,0 +1,96 @@
+"""What a person forbids stands until they take it back, whoever plans, also over a restart."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.planner_bounds import moves
+from benchmarks.planner_corpus import home, scenes
+from benchmarks.planner_desk import Desk, fresh_desk
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.prohibition import Forbidden, Order, Prohibition
+from vla_deploy.planning.prohibitions import Prohibitions, read_order
+from vla_deploy.robots import load_robot
+
+WORLD = world_of(load_robot("butler"), {})
+KEYS = Prohibition(what=Forbidden.THING, words="keys")
+KITCHEN = Prohibition(what=Forbidden.PLACE, words="kitchen")
+
+
+def in_the_flat(desk: Desk) -> Desk:
+    desk.tell(scenes()["tidy"].world(home()))
+    return desk
+
+
+def refused(desk: Desk, text: str) -> str:
+    answer = desk.say(text)[1]
+    assert answer.outcome == "refuse", answer
+    return answer.text
+
+
+@pytest.mark.parametrize(
+    ("text", "order"),
+    [
+        ("don't touch the keys", Order(forbids=True, of=KEYS)),
+        ("Never ever touch my keys again!", Order(forbids=True, of=KEYS)),
+        ("please leave the keys alone", Order(forbids=True, of=KEYS)),
+        ("hands off the keys", Order(forbids=True, of=KEYS)),
+        ("stay out of the kitchen", Order(forbids=True, of=KITCHEN)),
+        ("never go into the kitchen again", Order(forbids=True, of=KITCHEN)),
+        ("don't go to the kitchen", None),
+        ("you may touch the keys again", Order(forbids=False, of=KEYS)),
+        ("you can go into the kitchen", Order(forbids=False, of=KITCHEN)),
+        ("forget what I said about the kitchen", Order(forbids=False, of=KITCHEN)),
+        ("you can go into the bedroom", None),
+        ("touch the keys", None),
+    ],
+)
+def test_orders_are_read_from_whole_sentences(text: str, order: Order | None) -> None:
+    assert read_order(text, WORLD, (KEYS, KITCHEN)) == order
+
+
+def test_a_thing_is_not_taken_until_that_is_permitted() -> None:
+    with fresh_desk() as desk:
+        in_the_flat(desk)
+        (said,) = (desk.say("don't touch the keys")[1].plan or {})["actions"]
+        assert said["parameters"] == {"text": "All right, I will not touch the keys."}
+        why = refused(desk, "bring me the keys")
+        assert 'say "you may touch the keys again" first' in why
+        refused(desk, "put the keys in the box")
+        assert moves(desk.say("pick up the red cup")[1].plan or {})
+        desk.say("you may touch the keys again")
+        assert desk.say("bring me the keys")[1].outcome == "plan"
+
+
+def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
+    with fresh_desk() as desk:
+        in_the_flat(desk)
+        desk.say("stay out of the kitchen")
+        refused(desk, "go to the kitchen")
+        refused(desk, "go to the kitchen table")
+        refused(desk, "bring me the green bottle")
+        assert desk.say("go to the bedroom")[1].outcome == "plan"
+
+
+def test_a_plan_of_somebody_else_is_held_to_it_too() -> None:
+    with fresh_desk() as desk:
+        in_the_flat(desk)
+        desk.say("don't touch the keys")
+        plan = {"goal": "keys", "actions": [{"id": "a", "skill": "pick_up",
+                                             "parameters": {"object": "keys_1"}}]}  # fmt: skip
+        assert desk.hand_in(plan)[1].outcome == "refuse"
+
+
+def test_they_stand_after_a_restart_and_a_spoilt_file_is_no_end(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = tmp_path / "state" / "prohibitions.json"
+    Prohibitions(file).apply(Order(forbids=True, of=KEYS))
+    again = Prohibitions(file)
+    assert again.items == (KEYS,)
+    again.apply(Order(forbids=False, of=KEYS))
+    assert Prohibitions(file).items == ()
+    for spoilt in ("{", "[1]", '[{"what": "mood", "words": "x"}]'):
+        file.write_text(spoilt)
+        assert Prohibitions(file).items == ()
+    assert "cannot be read" in caplog.text

@@ -1,0 +1,167 @@
+"""Keep what a person has forbidden, until they take it back: things to touch, places to enter.
+
+A prohibition stands over restarts of the planner. The check of every plan asks here, whoever has
+planned it.
+"""
+
+import json
+import logging
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from vla_deploy.planning.builders.tidying import surfaces_of
+from vla_deploy.planning.errors import NotAble, UnknownObject
+from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.patterns.phrase import courtesy_off
+from vla_deploy.planning.patterns.slots import THING, WORDS
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.prohibition import Forbidden, Order, Prohibition
+from vla_deploy.planning.references import match_place, parse_object
+from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.world import Snapshot
+
+FILE_NAME: Final = "prohibitions.json"
+MOST: Final = 32
+_log = logging.getLogger(__name__)
+
+
+class Prohibitions:
+    """Hold all of them, and their file where there is one."""
+
+    def __init__(self, file: Path | None = None) -> None:
+        self._file = file
+        self.items: tuple[Prohibition, ...] = _read(file) if file is not None else ()
+
+    def apply(self, order: Order) -> None:
+        """Forbid, or permit again; the oldest of too many go."""
+        kept = tuple(one for one in self.items if one != order.of)
+        self.items = (*kept, order.of)[-MOST:] if order.forbids else kept
+        if self._file is not None:
+            _write(self._file, self.items)
+
+
+_TOUCH: Final = "(?:touch|move|lay a (?:hand|finger) on|go near)"
+_EVER: Final = r"(?: again| ever| ever again| any ?more| from now on)?"
+_FORBIDS: Final = tuple(
+    re.compile(pattern)
+    for pattern in (
+        rf"(?:don't|do not|never|you must not|you mustn't|you may not)(?: ever)? {_TOUCH} "
+        rf"(?P<thing>{THING}){_EVER}",
+        rf"(?:leave|let) (?P<thing>{THING}) (?:alone|be)",
+        rf"(?:hands off|keep your hands off) (?P<thing>{THING})",
+        rf"(?:stay|keep) out of (?P<place>{WORDS})",
+        rf"(?:never|don't ever|do not ever|you must not|you mustn't|you may not) "
+        rf"(?:go|drive|come|enter)(?: in| into| to)? (?P<place>{WORDS}){_EVER}",
+        r"(?:don't|do not) (?:go|drive|come)(?: in| into| to)? "
+        rf"(?P<place>{WORDS})(?: ever again| any ?more| from now on)",
+    )
+)
+_PERMITS: Final = tuple(
+    re.compile(pattern)
+    for pattern in (
+        rf"you (?:may|can) {_TOUCH} (?P<thing>{THING})(?: again)?",
+        r"you (?:may|can) (?:go|drive|come) (?:back )?(?:in|into|to) "
+        rf"(?P<place>{WORDS})(?: again)?",
+        rf"forget what i said about (?P<thing>{THING})",
+        rf"forget what i said about (?P<place>{WORDS})",
+    )
+)
+
+
+def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Order | None:
+    """Return what a command forbids for good, or permits again; None for any other command.
+
+    What stands already is what may be permitted: "you can go to the kitchen" is a command, too.
+    """
+    clause = courtesy_off(text)
+    for forbids, patterns in ((True, _FORBIDS), (False, _PERMITS)):
+        for pattern in patterns:
+            found = pattern.fullmatch(clause)
+            meant = _meant(found.groupdict(), world) if found is not None else None
+            if meant is not None and (forbids or meant in standing):
+                return Order(forbids=forbids, of=meant)
+    return None
+
+
+def refuse_forbidden(
+    plan: Plan, world: World, scene: Snapshot | None, standing: Sequence[Prohibition]
+) -> None:
+    """Refuse a grounded plan that does what is forbidden.
+
+    Raises:
+        NotAble: it does; says what, and how it is permitted again.
+    """
+    for one in standing:
+        if any(_breaks(action, one, world, scene) for action in plan.actions):
+            raise NotAble(f'you told me not to {one}; say "you may {one} again" first')
+
+
+def _meant(groups: dict[str, str | None], world: World) -> Prohibition | None:
+    place = match_place(groups.get("place") or "", world.places)
+    if place is not None:
+        return Prohibition(what=Forbidden.PLACE, words=place)
+    try:
+        words = str(parse_object(groups.get("thing") or ""))
+    except UnknownObject:
+        return None
+    return Prohibition(what=Forbidden.THING, words=words)
+
+
+def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | None) -> bool:
+    given = action.parameters
+    if one.what is Forbidden.THING:
+        touched = [given.get("object")] if action.skill == "pick_up" else []
+        touched += [given.get("destination")] if action.skill == "place" else []
+        return any(_is_same(str(text), one.words, scene) for text in touched if text)
+    inside = surfaces_of(one.words, world)
+    named = {str(given[name]) for name in ("place", "destination") if name in given}
+    return bool(inside & (named | set(_rests(given.get("object"), scene))))
+
+
+def _is_same(text: str, words: str, scene: Snapshot | None) -> bool:
+    try:
+        subject, query = subject_of(text, scene), parse_object(words)
+    except UnknownObject:
+        return False
+    if subject.thing is not None and scene is not None:
+        return any(one.thing_id == subject.thing.thing_id for one in query.among(scene))
+    return subject.kind == query.kind and (not query.colour or query.colour in subject.words)
+
+
+def _rests(text: object, scene: Snapshot | None) -> Iterator[str]:
+    """Yield what a thing that an action names rests on, where that is known."""
+    if not isinstance(text, str) or scene is None:
+        return
+    try:
+        thing = subject_of(text, scene).thing
+    except UnknownObject:
+        return
+    if thing is not None and thing.rests is not None:
+        yield thing.rests.of
+
+
+def _read(file: Path) -> tuple[Prohibition, ...]:
+    try:
+        told = json.loads(file.read_text(encoding="utf-8"))
+        return tuple(
+            Prohibition(what=Forbidden(one["what"]), words=str(one["words"])) for one in told[:MOST]
+        )
+    except FileNotFoundError:
+        return ()
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        _log.error("%s cannot be read, so nothing is forbidden: %s; say it anew", file, error)
+        return ()
+
+
+def _write(file: Path, items: Sequence[Prohibition]) -> None:
+    """Write the file as a whole; a robot that cannot keep it still obeys until it is restarted."""
+    fresh = file.with_suffix(".new")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        fresh.write_text(json.dumps([asdict(one) for one in items]) + "\n", encoding="utf-8")
+        fresh.replace(file)
+    except OSError as error:
+        _log.error("what is forbidden is not kept over a restart: %s", error)
