@@ -85,3 +85,11 @@ def test_a_command_said_into_the_browser_is_heard_and_planned(page: Page) -> Non
     page.mouse.up()
     expect(heard).to_contain_text("accepted")
     expect(page.locator(".card", has_text="by voice").first).to_contain_text("turn")
+
+
+def test_what_is_forbidden_for_good_is_shown_until_it_is_permitted(page: Page) -> None:
+    told = page.locator(".notice", has_text="Told not to touch the keys")
+    give(page, "don't touch the keys")
+    expect(told).to_be_visible()
+    give(page, "you may touch the keys again")
+    expect(told).to_have_count(0)

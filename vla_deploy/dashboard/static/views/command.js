@@ -17,6 +17,7 @@ export function View() {
   return html`
     <div class="view-head"><h1>Command</h1></div>
     <${Refusal} />
+    <${Prohibitions} />
     <div class="command-view">
       <div class="stack">
         <${Composer} />
@@ -24,6 +25,15 @@ export function View() {
       </div>
       <${History} commands=${commands} chosen=${shown?.command_id} onChoose=${setChosen} />
     </div>
+  `;
+}
+
+/** List what somebody has forbidden for good. */
+function Prohibitions() {
+  const standing = useTopic("planner_status").data?.prohibitions ?? [];
+  if (!standing.length) return null;
+  return html`
+    <${Notice} icon="alert">Told not to ${standing.join("; not to ")}. “You may … again” permits it.<//>
   `;
 }
 
