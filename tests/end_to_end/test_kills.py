@@ -16,6 +16,7 @@ def failures(chosen: list[Injection]) -> list[str]:
     return [case.row for case in report.failed]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_a_kill_at_a_random_moment_leaves_the_robot_safe() -> None:
     assert failures(injections(1, 0, EARLY_S)) == []
