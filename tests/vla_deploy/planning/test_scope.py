@@ -8,7 +8,12 @@ import pytest
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_desk import Answer, fresh_desk
-from vla_deploy.planning.scope import scope_words
+from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.errors import CannotBeDone
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.scope import guarded, scope_words
+from vla_deploy.robots import load_robot
 
 PLAIN: Final = ("go to the kitchen", "bring me the red cup", "put the ball in the box")
 CHANGES: Final = (
@@ -68,3 +73,29 @@ def test_the_question_names_what_may_not_be_understood() -> None:
     answer = asked("go to the kitchen before dinner")
     assert answer.outcome in ("ask", "refuse")
     assert re.search(r"before|later|time|sure|leave out|understand", answer.text), answer.text
+
+
+def proposed(skill: str = "navigate_to", **changes: object) -> Proposal:
+    plan = Plan(goal="g", summary="go to the kitchen", actions=(Action(id="a", skill=skill),))
+    return Proposal(plan=plan, rung="test", confidence=1.0, **changes)
+
+
+def request_for(text: str) -> Request:
+    return Request(command_id="c", text=text, world=world_of(load_robot("butler"), {}))
+
+
+def test_a_language_model_is_asked_about_what_others_are_refused_for() -> None:
+    request = request_for("don't go to the kitchen")
+    with pytest.raises(CannotBeDone, match="don't"):
+        guarded(proposed(), request)
+    assert guarded(proposed(knows_grammar=True), request).read_back == (
+        'You said "don\'t", which I may not have understood. Shall I go to the kitchen?'
+    )
+
+
+def test_what_a_plan_covers_or_what_moves_nothing_is_not_asked_about() -> None:
+    request = request_for("go to the kitchen before dinner")
+    assert guarded(proposed(covers=frozenset({"before"})), request).read_back == ""
+    assert guarded(proposed(covers=None), request).read_back == ""
+    assert guarded(proposed("speak"), request).read_back == ""
+    assert "before" in guarded(proposed(), request).read_back

@@ -93,6 +93,7 @@ class ChatRung:
             confidence=round(confidence, 3),
             read_back="" if confidence >= SURE else asked,
             saw_scene=True,
+            knows_grammar=True,
         )
 
 

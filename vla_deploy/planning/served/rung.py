@@ -110,6 +110,7 @@ class ServedRung:
             confidence=choice.confidence,
             read_back=Says.CONFIRM.format(steps=steps) if unsure else "",
             saw_scene=True,
+            knows_grammar=True,
             is_momentary=self._shown(request) is not None,
         )
 
