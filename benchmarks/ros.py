@@ -3,7 +3,8 @@
 The robot runs on its twin by the wall clock; a listener in a process of its own takes joint states
 at 100 Hz, odometry, frames, the scan, diagnostics, and both images at 10 Hz. Beside that: a node
 that publishes the same joint states and nothing else (`peer_core_share`), and control's late ticks
-of a robot without the gateway, in a run just before (`late_ratio_without`).
+of a robot without the gateway, in a run just before (`late_ratio_without`): `late_ticks_added` is
+what the gateway's run had more, of as many ticks.
 """
 
 import json
@@ -22,6 +23,7 @@ from benchmarks.command import parser, show
 from benchmarks.core import REALTIME_PRIORITY, realtime
 from benchmarks.live_robot import arm, live_stack
 from benchmarks.percentiles import percentile
+from platforms import load_profile
 from sim_twin.process_stack import ProcessStack
 from vla_deploy.cli.session import Session
 from vla_deploy.gateways.ros.launching import launch_environment
@@ -51,10 +53,14 @@ def measure(seconds: float) -> dict[str, Any]:
         options = ("--robot", str(robot), "--ros")
         with live_stack(folder, profile, *options) as (stack, session):
             arm(session)
-            return _with_gateway(stack, session, folder, seconds) | {
+            report = _with_gateway(stack, session, folder, seconds)
+            ticks = load_profile("desktop").control_rate_hz * seconds
+            added = max(0.0, report["late_ratio_with"] - without) * ticks
+            return report | {
                 "seconds": seconds,
                 "goal_core_share": GOAL_CORE_SHARE,
                 "late_ratio_without": without,
+                "late_ticks_added": round(added),
             }
 
 
