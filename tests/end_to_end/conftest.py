@@ -70,12 +70,6 @@ def make_stack_at_table(
 
 
 @pytest.fixture
-def stack_at_table(make_stack_at_table: Callable[[str], LockstepStack]) -> LockstepStack:
-    """The robot before the table, at the rates of the desktop's profile."""
-    return make_stack_at_table("desktop")
-
-
-@pytest.fixture
 def coarse_at_table(
     make_stack_at_table: Callable[[str], LockstepStack], coarse: str
 ) -> LockstepStack:

@@ -43,5 +43,5 @@ SIZES: Final[Mapping[str, Settings]] = {
     # Of the same shape: it can go on from where the other one ended.
     "long": Settings(name="long", budget_s=14_400.0),
     # For going on from a training that is finished: smaller steps.
-    "more": Settings(name="more", budget_s=3000.0, rate=1.2e-3, matrix_rate=0.009, seed=7),
+    "more": Settings(name="more", budget_s=4500.0, rate=1.2e-3, matrix_rate=0.009, seed=7),
 }

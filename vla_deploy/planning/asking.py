@@ -9,7 +9,7 @@ from vla_deploy.model_servers.picture import Image
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.prohibition import Order, Prohibition
+from vla_deploy.planning.prohibition import Prohibition, StandingOrder
 from vla_deploy.planning.understanding.conversation import Conversation
 from vla_deploy.world import Snapshot
 
@@ -77,7 +77,7 @@ class Proposal:
     origin: str = ""
     covers: frozenset[str] | None = frozenset()
     knows_grammar: bool = False
-    order: Order | None = None
+    order: StandingOrder | None = None
 
     def as_heard(self, heard_confidence: float | None) -> "Proposal":
         """Return it as unsure as its words were heard; None for words that were typed.

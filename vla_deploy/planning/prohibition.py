@@ -26,7 +26,7 @@ class Prohibition:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
+class StandingOrder:
     """Hold a command that forbids something, or permits it again."""
 
     forbids: bool

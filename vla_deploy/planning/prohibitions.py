@@ -18,7 +18,7 @@ from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.slots import THING, WORDS
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.prohibition import Forbidden, Order, Prohibition
+from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic.subjects import subject_of
 from vla_deploy.world import Snapshot
@@ -35,7 +35,7 @@ class Prohibitions:
         self._file = file
         self.items: tuple[Prohibition, ...] = _read(file) if file is not None else ()
 
-    def apply(self, order: Order) -> None:
+    def apply(self, order: StandingOrder) -> None:
         """Forbid, or permit again; the oldest of too many go."""
         kept = tuple(one for one in self.items if one != order.of)
         self.items = (*kept, order.of)[-MOST:] if order.forbids else kept
@@ -71,7 +71,7 @@ _PERMITS: Final = tuple(
 )
 
 
-def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Order | None:
+def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> StandingOrder | None:
     """Return what a command forbids for good, or permits again; None for any other command.
 
     What stands already is what may be permitted: "you can go to the kitchen" is a command, too.
@@ -82,7 +82,7 @@ def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Orde
             found = pattern.fullmatch(clause)
             meant = _meant(found.groupdict(), world) if found is not None else None
             if meant is not None and (forbids or meant in standing):
-                return Order(forbids=forbids, of=meant)
+                return StandingOrder(forbids=forbids, of=meant)
     return None
 
 

@@ -15,7 +15,7 @@ from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import CannotBeDone
 
 
-class Scope(StrEnum):
+class ScopeGroup(StrEnum):
     """Group the words by what they do to a command."""
 
     NEGATION = "negation"
@@ -23,25 +23,24 @@ class Scope(StrEnum):
     CONDITION = "condition"
     ALTERNATIVE = "alternative"
     QUANTITY = "quantity"
-    PERSON = "person"
 
 
-WORDS: Final[Mapping[Scope, frozenset[str]]] = {
-    Scope.NEGATION: frozenset(
+WORDS: Final[Mapping[ScopeGroup, frozenset[str]]] = {
+    ScopeGroup.NEGATION: frozenset(
         {"not", "never", "no", "none", "nobody", "nothing", "nowhere", "without", "cannot", "avoid",
          "refrain", "neither", "nor", "forbidden"}
     ),
-    Scope.EXCEPTION: frozenset(
+    ScopeGroup.EXCEPTION: frozenset(
         {"but", "except", "excepting", "excluding", "only", "instead", "rather", "besides", "apart",
          "aside", "than"}
     ),
-    Scope.CONDITION: frozenset(
+    ScopeGroup.CONDITION: frozenset(
         {"if", "unless", "until", "till", "when", "whenever", "once", "before", "after", "while",
          "whether", "provided", "later", "tomorrow", "tonight", "afterwards", "every", "always",
          "o'clock", "noon", "midnight"}
     ),
-    Scope.ALTERNATIVE: frozenset({"or", "either", "otherwise"}),
-    Scope.QUANTITY: frozenset(
+    ScopeGroup.ALTERNATIVE: frozenset({"or", "either", "otherwise"}),
+    ScopeGroup.QUANTITY: frozenset(
         {"all", "both", "each", "another", "again", "twice", "times", "everything"}
     ),
 }  # fmt: skip
@@ -89,7 +88,7 @@ _STILL: Final = frozenset({"speak", "wait", "stop", "look_at"})
 
 def scope_words(text: str) -> tuple[str, ...]:
     """Return the words of a command that change its scope, in their order, idioms left out."""
-    said = text.lower().replace("’", "'")
+    said = _plain(text)
     called = _CALLED.match(said)
     name = called["name"] if called and called["name"] not in _NOT_NAMES else ""
     said = IDIOMS.sub(" ", said)
@@ -99,9 +98,13 @@ def scope_words(text: str) -> tuple[str, ...]:
     return (name, *words) if name else tuple(words)
 
 
-def group_of(word: str) -> Scope | None:
+def _plain(text: str) -> str:
+    return text.lower().replace("’", "'")
+
+
+def group_of(word: str) -> ScopeGroup | None:
     """Return what a word does to a command, None for nothing."""
-    return Scope.NEGATION if _NOT.search(word) else _GROUP.get(word)
+    return ScopeGroup.NEGATION if _NOT.search(word) else _GROUP.get(word)
 
 
 def guarded(proposal: Proposal, request: Request) -> Proposal:
@@ -115,10 +118,9 @@ def guarded(proposal: Proposal, request: Request) -> Proposal:
     left_out = _without(scope_words(request.text), proposal.covers)
     if not left_out:
         return proposal
-    groups = {group_of(word) or Scope.PERSON for word in left_out}
     listed = " and ".join(f'"{word}"' for word in dict.fromkeys(left_out))
-    is_denied = Scope.NEGATION in groups and _DENIED.match(request.text.lower().replace("’", "'"))
-    if is_denied and not proposal.knows_grammar:
+    denies = any(group_of(word) is ScopeGroup.NEGATION for word in left_out)
+    if denies and not proposal.knows_grammar and _DENIED.match(_plain(request.text)):
         raise CannotBeDone(f"I would leave out {listed}; say just what to do now")
     question = proposal.read_back or f"Shall I {proposal.plan.summary or 'do that'}?"
     asked = f"You said {listed}, which I may not have understood. {question}"

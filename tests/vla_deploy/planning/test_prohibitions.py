@@ -8,7 +8,7 @@ from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_desk import Desk, fresh_desk
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.prohibition import Forbidden, Order, Prohibition
+from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.prohibitions import Prohibitions, read_order
 from vla_deploy.robots import load_robot
 
@@ -31,21 +31,21 @@ def refused(desk: Desk, text: str) -> str:
 @pytest.mark.parametrize(
     ("text", "order"),
     [
-        ("don't touch the keys", Order(forbids=True, of=KEYS)),
-        ("Never ever touch my keys again!", Order(forbids=True, of=KEYS)),
-        ("please leave the keys alone", Order(forbids=True, of=KEYS)),
-        ("hands off the keys", Order(forbids=True, of=KEYS)),
-        ("stay out of the kitchen", Order(forbids=True, of=KITCHEN)),
-        ("never go into the kitchen again", Order(forbids=True, of=KITCHEN)),
+        ("don't touch the keys", StandingOrder(forbids=True, of=KEYS)),
+        ("Never ever touch my keys again!", StandingOrder(forbids=True, of=KEYS)),
+        ("please leave the keys alone", StandingOrder(forbids=True, of=KEYS)),
+        ("hands off the keys", StandingOrder(forbids=True, of=KEYS)),
+        ("stay out of the kitchen", StandingOrder(forbids=True, of=KITCHEN)),
+        ("never go into the kitchen again", StandingOrder(forbids=True, of=KITCHEN)),
         ("don't go to the kitchen", None),
-        ("you may touch the keys again", Order(forbids=False, of=KEYS)),
-        ("you can go into the kitchen", Order(forbids=False, of=KITCHEN)),
-        ("forget what I said about the kitchen", Order(forbids=False, of=KITCHEN)),
+        ("you may touch the keys again", StandingOrder(forbids=False, of=KEYS)),
+        ("you can go into the kitchen", StandingOrder(forbids=False, of=KITCHEN)),
+        ("forget what I said about the kitchen", StandingOrder(forbids=False, of=KITCHEN)),
         ("you can go into the bedroom", None),
         ("touch the keys", None),
     ],
 )
-def test_orders_are_read_from_whole_sentences(text: str, order: Order | None) -> None:
+def test_orders_are_read_from_whole_sentences(text: str, order: StandingOrder | None) -> None:
     assert read_order(text, WORLD, (KEYS, KITCHEN)) == order
 
 
@@ -85,10 +85,10 @@ def test_they_stand_after_a_restart_and_a_spoilt_file_is_no_end(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     file = tmp_path / "state" / "prohibitions.json"
-    Prohibitions(file).apply(Order(forbids=True, of=KEYS))
+    Prohibitions(file).apply(StandingOrder(forbids=True, of=KEYS))
     again = Prohibitions(file)
     assert again.items == (KEYS,)
-    again.apply(Order(forbids=False, of=KEYS))
+    again.apply(StandingOrder(forbids=False, of=KEYS))
     assert Prohibitions(file).items == ()
     for spoilt in ("{", "[1]", '[{"what": "mood", "words": "x"}]'):
         file.write_text(spoilt)

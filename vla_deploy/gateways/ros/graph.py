@@ -8,6 +8,7 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any, Final, Protocol
 
 import rclpy
@@ -31,7 +32,7 @@ MOST_WAITING: Final = 256
 SOURCE: Final = "ros"
 _NAME_LETTERS: Final = 44
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
-LOOKS: Final = 4
+_LOOKS: Final = 4
 """Steps in which the name of who sent something is looked for: a stop in words may wait for it."""
 _JOIN_S: Final = 2.0
 _log = logging.getLogger(__name__)
@@ -120,14 +121,28 @@ class GraphLink:
     ) -> None:
         """Subscribe; each message is taken in a step, with who sent it."""
 
-        def receive(message: Any, looks: int = LOOKS) -> None:
+        def receive(message: Any) -> None:
             sender = self.sender(topic)  # now: whoever sends once may be gone in a moment
-            if sender == SOURCE and looks:  # DDS tells a node's name after its publishers
-                self.put(lambda: receive(message, looks - 1))
+            if sender == SOURCE:
+                find = partial(self.sender, topic)
+                self.put(lambda: self.when_named(find, partial(take, message)))
             else:
                 self.put(lambda: take(message, sender))
 
-        self.node.create_subscription(kind, topic, lambda message: receive(message), qos)
+        self.node.create_subscription(kind, topic, receive, qos)
+
+    def when_named(
+        self, find: Callable[[], str], take: Callable[[str], None], looks: int = _LOOKS
+    ) -> None:
+        """Give `take`, in a step, the name that `find` returns.
+
+        DDS tells a node's name after its publishers and clients, so some steps are waited for it.
+        """
+        name = find()
+        if name == SOURCE and looks:
+            self.put(lambda: self.when_named(find, take, looks - 1))
+        else:
+            take(name)
 
     def sender(self, topic: str) -> str:
         """Return who publishes a topic beside us, for logs and the audit trail.

@@ -4,11 +4,12 @@ Grounding resolves the words and puts in the way there, so a step says only what
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
+from vla_deploy.planning.plan import Action, Priority
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
@@ -51,6 +52,23 @@ _SAYS_MORE: Final = re.compile(
     r"|^(?:two|three|four|both|all|some|an? (?:couple|pair) of)\b"
 )
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
+
+
+def chained(
+    steps: Sequence[Step], priorities: Sequence[Priority] | None = None
+) -> tuple[Action, ...]:
+    """Return the actions of steps, one after the other; each of medium priority by default."""
+    ranks = priorities or [Priority.MEDIUM] * len(steps)
+    return tuple(
+        Action(
+            id=f"a{number}",
+            skill=skill,
+            parameters=dict(parameters),
+            depends_on=(f"a{number - 1}",) if number > 1 else (),
+            priority=rank,
+        )
+        for number, ((skill, parameters), rank) in enumerate(zip(steps, ranks, strict=True), 1)
+    )
 
 
 def parts_of(text: str) -> list[str]:

@@ -49,15 +49,7 @@ class Steps(Spoken):
             PlanInvalid: an amount is none.
         """
         skills = [skill for step in steps for skill in _HANDLERS[step["do"]](self, step)]
-        return tuple(
-            Action(
-                id=f"a{number}",
-                skill=skill,
-                parameters=dict(parameters),
-                depends_on=(f"a{number - 1}",) if number > 1 else (),
-            )
-            for number, (skill, parameters) in enumerate(skills, start=1)
-        )
+        return building.chained(skills)
 
 
 def are_of_the_moment(steps: Sequence[Step]) -> bool:
@@ -66,6 +58,8 @@ def are_of_the_moment(steps: Sequence[Step]) -> bool:
 
 
 def _go(spoken: Spoken, step: Step) -> list[Skill]:
+    if "else" in step:
+        raise CannotBeDone("every place that I know is there: say to which one I shall go")
     where = step["where"]
     if where in _SPEAKERS:
         return [("navigate_to", {"place": "here"})]
@@ -192,6 +186,8 @@ def _ask(spoken: Spoken, step: Step) -> list[Skill]:
 
 
 def _tidy(spoken: Spoken, step: Step) -> list[Skill]:
+    if "except" in step:
+        raise CannotBeDone("I tidy up all or nothing; say what goes where")
     place = {"place": spoken.spoken(step, "where")} if "where" in step else {}
     return tidying.tidy(place, spoken.request)
 
@@ -237,8 +233,10 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "ask": _ask,
     "tidy": _tidy,
     "await": lambda _spoken, _step: [],
-    "forbid": _refused(CannotBeDone, "I cannot keep such an order yet"),
-    "permit": _refused(CannotBeDone, "nothing was forbidden"),
+    "forbid": _refused(
+        CannotBeDone, 'say it as "don\'t touch the keys", "keep out of the kitchen"'
+    ),
+    "permit": _refused(CannotBeDone, 'say it as "you may touch the keys again"'),
     "nothing": _refused(CannotBeDone, "it says what not to do, so I leave it"),
     "impossible": _refused(CannotBeDone, "none of my skills does that"),
     "unknown": _refused(Declined, "it is no command that I know"),

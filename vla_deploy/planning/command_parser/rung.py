@@ -37,7 +37,7 @@ from vla_deploy.planning.command_parser.wording import (
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.scope import WORDS, Scope
+from vla_deploy.planning.scope import WORDS, ScopeGroup
 
 NAME: Final = "command_parser"
 KNOWN_WORDS: Final = "known_words.txt"
@@ -180,13 +180,12 @@ def known_words(folder: Path) -> frozenset[str]:
 
 # Which words that change a command's scope a field or a step stands for, besides what it copies.
 _STANDS_FOR: Final[Mapping[str, frozenset[str]]] = {
-    "except": WORDS[Scope.EXCEPTION] | WORDS[Scope.NEGATION],
-    "else": WORDS[Scope.ALTERNATIVE] | {"if"},
+    "except": WORDS[ScopeGroup.EXCEPTION] | WORDS[ScopeGroup.NEGATION],
+    "else": WORDS[ScopeGroup.ALTERNATIVE] | {"if"},
     "see": frozenset({"if", "whether", "when"}),
-    "await": frozenset({"when", "until", "till", "before", "once"}),
-    "forbid": WORDS[Scope.NEGATION],
+    "forbid": WORDS[ScopeGroup.NEGATION],
     "permit": frozenset({"again"}),
-    "nothing": WORDS[Scope.NEGATION],
+    "nothing": WORDS[ScopeGroup.NEGATION],
 }
 
 

@@ -7,16 +7,16 @@ from typing import Final
 from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Proposal, Request
-from vla_deploy.planning.builders.steps import Groups, Step
+from vla_deploy.planning.builders.steps import Groups, Step, chained
 from vla_deploy.planning.correction import corrected_by, correction_in
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.repeating import is_again, recalled, repeated
+from vla_deploy.planning.patterns.repeating import can_repeat, is_again, recalled, repeated
 from vla_deploy.planning.patterns.slots import is_place, is_thing
 from vla_deploy.planning.patterns.table import PATTERNS, Pattern
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import Action, Plan, Priority
 from vla_deploy.planning.prohibitions import read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
@@ -60,7 +60,7 @@ def pattern_plan(request: Request) -> Plan:
     said = clauses(request.text)
     if len(said) == 1 and is_again(said[0]):
         return repeated(request)
-    if correction_in(request.text) and request.conversation.turns:
+    if correction_in(request.text) and can_repeat(request):
         plan = corrected_by(repeated(request), request.text)
         if plan is not None:
             return plan
@@ -74,7 +74,7 @@ def pattern_plan(request: Request) -> Plan:
     for clause in said:
         pattern, groups = _fitting(clause, request)
         built += [(step, pattern.intent) for step in pattern.build(groups, request)]
-    return Plan(goal=goal, summary=_summary(built), actions=_chain(built))
+    return Plan(goal=goal, summary=_summary(built), actions=chained(*_ranked(built)))
 
 
 def plan_command(text: str, world: World, here: tuple[float, float, float] | None = None) -> Plan:
@@ -115,17 +115,8 @@ def _are_known(groups: Groups, request: Request) -> bool:
     return is_known and (is_place(where, places) or is_thing(where) or where in _THERE)
 
 
-def _chain(built: Sequence[tuple[Step, Intent]]) -> tuple[Action, ...]:
-    return tuple(
-        Action(
-            id=f"a{number}",
-            skill=skill,
-            parameters=parameters,
-            depends_on=(f"a{number - 1}",) if number > 1 else (),
-            priority=PRIORITIES[intent],
-        )
-        for number, ((skill, parameters), intent) in enumerate(built, start=1)
-    )
+def _ranked(built: Sequence[tuple[Step, Intent]]) -> tuple[list[Step], list[Priority]]:
+    return [step for step, _ in built], [PRIORITIES[intent] for _, intent in built]
 
 
 def _summary(built: Sequence[tuple[Step, Intent]]) -> str:

@@ -10,7 +10,7 @@ _VERBS: Final = (
     "find|search|open|close|wait|say|tuck|tidy|tell|stop|return|lay|hold|locate|lift"
 )
 _BEFORE: Final = re.compile(
-    r"(?:(?:please|robot|butler|hey|hello|hi|ok|okay|well|so|now|just|and|then|next|also|"
+    r"^(?:(?:please|robot|butler|hey|hello|hi|ok|okay|well|so|now|just|and|then|next|also|"
     r"(?:can|could|would|will) you(?: please| kindly)?|i(?:'d| would) like you to|i want you to|"
     r"i need you to|would you mind|go ahead and|be so kind(?: as to)?(?: and)?|first(?= \w))"
     r"[, ]+)+"
@@ -29,13 +29,15 @@ def clauses(text: str) -> tuple[str, ...]:
     """Return the clauses of a command in their order; none of a text that is too long."""
     if len(text) > MOST_LETTERS:
         return ()
-    said = " ".join(text.lower().replace("’", "'").split()).strip(" .!?,")
-    parts = tuple(filter(None, map(courtesy_off, _JOINT.split(said))))
+    parts = tuple(filter(None, map(courtesy_off, _JOINT.split(plain(text)))))
     return parts if len(parts) <= MOST_CLAUSES else ()
 
 
 def courtesy_off(text: str) -> str:
     """Return a clause in lower case without what only asks nicely."""
-    said = " ".join(text.lower().replace("’", "'").split()).strip(" .!?,")
-    said = _BEFORE.sub("", said, count=1) if _BEFORE.match(said) else said
-    return _BEHIND.sub("", said).strip(" .!?,")
+    return plain(_BEHIND.sub("", _BEFORE.sub("", plain(text))))
+
+
+def plain(text: str) -> str:
+    """Return a text in lower case, with one space between words and no marks around."""
+    return " ".join(text.lower().replace("’", "'").split()).strip(" .!?,")

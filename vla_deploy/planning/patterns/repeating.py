@@ -108,6 +108,13 @@ def is_again(text: str) -> bool:
     return _AGAIN.fullmatch(text) is not None
 
 
+def can_repeat(request: Request) -> bool:
+    """Tell whether the command before this one was carried out, or is."""
+    last = next(iter(request.conversation.turns[-1:]), None)
+    is_done = last is not None and last.outcome in (Outcome.UNDER_WAY, Outcome.SUCCEEDED)
+    return is_done and last is not None and last.plan is not None
+
+
 def repeated(request: Request) -> Plan:
     """Return the plan of the command before this one, without what grounding has put in.
 
@@ -133,7 +140,7 @@ def _last(request: Request) -> Turn:
     if not turns:
         raise NothingBefore("there is no command yet that I could repeat; say the whole command")
     last = turns[-1]
-    if last.outcome not in (Outcome.UNDER_WAY, Outcome.SUCCEEDED) or last.plan is None:
+    if not can_repeat(request):
         raise NothingBefore(
             f'"{last.said[:60]}" was not done ({last.outcome.value}), so I do not repeat it; '
             "say the whole command"

@@ -32,7 +32,8 @@ _STANDS: Final = (
 _SEVERAL: Final = (
     rf"(?:both|all)(?: of)?(?: the| my| our)? (?:{_LOOK} )?{KIND}s?|everything(?:{_STANDS})?"
 )
-THING: Final = rf"(?:(?:{_ONE})(?:{_STANDS})?|{_SEVERAL}|{_UNKNOWN})"
+_KNOWN: Final = rf"(?:{_ONE})(?:{_STANDS})?|{_SEVERAL}"
+THING: Final = rf"(?:{_KNOWN}|{_UNKNOWN})"
 THINGS: Final = rf"{THING}(?:(?:,| and|, and) {THING})*"
 WORDS: Final = r"[a-z][a-z']*(?: [a-z']+){0,4}?"
 METRES: Final = (
@@ -43,7 +44,7 @@ SECONDS: Final = rf"{NUMBER}(?: of a| an?)? ?(?:seconds?|secs?|s|minutes?|mins?|
 HAND: Final = (
     r"(?:your |the )?(?:(?P<arm>left|right) )?(?:hand|gripper|claw|fingers|hands|grippers)"
 )
-_IS_THING: Final = re.compile(rf"(?:{_ONE})(?:{_STANDS})?|{_SEVERAL}")
+_IS_THING: Final = re.compile(_KNOWN)
 
 
 def is_place(text: str, places: Mapping[str, str]) -> bool:

@@ -4,12 +4,14 @@ import re
 from typing import Final
 
 from vla_deploy.planning.bounds import MOST_CHARACTERS
+from vla_deploy.planning.patterns.phrase import courtesy_off
 
 STOP_PHRASES: Final = frozenset(
     {
         "stop", "halt", "freeze", "cancel", "abort", "whoa", "enough", "emergency stop",
         "stop it", "stop that", "stop there", "stop right there", "stop moving", "stop all",
-        "stop everything", "stop what you are doing", "stop what you're doing", "hold it",
+        "stop everything", "stop what you are doing", "stop what you're doing",
+        "stop what youre doing", "hold it",
         "don't move", "do not move", "dont move", "stand still", "hold still", "cancel it",
         "cancel that", "cancel everything", "abort mission", "never mind", "nevermind", "forget it",
     }
@@ -30,8 +32,7 @@ def is_stop(text: str) -> bool:
     """Tell whether a command means: stop what you are doing."""
     if len(text) > MOST_CHARACTERS:
         return False
-    said = [" ".join(part.split()) for part in _SENTENCE.split(text.lower().replace("’", "'"))]
-    bare = [_urged_off(part) for part in said if part]
+    bare = [_urged_off(courtesy_off(part)) for part in _SENTENCE.split(text)]
     return any(bare) and all(map(_is_stop, filter(None, bare)))
 
 

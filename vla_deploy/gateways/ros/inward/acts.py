@@ -6,6 +6,7 @@ A press of the stop does not wait for a step of the gateway.
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from rclpy.task import Future
@@ -15,7 +16,6 @@ from std_srvs.srv import Trigger
 from drivers.clock import NS_PER_S
 from vla_deploy.client.acts import REACHED, why_not
 from vla_deploy.client.link import RobotLink
-from vla_deploy.gateways.ros.graph import LOOKS, SOURCE
 from vla_deploy.gateways.ros.part import Gateway
 from vla_deploy.ipc.stop_button import ESTOP
 
@@ -80,13 +80,15 @@ class Acts:
 
         return handle
 
-    def _take(self, asked: _Asked, looks: int = LOOKS) -> None:
-        if asked.act != ESTOP:
-            caller = self._gateway.graph.caller(asked.service)
-            if caller == SOURCE and looks:  # its client may not have been discovered yet
-                self._gateway.graph.put(lambda: self._take(asked, looks - 1))
-                return
-            self._gateway.link.operate(asked.act, "over ROS", caller)
+    def _take(self, asked: _Asked) -> None:
+        graph = self._gateway.graph
+        if asked.act == ESTOP:
+            self._asked.append(asked)
+        else:
+            graph.when_named(partial(graph.caller, asked.service), partial(self._operate, asked))
+
+    def _operate(self, asked: _Asked, caller: str) -> None:
+        self._gateway.link.operate(asked.act, "over ROS", caller)
         self._asked.append(asked)
 
     def _pressed(self, message: Bool) -> None:
