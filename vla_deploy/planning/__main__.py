@@ -8,6 +8,7 @@ from vla_deploy.aside import beside
 from vla_deploy.node import NodeContext
 from vla_deploy.planning.assembly import open_memory, planner_for
 from vla_deploy.planning.node import PlannerNode
+from vla_deploy.planning.prohibitions import Prohibitions
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 
@@ -21,7 +22,8 @@ def build(context: NodeContext) -> PlannerNode:
     profile, base = load_profile(context.profile), context.run_dir.parent
     planner = planner_for(robot, profile, context.clock, base, run_dir=context.run_dir)
     memory = open_memory(profile.planning, base)
-    return PlannerNode(context, robot, planner, beside("plan", context.clock, PLANNING_S), memory)
+    aside = beside("plan", context.clock, PLANNING_S)
+    return PlannerNode(context, robot, planner, aside, memory, Prohibitions.of_base(base))
 
 
 if __name__ == "__main__":

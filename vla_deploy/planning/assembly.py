@@ -15,10 +15,8 @@ from vla_deploy.one_line import one_line
 from vla_deploy.planning.asking import Rung
 from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.planner import Planner, checked
-from vla_deploy.planning.prohibitions import FILE_NAME, Prohibitions
 from vla_deploy.planning.served.rung import Effort, ServedRung
 from vla_deploy.robots import RobotDescription
-from vla_deploy.state_dir import state_dir_of
 
 _log = logging.getLogger(__name__)
 
@@ -65,8 +63,7 @@ def open_planner(
     for name in away.keys() - (models_away or {}).keys():
         _log.warning("planning does without server %s: %s", name, away[name])
     slow = (*on_board, *servers)[: settings.max_rungs]
-    prohibitions = Prohibitions(state_dir_of(base) / FILE_NAME)
-    return Planner(clock, slow, within_s=settings.within_s, away=away, prohibitions=prohibitions)
+    return Planner(clock, slow, within_s=settings.within_s, away=away)
 
 
 def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:

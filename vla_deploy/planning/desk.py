@@ -24,6 +24,7 @@ from vla_deploy.planning.ladder import Answer
 from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
+from vla_deploy.planning.prohibitions import Prohibitions
 from vla_deploy.planning.recovery import recover
 from vla_deploy.planning.rehearing import Rehearing
 from vla_deploy.planning.situation import Situation
@@ -48,6 +49,7 @@ class Desk:
         aside: Executor,
         clock: Clock,
         further_plans: int = NOT_BOUNDED.further_plans,
+        prohibitions: Prohibitions | None = None,
     ) -> None:
         self.planner = planner
         self.dialogue = Dialogue(clock)
@@ -58,9 +60,9 @@ class Desk:
         self._queue: deque[Command] = deque()
         self._under_way = UnderWay(further_plans)
         self._rehearing = Rehearing(clock)
+        self._prohibitions = prohibitions or Prohibitions()
         self._conclusions = Conclusions(
-            # Another profile brings another planner.
-            lambda request, answer: self.planner.accepted(request, answer),
+            self._accept,
             situation,
             telling,
             self.dialogue,
@@ -152,6 +154,7 @@ class Desk:
             "commands": [one.command_id for one in (*held, *self._queue)],
             "question": None if waiting is None else waiting.question.text,
             **self.planner.document(),
+            "prohibitions": self._prohibitions.document(),
         }
 
     def _begin(self, command: Command) -> None:
@@ -217,9 +220,15 @@ class Desk:
             self.accounts.failed += 1
             self._conclusions.refuse(command, f"the planner failed: {type(error).__name__}")
 
+    def _accept(self, request: Request, answer: Answer) -> None:
+        """Obey an order from now on, whatever planner another profile brings."""
+        if answer.proposal is not None and answer.proposal.order is not None:
+            self._prohibitions.apply(answer.proposal.order)
+        self.planner.accepted(request, answer)
+
     def _request(self, command: Command) -> Request:
         request = self._situation.request(command, self.dialogue.talk, of_use=self.planner.uses)
-        return replace(request, prohibitions=self.planner.prohibitions.items)
+        return replace(request, prohibitions=self._prohibitions.items)
 
     # --- answers --------------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from vla_deploy.planning.errors import NotReady, PlanningError
 from vla_deploy.planning.inbox import Command, asks_to_stop, command_id_of, read_command
 from vla_deploy.planning.left_over import LeftOver, left_over
 from vla_deploy.planning.planner import Planner
+from vla_deploy.planning.prohibitions import Prohibitions
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.robots import RobotDescription
@@ -42,6 +43,7 @@ class PlannerNode:
         planner: Planner | None = None,
         aside: Executor | None = None,
         memory: MemoryStore | None = None,
+        prohibitions: Prohibitions | None = None,
     ) -> None:
         self._space = SharedSpace(context.run_dir / "ipc", context.clock)
         self._clock = context.clock
@@ -50,6 +52,7 @@ class PlannerNode:
         self._planner = planner or Planner(context.clock)
         self._aside = aside or AtOnce()
         self._memory = memory
+        self._prohibitions = prohibitions
         self._run_id = context.run_dir.name
         self._keeper: MemoryKeeper | None = None
         self._status_due_ns = 0
@@ -77,6 +80,7 @@ class PlannerNode:
             self._aside,
             self._clock,
             self._robot.planning.further_plans,
+            self._prohibitions,
         )
         self._status = self._space.cell_writer("planner_status")
         self._take_up(before)

@@ -15,7 +15,7 @@ from vla_deploy.planning.ladder import Answer, Check, Ladder
 from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
-from vla_deploy.planning.prohibitions import Prohibitions, refuse_forbidden
+from vla_deploy.planning.prohibitions import refuse_forbidden
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
@@ -78,9 +78,7 @@ class Planner:
         within_s: float = WITHIN_S,
         check: Check = checked,
         away: Mapping[str, str] | None = None,
-        prohibitions: Prohibitions | None = None,
     ) -> None:
-        self.prohibitions = prohibitions or Prohibitions()
         self.cache = PlanCache(clock)
         self.within_s = within_s
         self.away = dict(away or {})
@@ -117,7 +115,6 @@ class Planner:
             "cache": self.cache.document(),
             "servers": servers,
             "away": self.away,
-            "prohibitions": [str(one) for one in self.prohibitions.items],
         }
 
     def close(self) -> None:
@@ -147,13 +144,8 @@ class Planner:
         return Ladder((_GivenPlan(document),), self.check, self._clock).climb(request, deadline)
 
     def accepted(self, request: Request, answer: Answer) -> None:
-        """Remember a plan that was handed on, and obey an order from now on.
-
-        What patterns make is made anew as fast.
-        """
+        """Remember a plan that was handed on; what patterns make is made anew as fast."""
         proposal = answer.proposal
-        if proposal is not None and proposal.order is not None:
-            self.prohibitions.apply(proposal.order)
         if proposal is not None and proposal.rung not in _NOT_KEPT:
             self.cache.keep(request, proposal)
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
 from vla_deploy.planning.builders.tidying import surfaces_of
 from vla_deploy.planning.errors import NotAble, UnknownObject
@@ -21,6 +21,7 @@ from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 
 FILE_NAME: Final = "prohibitions.json"
@@ -34,6 +35,15 @@ class Prohibitions:
     def __init__(self, file: Path | None = None) -> None:
         self._file = file
         self.items: tuple[Prohibition, ...] = _read(file) if file is not None else ()
+
+    @classmethod
+    def of_base(cls, base: Path) -> Self:
+        """Return those of a runtime directory."""
+        return cls(state_dir_of(base) / FILE_NAME)
+
+    def document(self) -> list[str]:
+        """Return what is forbidden, as one says it."""
+        return [str(one) for one in self.items]
 
     def apply(self, order: StandingOrder) -> None:
         """Forbid, or permit again; the oldest of too many go."""

@@ -7,7 +7,9 @@ import pytest
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_desk import Desk, fresh_desk
+from drivers.clock import MonotonicClock
 from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.planner import Planner
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.prohibitions import Prohibitions, read_order
 from vla_deploy.robots import load_robot
@@ -79,6 +81,14 @@ def test_a_plan_of_somebody_else_is_held_to_it_too() -> None:
         plan = {"goal": "keys", "actions": [{"id": "a", "skill": "pick_up",
                                              "parameters": {"object": "keys_1"}}]}  # fmt: skip
         assert desk.hand_in(plan)[1].outcome == "refuse"
+
+
+def test_another_profiles_planner_holds_to_it_too() -> None:
+    with fresh_desk() as desk:
+        in_the_flat(desk)
+        desk.say("stay out of the kitchen")
+        desk.node.commit(Planner(MonotonicClock()))
+        refused(desk, "go to the kitchen")
 
 
 def test_they_stand_after_a_restart_and_a_spoilt_file_is_no_end(
