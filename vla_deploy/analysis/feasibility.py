@@ -1,8 +1,6 @@
-"""Judge whether a goal in words can be reached, by planning it with patterns and going through it.
+"""Judge by measurement whether actions can be done, from how the world is now."""
 
-One action of a plan is judged in the same way, without the planning.
-"""
-
+from collections.abc import Sequence
 from typing import Final
 
 from vla_deploy.analysis.abilities import Abilities
@@ -10,61 +8,40 @@ from vla_deploy.analysis.document import Feasible, Task
 from vla_deploy.analysis.outlook import MOST_ALTERNATIVES, CannotBe, Outlook
 from vla_deploy.analysis.question import Question
 from vla_deploy.analysis.steps import judge_step
-from vla_deploy.planning.errors import NotUnderstood, PlanningError
-from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.patterns.backend import plan_command
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import Action
 
 _DIGITS: Final = 3
 
 
-def judge_goal(question: Question, abilities: Abilities) -> Task:
-    """Return the verdict on the question's goal."""
-    outlook = _outlook(question, abilities)
+def judge_action(action: Action, question: Question, abilities: Abilities) -> Task:
+    """Return the verdict on one action of a plan."""
+    return judge_actions((action,), question, outlook_of(question, abilities))
+
+
+def judge_actions(actions: Sequence[Action], question: Question, outlook: Outlook) -> Task:
+    """Return the verdict on actions that follow each other."""
     try:
-        plan = _plan(question, abilities, outlook)
-    except NotUnderstood as error:
-        return _task(question, outlook, Feasible.UNKNOWN, 0.0, str(error))
-    except PlanningError as error:
-        return _task(question, outlook, Feasible.NO, 1.0, str(error))
-    try:
-        for action in plan.actions:
+        for action in actions:
             judge_step(action.skill, action.parameters, outlook)
     except CannotBe as found:
-        return _task(question, outlook, Feasible.NO, found.belief, str(found))
-    return _summed_up(question, outlook, len(plan.actions))
-
-
-def judge_action(action: Action, question: Question, abilities: Abilities) -> Task:
-    """Return the verdict on one action of a plan, from how the world is now."""
-    outlook = _outlook(question, abilities)
-    try:
-        judge_step(action.skill, action.parameters, outlook)
-    except CannotBe as found:
-        return _task(question, outlook, Feasible.NO, found.belief, str(found))
-    return _summed_up(question, outlook, 1)
+        return task_of(question, outlook, Feasible.NO, found.belief, str(found))
+    return _summed_up(question, outlook, len(actions))
 
 
 def _summed_up(question: Question, outlook: Outlook, steps: int) -> Task:
     if outlook.unseen:
         unseen = " and ".join(f"the {one}" for one in outlook.unseen)
         reason = f"{unseen} must be found first; what comes after cannot be judged"
-        return _task(question, outlook, Feasible.UNKNOWN, 0.0, reason)
+        return task_of(question, outlook, Feasible.UNKNOWN, 0.0, reason)
     if outlook.prerequisites:
         reason = "something must be done before"
-        return _task(question, outlook, Feasible.AFTER_PREREQUISITES, outlook.belief, reason)
+        return task_of(question, outlook, Feasible.AFTER_PREREQUISITES, outlook.belief, reason)
     reason = f"{steps} steps, and nothing in their way"
-    return _task(question, outlook, Feasible.YES, outlook.belief, reason)
+    return task_of(question, outlook, Feasible.YES, outlook.belief, reason)
 
 
-def _plan(question: Question, abilities: Abilities, outlook: Outlook) -> Plan:
-    robot = question.world.robot
-    here = None if robot is None else (robot.x_m, robot.y_m, robot.yaw_rad)
-    world = World(places=abilities.spoken, poses=abilities.poses, holding=outlook.holding)
-    return plan_command(question.goal, world, here)
-
-
-def _outlook(question: Question, abilities: Abilities) -> Outlook:
+def outlook_of(question: Question, abilities: Abilities) -> Outlook:
+    """Return what is known before the first step."""
     robot = question.world.robot
     held = next((thing for thing in question.world.things if thing.held_by), None)
     holding = {name: question.holding.get(name) for name in abilities.body.hands}
@@ -80,9 +57,10 @@ def _outlook(question: Question, abilities: Abilities) -> Outlook:
     )
 
 
-def _task(
+def task_of(
     question: Question, outlook: Outlook, feasible: Feasible, belief: float, reason: str
 ) -> Task:
+    """Return the verdict with what the steps have found."""
     alternatives = tuple(dict.fromkeys(outlook.alternatives))[:MOST_ALTERNATIVES]
     return Task(
         goal=question.goal,

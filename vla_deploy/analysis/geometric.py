@@ -5,7 +5,7 @@ from typing import Final
 from vla_deploy.analysis.abilities import Abilities
 from vla_deploy.analysis.describing import objects_of, relations_between
 from vla_deploy.analysis.document import SceneAnalysis
-from vla_deploy.analysis.feasibility import judge_goal
+from vla_deploy.analysis.goal_feasibility import judge_goal
 from vla_deploy.analysis.question import Question
 
 GEOMETRIC: Final = "geometric"
