@@ -96,7 +96,9 @@ def _strongest_level(z: Floats, area: Floats, known: Sequence[KnownSurface]) -> 
         return None
     bins = np.floor(z / BIN_M).astype(np.int64)
     first = int(bins.min())
-    histogram = np.convolve(np.bincount(bins - first, weights=area), np.ones(3), mode="same")
+    # Padded: "same" would shift what is shorter than the kernel.
+    bins_around = np.pad(np.bincount(bins - first, weights=area), 1)
+    histogram = np.convolve(bins_around, np.ones(3), mode="valid")
     levels = (first + np.arange(histogram.size) + 0.5) * BIN_M
     needed = np.full(histogram.size, MIN_AREA_M2)
     for one in known:
