@@ -25,6 +25,7 @@ SUNK = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(200)
 def test_arms_that_lie_under_a_table_are_drawn_out_before_they_rise(
     make_stack: Callable[[int], LockstepStack],

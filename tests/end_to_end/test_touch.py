@@ -56,6 +56,7 @@ def test_a_cup_that_is_nudged_under_the_hand_is_taken_all_the_same(stack: Lockst
     assert CUP in stack.lockstep.truth()["held"]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_cup_that_comes_down_on_the_rim_of_a_box_is_raised_and_put_into_it(
     coarse_at_table: LockstepStack,

@@ -1,8 +1,9 @@
 """Take serialised messages from the graph, as a recorder does; run by ROS's interpreter.
 
-    bag_client.py SECONDS
+    bag_client.py SECONDS TOPIC...
 
-prints one JSON document: of each topic its type, the type's hash, and messages in base64.
+prints one JSON document: of each topic its type, the type's hash, and messages in base64. It ends
+when each of the named topics has given a message, at the latest after so many seconds.
 """
 
 import base64
@@ -24,8 +25,10 @@ def main() -> None:
     node = Node("recorder")
     told: dict[str, dict[str, object]] = {}
     begun_s = time.monotonic()
-    span_s = float(sys.argv[1])
+    span_s, awaited = float(sys.argv[1]), sys.argv[2:]
     while time.monotonic() < begun_s + span_s:
+        if all(told.get(topic, {}).get("data") for topic in awaited):
+            break
         for topic, types in node.get_topic_names_and_types():
             infos = node.get_publishers_info_by_topic(topic)
             if "/msg/" not in types[0]:  # of an action

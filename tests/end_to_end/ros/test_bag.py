@@ -34,7 +34,7 @@ def types() -> Any:
 def test_a_bag_of_all_that_is_told_is_read_by_others(
     robot: ProcessStack, ros_graph: Any, types: Any, tmp_path: Path
 ) -> None:
-    told = ros_graph.run(CLIENT, "25", timeout_s=300.0)
+    told = ros_graph.run(CLIENT, "60", *sorted(EXPECTED), timeout_s=300.0)
     assert told.keys() >= EXPECTED
     hashes = {topic: (one["type"], one["hash"]) for topic, one in told.items()}
     assert {topic: types.hash_rihs01(kind) for topic, (kind, _) in hashes.items()} == {

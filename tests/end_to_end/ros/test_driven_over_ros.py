@@ -116,7 +116,9 @@ def test_a_dead_sender_of_velocities_leaves_a_base_that_stands_within_half_a_sec
     assert robot.state() == "armed"
 
 
-@pytest.mark.parametrize("hit", [ProcessStack.kill, ProcessStack.freeze])
+@pytest.mark.parametrize(
+    "hit", [ProcessStack.kill, pytest.param(ProcessStack.freeze, marks=pytest.mark.slow)]
+)
 def test_a_dead_or_frozen_gateway_leaves_a_safe_robot_and_comes_back(
     robot: ProcessStack,
     ros_graph: Any,
