@@ -101,26 +101,23 @@ def _put_down(groups: building.Groups, _: Request) -> list[Skill]:
 
 
 def _bring(spoken: Spoken, step: Step) -> list[Skill]:
-    way, behind = spoken.source(step)
-    brought: list[Skill] = []
-    for part in spoken.parts(step):
-        picked, *back = building.bring({"object": part}, spoken.request)
-        brought += [*way, (picked[0], {"object": part + behind}), *_delivered(spoken, step, back)]
-    return brought
-
-
-def _delivered(spoken: Spoken, step: Step, back: list[Skill]) -> list[Skill]:
-    """Return the way to where somebody is to get it: back to the speaker, or to a place.
+    """Give each thing to who speaks, or take it to a place, where it is put down on what is there.
 
     Raises:
         UnknownPlace: it is to go to a person, of whom nobody knows where they are.
     """
+    way, behind = spoken.source(step)
+    things = [part + behind for part in spoken.parts(step)]
     if step.get("to", "me") in _SPEAKERS:
-        return back
-    to_whom, places = spoken.spoken(step, "to"), spoken.request.world.places
-    if match_place(to_whom, places) is None:
-        raise UnknownPlace(to_whom, set(places.values()))
-    return [("navigate_to", {"place": to_whom})]
+        return way + building.bring({"object": " and ".join(things)}, spoken.request)
+    to, world = spoken.spoken(step, "to"), spoken.request.world
+    place = match_place(to, world.places)
+    if place is None:
+        raise UnknownPlace(to, set(world.places.values()))
+    if place in world.furniture:
+        return way + [("place", {"object": one, "destination": to}) for one in things]
+    go: Skill = ("navigate_to", {"place": to})
+    return way + [skill for one in things for skill in (("pick_up", {"object": one}), go)]
 
 
 def _give(_spoken: Spoken, _step: Step) -> list[Skill]:

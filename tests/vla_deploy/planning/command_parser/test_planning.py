@@ -82,10 +82,20 @@ def test_what_was_copied_beside_a_thing_is_left_out(command: str, what: str) -> 
     assert found == ("pick_up", {"object": "the cup"})
 
 
-def test_bringing_goes_back_to_who_asked() -> None:
-    found = planned("bring me the bottle", {"do": "bring", "what": "bottle"})
-    assert [skill for skill, _ in found] == ["pick_up", "navigate_to", "speak"]
-    assert found[1][1] == {"place": "here"}
+@pytest.mark.parametrize(
+    ("to", "skills"),
+    [
+        ({}, [("hand_over", {"object": "bottle"})]),
+        ({"to": "me"}, [("hand_over", {"object": "bottle"})]),
+        ({"to": "coffee table"}, [("place", {"object": "bottle", "destination": "coffee table"})]),
+        ({"to": "entrance"},
+         [("pick_up", {"object": "bottle"}), ("navigate_to", {"place": "entrance"})]),
+    ],
+)  # fmt: skip
+def test_what_is_brought_is_handed_to_a_person_and_taken_to_a_place(
+    to: Step, skills: Skills
+) -> None:
+    assert planned("bring bottle", {"do": "bring", "what": "bottle", **to}) == skills
 
 
 def test_back_is_where_the_command_before_was_told() -> None:

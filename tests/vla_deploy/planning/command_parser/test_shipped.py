@@ -76,7 +76,7 @@ def test_a_question_about_the_speaker_is_a_command_only_for_a_thing(parser: Comm
     with pytest.raises(Declined, match="the one who speaks"):
         parser.propose(request("Can I stay up a bit longer, please?"), soon())
     handed = parser.propose(request("Can I have the red cup, please?"), soon())
-    assert "pick_up" in [one.skill for one in handed.plan.actions]
+    assert "hand_over" in [one.skill for one in handed.plan.actions]
 
 
 def test_a_plan_of_it_passes_grounding_and_validation(parser: CommandParser) -> None:
