@@ -105,7 +105,7 @@ def _find(world: World, given: Parameters) -> None:
     except ActionFails:
         thing = world.known(given["object"], among_all=True)
         furniture = world.furniture_of(thing)
-        if furniture not in world.home.places:
+        if furniture not in world.home.places or furniture in world.keeps_out:
             raise ActionFails(f"the {thing.kind} is nowhere that the robot looks") from None
         world.stand_at(world.home.places[furniture])
         world.things |= {

@@ -7,7 +7,7 @@ planned it.
 import json
 import logging
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
@@ -21,6 +21,7 @@ from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 
@@ -96,17 +97,36 @@ def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Stan
     return None
 
 
-def refuse_forbidden(
-    plan: Plan, world: World, scene: Snapshot | None, standing: Sequence[Prohibition]
-) -> None:
-    """Refuse a grounded plan that does what is forbidden.
+def held_to(
+    standing: Sequence[Prohibition], plan: Plan, world: World, scene: Snapshot | None
+) -> Plan:
+    """Return a grounded plan that keeps out of what is forbidden, also where it only searches.
 
     Raises:
-        NotAble: it does; says what, and how it is permitted again.
+        NotAble: it does what is forbidden, or nothing else is left to search; says what, and how it
+            is permitted again.
     """
     for one in standing:
         if any(_breaks(action, one, world, scene) for action in plan.actions):
             raise NotAble(f'you told me not to {one}; say "you may {one} again" first')
+    closed = [one for one in standing if one.what is Forbidden.PLACE]
+    places = frozenset[str]().union(*(surfaces_of(one.words, world) for one in closed))
+    if places and _searches(plan, scene) and not _open_views(world, places):
+        told = " and ".join(map(str, closed))
+        raise NotAble(f"you told me not to {told}, and there is nowhere else where I could look")
+    return plan.model_copy(update={"keeps_out": tuple(sorted(places))})
+
+
+def _searches(plan: Plan, scene: Snapshot | None) -> bool:
+    """Tell whether a plan looks for something that is not in the scene."""
+    sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
+    return any(subject_of(str(text), scene).thing is None for text in sought)
+
+
+def _open_views(world: World, closed: frozenset[str]) -> set[FloorPose]:
+    """Return from where furniture can be searched that is in none of the closed places."""
+    shut = {view for name in closed & world.sites.keys() for view in world.sites[name].viewpoints}
+    return {view for site in world.sites.values() for view in site.viewpoints} - shut
 
 
 def _meant(groups: dict[str, str | None], world: World) -> Prohibition | None:
@@ -128,7 +148,7 @@ def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | No
         return any(_is_same(str(text), one.words, scene) for text in touched if text)
     inside = surfaces_of(one.words, world)
     named = {str(given[name]) for name in ("place", "destination") if name in given}
-    return bool(inside & (named | set(_rests(given.get("object"), scene))))
+    return bool(inside & (named | _rests(given.get("object"), scene)))
 
 
 def _is_same(text: str, words: str, scene: Snapshot | None) -> bool:
@@ -141,16 +161,15 @@ def _is_same(text: str, words: str, scene: Snapshot | None) -> bool:
     return subject.kind == query.kind and (not query.colour or query.colour in subject.words)
 
 
-def _rests(text: object, scene: Snapshot | None) -> Iterator[str]:
-    """Yield what a thing that an action names rests on, where that is known."""
+def _rests(text: object, scene: Snapshot | None) -> set[str]:
+    """Return all that a thing rests on which an action names, where that is known."""
     if not isinstance(text, str) or scene is None:
-        return
+        return set()
     try:
         thing = subject_of(text, scene).thing
     except UnknownObject:
-        return
-    if thing is not None and thing.rests is not None:
-        yield thing.rests.of
+        return set()
+    return set() if thing is None else {*scene.below(thing.thing_id)}
 
 
 def _read(file: Path) -> tuple[Prohibition, ...]:
