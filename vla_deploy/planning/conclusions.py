@@ -7,7 +7,7 @@ from typing import Final
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
-from vla_deploy.planning.confirmation import agreement_to, confirmation_of
+from vla_deploy.planning.confirmation import agreement_to, confirmation_of, things_named
 from vla_deploy.planning.dialogue import Dialogue
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.inbox import Command
@@ -57,7 +57,8 @@ class Conclusions:
             agreed = self._under_way.agreed(command)
             question = answer.read_back or confirmation_of(answer.plan, request, agreed)
             if question:
-                raise Ambiguous(question)
+                named = things_named(answer.plan, request)
+                raise Ambiguous(f"{question} {named}".strip())
             self.hand_on(command, request, answer, answer.plan)
         except Ambiguous as unclear:
             if command.recovers:  # the robot stands in the middle of it: nobody is asked for long

@@ -91,7 +91,7 @@ def steps_in_words(plan: Plan) -> str:
     steps = list(_steps(plan))
     if len(steps) > _MOST_STEPS:
         steps = [*steps[:_MOST_STEPS], f"do {len(steps) - _MOST_STEPS} things more"]
-    return _listed(steps)
+    return listed(steps)
 
 
 def _steps(plan: Plan) -> Iterator[str]:
@@ -109,7 +109,8 @@ def _steps(plan: Plan) -> Iterator[str]:
             yield _PHRASES[action.skill](action.parameters)
 
 
-def _listed(steps: Sequence[str]) -> str:
+def listed(steps: Sequence[str]) -> str:
+    """Return "one, two and three"."""
     if len(steps) < 2:
         return "".join(steps)
     return f"{', '.join(steps[:-1])} and {steps[-1]}"
