@@ -40,8 +40,13 @@ def confirmation_of(plan: Plan, request: Request, agreed: Set[str] = frozenset()
     reasons = _reasons(plan, request)
     if reasons.keys() <= agreed:
         return ""
-    question = Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
-    return " ".join([question, *(f"{reason}." for reason in reasons.values() if reason)])
+    told = [f"{reason}." for reason in reasons.values() if reason]
+    return " ".join([question_about(plan, request), *told])
+
+
+def question_about(plan: Plan, request: Request) -> str:
+    """Return the question whether a plan is wanted."""
+    return Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
 
 
 def things_named(plan: Plan, request: Request) -> str:

@@ -16,11 +16,13 @@ from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.beside import Beside
 from vla_deploy.planning.conclusions import Conclusions
-from vla_deploy.planning.correction import CORRECTED, corrected_by
+from vla_deploy.planning.confirmation import question_about
+from vla_deploy.planning.correction import CORRECTED, corrected_by, corrected_text
 from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import PlanningError
 from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.patterns.repeating import asked_for, can_repeat
 from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
@@ -31,6 +33,7 @@ from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.planning.understanding import Outcome, Question, Reply, Turn, Verdict, described
+from vla_deploy.planning.understanding.mentioned import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 MOST_WAITING: Final = 8
@@ -167,6 +170,10 @@ class Desk:
                 command, request, self.planner.check_given(command.plan, request)
             )
             return
+        plan = command.corrected or self._correction_of_last(command, request)
+        if plan is not None:
+            self._begin_corrected(command, request, plan)
+            return
         within_s = self._rehearing.within_s(command, self.planner.within_s)
         deadline = Deadline.within(self._clock, within_s, Event())
         self._go_slowly(command, request, self.planner.plan_at_once(request, deadline), deadline)
@@ -243,9 +250,10 @@ class Desk:
         elif waiting.is_open and not self._is_command(command):
             self._telling.answered(command, waiting.command)
             self._complete(waiting, command.text)
-        elif plan := corrected_by(waiting.plan, command.text):
+        elif other := self._corrected(waiting, command.text):
             self._telling.answered(command, waiting.command)
-            self._correct(waiting, plan)
+            self.dialogue.settle()
+            self._queue.appendleft(other)
         elif full:
             self._telling.answered(command, waiting.command)
             self.dialogue.settle()
@@ -291,18 +299,43 @@ class Desk:
         asked = waiting.command
         self._queue.appendleft(replace(asked, text=f"{asked.text}: {text}"))
 
-    def _correct(self, waiting: Waiting, plan: Plan) -> None:
-        """Go on with another plan in the place of the one that was read back."""
-        self.dialogue.settle()
-        command = waiting.command
-        request = self._request(command)
+    def _corrected(self, waiting: Waiting, text: str) -> Command | None:
+        """Return the command that waits with what a correction puts in the place of something."""
+        command, request = waiting.command, self._request(waiting.command)
+        proposal = waiting.answer.proposal
+        if waiting.plan is None or proposal is None:
+            told = corrected_text(waiting.question, text, request.world.places)
+            return None if told is None else replace(command, text=told)
+        plan = corrected_by(proposal.plan, text, request.world.places)
+        if plan is None:
+            return None
+        # "The other one" is another than what was asked about.
+        asked = mentions_of(waiting.plan, request.scene)
+        turn = Turn(said=command.text, command_id=command.command_id, mentioned=asked)
+        self.dialogue.remember(replace(turn, outcome=Outcome.ASKED))
+        return replace(command, corrected=plan)
+
+    def _correction_of_last(self, command: Command, request: Request) -> Plan | None:
+        """Return what a command makes of the one before it, which ends where it is under way."""
+        if command.is_doubted or not can_repeat(request):
+            return None
+        last = request.conversation.turns[-1]
+        plan = corrected_by(asked_for(last), command.text, request.world.places)
+        if plan is not None and last.outcome is Outcome.UNDER_WAY:
+            self._telling.cancelled_all(f"{command.command_id}-corrects")
+        return plan
+
+    def _begin_corrected(self, command: Command, request: Request, plan: Plan) -> None:
+        """Read a plan back that takes the place of the one that was asked about or has begun."""
         proposal = Proposal(plan=plan, rung=CORRECTED, confidence=1.0)
         try:
             checked = self.planner.check(plan, request)
         except PlanningError as error:
-            self._conclusions.conclude(command, request, Answer(error=error))
-            return
-        self._conclusions.conclude(command, request, Answer(plan=checked, proposal=proposal))
+            answer = Answer(error=error)
+        else:
+            proposal = replace(proposal, read_back=question_about(checked, request))
+            answer = Answer(plan=checked, proposal=proposal)
+        self._conclusions.conclude(replace(command, corrected=plan), request, answer)
 
     def _ask_again(self, waiting: Waiting, question: Question) -> None:
         asked = self.dialogue.ask_again(question)

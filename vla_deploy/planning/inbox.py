@@ -9,6 +9,7 @@ from vla_deploy.ipc import Event
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.patterns.stopping import is_stop
+from vla_deploy.planning.plan import Plan
 
 VOICE: Final = "voice"
 READ_BACK: Final = 0.5
@@ -26,7 +27,7 @@ class Command:
     over that of the words; with `is_doubted` the words are not sure enough to act by, and with
     `may_ask_again` nobody minds to be asked for them once more. With `is_answer` the words are no
     command of their own; with `recovers` it is under way already, and what is planned for it goes
-    on after a failure.
+    on after a failure. `corrected` is the plan that a correction made of the one before it.
     """
 
     command_id: str
@@ -38,6 +39,7 @@ class Command:
     others: tuple[tuple[str, float], ...] = ()
     is_doubted: bool = False
     may_ask_again: bool = False
+    corrected: Plan | None = None
     is_answer: bool = False
     recovers: bool = False
 

@@ -7,6 +7,7 @@ word: the robot would take a person's for its own.
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
+from itertools import zip_longest
 from typing import Any, Final
 
 from vla_deploy.planning.errors import NotReady, NotUnderstood, PlanInvalid, PlanningError
@@ -102,10 +103,11 @@ def _steps(plan: Plan) -> Iterator[str]:
         for name in ("object", "destination")
         if action.skill in ("pick_up", "place")
     }
-    for action in plan.actions:
+    for action, then in zip_longest(plan.actions, plan.actions[1:]):
         leads_up = action.skill in ("find_object", "navigate_to")
         where = action.parameters.get("object", action.parameters.get("place"))
-        if not (leads_up and str(where) in handled):
+        comes_back = "x_m" in action.parameters and then and then.skill == "hand_over"
+        if not (leads_up and (str(where) in handled or comes_back)):
             yield _PHRASES[action.skill](action.parameters)
 
 

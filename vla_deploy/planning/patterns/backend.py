@@ -8,12 +8,12 @@ from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.builders.steps import Groups, Step, chained
-from vla_deploy.planning.correction import corrected_by, correction_in
+from vla_deploy.planning.correction import wants_other_too, with_other
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.repeating import can_repeat, is_again, recalled, repeated
+from vla_deploy.planning.patterns.repeating import is_again, recalled, repeated
 from vla_deploy.planning.patterns.slots import is_place, is_thing
 from vla_deploy.planning.patterns.table import PATTERNS, Pattern
 from vla_deploy.planning.plan import Action, Plan, Priority
@@ -60,10 +60,11 @@ def pattern_plan(request: Request) -> Plan:
     said = clauses(request.text)
     if len(said) == 1 and is_again(said[0]):
         return repeated(request)
-    if correction_in(request.text) and can_repeat(request):
-        plan = corrected_by(repeated(request), request.text)
-        if plan is not None:
-            return plan
+    if len(said) == 1 and wants_other_too(said[0]):
+        plan = with_other(repeated(request))
+        if plan is None:
+            raise Declined("there is no one thing of which there may be another")
+        return plan
     full = recalled(said[0], request) if len(said) == 1 else None
     said = clauses(full) if full is not None else said
     if not said:

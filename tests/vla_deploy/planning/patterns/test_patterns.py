@@ -7,7 +7,7 @@ from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.stopping import is_stop
-from vla_deploy.planning.understanding import Conversation, Outcome, Turn
+from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {"left": None, "right": None})
@@ -110,9 +110,3 @@ def test_again_does_what_was_done_last() -> None:
 )  # fmt: skip
 def test_words_that_only_stop_are_known(text: str, stops: bool) -> None:
     assert is_stop(text) is stops
-
-
-def test_a_correction_of_what_was_not_done_is_a_command_of_its_own() -> None:
-    refused = Turn(said="go to narnia", outcome=Outcome.REFUSED)
-    with pytest.raises(Declined):
-        pattern_plan(request_for("no, the blue cup", refused))
