@@ -33,6 +33,7 @@ from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.planning.understanding import Outcome, Question, Reply, Turn, Verdict, described
+from vla_deploy.planning.understanding.answers import judge_answer
 from vla_deploy.planning.understanding.mentioned import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
@@ -90,6 +91,8 @@ class Desk:
             return
         if waiting is not None and self._is_answer(command, waiting):
             return
+        if waiting is None and self._is_word(command):
+            return
         if command.is_answer:
             self._conclusions.refuse(command, Says.NOTHING_ASKED)
         elif len(self._queue) >= MOST_WAITING:
@@ -104,7 +107,9 @@ class Desk:
         self._telling.cancelled_all(command_id)
         waiting = self.dialogue.settle()
         asked = None if waiting is None else waiting.command
-        dropped = (asked, self._beside.call_in(), *self._queue)
+        held = self.dialogue.take_held()
+        begun = None if held is None else held.command
+        dropped = (asked, begun, self._beside.call_in(), *self._queue)
         self._queue.clear()
         self._rehearing.forget()
         for command in dropped:
@@ -142,6 +147,8 @@ class Desk:
         """Go on with what has become possible."""
         if self.dialogue.is_overdue:
             self._leave(Says.NO_ANSWER)
+        if self.dialogue.is_held_too_long:
+            self._conclusions.drop(self.dialogue.take_held(), Says.NO_ANSWER)
         self._look_after_work()
         while self._queue and self._beside.work is None and self.dialogue.waiting is None:
             command = self._queue.popleft()
@@ -150,12 +157,13 @@ class Desk:
 
     def document(self) -> dict[str, Any]:
         """Return which commands are in work, what was asked, and how it has been going."""
-        waiting = self.dialogue.waiting
-        held = [one.command for one in (self._beside.work, waiting) if one is not None]
+        waiting, held = self.dialogue.waiting, self.dialogue.held
+        in_work = [one.command for one in (self._beside.work, waiting, held) if one is not None]
+        asked = waiting or held
         return {
             **self.accounts.document(),
-            "commands": [one.command_id for one in (*held, *self._queue)],
-            "question": None if waiting is None else waiting.question.text,
+            "commands": [one.command_id for one in (*in_work, *self._queue)],
+            "question": None if asked is None else asked.question.text,
             **self.planner.document(),
             "prohibitions": self._prohibitions.document(),
         }
@@ -236,6 +244,22 @@ class Desk:
     def _request(self, command: Command) -> Request:
         request = self._situation.request(command, self.dialogue.talk, of_use=self.planner.uses)
         return replace(request, prohibitions=self._prohibitions.items)
+
+    def _is_word(self, command: Command) -> bool:
+        """Take an utterance as the word that begins the held plan, or drops it."""
+        held = self.dialogue.held
+        if held is None or held.plan is None or command.is_doubted:
+            return False
+        verdict, _ = judge_answer(held.question, command.text)
+        if verdict not in (Verdict.YES, Verdict.NO):
+            return False
+        self.dialogue.take_held()
+        self._telling.answered(command, held.command)
+        if verdict is Verdict.YES:
+            self._run_confirmed(held, held.plan)
+        else:
+            self._conclusions.drop(held, Says.LEFT)
+        return True
 
     # --- answers --------------------------------------------------------------------------------
 
@@ -357,6 +381,4 @@ class Desk:
             self._conclusions.refuse(command, error, waiting.answer)
 
     def _leave(self, why: Says) -> None:
-        waiting = self.dialogue.settle()
-        if waiting is not None:
-            self._conclusions.refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
+        self._conclusions.drop(self.dialogue.settle(), why)

@@ -182,6 +182,51 @@ class TestQuestions:
         assert (told["command_id"], told["reason"]) == ("c4", Says.NOTHING_ASKED)
 
 
+class TestWaitingForAWord:
+    @pytest.fixture
+    def desk(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="when I say so, pick up the red cup")
+        return desk
+
+    def test_the_plan_is_read_back_and_held(self, desk):
+        (asked,) = desk.answers()
+        assert asked["question"] == "Shall I pick up the red cup? I wait for you to say go."
+        assert asked["plan"]["actions"][-1]["skill"] == "pick_up"
+        assert desk.plans() == []
+        desk.clock.pass_s(600.0)
+        assert desk.answers() == []
+        assert desk.status()["question"] == asked["question"]
+        assert desk.status()["commands"] == ["c1"]
+
+    @pytest.mark.parametrize(
+        ("word", "end"),
+        [
+            ("go", ("c1", "plan")),
+            ("now, please", ("c1", "plan")),
+            ("yes", ("c1", "plan")),
+            ("not now", ("c1", "rejected")),
+            ("never mind", ("c1", "rejected")),
+            ("look left", ("c2", "plan")),
+        ],
+    )
+    def test_a_word_begins_or_drops_it_and_anything_else_does_not(self, desk, word, end):
+        desk.answers()
+        desk.give(command_id="c2", text=word)
+        assert events(desk.answers())[-1] == end
+        is_held = desk.status()["question"] is not None
+        assert is_held == (end[0] == "c2")
+
+    def test_another_takes_its_place_and_none_waits_for_ever(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="look left when I call")
+        assert events(desk.answers()) == [("c1", "rejected"), ("c2", "asked")]
+        desk.clock.pass_s(3601.0)
+        (left,) = desk.answers()
+        assert (left["command_id"], left["reason"]) == ("c2", Says.NO_ANSWER)
+
+
 class TestReadingBack:
     @pytest.fixture
     def desk(self, open_desk, rung, propose):

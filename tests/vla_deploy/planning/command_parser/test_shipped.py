@@ -14,8 +14,11 @@ from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import EMBEDDED, Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.command_parser.rung import CommandParser, open_command_parser
-from vla_deploy.planning.errors import Declined, PlanningError
+from vla_deploy.planning.command_parser.certainty import Oddities
+from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
+from vla_deploy.planning.command_parser.wording import plain_words
+from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
 from vla_deploy.robots import load_robot
@@ -70,6 +73,30 @@ def test_plain_commands_are_read(
     parser: CommandParser, text: str, steps: list[dict[str, str]]
 ) -> None:
     assert list(parser.parse(text, soon()).steps) == steps
+
+
+def reading(parser: CommandParser, monkeypatch: pytest.MonkeyPatch, *steps: Step) -> None:
+    """Let the parser read these steps, as one that was trained further may."""
+    oddities = Oddities()
+
+    def parse(text: str, _: Deadline) -> Parsed:
+        words = tuple(plain_words(text))
+        return Parsed(words=words, steps=steps, confidence=1.0, features={}, oddities=oddities)
+
+    monkeypatch.setattr(parser, "parse", parse)
+
+
+def test_a_step_that_waits_for_a_word_holds_all_that_follows(
+    parser: CommandParser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go, wait = {"do": "go", "where": "kitchen"}, {"do": "await"}
+    reading(parser, monkeypatch, wait, go)
+    held = parser.propose(request("once I nod go to the kitchen"), soon())
+    assert held.awaits_word and held.plan.summary == "go to kitchen"
+    assert held.covers is not None and "once" in held.covers
+    reading(parser, monkeypatch, go, wait, go)
+    with pytest.raises(CannotBeDone, match="only before I begin"):
+        parser.propose(request("go to the kitchen and once I nod go to the kitchen"), soon())
 
 
 def test_a_question_about_the_speaker_is_a_command_only_for_a_thing(parser: CommandParser) -> None:

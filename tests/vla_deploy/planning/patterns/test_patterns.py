@@ -5,6 +5,7 @@ import pytest
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
 from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.patterns.awaiting import awaiting
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.stopping import is_stop
 from vla_deploy.planning.understanding import Conversation, Turn
@@ -94,6 +95,23 @@ def test_again_does_what_was_done_last() -> None:
     assert does("the other way", last) == "turn -0.5236"
     with pytest.raises(NothingBefore):
         pattern_plan(request_for("again"))
+
+
+@pytest.mark.parametrize(
+    ("text", "rest"),
+    [
+        ("When I say so, bring me the cup.", "bring me the cup"),
+        ("when I tell you go to the kitchen", "go to the kitchen"),
+        ("when I tell you to, go to the kitchen", "go to the kitchen"),
+        ("bring me the cup, but only when I say so", "bring me the cup"),
+        ("wait until I give you the word and then go home", "go home"),
+        ("when I tell you to go to bed, turn left", None),
+        ("when I come home, turn left", None),
+        ("bring me the cup", None),
+    ],
+)
+def test_a_command_that_waits_for_a_word_is_found(text: str, rest: str | None) -> None:
+    assert awaiting(text) == rest
 
 
 @pytest.mark.parametrize(
