@@ -7,13 +7,14 @@ planned it.
 import json
 import logging
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
 
+from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.builders.tidying import surfaces_of
-from vla_deploy.planning.errors import NotAble, UnknownObject
+from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.slots import THING, WORDS
@@ -97,6 +98,29 @@ def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Stan
     return None
 
 
+def order_of(groups: Mapping[str, str], forbids: bool, request: Request) -> StandingOrder:
+    """Return the order about the words of a "thing" or a "place".
+
+    Raises:
+        CannotBeDone: they name nothing that may be forbidden, or that is not forbidden.
+    """
+    meant = _meant(groups, request.world)
+    if meant is None:
+        raise CannotBeDone('say what: "don\'t touch the keys", "you may go into the kitchen again"')
+    if not forbids and meant not in request.prohibitions:
+        raise CannotBeDone(f"nobody has told me not to {meant}")
+    return StandingOrder(forbids=forbids, of=meant)
+
+
+def proposal_of(order: StandingOrder, request: Request, rung: str) -> Proposal:
+    """Return the proposal to say that an order stands from now on."""
+    said = Action(id="a1", skill="speak", parameters={"text": order.answer})
+    plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
+    return Proposal(
+        plan=plan, rung=rung, confidence=1.0, read_back=order.question, covers=None, order=order
+    )
+
+
 def held_to(
     standing: Sequence[Prohibition], plan: Plan, world: World, scene: Snapshot | None
 ) -> Plan:
@@ -129,7 +153,7 @@ def _open_views(world: World, closed: frozenset[str]) -> set[FloorPose]:
     return {view for site in world.sites.values() for view in site.viewpoints} - shut
 
 
-def _meant(groups: dict[str, str | None], world: World) -> Prohibition | None:
+def _meant(groups: Mapping[str, str | None], world: World) -> Prohibition | None:
     place = match_place(groups.get("place") or "", world.places)
     if place is not None:
         return Prohibition(what=Forbidden.PLACE, words=place)

@@ -60,7 +60,11 @@ def test_a_thing_is_not_taken_until_that_is_permitted() -> None:
         assert 'say "you may touch the keys again" first' in why
         refused(desk, "put the keys in the box")
         assert moves(desk.say("pick up the red cup")[1].plan or {})
+        asked = desk.say("you may touch the keys again")[1]
+        assert (asked.outcome, asked.text) == ("ask", "May I touch the keys again?")
+        refused(desk, "bring me the keys")
         desk.say("you may touch the keys again")
+        desk.say("yes")
         assert desk.say("bring me the keys")[1].outcome == "plan"
 
 

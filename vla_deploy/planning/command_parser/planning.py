@@ -17,6 +17,8 @@ from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spoken import Spoken
 from vla_deploy.planning.errors import CannotBeDone, Declined, UnknownPlace
 from vla_deploy.planning.plan import Action
+from vla_deploy.planning.prohibition import StandingOrder
+from vla_deploy.planning.prohibitions import order_of
 from vla_deploy.planning.references import match_place
 
 Skill = building.Step
@@ -50,6 +52,16 @@ class Steps(Spoken):
         """
         skills = [skill for step in steps for skill in _HANDLERS[step["do"]](self, step)]
         return building.chained(skills)
+
+    def order(self, step: Step) -> StandingOrder:
+        """Return what a step forbids or permits.
+
+        Raises:
+            CannotBeDone: that is nothing which may be forbidden, or nothing that is.
+        """
+        said = (("what", "thing"), ("where", "place"))
+        groups = {name: self.spoken(step, field) for field, name in said if field in step}
+        return order_of(groups, step["do"] == "forbid", self.request)
 
 
 def are_of_the_moment(steps: Sequence[Step]) -> bool:
@@ -183,10 +195,9 @@ def _ask(spoken: Spoken, step: Step) -> list[Skill]:
 
 
 def _tidy(spoken: Spoken, step: Step) -> list[Skill]:
-    if "except" in step:
-        raise CannotBeDone("I tidy up all or nothing; say what goes where")
-    place = {"place": spoken.spoken(step, "where")} if "where" in step else {}
-    return tidying.tidy(place, spoken.request)
+    said = (("where", "place"), ("except", "except"))
+    groups = {name: spoken.spoken(step, field) for field, name in said if field in step}
+    return tidying.tidy(groups, spoken.request)
 
 
 def _doing(_: building.Groups, request: Request) -> list[Skill]:
@@ -230,10 +241,8 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "ask": _ask,
     "tidy": _tidy,
     "await": lambda _spoken, _step: [],
-    "forbid": _refused(
-        CannotBeDone, 'say it as "don\'t touch the keys", "keep out of the kitchen"'
-    ),
-    "permit": _refused(CannotBeDone, 'say it as "you may touch the keys again"'),
+    "forbid": _refused(CannotBeDone, "say by itself what I shall not do from now on"),
+    "permit": _refused(CannotBeDone, "say by itself what I may do again"),
     "nothing": _refused(CannotBeDone, "it says what not to do, so I leave it"),
     "impossible": _refused(CannotBeDone, "none of my skills does that"),
     "unknown": _refused(Declined, "it is no command that I know"),

@@ -37,6 +37,7 @@ from vla_deploy.planning.command_parser.wording import (
 from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.prohibitions import proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
 
 NAME: Final = "command_parser"
@@ -91,7 +92,10 @@ class CommandParser:
             parsed = self.parse(request.text, deadline)
         except InferenceError as error:
             raise Declined(one_line(error)) from error
-        actions = Steps(parsed.words, request).actions(parsed.steps)
+        reader = Steps(parsed.words, request)
+        if len(parsed.steps) == 1 and parsed.steps[0]["do"] in ("forbid", "permit"):
+            return proposal_of(reader.order(parsed.steps[0]), request, self.name)
+        actions = reader.actions(parsed.steps)
         if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
             # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.
             raise Declined("it asks about the one who speaks")

@@ -16,8 +16,8 @@ from vla_deploy.planning.patterns.phrase import clauses
 from vla_deploy.planning.patterns.repeating import is_again, recalled, repeated
 from vla_deploy.planning.patterns.slots import is_place, is_thing
 from vla_deploy.planning.patterns.table import PATTERNS, Pattern
-from vla_deploy.planning.plan import Action, Plan, Priority
-from vla_deploy.planning.prohibitions import read_order
+from vla_deploy.planning.plan import Plan, Priority
+from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 
@@ -42,9 +42,7 @@ class Patterns:
             raise Declined("patterns know words, not what was done of them")
         order = read_order(request.text, request.world, request.prohibitions)
         if order is not None:
-            said = Action(id="a1", skill="speak", parameters={"text": order.answer})
-            plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
-            return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None, order=order)
+            return proposal_of(order, request, self.name)
         plan = pattern_plan(request)
         # What may stand in a slot has no words beside it that change anything.
         return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None)

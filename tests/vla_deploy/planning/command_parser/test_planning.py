@@ -11,6 +11,7 @@ from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, Unkn
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
+from vla_deploy.world import Snapshot
 
 WORLD = world_of(load_robot("butler"), {})
 HERE = (1.0, 2.0, 0.5)
@@ -96,6 +97,13 @@ def test_what_is_brought_is_handed_to_a_person_and_taken_to_a_place(
     to: Step, skills: Skills
 ) -> None:
     assert planned("bring bottle", {"do": "bring", "what": "bottle", **to}) == skills
+
+
+def test_what_is_excepted_from_tidying_stays(scene: Snapshot) -> None:
+    command = "tidy up everything except the red cup"
+    request = Request(command_id="c", text=command, world=WORLD, here=HERE, scene=scene)
+    found = planned(command, {"do": "tidy", "except": "red cup"}, request=request)
+    assert [given.get("object") for skill, given in found if skill == "place"] == ["cup_2"]
 
 
 def test_back_is_where_the_command_before_was_told() -> None:

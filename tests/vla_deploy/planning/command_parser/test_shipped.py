@@ -21,6 +21,7 @@ from vla_deploy.planning.command_parser.wording import plain_words
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
+from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {})
@@ -97,6 +98,39 @@ def test_a_step_that_waits_for_a_word_holds_all_that_follows(
     reading(parser, monkeypatch, go, wait, go)
     with pytest.raises(CannotBeDone, match="only before I begin"):
         parser.propose(request("go to the kitchen and once I nod go to the kitchen"), soon())
+
+
+KEYS = Prohibition(what=Forbidden.THING, words="keys")
+KITCHEN = Prohibition(what=Forbidden.PLACE, words="kitchen")
+
+
+@pytest.mark.parametrize(
+    ("step", "order", "question"),
+    [
+        ({"do": "forbid", "what": "keys"}, StandingOrder(forbids=True, of=KEYS), ""),
+        ({"do": "forbid", "where": "kitchen"}, StandingOrder(forbids=True, of=KITCHEN), ""),
+        ({"do": "permit", "what": "keys"}, StandingOrder(forbids=False, of=KEYS),
+         "May I touch the keys again?"),
+        ({"do": "permit", "where": "kitchen"}, None, "nobody has told me not to go into"),
+        ({"do": "forbid", "what": "mood"}, None, "say what"),
+    ],
+)  # fmt: skip
+def test_what_is_forbidden_stands_at_once_and_what_is_permitted_is_read_back(
+    parser: CommandParser,
+    monkeypatch: pytest.MonkeyPatch,
+    step: Step,
+    order: StandingOrder | None,
+    question: str,
+) -> None:
+    reading(parser, monkeypatch, step)
+    asked = replace(request("words about keys, kitchen and mood"), prohibitions=(KEYS,))
+    if order is None:
+        with pytest.raises(CannotBeDone, match=question):
+            parser.propose(asked, soon())
+        return
+    found = parser.propose(asked, soon())
+    assert (found.order, found.read_back) == (order, question)
+    assert [one.skill for one in found.plan.actions] == ["speak"]
 
 
 def test_a_question_about_the_speaker_is_a_command_only_for_a_thing(parser: CommandParser) -> None:
