@@ -59,7 +59,7 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "open_gripper": lambda given: f"open my {_hand(given)}",
     "close_gripper": lambda given: f"close my {_hand(given)}",
     "move_arm": lambda given: f"bring my arms to the pose {given['pose']}",
-    "speak": lambda given: "say something",
+    "speak": lambda given: f'say "{first_part(str(given["text"]))}"',
     "wait": lambda given: f"wait {float(given['duration_s']):g} seconds",
     "stop": lambda given: "stand still",
 }

@@ -253,7 +253,9 @@ class TestReadingBack:
         desk.give(command_id="c2", text="no, the blue one")
         told = desk.answers()
         assert events(told) == [("c2", "answered"), ("c1", "asked")]
-        assert told[-1]["question"] == "Shall I pick up the blue cup and say something?"
+        assert (
+            told[-1]["question"] == 'Shall I pick up the blue cup and say "Here is the blue cup"?'
+        )
         desk.give(command_id="c3", text="yes")
         told = desk.answers()
         assert events(told) == [("c3", "answered"), ("c1", "accepted"), ("c1", "plan")]

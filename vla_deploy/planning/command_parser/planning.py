@@ -244,6 +244,9 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "forbid": _refused(CannotBeDone, "say by itself what I shall not do from now on"),
     "permit": _refused(CannotBeDone, "say by itself what I may do again"),
     "nothing": _refused(CannotBeDone, "it says what not to do, so I leave it"),
-    "impossible": _refused(CannotBeDone, "none of my skills does that"),
+    "impossible": _refused(
+        CannotBeDone,
+        "none of my skills does that, but I can look for things, bring them and put them away",
+    ),
     "unknown": _refused(Declined, "it is no command that I know"),
 }
