@@ -106,10 +106,9 @@ class Desk:
         """Let go of every command, and let the executor end what it does."""
         self._telling.cancelled_all(command_id)
         waiting = self.dialogue.settle()
-        asked = None if waiting is None else waiting.command
-        held = self.dialogue.take_held()
-        begun = None if held is None else held.command
-        dropped = (asked, begun, self._beside.call_in(), *self._queue)
+        open_ones = (waiting, self.dialogue.take_held())
+        asked = [one.command for one in open_ones if one is not None]
+        dropped = (*asked, self._beside.call_in(), *self._queue)
         self._queue.clear()
         self._rehearing.forget()
         for command in dropped:
@@ -329,7 +328,7 @@ class Desk:
         proposal = waiting.answer.proposal
         if waiting.plan is None or proposal is None:
             told = corrected_text(waiting.question, text, request.world.places)
-            return None if told is None else replace(command, text=told)
+            return None if told is None else replace(command, text=told, corrected=None)
         plan = corrected_by(proposal.plan, text, request.world.places)
         if plan is None:
             return None

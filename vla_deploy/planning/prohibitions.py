@@ -117,7 +117,13 @@ def proposal_of(order: StandingOrder, request: Request, rung: str) -> Proposal:
     said = Action(id="a1", skill="speak", parameters={"text": order.answer})
     plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
     return Proposal(
-        plan=plan, rung=rung, confidence=1.0, read_back=order.question, covers=None, order=order
+        plan=plan,
+        rung=rung,
+        confidence=1.0,
+        read_back=order.question,
+        is_momentary=True,
+        covers=None,
+        order=order,
     )
 
 

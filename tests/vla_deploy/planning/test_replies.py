@@ -11,7 +11,7 @@ from benchmarks.planner_desk import fresh_desk
     [
         ("thanks", "plan", "You are welcome."),
         ("Thank you very much!", "plan", "You are welcome."),
-        ("how are you?", "plan", "I am well, and ready for a command."),
+        ("how are you?", "plan", "I am ready for a command."),
         ("good night", "plan", "good night"),
         ("How much battery do you have left?", "plan", "I cannot measure how full my battery is."),
         ("bring me my glasses", "ask", "Did you mean the glass?"),

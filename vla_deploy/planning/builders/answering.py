@@ -33,7 +33,7 @@ def tell_welcome(_: Groups, __: Request) -> list[Step]:
 
 def tell_ready(_: Groups, __: Request) -> list[Step]:
     """Answer who asks how the robot is: one that may not move refuses every plan before."""
-    return _say("I am well, and ready for a command.")
+    return _say("I am ready for a command.")
 
 
 def tell_battery(_: Groups, __: Request) -> list[Step]:

@@ -165,15 +165,20 @@ def is_one(text: str, request: Request) -> bool:
 
 
 def bring(groups: Groups, request: Request) -> list[Step]:
-    """Fetch each thing and give it to who asked; grounding puts in the ways there and back.
+    """Fetch each thing and give it to who asked."""
+    return handed_over(parts_of(groups["object"]), request)
+
+
+def handed_over(things: Sequence[str], request: Request) -> list[Step]:
+    """Return the steps that give things to who asked; grounding puts in the ways there and back.
 
     Two are fetched on one way, a hand each.
     """
-    parts = parts_of(groups["object"])
-    give: list[Step] = [("hand_over", {"object": part}) for part in parts]
-    if len(parts) != len(ARMS) or request.here is None:
+    give: list[Step] = [("hand_over", {"object": one}) for one in things]
+    if len(things) != len(ARMS) or request.here is None:
         return give
-    return [*pick(groups, request), ("navigate_to", {"place": "here"}), *give]
+    fetch: list[Step] = [("pick_up", {"object": one}) for one in things]
+    return [*fetch, ("navigate_to", {"place": "here"}), *give]
 
 
 def find(groups: Groups, _: Request) -> list[Step]:

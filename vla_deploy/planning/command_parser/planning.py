@@ -121,7 +121,7 @@ def _bring(spoken: Spoken, step: Step) -> list[Skill]:
     way, behind = spoken.source(step)
     things = [part + behind for part in spoken.parts(step)]
     if step.get("to", "me") in _SPEAKERS:
-        return way + building.bring({"object": " and ".join(things)}, spoken.request)
+        return way + building.handed_over(things, spoken.request)
     to, world = spoken.spoken(step, "to"), spoken.request.world
     place = match_place(to, world.places)
     if place is None:

@@ -99,6 +99,12 @@ def test_what_is_brought_is_handed_to_a_person_and_taken_to_a_place(
     assert planned("bring bottle", {"do": "bring", "what": "bottle", **to}) == skills
 
 
+def test_what_is_excepted_from_what_is_brought_stays_one_thing_to_bring() -> None:
+    step = {"do": "bring", "what": "all cups", "except": "red cup and blue cup"}
+    found = planned("bring me all the cups but the red cup and the blue cup", step)
+    assert found == [("hand_over", {"object": "all the cups but the red cup and the blue cup"})]
+
+
 def test_what_is_excepted_from_tidying_stays(scene: Snapshot) -> None:
     command = "tidy up everything except the red cup"
     request = Request(command_id="c", text=command, world=WORLD, here=HERE, scene=scene)
