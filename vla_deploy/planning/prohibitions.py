@@ -6,14 +6,15 @@ planned it.
 
 import json
 import logging
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
 
 from vla_deploy.planning.asking import Proposal, Request
-from vla_deploy.planning.builders.tidying import surfaces_of
+from vla_deploy.planning.builders.tidying import REACH_M, surfaces_of
 from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.phrase import courtesy_off
@@ -177,8 +178,16 @@ def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | No
         touched += [given.get("destination")] if action.skill == "place" else []
         return any(_is_same(str(text), one.words, scene) for text in touched if text)
     inside = surfaces_of(one.words, world)
+    if "x_m" in given and "y_m" in given:
+        return _is_near((float(given["x_m"]), float(given["y_m"])), inside, world)
     named = {str(given[name]) for name in ("place", "destination") if name in given}
     return bool(inside & (named | _rests(given.get("object"), scene)))
+
+
+def _is_near(point: tuple[float, float], places: Set[str], world: World) -> bool:
+    """Tell whether a point of the map is at one of the places: no map says where rooms end."""
+    poses = (site.pose for name, site in world.sites.items() if name in places)
+    return any(math.dist(point, (one.x_m, one.y_m)) <= REACH_M for one in poses)
 
 
 def _is_same(text: str, words: str, scene: Snapshot | None) -> bool:

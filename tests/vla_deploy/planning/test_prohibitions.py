@@ -74,6 +74,7 @@ def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
         desk.say("stay out of the kitchen")
         refused(desk, "go to the kitchen")
         refused(desk, "go to the kitchen table")
+        refused(desk, "patrol the kitchen")
         refused(desk, "bring me the green bottle")
         assert desk.say("go to the bedroom")[1].outcome == "plan"
 
