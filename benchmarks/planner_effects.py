@@ -17,6 +17,7 @@ from benchmarks.planner_flat import (
     GRASPABLE,
     HANDS,
     SUPPORTS,
+    WITH_SPEAKER,
     Point,
     Thing,
 )
@@ -104,7 +105,7 @@ def _find(world: World, given: Parameters) -> None:
     except ActionFails:
         thing = world.known(given["object"], among_all=True)
         furniture = world.furniture_of(thing)
-        if furniture not in world.home.places:
+        if furniture not in world.home.places or furniture in world.keeps_out:
             raise ActionFails(f"the {thing.kind} is nowhere that the robot looks") from None
         world.stand_at(world.home.places[furniture])
         world.things |= {
@@ -183,7 +184,9 @@ def _give(world: World, given: Parameters) -> None:
         raise ActionFails(f"{len(held)} hands hold something, expected one that it is taken from")
     (given_away,) = held
     world.open_hands[given_away.held_by] = True
-    world.things[given_away.thing_id] = replace(given_away, held_by="", rests=("with", "speaker"))
+    world.things[given_away.thing_id] = replace(
+        given_away, held_by="", rests=WITH_SPEAKER, xy_m=world.pose[:2]
+    )
 
 
 def _open(world: World, given: Parameters) -> None:

@@ -13,6 +13,8 @@ Pose = tuple[float, float, float]
 
 ROBOT: Final = "butler"
 FLOOR: Final = "floor"
+WITH_SPEAKER: Final = ("with", "speaker")
+"""What a thing rests in that somebody has taken from the robot."""
 WIDTH_M, DEPTH_M = 8.0, 6.0
 HANDS: Final = ("left", "right")
 CONTAINERS: Final = frozenset({"box"})

@@ -5,6 +5,7 @@
     condition = word { argument }        as in `CONDITIONS`
 
 A thing that no condition of a way names must be where it was: in the same hand, in or on the same.
+`held cup_1; at start` is how a goal says that the cup was brought: handed over there it is, too.
 """
 
 import math
@@ -13,12 +14,13 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from benchmarks.planner_flat import FURNITURE, HANDS, Thing
+from benchmarks.planner_flat import FURNITURE, HANDS, WITH_SPEAKER, Thing
 from benchmarks.planner_world import World
 
 AT_PLACE_M: Final = 0.6
 AT_START_M: Final = 0.7
 NEAR_THING_M: Final = 1.0
+BROUGHT: Final = ("at", "start")
 SLACK_RATIO: Final = 0.05
 SLACK: Final = 0.02
 SLACK_DEG: Final = 3.0
@@ -62,6 +64,7 @@ def _faults(way: Sequence[tuple[str, ...]], world: World, start: World) -> list[
         " ".join(condition)
         for condition in way
         if not CONDITIONS[condition[0]](world, start, condition[1:])
+        and not (BROUGHT in way and _is_handed_over(condition, world, start))
     ]
     named = {word for condition in way for word in condition[1:]}
     return faults + [
@@ -69,6 +72,15 @@ def _faults(way: Sequence[tuple[str, ...]], world: World, start: World) -> list[
         for name, thing in world.things.items()
         if name not in named and _whereabouts(thing) != _whereabouts(start.things[name])
     ]
+
+
+def _is_handed_over(condition: tuple[str, ...], world: World, start: World) -> bool:
+    """Tell whether who spoke was handed the thing of `held cup_1`, where they spoke."""
+    if condition[0] != "held" or len(condition) != 2:
+        return False
+    thing = world.things[condition[1]]
+    is_there = math.dist(thing.xy_m, start.pose[:2]) <= AT_START_M
+    return thing.rests == WITH_SPEAKER and is_there
 
 
 def _whereabouts(thing: Thing) -> tuple[object, ...]:

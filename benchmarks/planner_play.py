@@ -110,6 +110,7 @@ def _played(plan: Mapping[str, Any], start: World) -> Iterator[tuple[World, str]
     for reading in waiting:
         end, failed = deepcopy(start), ""
         end.chosen = dict(reading)
+        end.keeps_out = frozenset(plan.get("keeps_out", ()))
         try:
             perform(end, plan["actions"])
         except ActionFails as error:

@@ -22,6 +22,7 @@ class World:
     """Hold the flat as it is after each action, and what the robot did on the way.
 
     `chosen` settles what an expression means that fits several things: the judge tries each.
+    `keeps_out` are the places that the plan says it does not enter.
     """
 
     home: Home
@@ -39,6 +40,7 @@ class World:
     moved_m: float = 0.0
     chosen: dict[str, str] = field(default_factory=dict)
     open_choices: dict[str, list[str]] = field(default_factory=dict)
+    keeps_out: frozenset[str] = frozenset()
 
     def held_in(self, hand: str) -> Thing | None:
         """Return what a hand holds."""

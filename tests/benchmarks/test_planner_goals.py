@@ -24,6 +24,24 @@ def test_a_goal_is_reached_by_any_of_its_ways() -> None:
     assert goal.missed(world(), world()) == "held cup_1 left"
 
 
+@pytest.mark.parametrize(
+    ("goal", "where", "missed"),
+    [
+        ("held cup_1; at start", None, ""),
+        ("held cup_1; at start", (6.2, 2.2), "held cup_1"),
+        ("held cup_1", None, "held cup_1"),
+        ("held cup_1 left; at start", None, "held cup_1 left"),
+    ],
+)
+def test_what_is_handed_over_where_it_was_asked_for_is_brought(
+    goal: str, where: tuple[float, float] | None, missed: str
+) -> None:
+    start, end = world(), world()
+    xy_m = where or start.pose[:2]
+    end.things["cup_1"] = replace(end.things["cup_1"], rests=("with", "speaker"), xy_m=xy_m)
+    assert parse_goal(goal).missed(end, start) == missed
+
+
 def test_what_a_goal_does_not_name_must_stay_where_it_is() -> None:
     end = held(held(world(), "cup_1", "right"), "ball_1", "left")
     assert parse_goal("held cup_1").missed(end, world()) == "ball_1 was not to be touched"

@@ -33,7 +33,7 @@ from vla_deploy.supervisor.supervisor import Supervisor
 COMMAND = "pick up the red cup and put it in the box"
 EXAMPLES = """  vla-deploy demo
   vla-deploy demo --seed 7 --json
-  vla-deploy demo --command "bring me the blue ball" --voice en-us+f4 --snr 10
+  vla-deploy demo --command "put the blue ball in the box" --voice en-us+f4 --snr 10
   vla-deploy demo --typed --fast
   vla-deploy demo --viewer                the twin in a window
 """

@@ -64,7 +64,7 @@ class Proposal:
     image showed. `origin` is the rung that made it first, where it was planned before. `covers` are
     the words that change the scope of a command and are represented in the plan, None for all;
     `knows_grammar` tells that whoever made the plan has read the whole sentence. An `order`
-    stands once the plan is handed on.
+    stands once the plan is handed on. With `awaits_word` it is held until the person says go.
     """
 
     plan: Plan
@@ -78,6 +78,7 @@ class Proposal:
     covers: frozenset[str] | None = frozenset()
     knows_grammar: bool = False
     order: StandingOrder | None = None
+    awaits_word: bool = False
 
     def as_heard(self, heard_confidence: float | None) -> "Proposal":
         """Return it as unsure as its words were heard; None for words that were typed.

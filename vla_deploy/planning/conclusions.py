@@ -7,8 +7,13 @@ from typing import Final
 from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
-from vla_deploy.planning.confirmation import agreement_to, confirmation_of
-from vla_deploy.planning.dialogue import Dialogue
+from vla_deploy.planning.confirmation import (
+    agreement_to,
+    confirmation_of,
+    question_about,
+    things_named,
+)
+from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.ladder import Answer
@@ -55,9 +60,13 @@ class Conclusions:
                 raise answer.error or PlanInvalid(["nobody was asked for a plan"])
             self._telling.check_length(answer.plan)
             agreed = self._under_way.agreed(command)
+            if command.awaits_word or (answer.proposal and answer.proposal.awaits_word):
+                self._hold(command, request, answer, answer.plan)
+                return
             question = answer.read_back or confirmation_of(answer.plan, request, agreed)
             if question:
-                raise Ambiguous(question)
+                named = things_named(answer.plan, request)
+                raise Ambiguous(f"{question} {named}".strip())
             self.hand_on(command, request, answer, answer.plan)
         except Ambiguous as unclear:
             if command.recovers:  # the robot stands in the middle of it: nobody is asked for long
@@ -68,6 +77,21 @@ class Conclusions:
             self._telling.asked(command, waiting.question, waiting.plan)
         except PlanningError as error:
             self.refuse(command, error, answer)
+
+    def _hold(self, command: Command, request: Request, answer: Answer, plan: Plan) -> None:
+        """Read a plan back, and hold it until the person says go; one that was held is dropped."""
+        self.drop(self._dialogue.take_held(), Says.REPLACED)
+        question = answer.read_back or confirmation_of(plan, request)
+        asked = (question or question_about(plan, request), things_named(plan, request))
+        text = Says.HELD.format(question=" ".join(filter(None, asked)))
+        self.accounts.asked += 1
+        held = self._dialogue.hold(command, answer, text)
+        self._telling.asked(command, held.question, plan)
+
+    def drop(self, waiting: Waiting | None, why: Says) -> None:
+        """Say that what waits for an answer, if anything does, is left."""
+        if waiting is not None:
+            self.refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
 
     def hand_on(self, command: Command, request: Request, answer: Answer, plan: Plan) -> None:
         """Give a checked plan to the executor, and remember what was understood."""

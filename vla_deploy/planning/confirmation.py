@@ -4,14 +4,17 @@ The robot file sets how far it goes (`[planning] require_confirmation`): never, 
 is unsure is always asked, since nobody has asked for it surely.
 """
 
+import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Set
 from typing import Final
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.phrasing import Says, steps_in_words
+from vla_deploy.planning.phrasing import Says, listed, steps_in_words
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import expected_s
+from vla_deploy.planning.symbolic.subjects import Subject, subject_of
 from vla_deploy.robots.plan_bounds import Confirm
 
 Risk = Callable[[Plan, Request], str]
@@ -22,6 +25,7 @@ SURELY_HEARD: Final = 0.6
 MANY_ACTIONS: Final = 25
 LONG_S: Final = 900.0
 MANY_THINGS: Final = 4
+MOST_NAMED: Final = 6
 HEAVY_RATIO: Final = 0.8
 FAR_BACK_M: Final = -1.0
 # These move nothing.
@@ -36,8 +40,40 @@ def confirmation_of(plan: Plan, request: Request, agreed: Set[str] = frozenset()
     reasons = _reasons(plan, request)
     if reasons.keys() <= agreed:
         return ""
-    question = Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
-    return " ".join([question, *(f"{reason}." for reason in reasons.values() if reason)])
+    told = [f"{reason}." for reason in reasons.values() if reason]
+    return " ".join([question_about(plan, request), *told])
+
+
+def question_about(plan: Plan, request: Request) -> str:
+    """Return the question whether a plan is wanted."""
+    return Says.CONFIRM.format(steps=steps_in_words(_called_by_words(plan, request)))
+
+
+def things_named(plan: Plan, request: Request) -> str:
+    """Return the sentence that names what a plan takes, "" for fewer than two things.
+
+    So a yes can catch an error; of many things it tells the kinds.
+    """
+    taken = (action.parameters["object"] for action in plan.actions if action.skill == "pick_up")
+    subjects = [subject_of(str(text), request.scene) for text in dict.fromkeys(taken)]
+    if len(subjects) < 2:
+        return ""
+    if len(subjects) <= MOST_NAMED:
+        return f"That is {listed([_where_it_is(one) for one in subjects])}."
+    kinds = Counter(one.kind for one in subjects)
+    counted = [
+        f"{count} {kind.removesuffix('s')}{'s' * (count > 1)}" for kind, count in kinds.items()
+    ]
+    return f"That is {len(subjects)} things: {listed(counted)}."
+
+
+def _where_it_is(subject: Subject) -> str:
+    """Return "the red cup on the coffee table", as far as that is known."""
+    thing = subject.thing
+    if thing is None or thing.rests is None:
+        return f"the {thing or subject.words}"
+    of = re.sub(r"_\d+$", "", thing.rests.of).replace("_", " ")
+    return f"the {thing} {thing.rests.relation} the {of}"
 
 
 def agreement_to(plan: Plan, request: Request) -> frozenset[str]:

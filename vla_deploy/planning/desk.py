@@ -16,11 +16,13 @@ from vla_deploy.planning.accounts import Accounts
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.beside import Beside
 from vla_deploy.planning.conclusions import Conclusions
-from vla_deploy.planning.correction import CORRECTED, corrected_by
+from vla_deploy.planning.confirmation import question_about
+from vla_deploy.planning.correction import CORRECTED, corrected_by, corrected_text
 from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import PlanningError
 from vla_deploy.planning.inbox import READ_BACK, Command
 from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.patterns.repeating import asked_for, can_repeat
 from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
@@ -31,6 +33,8 @@ from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.telling import Telling
 from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.planning.understanding import Outcome, Question, Reply, Turn, Verdict, described
+from vla_deploy.planning.understanding.answers import judge_answer
+from vla_deploy.planning.understanding.mentioned import mentions_of
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 MOST_WAITING: Final = 8
@@ -87,6 +91,8 @@ class Desk:
             return
         if waiting is not None and self._is_answer(command, waiting):
             return
+        if waiting is None and self._is_word(command):
+            return
         if command.is_answer:
             self._conclusions.refuse(command, Says.NOTHING_ASKED)
         elif len(self._queue) >= MOST_WAITING:
@@ -100,8 +106,9 @@ class Desk:
         """Let go of every command, and let the executor end what it does."""
         self._telling.cancelled_all(command_id)
         waiting = self.dialogue.settle()
-        asked = None if waiting is None else waiting.command
-        dropped = (asked, self._beside.call_in(), *self._queue)
+        open_ones = (waiting, self.dialogue.take_held())
+        asked = [one.command for one in open_ones if one is not None]
+        dropped = (*asked, self._beside.call_in(), *self._queue)
         self._queue.clear()
         self._rehearing.forget()
         for command in dropped:
@@ -139,6 +146,8 @@ class Desk:
         """Go on with what has become possible."""
         if self.dialogue.is_overdue:
             self._leave(Says.NO_ANSWER)
+        if self.dialogue.is_held_too_long:
+            self._conclusions.drop(self.dialogue.take_held(), Says.NO_ANSWER)
         self._look_after_work()
         while self._queue and self._beside.work is None and self.dialogue.waiting is None:
             command = self._queue.popleft()
@@ -147,12 +156,13 @@ class Desk:
 
     def document(self) -> dict[str, Any]:
         """Return which commands are in work, what was asked, and how it has been going."""
-        waiting = self.dialogue.waiting
-        held = [one.command for one in (self._beside.work, waiting) if one is not None]
+        waiting, held = self.dialogue.waiting, self.dialogue.held
+        in_work = [one.command for one in (self._beside.work, waiting, held) if one is not None]
+        asked = waiting or held
         return {
             **self.accounts.document(),
-            "commands": [one.command_id for one in (*held, *self._queue)],
-            "question": None if waiting is None else waiting.question.text,
+            "commands": [one.command_id for one in (*in_work, *self._queue)],
+            "question": None if asked is None else asked.question.text,
             **self.planner.document(),
             "prohibitions": self._prohibitions.document(),
         }
@@ -166,6 +176,10 @@ class Desk:
             self._conclusions.conclude(
                 command, request, self.planner.check_given(command.plan, request)
             )
+            return
+        plan = command.corrected or self._correction_of_last(command, request)
+        if plan is not None:
+            self._begin_corrected(command, request, plan)
             return
         within_s = self._rehearing.within_s(command, self.planner.within_s)
         deadline = Deadline.within(self._clock, within_s, Event())
@@ -230,6 +244,22 @@ class Desk:
         request = self._situation.request(command, self.dialogue.talk, of_use=self.planner.uses)
         return replace(request, prohibitions=self._prohibitions.items)
 
+    def _is_word(self, command: Command) -> bool:
+        """Take an utterance as the word that begins the held plan, or drops it."""
+        held = self.dialogue.held
+        if held is None or held.plan is None or command.is_doubted:
+            return False
+        verdict, _ = judge_answer(held.question, command.text)
+        if verdict not in (Verdict.YES, Verdict.NO):
+            return False
+        self.dialogue.take_held()
+        self._telling.answered(command, held.command)
+        if verdict is Verdict.YES:
+            self._run_confirmed(held, held.plan)
+        else:
+            self._conclusions.drop(held, Says.LEFT)
+        return True
+
     # --- answers --------------------------------------------------------------------------------
 
     def _is_answer(self, command: Command, waiting: Waiting) -> bool:
@@ -243,9 +273,10 @@ class Desk:
         elif waiting.is_open and not self._is_command(command):
             self._telling.answered(command, waiting.command)
             self._complete(waiting, command.text)
-        elif plan := corrected_by(waiting.plan, command.text):
+        elif other := self._corrected(waiting, command.text):
             self._telling.answered(command, waiting.command)
-            self._correct(waiting, plan)
+            self.dialogue.settle()
+            self._queue.appendleft(other)
         elif full:
             self._telling.answered(command, waiting.command)
             self.dialogue.settle()
@@ -291,18 +322,43 @@ class Desk:
         asked = waiting.command
         self._queue.appendleft(replace(asked, text=f"{asked.text}: {text}"))
 
-    def _correct(self, waiting: Waiting, plan: Plan) -> None:
-        """Go on with another plan in the place of the one that was read back."""
-        self.dialogue.settle()
-        command = waiting.command
-        request = self._request(command)
+    def _corrected(self, waiting: Waiting, text: str) -> Command | None:
+        """Return the command that waits with what a correction puts in the place of something."""
+        command, request = waiting.command, self._request(waiting.command)
+        proposal = waiting.answer.proposal
+        if waiting.plan is None or proposal is None:
+            told = corrected_text(waiting.question, text, request.world.places)
+            return None if told is None else replace(command, text=told, corrected=None)
+        plan = corrected_by(proposal.plan, text, request.world.places)
+        if plan is None:
+            return None
+        # "The other one" is another than what was asked about.
+        asked = mentions_of(waiting.plan, request.scene)
+        turn = Turn(said=command.text, command_id=command.command_id, mentioned=asked)
+        self.dialogue.remember(replace(turn, outcome=Outcome.ASKED))
+        return replace(command, corrected=plan)
+
+    def _correction_of_last(self, command: Command, request: Request) -> Plan | None:
+        """Return what a command makes of the one before it, which ends where it is under way."""
+        if command.is_doubted or not can_repeat(request):
+            return None
+        last = request.conversation.turns[-1]
+        plan = corrected_by(asked_for(last), command.text, request.world.places)
+        if plan is not None and last.outcome is Outcome.UNDER_WAY:
+            self._telling.cancelled_all(f"{command.command_id}-corrects")
+        return plan
+
+    def _begin_corrected(self, command: Command, request: Request, plan: Plan) -> None:
+        """Read a plan back that takes the place of the one that was asked about or has begun."""
         proposal = Proposal(plan=plan, rung=CORRECTED, confidence=1.0)
         try:
             checked = self.planner.check(plan, request)
         except PlanningError as error:
-            self._conclusions.conclude(command, request, Answer(error=error))
-            return
-        self._conclusions.conclude(command, request, Answer(plan=checked, proposal=proposal))
+            answer = Answer(error=error)
+        else:
+            proposal = replace(proposal, read_back=question_about(checked, request))
+            answer = Answer(plan=checked, proposal=proposal)
+        self._conclusions.conclude(replace(command, corrected=plan), request, answer)
 
     def _ask_again(self, waiting: Waiting, question: Question) -> None:
         asked = self.dialogue.ask_again(question)
@@ -324,6 +380,4 @@ class Desk:
             self._conclusions.refuse(command, error, waiting.answer)
 
     def _leave(self, why: Says) -> None:
-        waiting = self.dialogue.settle()
-        if waiting is not None:
-            self._conclusions.refuse(waiting.command, why, waiting.answer, Outcome.CANCELLED)
+        self._conclusions.drop(self.dialogue.settle(), why)

@@ -22,6 +22,8 @@ from vla_deploy.planning.understanding import (
 )
 
 MOST_ASKED: Final = 3
+HELD_S: Final = 3600.0
+"""How long a plan waits for the word that begins it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,11 +43,15 @@ class Waiting:
 
 
 class Dialogue:
-    """Remember what was said; at most one question waits at a time."""
+    """Remember what was said; at most one question waits at a time.
+
+    Beside it a plan may be `held` until the person says go; what else is said does not drop it.
+    """
 
     def __init__(self, clock: Clock) -> None:
         self.talk = Conversation()
         self.waiting: Waiting | None = None
+        self.held: Waiting | None = None
         self._clock = clock
 
     @property
@@ -53,6 +59,11 @@ class Dialogue:
         """Tell whether the answer to the question would come too late by now."""
         now_ns = self._clock.now_ns()
         return self.waiting is not None and not self.waiting.question.is_open(now_ns)
+
+    @property
+    def is_held_too_long(self) -> bool:
+        """Tell whether the word that begins the held plan has not come."""
+        return self.held is not None and not self.held.question.is_open(self._clock.now_ns())
 
     def ask(
         self, command: Command, request: Request, answer: Answer, unclear: Ambiguous
@@ -70,6 +81,23 @@ class Dialogue:
         self.talk = self.talk.asks(question)
         self.waiting = Waiting(command=command, answer=answer, question=question, plan=answer.plan)
         return self.waiting
+
+    def hold(self, command: Command, answer: Answer, text: str) -> Waiting:
+        """Hold a plan until it is agreed to."""
+        question = Question(
+            text=text,
+            asked_ns=self._clock.now_ns(),
+            command_id=command.command_id,
+            command_text=command.text,
+            limit_s=HELD_S,
+        )
+        self.held = Waiting(command=command, answer=answer, question=question, plan=answer.plan)
+        return self.held
+
+    def take_held(self) -> Waiting | None:
+        """Return what was held, and hold nothing any more."""
+        held, self.held = self.held, None
+        return held
 
     def ask_again(self, question: Question) -> Question | None:
         """Wait once more, and return the question in other words; None when that was enough.

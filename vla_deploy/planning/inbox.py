@@ -8,7 +8,9 @@ from typing import Any, Final
 from vla_deploy.ipc import Event
 from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
+from vla_deploy.planning.patterns.awaiting import awaiting
 from vla_deploy.planning.patterns.stopping import is_stop
+from vla_deploy.planning.plan import Plan
 
 VOICE: Final = "voice"
 READ_BACK: Final = 0.5
@@ -26,7 +28,8 @@ class Command:
     over that of the words; with `is_doubted` the words are not sure enough to act by, and with
     `may_ask_again` nobody minds to be asked for them once more. With `is_answer` the words are no
     command of their own; with `recovers` it is under way already, and what is planned for it goes
-    on after a failure.
+    on after a failure. `corrected` is the plan that a correction made of the one before it.
+    With `awaits_word` the plan is held until the person says go.
     """
 
     command_id: str
@@ -38,6 +41,8 @@ class Command:
     others: tuple[tuple[str, float], ...] = ()
     is_doubted: bool = False
     may_ask_again: bool = False
+    corrected: Plan | None = None
+    awaits_word: bool = False
     is_answer: bool = False
     recovers: bool = False
 
@@ -66,19 +71,22 @@ def read_command(event: Event) -> Command:
     """
     given = event.payload
     plan = given.get("plan")
+    text = _words(given) if plan is None else ""
+    rest = awaiting(text)
     told = given.get("heard")
     heard: Mapping[str, Any] = told if isinstance(told, Mapping) else {}
     return Command(
         command_id=command_id_of(event),
         told_ns=event.stamp_ns,
         source=str(given.get("source", "")),
-        text=_words(given) if plan is None else "",
+        text=text if rest is None else rest,
         plan=plan,
         heard_confidence=_confidence(heard),
         others=tuple(islice(_others(heard.get("others")), _MOST_OTHERS)),
         is_doubted=bool(heard.get("doubted")),
         may_ask_again=bool(heard.get("ask_again")),
         is_answer=bool(given.get("answer")),
+        awaits_word=rest is not None,
     )
 
 

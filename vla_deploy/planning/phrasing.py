@@ -7,6 +7,7 @@ word: the robot would take a person's for its own.
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
+from itertools import zip_longest
 from typing import Any, Final
 
 from vla_deploy.planning.errors import NotReady, NotUnderstood, PlanInvalid, PlanningError
@@ -23,6 +24,7 @@ class Says(StrEnum):
 
     WORKING = "One moment."
     CONFIRM = "Shall I {steps}?"
+    HELD = "{question} I wait for you to say go."
     NOT_CLEAR = "Sorry, I did not get that. {question}"
     LEFT = "All right, I leave it."
     NO_ANSWER = "I got no answer, so I leave it."
@@ -57,7 +59,7 @@ _PHRASES: Final[Mapping[str, Callable[[Parameters], str]]] = {
     "open_gripper": lambda given: f"open my {_hand(given)}",
     "close_gripper": lambda given: f"close my {_hand(given)}",
     "move_arm": lambda given: f"bring my arms to the pose {given['pose']}",
-    "speak": lambda given: "say something",
+    "speak": lambda given: f'say "{first_part(str(given["text"]))}"',
     "wait": lambda given: f"wait {float(given['duration_s']):g} seconds",
     "stop": lambda given: "stand still",
 }
@@ -91,7 +93,7 @@ def steps_in_words(plan: Plan) -> str:
     steps = list(_steps(plan))
     if len(steps) > _MOST_STEPS:
         steps = [*steps[:_MOST_STEPS], f"do {len(steps) - _MOST_STEPS} things more"]
-    return _listed(steps)
+    return listed(steps)
 
 
 def _steps(plan: Plan) -> Iterator[str]:
@@ -102,14 +104,16 @@ def _steps(plan: Plan) -> Iterator[str]:
         for name in ("object", "destination")
         if action.skill in ("pick_up", "place")
     }
-    for action in plan.actions:
+    for action, then in zip_longest(plan.actions, plan.actions[1:]):
         leads_up = action.skill in ("find_object", "navigate_to")
         where = action.parameters.get("object", action.parameters.get("place"))
-        if not (leads_up and str(where) in handled):
+        comes_back = "x_m" in action.parameters and then and then.skill == "hand_over"
+        if not (leads_up and (str(where) in handled or comes_back)):
             yield _PHRASES[action.skill](action.parameters)
 
 
-def _listed(steps: Sequence[str]) -> str:
+def listed(steps: Sequence[str]) -> str:
+    """Return "one, two and three"."""
     if len(steps) < 2:
         return "".join(steps)
     return f"{', '.join(steps[:-1])} and {steps[-1]}"

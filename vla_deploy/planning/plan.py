@@ -37,7 +37,10 @@ class Action(BaseModel):
 
 
 class Plan(BaseModel):
-    """Answer one command with actions, or say why it is not feasible."""
+    """Answer one command with actions, or say why it is not feasible.
+
+    The planner fills in `keeps_out`: the places that nothing may enter while it is carried out.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -48,6 +51,7 @@ class Plan(BaseModel):
     actions: tuple[Action, ...] = Field(default=(), max_length=MOST_ACTIONS)
     safety_concerns: tuple[str, ...] = ()
     success_criteria: tuple[str, ...] = ()
+    keeps_out: tuple[str, ...] = ()
 
 
 def plan_schema() -> dict[str, Any]:

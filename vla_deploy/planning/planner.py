@@ -15,7 +15,7 @@ from vla_deploy.planning.ladder import Answer, Check, Ladder
 from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
-from vla_deploy.planning.prohibitions import refuse_forbidden
+from vla_deploy.planning.prohibitions import held_to
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
@@ -32,8 +32,7 @@ def checked(plan: Plan, request: Request) -> Plan:
     """
     grounded = ground_plan(plan, request).plan
     check_plan(grounded, request.world, request.scene, request.here)
-    refuse_forbidden(grounded, request.world, request.scene, request.prohibitions)
-    return grounded
+    return held_to(request.prohibitions, grounded, request.world, request.scene)
 
 
 @runtime_checkable

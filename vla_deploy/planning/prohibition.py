@@ -36,3 +36,8 @@ class StandingOrder:
     def answer(self) -> str:
         """Return what the robot says to it."""
         return f"All right, I will {'not' if self.forbids else 'now'} {self.of}."
+
+    @property
+    def question(self) -> str:
+        """Return what is asked before it stands; to forbid something is safe at once."""
+        return "" if self.forbids else f"May I {self.of} again?"

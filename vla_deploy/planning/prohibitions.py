@@ -6,14 +6,16 @@ planned it.
 
 import json
 import logging
+import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
 
-from vla_deploy.planning.builders.tidying import surfaces_of
-from vla_deploy.planning.errors import NotAble, UnknownObject
+from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.builders.tidying import REACH_M, surfaces_of
+from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.slots import THING, WORDS
@@ -21,6 +23,7 @@ from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic.subjects import subject_of
+from vla_deploy.robots.description import FloorPose
 from vla_deploy.state_dir import state_dir_of
 from vla_deploy.world import Snapshot
 
@@ -96,20 +99,68 @@ def read_order(text: str, world: World, standing: Sequence[Prohibition]) -> Stan
     return None
 
 
-def refuse_forbidden(
-    plan: Plan, world: World, scene: Snapshot | None, standing: Sequence[Prohibition]
-) -> None:
-    """Refuse a grounded plan that does what is forbidden.
+def order_of(groups: Mapping[str, str], forbids: bool, request: Request) -> StandingOrder:
+    """Return the order about the words of a "thing" or a "place".
 
     Raises:
-        NotAble: it does; says what, and how it is permitted again.
+        CannotBeDone: they name nothing that may be forbidden, or that is not forbidden.
+    """
+    meant = _meant(groups, request.world)
+    if meant is None:
+        raise CannotBeDone('say what: "don\'t touch the keys", "you may go into the kitchen again"')
+    if not forbids and meant not in request.prohibitions:
+        raise CannotBeDone(f"nobody has told me not to {meant}")
+    return StandingOrder(forbids=forbids, of=meant)
+
+
+def proposal_of(order: StandingOrder, request: Request, rung: str) -> Proposal:
+    """Return the proposal to say that an order stands from now on."""
+    said = Action(id="a1", skill="speak", parameters={"text": order.answer})
+    plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
+    return Proposal(
+        plan=plan,
+        rung=rung,
+        confidence=1.0,
+        read_back=order.question,
+        is_momentary=True,
+        covers=None,
+        order=order,
+    )
+
+
+def held_to(
+    standing: Sequence[Prohibition], plan: Plan, world: World, scene: Snapshot | None
+) -> Plan:
+    """Return a grounded plan that keeps out of what is forbidden, also where it only searches.
+
+    Raises:
+        NotAble: it does what is forbidden, or nothing else is left to search; says what, and how it
+            is permitted again.
     """
     for one in standing:
         if any(_breaks(action, one, world, scene) for action in plan.actions):
             raise NotAble(f'you told me not to {one}; say "you may {one} again" first')
+    closed = [one for one in standing if one.what is Forbidden.PLACE]
+    places = frozenset[str]().union(*(surfaces_of(one.words, world) for one in closed))
+    if places and _searches(plan, scene) and not _open_views(world, places):
+        told = " and ".join(map(str, closed))
+        raise NotAble(f"you told me not to {told}, and there is nowhere else where I could look")
+    return plan.model_copy(update={"keeps_out": tuple(sorted(places))})
 
 
-def _meant(groups: dict[str, str | None], world: World) -> Prohibition | None:
+def _searches(plan: Plan, scene: Snapshot | None) -> bool:
+    """Tell whether a plan looks for something that is not in the scene."""
+    sought = [one.parameters["object"] for one in plan.actions if one.skill == "find_object"]
+    return any(subject_of(str(text), scene).thing is None for text in sought)
+
+
+def _open_views(world: World, closed: frozenset[str]) -> set[FloorPose]:
+    """Return from where furniture can be searched that is in none of the closed places."""
+    shut = {view for name in closed & world.sites.keys() for view in world.sites[name].viewpoints}
+    return {view for site in world.sites.values() for view in site.viewpoints} - shut
+
+
+def _meant(groups: Mapping[str, str | None], world: World) -> Prohibition | None:
     place = match_place(groups.get("place") or "", world.places)
     if place is not None:
         return Prohibition(what=Forbidden.PLACE, words=place)
@@ -127,8 +178,16 @@ def _breaks(action: Action, one: Prohibition, world: World, scene: Snapshot | No
         touched += [given.get("destination")] if action.skill == "place" else []
         return any(_is_same(str(text), one.words, scene) for text in touched if text)
     inside = surfaces_of(one.words, world)
+    if "x_m" in given and "y_m" in given:
+        return _is_near((float(given["x_m"]), float(given["y_m"])), inside, world)
     named = {str(given[name]) for name in ("place", "destination") if name in given}
-    return bool(inside & (named | set(_rests(given.get("object"), scene))))
+    return bool(inside & (named | _rests(given.get("object"), scene)))
+
+
+def _is_near(point: tuple[float, float], places: Set[str], world: World) -> bool:
+    """Tell whether a point of the map is at one of the places: no map says where rooms end."""
+    poses = (site.pose for name, site in world.sites.items() if name in places)
+    return any(math.dist(point, (one.x_m, one.y_m)) <= REACH_M for one in poses)
 
 
 def _is_same(text: str, words: str, scene: Snapshot | None) -> bool:
@@ -141,16 +200,15 @@ def _is_same(text: str, words: str, scene: Snapshot | None) -> bool:
     return subject.kind == query.kind and (not query.colour or query.colour in subject.words)
 
 
-def _rests(text: object, scene: Snapshot | None) -> Iterator[str]:
-    """Yield what a thing that an action names rests on, where that is known."""
+def _rests(text: object, scene: Snapshot | None) -> set[str]:
+    """Return all that a thing rests on which an action names, where that is known."""
     if not isinstance(text, str) or scene is None:
-        return
+        return set()
     try:
         thing = subject_of(text, scene).thing
     except UnknownObject:
-        return
-    if thing is not None and thing.rests is not None:
-        yield thing.rests.of
+        return set()
+    return set() if thing is None else {*scene.below(thing.thing_id)}
 
 
 def _read(file: Path) -> tuple[Prohibition, ...]:

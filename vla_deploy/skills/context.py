@@ -43,7 +43,7 @@ class SkillContext:
     `rests` tell of relative motions, by the actions' ids, what is left of them;
     `way_m` are the points of the path that the base follows, (n, 2) in the map, none while it
     follows none. `holder` is the claim of the acting action, `ros` the way to servers beyond the
-    robot, where the robot file names any.
+    robot, where the robot file names any. `keeps_out` are the places that the plan may not enter.
     """
 
     robot: RobotDescription
@@ -59,6 +59,7 @@ class SkillContext:
     way_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     holder: str = ""
     ros: RosGoals | None = None
+    keeps_out: frozenset[str] = frozenset()
 
     def note(self, text: str) -> None:
         """Have the result of the acting action say something, whatever its status."""
@@ -79,6 +80,11 @@ class SkillContext:
                 return name
         which = f"the {wanted} hand" if wanted else "neither hand"
         raise NotPossible(f"{which} holds anything; pick something up first")
+
+
+def spoken(place: str) -> str:
+    """Return the name of a place as it is said."""
+    return place.replace("_", " ")
 
 
 SkillFunction = Callable[[SkillContext, Mapping[str, Any]], Skill]

@@ -104,6 +104,7 @@ class PlanExecution:
         self.plan = plan
         self.records = [ActionRecord(action=action) for action in execution_order(plan.actions)]
         self._context = context
+        context.keeps_out = frozenset(plan.keeps_out)
         self._tell = tell
         self._command_id = command_id
         self._world = WorldCheck(context)

@@ -10,11 +10,12 @@ from vla_deploy.navigation.errors import NavigationError
 from vla_deploy.planning.references import ObjectQuery, parse_object
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.carrying import carry
-from vla_deploy.skills.context import Skill, SkillContext
+from vla_deploy.skills.context import Skill, SkillContext, spoken
 from vla_deploy.skills.drive import drive_to
 from vla_deploy.skills.errors import NotPossible, TryAgain
 from vla_deploy.skills.frames import to_base, to_map
 from vla_deploy.skills.gaze import DRIVING_GAZE, gaze_at, remembered, turn_head, watch_for
+from vla_deploy.skills.simple import speak
 
 # A viewpoint stands this far before the middle of the furniture that it is for.
 FURNITURE_AHEAD_M = 0.5
@@ -31,7 +32,7 @@ SWEEP = ((0.0, 0.85), (0.65, 0.65), (-0.65, 0.65))
 
 
 def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
-    """Look for an object until it is in the scene.
+    """Look for an object until it is in the scene, and say which places are left out.
 
     Raises:
         TryAgain: it is nowhere to be seen.
@@ -39,9 +40,11 @@ def find_object(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     query = parse_object(parameters["object"])
     if remembered(context, query) is not None:
         return
-    left = {
-        viewpoint: None for place in context.robot.places.values() for viewpoint in place.viewpoints
-    }
+    places = context.robot.places
+    shut = {view for name in context.keeps_out & places.keys() for view in places[name].viewpoints}
+    left = {view: None for one in places.values() for view in one.viewpoints if view not in shut}
+    if shut:
+        yield from speak(context, {"text": f"I leave out the {_left_out(context)}."})
     yield from _look_around(context, query, left)
     while left and remembered(context, query) is None:
         viewpoint = min(left, key=lambda one: _way_m(context, one))
@@ -115,6 +118,11 @@ def _way_m(context: SkillContext, goal: FloorPose) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
+def _left_out(context: SkillContext) -> str:
+    return " and the ".join(spoken(one) for one in sorted(context.keeps_out))
+
+
 def _nowhere(context: SkillContext, query: ObjectQuery) -> str:
     seen = sorted({f"{one['colour']} {one['class']}" for one in context.link.objects})
-    return f"I cannot find a {query}; I have seen: {', '.join(seen) or 'nothing'}"
+    left_out = f", and left out the {_left_out(context)}" if context.keeps_out else ""
+    return f"I cannot find a {query}; I have seen: {', '.join(seen) or 'nothing'}{left_out}"

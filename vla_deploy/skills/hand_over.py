@@ -19,6 +19,7 @@ from vla_deploy.skills.context import Skill, SkillContext
 from vla_deploy.skills.errors import NotPossible, Touched
 from vla_deploy.skills.motion import pause, settle, stay
 from vla_deploy.skills.simple import speak
+from vla_deploy.world.vocabulary import ANY_CLASS
 
 PATIENCE_S: Final = 30.0
 PULL_RATIO: Final = 0.15
@@ -43,11 +44,12 @@ def hand_over(context: SkillContext, parameters: Mapping[str, Any]) -> Skill:
     """
     hand = context.holding_hand(parameters.get("arm"))
     held = context.hands[hand]
-    kind = "object" if held is None else held.kind
+    kind = ANY_CLASS if held is None else held.kind
     yield from carry(context)
     yield from settle(context, arm_joints(context, hand))
     alone = _efforts(context, hand)
-    yield from speak(context, {"text": f"Here is the {kind}. Pull a little, and I let go."})
+    here = "Here you are" if kind == ANY_CLASS else f"Here is the {kind}"
+    yield from speak(context, {"text": f"{here}. Pull a little, and I let go."})
     yield from _taken(context, hand, kind, alone)
     yield from open_gripper(context, {"arm": hand})
     yield from pause(context, AWAY_S)

@@ -8,7 +8,7 @@ from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.references import ObjectQuery, match_place, parse_object
 from vla_deploy.robots.description import FloorPose
 from vla_deploy.skills.carrying import carry
-from vla_deploy.skills.context import Skill, SkillContext
+from vla_deploy.skills.context import Skill, SkillContext, spoken
 from vla_deploy.skills.drive import drive_to, turn_by
 from vla_deploy.skills.errors import NotPossible, OutOfReach, TryAgain
 from vla_deploy.skills.frames import to_base
@@ -59,11 +59,15 @@ def reach(
 
     Raises:
         TryAgain: the object has not been seen.
-        NotPossible: no pose near it is free and reachable.
+        NotPossible: no pose near it is free and reachable, or it is where the plan keeps out of.
     """
     known = remembered(context, query)
     if known is None:
         raise TryAgain(f"I have not seen a {query}; look for it first")
+    scene = context.link.snapshot() if context.keeps_out else None
+    for place in () if scene is None else scene.below(known["id"]):
+        if place in context.keeps_out:
+            raise NotPossible(f"the {query} is at the {spoken(place)}, where I was told not to go")
     reasons = []
     for goal in standing_poses(context, known["position_m"], anew=anew):
         try:

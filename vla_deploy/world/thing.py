@@ -100,6 +100,15 @@ class Snapshot:
         """Return the thing that goes by an id, or None."""
         return next((one for one in self.things if one.is_called(name)), None)
 
+    def below(self, name: str) -> tuple[str, ...]:
+        """Return what a thing rests in or on, and all below that: a box, the table under it."""
+        found: list[str] = []
+        thing = self.thing(name)
+        while thing is not None and thing.rests is not None and thing.rests.of not in found:
+            found.append(thing.rests.of)
+            thing = self.thing(thing.rests.of)
+        return tuple(found)
+
     def unseen_s(self, thing: Thing) -> float:
         """Return for how long a thing had not been seen."""
         return max(0.0, (self.stamp_ns - thing.last_seen_ns) / NS_PER_S)

@@ -3,13 +3,14 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.confirmation import agreement_to, confirmation_of
+from vla_deploy.planning.confirmation import agreement_to, confirmation_of, things_named
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.understanding.grounding import PUT_IN
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.plan_bounds import Confirm
 from vla_deploy.world import Snapshot, Thing
+from vla_deploy.world.thing import Rest
 
 GO = Action(id="a", skill="navigate_to", parameters={"place": "kitchen"})
 PICK = Action(id="p", skill="pick_up", parameters={"object": "bottle"})
@@ -108,3 +109,38 @@ def test_where_every_motion_waits_for_a_yes_an_answer_is_none(butler: World) -> 
     said, moved = (Plan(goal="x", actions=(one,)) for one in (speak, GO))
     assert confirmation_of(moved, request, agreement_to(moved, request)) == ""
     assert confirmation_of(moved, request, agreement_to(said, request))
+
+
+CUPS = [f"red cup_{number}" for number in range(1, 6)]
+
+
+@pytest.mark.parametrize(
+    ("taken", "said"),
+    [
+        (["red cup_1"], ""),
+        (["red cup_1", "green ball_1", "keys"],
+         "That is the red cup on the coffee table, the green ball in the box and the keys."),
+        ([*CUPS, "green ball_1"], None),
+        ([*CUPS, "green ball_1", "green ball_2"],
+         "That is 7 things: 5 cups and 2 balls."),
+    ],
+)  # fmt: skip
+def test_every_thing_of_a_set_is_named_of_many_the_kinds(
+    butler: World, taken: list[str], said: str | None
+) -> None:
+    rests = {"cup": Rest("on", "coffee_table"), "ball": Rest("in", "box_1")}
+    names = [one.split() for one in taken]
+    things = tuple(
+        Thing(thing_id=name[1], kind=(kind := name[1].partition("_")[0]), colour=name[0],
+              position_m=(2.0, 1.5, 0.5), size_m=(0.06, 0.06, 0.2), rests=rests[kind])
+        for name in names if len(name) > 1
+    )  # fmt: skip
+    actions = tuple(
+        Action(id=f"a{number}", skill="pick_up", parameters={"object": name[-1]})
+        for number, name in enumerate(names)
+    )
+    request = Request(
+        command_id="c", text="x", world=butler, scene=Snapshot(stamp_ns=0, things=things)
+    )
+    found = things_named(Plan(goal="x", actions=actions), request)
+    assert found.count("on the coffee table") == 5 if said is None else found == said

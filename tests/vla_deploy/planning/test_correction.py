@@ -2,7 +2,14 @@
 
 import pytest
 
-from vla_deploy.planning.correction import corrected, correction_in
+from vla_deploy.planning.correction import (
+    corrected,
+    corrected_by,
+    corrected_text,
+    correction_in,
+    with_other,
+)
+from vla_deploy.planning.understanding import Question
 
 TAKE = ("pick_up", {"object": "red cup"})
 PUT = ("place", {"destination": "box", "relation": "in"})
@@ -17,6 +24,10 @@ PUT = ("place", {"destination": "box", "relation": "in"})
         ("no wait, the blue one", "the blue one"),
         ("Wait, no, I said the blue one", "the blue one"),
         ("sorry, the blue one", "the blue one"),
+        ("I mean the phone", "the phone"),
+        ("the blue one I mean", "the blue one"),
+        ("the other one", "the other one"),
+        ("no phone", ""),
         ("no", ""),
         ("the blue one", ""),
         ("nobody is here", ""),
@@ -33,7 +44,8 @@ def test_what_follows_a_no_is_found(text, rest):
         ("blue", ["blue cup", "box"]),
         ("the blue cup", ["the blue cup", "box"]),
         ("the small box", ["red cup", "the small box"]),
-        ("the ball", None),
+        ("the ball", ["the ball", "box"]),
+        ("the other one", ["the other cup", "box"]),
         ("narnia", None),
     ],
 )
@@ -67,6 +79,53 @@ def test_what_is_said_of_an_id_is_known_by_its_kind(propose):
     plan = corrected(propose(*bring).plan, "the blue one")
     told = [one.parameters for one in plan.actions]
     assert told == [{"object": "the blue cup"}, {"text": "Here is the blue cup."}]
+
+
+@pytest.mark.parametrize(
+    ("steps", "text", "parameters"),
+    [
+        ([("navigate_to", {"place": "kitchen"})], "no, the bedroom", [{"place": "the bedroom"}]),
+        ([TAKE, PUT], "no, the bedroom", [{"object": "red cup"}, {"destination": "the bedroom"}]),
+        ([TAKE], "no, the bedroom", None),
+        ([("navigate_to", {"place": "kitchen"}), ("navigate_to", {"place": "hall"})],
+         "no, the bedroom", None),
+    ],
+)  # fmt: skip
+def test_a_place_takes_the_place_of_the_only_one(propose, steps, text, parameters):
+    plan = corrected_by(propose(*steps).plan, text, {"bedroom": "bedroom"})
+    assert (plan and [one.parameters for one in plan.actions]) == parameters
+
+
+@pytest.mark.parametrize(
+    ("text", "command"),
+    [
+        ("no, the can", "please pick up the can now"),
+        ("I mean the phone", "please pick up the phone now"),
+        ("no, the green one", "please pick up the green cup now"),
+        ("the red one", None),
+        ("no, go home", None),
+    ],
+)
+def test_what_was_unclear_is_replaced_in_the_command_that_waits(text, command):
+    question = Question(
+        text="Which cup?", asked_ns=0, command_text="please pick up the cup now", expression="cup"
+    )
+    assert corrected_text(question, text, {}) == command
+
+
+@pytest.mark.parametrize(
+    ("steps", "parameters"),
+    [
+        ([TAKE, PUT], [{"object": "the other cup"}, PUT[1]]),
+        ([("place", {"destination": "box", "relation": "in", "arm": "left"})],
+         [{"destination": "box", "relation": "in", "object": "the other one"}]),
+    ],
+)  # fmt: skip
+def test_the_other_one_too_is_another_of_the_kind_or_what_the_other_hand_holds(
+    propose, steps, parameters
+):
+    plan = with_other(propose(*steps).plan)
+    assert [one.parameters for one in plan.actions] == parameters
 
 
 def test_between_two_of_a_kind_nothing_is_guessed(propose):

@@ -182,6 +182,51 @@ class TestQuestions:
         assert (told["command_id"], told["reason"]) == ("c4", Says.NOTHING_ASKED)
 
 
+class TestWaitingForAWord:
+    @pytest.fixture
+    def desk(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="when I say so, pick up the red cup")
+        return desk
+
+    def test_the_plan_is_read_back_and_held(self, desk):
+        (asked,) = desk.answers()
+        assert asked["question"] == "Shall I pick up the red cup? I wait for you to say go."
+        assert asked["plan"]["actions"][-1]["skill"] == "pick_up"
+        assert desk.plans() == []
+        desk.clock.pass_s(600.0)
+        assert desk.answers() == []
+        assert desk.status()["question"] == asked["question"]
+        assert desk.status()["commands"] == ["c1"]
+
+    @pytest.mark.parametrize(
+        ("word", "end"),
+        [
+            ("go", ("c1", "plan")),
+            ("now, please", ("c1", "plan")),
+            ("yes", ("c1", "plan")),
+            ("not now", ("c1", "rejected")),
+            ("never mind", ("c1", "rejected")),
+            ("look left", ("c2", "plan")),
+        ],
+    )
+    def test_a_word_begins_or_drops_it_and_anything_else_does_not(self, desk, word, end):
+        desk.answers()
+        desk.give(command_id="c2", text=word)
+        assert events(desk.answers())[-1] == end
+        is_held = desk.status()["question"] is not None
+        assert is_held == (end[0] == "c2")
+
+    def test_another_takes_its_place_and_none_waits_for_ever(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="look left when I call")
+        assert events(desk.answers()) == [("c1", "rejected"), ("c2", "asked")]
+        desk.clock.pass_s(3601.0)
+        (left,) = desk.answers()
+        assert (left["command_id"], left["reason"]) == ("c2", Says.NO_ANSWER)
+
+
 class TestReadingBack:
     @pytest.fixture
     def desk(self, open_desk, rung, propose):
@@ -207,11 +252,58 @@ class TestReadingBack:
         assert desk.answers()[-1]["event"] == "asked"
         desk.give(command_id="c2", text="no, the blue one")
         told = desk.answers()
-        assert events(told) == [("c2", "answered"), ("c1", "accepted"), ("c1", "plan")]
+        assert events(told) == [("c2", "answered"), ("c1", "asked")]
+        assert (
+            told[-1]["question"] == 'Shall I pick up the blue cup and say "Here is the blue cup"?'
+        )
+        desk.give(command_id="c3", text="yes")
+        told = desk.answers()
+        assert events(told) == [("c3", "answered"), ("c1", "accepted"), ("c1", "plan")]
         assert told[-1]["rung"] == "correction"
         actions = told[-1]["plan"]["actions"]
         assert "blue cup" in [one["parameters"].get("object") for one in actions]
         assert actions[-1]["parameters"]["text"] == "Here is the blue cup."
+
+    @pytest.mark.parametrize(
+        ("said", "question"),
+        [
+            ("no, the blue one", "Shall I pick up the blue cup?"),
+            ("I mean the ball", "Shall I pick up the ball?"),
+            ("the other one", "Shall I pick up the blue cup?"),
+            ("the green ball I mean", "Shall I pick up the green ball?"),
+        ],
+    )
+    def test_a_correction_ends_what_has_begun_and_is_read_back(self, open_desk, said, question):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2", "green ball_1")
+        desk.give(text="pick up the red cup")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said)
+        (asked,) = desk.answers()
+        assert (asked["event"], asked["question"]) == ("asked", question)
+        assert desk.plans() == [{"command_id": "c2-corrects", "cancel": True}]
+        desk.give(command_id="c3", text="yes")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+
+    def test_a_correction_of_what_was_not_done_is_a_command_of_its_own(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(text="go to narnia")
+        desk.answers()
+        desk.give(command_id="c2", text="no, the blue cup")
+        assert events(desk.answers()) == [("c2", "rejected")]
+
+    def test_what_is_done_need_not_be_ended_for_the_other_one_too(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(text="look at the red cup")
+        desk.answers()
+        desk.plans()
+        desk.executor_tells(command_id="c1", event="finished", success=True, error=None)
+        desk.give(command_id="c2", text="and the other one too")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+        assert [list(one) for one in desk.plans()] == [["command_id", "plan"]]
 
     def test_a_robot_that_was_disarmed_meanwhile_does_not_move(self, desk):
         desk.answers()

@@ -60,7 +60,11 @@ def test_a_thing_is_not_taken_until_that_is_permitted() -> None:
         assert 'say "you may touch the keys again" first' in why
         refused(desk, "put the keys in the box")
         assert moves(desk.say("pick up the red cup")[1].plan or {})
+        asked = desk.say("you may touch the keys again")[1]
+        assert (asked.outcome, asked.text) == ("ask", "May I touch the keys again?")
+        refused(desk, "bring me the keys")
         desk.say("you may touch the keys again")
+        desk.say("yes")
         assert desk.say("bring me the keys")[1].outcome == "plan"
 
 
@@ -70,8 +74,36 @@ def test_nobody_goes_where_it_is_forbidden_nor_takes_what_is_there() -> None:
         desk.say("stay out of the kitchen")
         refused(desk, "go to the kitchen")
         refused(desk, "go to the kitchen table")
+        refused(desk, "patrol the kitchen")
         refused(desk, "bring me the green bottle")
         assert desk.say("go to the bedroom")[1].outcome == "plan"
+
+
+@pytest.mark.parametrize(
+    ("orders", "text", "outcome", "keeps_out"),
+    [
+        ((), "find the remote", "plan", []),
+        (("stay out of the kitchen",), "find the remote", "plan", ["kitchen", "kitchen_table"]),
+        (("stay out of the kitchen",), "bring me the remote", "plan",
+         ["kitchen", "kitchen_table"]),
+        (("stay out of the kitchen",), "find the remote in the kitchen", "refuse", None),
+        (("stay out of the kitchen",), "find the red cup", "plan", ["kitchen", "kitchen_table"]),
+        (("stay out of the kitchen", "stay out of the bedroom", "stay out of the living room"),
+         "find the remote", "refuse", None),
+    ],
+)  # fmt: skip
+def test_a_search_leaves_out_what_may_not_be_entered(
+    orders: tuple[str, ...], text: str, outcome: str, keeps_out: list[str] | None
+) -> None:
+    with fresh_desk() as desk:
+        in_the_flat(desk)
+        for order in orders:
+            desk.say(order)
+        answer = desk.say(text)[1]
+        assert answer.outcome == outcome, answer
+        assert (answer.plan and answer.plan["keeps_out"]) == keeps_out
+        if outcome == "refuse":
+            assert "you told me not to go into the kitchen" in answer.text
 
 
 def test_a_plan_of_somebody_else_is_held_to_it_too() -> None:

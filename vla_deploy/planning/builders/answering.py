@@ -13,6 +13,7 @@ from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
 from vla_deploy.planning.understanding.insertions import is_surface
+from vla_deploy.planning.understanding.questions import did_you_mean
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words
@@ -23,6 +24,21 @@ ABILITIES = (
     "I can go to places, look for things, pick them up, put them in the box or on a table, "
     "bring them to you, tidy up, tell you what I see, and stand still when you tell me to."
 )
+
+
+def tell_welcome(_: Groups, __: Request) -> list[Step]:
+    """Answer thanks and praise."""
+    return _say("You are welcome.")
+
+
+def tell_ready(_: Groups, __: Request) -> list[Step]:
+    """Answer who asks how the robot is: one that may not move refuses every plan before."""
+    return _say("I am ready for a command.")
+
+
+def tell_battery(_: Groups, __: Request) -> list[Step]:
+    """Say that no board or drive measures the charge."""
+    return _say("I cannot measure how full my battery is.")
 
 
 def tell_abilities(_: Groups, __: Request) -> list[Step]:
@@ -111,7 +127,11 @@ def _known(text: str, request: Request) -> list[Thing]:
     if request.scene is None:
         return []
     setting = Setting(request)
-    return fitting(read_expression(text, setting.furniture), Use.SEE, setting)
+    read = read_expression(text, setting.furniture)
+    read = read_expression(request.conversation.choices.get(read.said, text), setting.furniture)
+    if read.doubts:
+        raise did_you_mean(read.doubts[0], read.said)
+    return fitting(read, Use.SEE, setting)
 
 
 def _of_room(text: str, request: Request) -> str:

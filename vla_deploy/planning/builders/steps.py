@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from vla_deploy.planning.asking import Request
+from vla_deploy.planning.catalogue import ARMS
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
 from vla_deploy.planning.plan import Action, Priority
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.phrases import PRONOUNS
 from vla_deploy.planning.understanding.places import is_like_place
 from vla_deploy.planning.understanding.quantities import quantity_of
 from vla_deploy.planning.understanding.referring import pose_parameters
@@ -45,11 +45,6 @@ _BESIDE_THERE: Final = re.compile(
 NO_THING: Final = re.compile(
     r"^(?:the |my |your )?(?:far |very )?(?:left|right|middle)$|\b(?:is|are|that|which|farthest|"
     r"furthest|nearest|closest|not|lying|standing|sitting|resting)$"
-)
-# What is said of a thing to tell it from others is no name for it.
-_SAYS_MORE: Final = re.compile(
-    r"'|\b(?:not|but|except|other than|that is|which)\b"
-    r"|^(?:two|three|four|both|all|some|an? (?:couple|pair) of)\b"
 )
 _AND: Final = re.compile(r"\s*(?:,\s*and|,|\band\b)\s*")
 
@@ -170,12 +165,20 @@ def is_one(text: str, request: Request) -> bool:
 
 
 def bring(groups: Groups, request: Request) -> list[Step]:
-    """Fetch a thing and return to where the command was given."""
-    back: list[Step] = [("navigate_to", {"place": "here"})] if request.here is not None else []
-    words = " ".join(words_of(groups["object"]))
-    is_name = words not in PRONOUNS and not _SAYS_MORE.search(groups["object"])
-    said = f"Here is the {words}." if is_name else "Here you are."
-    return [*pick(groups, request), *back, ("speak", {"text": said})]
+    """Fetch each thing and give it to who asked."""
+    return handed_over(parts_of(groups["object"]), request)
+
+
+def handed_over(things: Sequence[str], request: Request) -> list[Step]:
+    """Return the steps that give things to who asked; grounding puts in the ways there and back.
+
+    Two are fetched on one way, a hand each.
+    """
+    give: list[Step] = [("hand_over", {"object": one}) for one in things]
+    if len(things) != len(ARMS) or request.here is None:
+        return give
+    fetch: list[Step] = [("pick_up", {"object": one}) for one in things]
+    return [*fetch, ("navigate_to", {"place": "here"}), *give]
 
 
 def find(groups: Groups, _: Request) -> list[Step]:

@@ -13,6 +13,9 @@ from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.references import match_place, words_of
+from vla_deploy.planning.understanding.expressions import read_expression
+from vla_deploy.planning.understanding.fitting import Use, fitting
+from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 
 MOST_THINGS: Final = 6
@@ -25,8 +28,12 @@ MOST_POINTS: Final = 20
 
 
 def tidy(groups: Groups, request: Request) -> list[Step]:
-    """Put away what lies on a piece of furniture, or everywhere; look first where none is known."""
-    lying = _lying(groups.get("place", ""), request)
+    """Put away what lies on a piece of furniture, or everywhere; look first where none is known.
+
+    What fits the words of "except" stays.
+    """
+    stays = _fitting(groups["except"], request) if "except" in groups else []
+    lying = [one for one in _lying(groups.get("place", ""), request) if one not in stays]
     if not lying:
         there = {"place": groups["place"]} if "place" in groups else {}
         said = "I know of nothing there to put away. I look around."
@@ -38,6 +45,11 @@ def tidy(groups: Groups, request: Request) -> list[Step]:
     left = len(lying) - MOST_THINGS
     said = f"{left} more things are left; tell me again." if left > 0 else "That is put away."
     return [*steps, ("speak", {"text": said})]
+
+
+def _fitting(text: str, request: Request) -> list[Thing]:
+    setting = Setting(request)
+    return fitting(read_expression(text, setting.furniture), Use.SEE, setting)
 
 
 def _lying(place: str, request: Request) -> list[Thing]:

@@ -17,6 +17,8 @@ from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spoken import Spoken
 from vla_deploy.planning.errors import CannotBeDone, Declined, UnknownPlace
 from vla_deploy.planning.plan import Action
+from vla_deploy.planning.prohibition import StandingOrder
+from vla_deploy.planning.prohibitions import order_of
 from vla_deploy.planning.references import match_place
 
 Skill = building.Step
@@ -50,6 +52,16 @@ class Steps(Spoken):
         """
         skills = [skill for step in steps for skill in _HANDLERS[step["do"]](self, step)]
         return building.chained(skills)
+
+    def order(self, step: Step) -> StandingOrder:
+        """Return what a step forbids or permits.
+
+        Raises:
+            CannotBeDone: that is nothing which may be forbidden, or nothing that is.
+        """
+        said = (("what", "thing"), ("where", "place"))
+        groups = {name: self.spoken(step, field) for field, name in said if field in step}
+        return order_of(groups, step["do"] == "forbid", self.request)
 
 
 def are_of_the_moment(steps: Sequence[Step]) -> bool:
@@ -101,26 +113,23 @@ def _put_down(groups: building.Groups, _: Request) -> list[Skill]:
 
 
 def _bring(spoken: Spoken, step: Step) -> list[Skill]:
-    way, behind = spoken.source(step)
-    brought: list[Skill] = []
-    for part in spoken.parts(step):
-        picked, *back = building.bring({"object": part}, spoken.request)
-        brought += [*way, (picked[0], {"object": part + behind}), *_delivered(spoken, step, back)]
-    return brought
-
-
-def _delivered(spoken: Spoken, step: Step, back: list[Skill]) -> list[Skill]:
-    """Return the way to where somebody is to get it: back to the speaker, or to a place.
+    """Give each thing to who speaks, or take it to a place, where it is put down on what is there.
 
     Raises:
         UnknownPlace: it is to go to a person, of whom nobody knows where they are.
     """
+    way, behind = spoken.source(step)
+    things = [part + behind for part in spoken.parts(step)]
     if step.get("to", "me") in _SPEAKERS:
-        return back
-    to_whom, places = spoken.spoken(step, "to"), spoken.request.world.places
-    if match_place(to_whom, places) is None:
-        raise UnknownPlace(to_whom, set(places.values()))
-    return [("navigate_to", {"place": to_whom})]
+        return way + building.handed_over(things, spoken.request)
+    to, world = spoken.spoken(step, "to"), spoken.request.world
+    place = match_place(to, world.places)
+    if place is None:
+        raise UnknownPlace(to, set(world.places.values()))
+    if place in world.furniture:
+        return way + [("place", {"object": one, "destination": to}) for one in things]
+    go: Skill = ("navigate_to", {"place": to})
+    return way + [skill for one in things for skill in (("pick_up", {"object": one}), go)]
 
 
 def _give(_spoken: Spoken, _step: Step) -> list[Skill]:
@@ -186,10 +195,9 @@ def _ask(spoken: Spoken, step: Step) -> list[Skill]:
 
 
 def _tidy(spoken: Spoken, step: Step) -> list[Skill]:
-    if "except" in step:
-        raise CannotBeDone("I tidy up all or nothing; say what goes where")
-    place = {"place": spoken.spoken(step, "where")} if "where" in step else {}
-    return tidying.tidy(place, spoken.request)
+    said = (("where", "place"), ("except", "except"))
+    groups = {name: spoken.spoken(step, field) for field, name in said if field in step}
+    return tidying.tidy(groups, spoken.request)
 
 
 def _doing(_: building.Groups, request: Request) -> list[Skill]:
@@ -233,11 +241,12 @@ _HANDLERS: Final[Mapping[str, Handler]] = {
     "ask": _ask,
     "tidy": _tidy,
     "await": lambda _spoken, _step: [],
-    "forbid": _refused(
-        CannotBeDone, 'say it as "don\'t touch the keys", "keep out of the kitchen"'
-    ),
-    "permit": _refused(CannotBeDone, 'say it as "you may touch the keys again"'),
+    "forbid": _refused(CannotBeDone, "say by itself what I shall not do from now on"),
+    "permit": _refused(CannotBeDone, "say by itself what I may do again"),
     "nothing": _refused(CannotBeDone, "it says what not to do, so I leave it"),
-    "impossible": _refused(CannotBeDone, "none of my skills does that"),
+    "impossible": _refused(
+        CannotBeDone,
+        "none of my skills does that, but I can look for things, bring them and put them away",
+    ),
     "unknown": _refused(Declined, "it is no command that I know"),
 }

@@ -34,9 +34,10 @@ from vla_deploy.planning.command_parser.wording import (
     foreign_share,
     plain_words,
 )
-from vla_deploy.planning.errors import Declined
+from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.prohibitions import proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
 
 NAME: Final = "command_parser"
@@ -91,11 +92,19 @@ class CommandParser:
             parsed = self.parse(request.text, deadline)
         except InferenceError as error:
             raise Declined(one_line(error)) from error
-        actions = Steps(parsed.words, request).actions(parsed.steps)
+        reader = Steps(parsed.words, request)
+        if len(parsed.steps) == 1 and parsed.steps[0]["do"] in ("forbid", "permit"):
+            return proposal_of(reader.order(parsed.steps[0]), request, self.name)
+        actions = reader.actions(parsed.steps)
         if asks_about_speaker(parsed.words) and not all("what" in step for step in parsed.steps):
             # "Can I have the cup?" wants it brought; what names no thing wants nothing of a robot.
             raise Declined("it asks about the one who speaks")
-        asked = question(parsed.steps)
+        awaits_word = parsed.steps[0]["do"] == "await"
+        if any(step["do"] == "await" for step in parsed.steps[1:]):
+            raise CannotBeDone(
+                "I wait for a word only before I begin; say the rest when it is time"
+            )
+        asked = question(parsed.steps[awaits_word:])
         plan = Plan(
             goal=request.text.strip(),
             summary=asked.removeprefix("Shall I ").removesuffix("?"),
@@ -114,6 +123,7 @@ class CommandParser:
             is_momentary=are_of_the_moment(parsed.steps),
             sureness=sureness,
             covers=_covered(parsed),
+            awaits_word=awaits_word,
         )
         return proposal.as_heard(request.heard_confidence)
 
@@ -186,6 +196,7 @@ _STANDS_FOR: Final[Mapping[str, frozenset[str]]] = {
     "forbid": WORDS[ScopeGroup.NEGATION],
     "permit": frozenset({"again"}),
     "nothing": WORDS[ScopeGroup.NEGATION],
+    "await": frozenset({"when", "whenever", "once", "until", "till", "before"}),
 }
 
 

@@ -8,16 +8,16 @@ from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.builders.steps import Groups, Step, chained
-from vla_deploy.planning.correction import corrected_by, correction_in
+from vla_deploy.planning.correction import wants_other_too, with_other
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.repeating import can_repeat, is_again, recalled, repeated
+from vla_deploy.planning.patterns.repeating import is_again, recalled, repeated
 from vla_deploy.planning.patterns.slots import is_place, is_thing
 from vla_deploy.planning.patterns.table import PATTERNS, Pattern
-from vla_deploy.planning.plan import Action, Plan, Priority
-from vla_deploy.planning.prohibitions import read_order
+from vla_deploy.planning.plan import Plan, Priority
+from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
 
@@ -42,9 +42,7 @@ class Patterns:
             raise Declined("patterns know words, not what was done of them")
         order = read_order(request.text, request.world, request.prohibitions)
         if order is not None:
-            said = Action(id="a1", skill="speak", parameters={"text": order.answer})
-            plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
-            return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None, order=order)
+            return proposal_of(order, request, self.name)
         plan = pattern_plan(request)
         # What may stand in a slot has no words beside it that change anything.
         return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None)
@@ -60,10 +58,11 @@ def pattern_plan(request: Request) -> Plan:
     said = clauses(request.text)
     if len(said) == 1 and is_again(said[0]):
         return repeated(request)
-    if correction_in(request.text) and can_repeat(request):
-        plan = corrected_by(repeated(request), request.text)
-        if plan is not None:
-            return plan
+    if len(said) == 1 and wants_other_too(said[0]):
+        plan = with_other(repeated(request))
+        if plan is None:
+            raise Declined("there is no one thing of which there may be another")
+        return plan
     full = recalled(said[0], request) if len(said) == 1 else None
     said = clauses(full) if full is not None else said
     if not said:

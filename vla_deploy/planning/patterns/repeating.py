@@ -121,7 +121,11 @@ def repeated(request: Request) -> Plan:
     Raises:
         NothingBefore: there is none, or it did not end well.
     """
-    last = _last(request)
+    return asked_for(_last(request))
+
+
+def asked_for(last: Turn) -> Plan:
+    """Return the plan of a turn without what grounding has put in."""
     own = [one for one in last.plan.actions if one.description != PUT_IN] if last.plan else []
     chained = tuple(
         one.model_copy(update={"depends_on": (own[number - 1].id,) if number else ()})

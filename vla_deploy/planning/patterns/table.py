@@ -111,9 +111,15 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (_TIDY, rf"(?:clean|tidy|clear)(?: up| off)? {_PLACE}", tidying.tidy),
     (_TIDY, rf"(?:patrol|inspect) {_PLACE}", tidying.patrol),
     # --- say, wait, answer
-    (_HELP, r"(?:say|announce) (?P<text>[^,;:]+)|(?P<text>hello|hi|good morning|good evening)",
-     steps.speak),
+    (_HELP, r"(?:say|announce) (?P<text>[^,;:]+)|"
+     r"(?P<text>hello|hi|good (?:morning|afternoon|evening|night)|goodbye|bye)", steps.speak),
     (_HELP, rf"wait(?: here)?(?:(?: for)? (?P<quantity>{SECONDS}))?", steps.wait),
+    (_HELP, r"(?:many )?thanks(?: a lot| so much| for that)?|thank you(?: very much| so much)?|"
+     r"good (?:job|robot)", answering.tell_welcome),
+    (_HELP, r"how are you(?: doing)?(?: today)?|are you (?:ok|okay|well|ready)",
+     answering.tell_ready),
+    (_ASK, r"how (?:much|full is your) battery(?: (?:is left|do you have(?: left)?|have you got))?|"
+     r"(?:how is|what is|how's) your battery(?: level)?", answering.tell_battery),
     (_HELP, r"help(?: me)?|what can you do|who are you|what are you", answering.tell_abilities),
     (_ASK, rf"where(?: is| are|'s) {_THING}|have you seen {_THING}|"
      rf"where did i (?:leave|put) {_THING}", answering.tell_or_find),

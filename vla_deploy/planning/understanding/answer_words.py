@@ -8,14 +8,14 @@ from vla_deploy.world.query import ORDERS
 
 NO_WORDS: Final = re.compile(
     r"(?:no|nope|nah|never ?mind|forget (?:it|about it|that)|cancel|neither|none|nothing|"
-    r"don'?t|do not|leave it|no thanks?|no thank you|"
+    r"not now|don'?t|do not|leave it|no thanks?|no thank you|"
     r"(?:none|neither|not any|nor any) of (?:them|those|these|the (?:two|three|four))|"
     r"neither (?:one|the one nor the other))(?: (?:one|please|thanks|thank you))*"
 )
 YES_WORDS: Final = re.compile(
     r"(?:yes|yeah|yep|yup|sure|ok|okay|right|correct|exactly|of course|please do|do it|do that|"
-    r"go ahead|go on|confirm(?:ed)?|affirmative|that'?s right|that is right)"
-    r"(?: (?:please|do it|do that|do|go ahead|that one|that'?s right))*"
+    r"go now|go|now|go ahead|go on|confirm(?:ed)?|affirmative|that'?s right|that is right)"
+    r"(?: (?:please|now|go|do it|do that|do|go ahead|that one|that'?s right))*"
 )
 ANY_WORDS: Final = re.compile(
     r"(?:either|any|whichever|any one|anyone|i don'?t care|doesn'?t matter|"

@@ -99,12 +99,11 @@ class _Grounder:
             dict.fromkeys(name for one in action.depends_on for name in self._last.get(one, (one,)))
         )
         for skill, parameters in grounded_steps(action, self.resolver, lambda: self._state):
-            own = skill == action.skill
-            step = _made(action, skill, parameters)
-            if own:
+            step = _made(action, skill, parameters, "")
+            if skill == action.skill:
                 step = action.model_copy(update={"parameters": dict(parameters)})
             step = self._with_hand(self._as_sure(step))
-            needed = self._append(step, self._prepared(step, needed), inserted=not own)
+            needed = self._append(step, self._prepared(step, needed))
         self._last[action.id] = needed
 
     def _with_hand(self, step: Action) -> Action:
@@ -169,15 +168,15 @@ class _Grounder:
         return (before.skill, before.parameters) == (action.skill, action.parameters)
 
 
-def _made(action: Action, skill: str, parameters: Parameters) -> Action:
-    """Return an action that is put in before another, of the same priority."""
+def _made(action: Action, skill: str, parameters: Parameters, description: str = PUT_IN) -> Action:
+    """Return an action that comes before another, of the same priority."""
     name = f"{action.id[:40]}_{skill}"
     return Action(
         id=name,
         skill=skill,
         parameters=dict(parameters),
         priority=action.priority,
-        description=PUT_IN,
+        description=description,
     )
 
 

@@ -8,11 +8,13 @@ from vla_deploy.world.vocabulary import ARTICLES, COLOURS, FILLERS, OBJECT_CLASS
 from vla_deploy.world.words import COMPARED, FORMS
 
 _SHORT: Final = 4
+# Plurals that mean another thing than several of one.
+_OF_THEIR_OWN: Final = frozenset({"glasses"})
 
 
 def single(word: str) -> str:
     """Return the singular of a plural of a known kind, else the word."""
-    if word in known_words() or not word.endswith("s"):
+    if word in known_words() | _OF_THEIR_OWN or not word.endswith("s"):
         return word
     return next((one for one in (word[:-2], word[:-1]) if is_kind(one)), word)
 

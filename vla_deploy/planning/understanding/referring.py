@@ -137,14 +137,20 @@ def _hand_over(given: Parameters, resolver: Resolver, state: GetState) -> Iterat
     if not isinstance(given.get("object"), str):
         yield "hand_over", given
         return
-    for thing in resolver.things(given["object"], Use.PUT):
-        if _held(thing, state(), resolver) is None:
+    things = list(resolver.things(given["object"], Use.PUT))
+    while things:
+        missing = [one for one in things if _held(one, state(), resolver) is None]
+        fetched = missing[: max(1, state().free_hands())]
+        for thing in fetched:
             yield from _on_furniture(thing)
             yield "pick_up", {"object": thing.name, **_arm(given)}
-            if resolver.setting.request.here is not None:
-                yield "navigate_to", _here("here", resolver)
-        held = _held(thing, state(), resolver)
-        yield "hand_over", _hand_of(held, state()) or _arm(given)
+        if fetched and resolver.setting.request.here is not None:
+            yield "navigate_to", _here("here", resolver)
+        in_hand = [one for one in things if _held(one, state(), resolver) is not None]
+        for thing in in_hand or fetched:
+            held = _held(thing, state(), resolver)
+            yield "hand_over", _hand_of(held, state()) or _arm(given)
+            things.remove(thing)
 
 
 def _has_put(thing: Referent, destination: Parameters, state: State, resolver: Resolver) -> bool:

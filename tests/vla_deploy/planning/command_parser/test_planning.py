@@ -11,6 +11,7 @@ from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, Unkn
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
+from vla_deploy.world import Snapshot
 
 WORLD = world_of(load_robot("butler"), {})
 HERE = (1.0, 2.0, 0.5)
@@ -82,10 +83,33 @@ def test_what_was_copied_beside_a_thing_is_left_out(command: str, what: str) -> 
     assert found == ("pick_up", {"object": "the cup"})
 
 
-def test_bringing_goes_back_to_who_asked() -> None:
-    found = planned("bring me the bottle", {"do": "bring", "what": "bottle"})
-    assert [skill for skill, _ in found] == ["pick_up", "navigate_to", "speak"]
-    assert found[1][1] == {"place": "here"}
+@pytest.mark.parametrize(
+    ("to", "skills"),
+    [
+        ({}, [("hand_over", {"object": "bottle"})]),
+        ({"to": "me"}, [("hand_over", {"object": "bottle"})]),
+        ({"to": "coffee table"}, [("place", {"object": "bottle", "destination": "coffee table"})]),
+        ({"to": "entrance"},
+         [("pick_up", {"object": "bottle"}), ("navigate_to", {"place": "entrance"})]),
+    ],
+)  # fmt: skip
+def test_what_is_brought_is_handed_to_a_person_and_taken_to_a_place(
+    to: Step, skills: Skills
+) -> None:
+    assert planned("bring bottle", {"do": "bring", "what": "bottle", **to}) == skills
+
+
+def test_what_is_excepted_from_what_is_brought_stays_one_thing_to_bring() -> None:
+    step = {"do": "bring", "what": "all cups", "except": "red cup and blue cup"}
+    found = planned("bring me all the cups but the red cup and the blue cup", step)
+    assert found == [("hand_over", {"object": "all the cups but the red cup and the blue cup"})]
+
+
+def test_what_is_excepted_from_tidying_stays(scene: Snapshot) -> None:
+    command = "tidy up everything except the red cup"
+    request = Request(command_id="c", text=command, world=WORLD, here=HERE, scene=scene)
+    found = planned(command, {"do": "tidy", "except": "red cup"}, request=request)
+    assert [given.get("object") for skill, given in found if skill == "place"] == ["cup_2"]
 
 
 def test_back_is_where_the_command_before_was_told() -> None:

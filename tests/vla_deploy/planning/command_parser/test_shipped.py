@@ -14,10 +14,14 @@ from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import EMBEDDED, Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.asking import Request
-from vla_deploy.planning.command_parser.rung import CommandParser, open_command_parser
-from vla_deploy.planning.errors import Declined, PlanningError
+from vla_deploy.planning.command_parser.certainty import Oddities
+from vla_deploy.planning.command_parser.grammar import Step
+from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
+from vla_deploy.planning.command_parser.wording import plain_words
+from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
+from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {})
@@ -72,11 +76,68 @@ def test_plain_commands_are_read(
     assert list(parser.parse(text, soon()).steps) == steps
 
 
+def reading(parser: CommandParser, monkeypatch: pytest.MonkeyPatch, *steps: Step) -> None:
+    """Let the parser read these steps, as one that was trained further may."""
+    oddities = Oddities()
+
+    def parse(text: str, _: Deadline) -> Parsed:
+        words = tuple(plain_words(text))
+        return Parsed(words=words, steps=steps, confidence=1.0, features={}, oddities=oddities)
+
+    monkeypatch.setattr(parser, "parse", parse)
+
+
+def test_a_step_that_waits_for_a_word_holds_all_that_follows(
+    parser: CommandParser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go, wait = {"do": "go", "where": "kitchen"}, {"do": "await"}
+    reading(parser, monkeypatch, wait, go)
+    held = parser.propose(request("once I nod go to the kitchen"), soon())
+    assert held.awaits_word and held.plan.summary == "go to kitchen"
+    assert held.covers is not None and "once" in held.covers
+    reading(parser, monkeypatch, go, wait, go)
+    with pytest.raises(CannotBeDone, match="only before I begin"):
+        parser.propose(request("go to the kitchen and once I nod go to the kitchen"), soon())
+
+
+KEYS = Prohibition(what=Forbidden.THING, words="keys")
+KITCHEN = Prohibition(what=Forbidden.PLACE, words="kitchen")
+
+
+@pytest.mark.parametrize(
+    ("step", "order", "question"),
+    [
+        ({"do": "forbid", "what": "keys"}, StandingOrder(forbids=True, of=KEYS), ""),
+        ({"do": "forbid", "where": "kitchen"}, StandingOrder(forbids=True, of=KITCHEN), ""),
+        ({"do": "permit", "what": "keys"}, StandingOrder(forbids=False, of=KEYS),
+         "May I touch the keys again?"),
+        ({"do": "permit", "where": "kitchen"}, None, "nobody has told me not to go into"),
+        ({"do": "forbid", "what": "mood"}, None, "say what"),
+    ],
+)  # fmt: skip
+def test_what_is_forbidden_stands_at_once_and_what_is_permitted_is_read_back(
+    parser: CommandParser,
+    monkeypatch: pytest.MonkeyPatch,
+    step: Step,
+    order: StandingOrder | None,
+    question: str,
+) -> None:
+    reading(parser, monkeypatch, step)
+    asked = replace(request("words about keys, kitchen and mood"), prohibitions=(KEYS,))
+    if order is None:
+        with pytest.raises(CannotBeDone, match=question):
+            parser.propose(asked, soon())
+        return
+    found = parser.propose(asked, soon())
+    assert (found.order, found.read_back) == (order, question)
+    assert [one.skill for one in found.plan.actions] == ["speak"]
+
+
 def test_a_question_about_the_speaker_is_a_command_only_for_a_thing(parser: CommandParser) -> None:
     with pytest.raises(Declined, match="the one who speaks"):
         parser.propose(request("Can I stay up a bit longer, please?"), soon())
     handed = parser.propose(request("Can I have the red cup, please?"), soon())
-    assert "pick_up" in [one.skill for one in handed.plan.actions]
+    assert "hand_over" in [one.skill for one in handed.plan.actions]
 
 
 def test_a_plan_of_it_passes_grounding_and_validation(parser: CommandParser) -> None:

@@ -5,9 +5,10 @@ import pytest
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
 from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.patterns.awaiting import awaiting
 from vla_deploy.planning.patterns.backend import pattern_plan
 from vla_deploy.planning.patterns.stopping import is_stop
-from vla_deploy.planning.understanding import Conversation, Outcome, Turn
+from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
 
 WORLD = world_of(load_robot("butler"), {"left": None, "right": None})
@@ -97,6 +98,23 @@ def test_again_does_what_was_done_last() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "rest"),
+    [
+        ("When I say so, bring me the cup.", "bring me the cup"),
+        ("when I tell you go to the kitchen", "go to the kitchen"),
+        ("when I tell you to, go to the kitchen", "go to the kitchen"),
+        ("bring me the cup, but only when I say so", "bring me the cup"),
+        ("wait until I give you the word and then go home", "go home"),
+        ("when I tell you to go to bed, turn left", None),
+        ("when I come home, turn left", None),
+        ("bring me the cup", None),
+    ],
+)
+def test_a_command_that_waits_for_a_word_is_found(text: str, rest: str | None) -> None:
+    assert awaiting(text) == rest
+
+
+@pytest.mark.parametrize(
     ("text", "stops"),
     [
         ("stop", True), ("Stop!", True), ("no, stop it now", True), ("robot, halt", True),
@@ -110,9 +128,3 @@ def test_again_does_what_was_done_last() -> None:
 )  # fmt: skip
 def test_words_that_only_stop_are_known(text: str, stops: bool) -> None:
     assert is_stop(text) is stops
-
-
-def test_a_correction_of_what_was_not_done_is_a_command_of_its_own() -> None:
-    refused = Turn(said="go to narnia", outcome=Outcome.REFUSED)
-    with pytest.raises(Declined):
-        pattern_plan(request_for("no, the blue cup", refused))

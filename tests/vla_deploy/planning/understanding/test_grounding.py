@@ -130,9 +130,30 @@ def test_places_units_and_hands_get_the_catalogues_form(
     assert steps_of(grounded(home, given, scene=("box_1",))) == steps
 
 
-def test_what_is_handed_over_is_fetched_to_who_asked_for_it(home: "Home") -> None:
-    found = steps_of(grounded(home, ("hand_over", {"object": "the red cup"}), scene=("cup_1",)))
-    assert [skill for skill, _ in found][-3:] == ["pick_up", "navigate_to", "hand_over"]
+GIVE = "pick_up navigate_to hand_over"
+
+
+@pytest.mark.parametrize(
+    ("given", "skills"),
+    [
+        ("the red cup", GIVE),
+        ("a cup", GIVE),
+        ("both cups", "pick_up pick_up navigate_to hand_over hand_over"),
+        ("everything on the coffee table",
+         f"pick_up pick_up navigate_to hand_over hand_over {GIVE}"),
+    ],
+)  # fmt: skip
+def test_what_is_handed_over_is_fetched_to_who_asked_for_it(
+    home: "Home", given: str, skills: str
+) -> None:
+    scene = ("cup_1", "cup_2", "ball_1")
+    found = steps_of(grounded(home, ("hand_over", {"object": given}), scene=scene))
+    told = [
+        skill
+        for skill, parameters in found
+        if skill == "pick_up" or (skill in GIVE.split() and "object" not in parameters)
+    ]
+    assert " ".join(told) == skills
 
 
 @pytest.mark.parametrize(

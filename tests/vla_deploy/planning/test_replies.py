@@ -1,0 +1,41 @@
+"""Talk gets a short true answer, and what the robot does not know is asked about or refused."""
+
+import pytest
+
+from benchmarks.planner_corpus import home, scenes
+from benchmarks.planner_desk import fresh_desk
+
+
+@pytest.mark.parametrize(
+    ("text", "outcome", "said"),
+    [
+        ("thanks", "plan", "You are welcome."),
+        ("Thank you very much!", "plan", "You are welcome."),
+        ("how are you?", "plan", "I am ready for a command."),
+        ("good night", "plan", "good night"),
+        ("How much battery do you have left?", "plan", "I cannot measure how full my battery is."),
+        ("bring me my glasses", "ask", "Did you mean the glass?"),
+        ("put the glasses in the box", "ask", "Did you mean the glass?"),
+        ("where are my glasses", "ask", "Did you mean the glass?"),
+        ("pick up the cap", "ask", "Did you mean the cup?"),
+        ("pick up the vase", "refuse", 'the object "the vase"; I can handle: ball, book'),
+        ("bring me a cushion", "refuse", 'the object "a cushion"; I can handle: ball, book'),
+        ("bring me something to drink", "refuse", "but I can look for things, bring them"),
+        ("go to the moon", "refuse", 'the place "the moon"; I know: bedroom'),
+    ],
+)
+def test_what_is_said_gets_a_true_answer(text: str, outcome: str, said: str) -> None:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["tidy"].world(home()))
+        answer = desk.say(text)[1]
+        told = [one["parameters"].get("text", "") for one in (answer.plan or {}).get("actions", ())]
+        assert answer.outcome == outcome, answer
+        assert said in " ".join([answer.text, *told])
+
+
+def test_a_yes_to_what_was_meant_goes_on() -> None:
+    with fresh_desk() as desk:
+        desk.tell(scenes()["tidy"].world(home()))
+        desk.say("where are my glasses")
+        plan = desk.say("yes")[1].plan or {}
+        assert plan["actions"][0]["parameters"]["text"].startswith("The red cup is on the coffee")
