@@ -12,7 +12,7 @@ from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.insertions import is_surface
+from vla_deploy.planning.understanding.furniture import is_surface
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
 from vla_deploy.world.memory import place_of, seen_words

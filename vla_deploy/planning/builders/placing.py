@@ -21,7 +21,7 @@ from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.insertions import surface_of
+from vla_deploy.planning.understanding.furniture import surface_of
 from vla_deploy.planning.understanding.phrases import IT, PRONOUNS
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world.relations import NEXT_TO

@@ -11,7 +11,7 @@ from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spans import find_span
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.understanding.insertions import is_surface
+from vla_deploy.planning.understanding.furniture import is_surface
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
 Skill = building.Step

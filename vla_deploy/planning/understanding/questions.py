@@ -10,7 +10,7 @@ from typing import Final
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.understanding.conversation import Candidate
 from vla_deploy.planning.understanding.names import Match
-from vla_deploy.planning.understanding.phrases import EXTREMES, FITTING_KINDS, ORDINALS
+from vla_deploy.planning.understanding.phrases import EXTREMES, ORDINALS
 from vla_deploy.planning.understanding.selection import MEASURES, by_distance, in_a_row, most
 from vla_deploy.world import Thing, Viewpoint
 
@@ -175,7 +175,6 @@ def _features(
     words |= {word for word, measure in EXTREMES.items() if most(things, measure) == [thing]}
     words |= {"large"} if "big" in words else set()
     words |= {"little"} if "small" in words else set()
-    words |= {word for word, kinds in FITTING_KINDS.items() if any(thing.kind in k for k in kinds)}
     words |= {*_by_nearness(thing, things, view), *_in_row(thing, things, view)}
     return frozenset(word for word in words if word)
 
