@@ -30,7 +30,7 @@ def checked(plan: Plan, request: Request) -> Plan:
         Ambiguous: only the person can tell what is meant.
         PlanningError: it speaks of what the robot does not know.
     """
-    grounded = ground_plan(plan, request).plan
+    grounded = ground_plan(plan, request)
     check_plan(grounded, request.world, request.scene, request.here)
     return held_to(request.prohibitions, grounded, request.world, request.scene)
 

@@ -14,9 +14,9 @@ from benchmarks.planner_desk import fresh_desk
         ("how are you?", "plan", "I am ready for a command."),
         ("good night", "plan", "good night"),
         ("How much battery do you have left?", "plan", "I cannot measure how full my battery is."),
-        ("bring me my glasses", "ask", "Did you mean the glass?"),
-        ("put the glasses in the box", "ask", "Did you mean the glass?"),
-        ("where are my glasses", "ask", "Did you mean the glass?"),
+        ("bring me my glasses", "refuse", 'the object "my glasses"; I can handle: ball, book'),
+        ("put the glasses in the box", "refuse", 'the object "the glasses"; I can handle: ball'),
+        ("where is my cap", "ask", "Did you mean the cup?"),
         ("pick up the cap", "ask", "Did you mean the cup?"),
         ("pick up the vase", "refuse", 'the object "the vase"; I can handle: ball, book'),
         ("bring me a cushion", "refuse", 'the object "a cushion"; I can handle: ball, book'),
@@ -36,6 +36,6 @@ def test_what_is_said_gets_a_true_answer(text: str, outcome: str, said: str) -> 
 def test_a_yes_to_what_was_meant_goes_on() -> None:
     with fresh_desk() as desk:
         desk.tell(scenes()["tidy"].world(home()))
-        desk.say("where are my glasses")
+        desk.say("where is my cap")
         plan = desk.say("yes")[1].plan or {}
         assert plan["actions"][0]["parameters"]["text"].startswith("The red cup is on the coffee")

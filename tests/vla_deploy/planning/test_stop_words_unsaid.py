@@ -23,7 +23,7 @@ NOT_SAID: Final = frozenset(
         "planning/patterns/stopping.py",  # what a person may say
         "planning/patterns/phrase.py",
         "planning/patterns/table.py",
-        "planning/command_parser/fillers.py",
+        "planning/command_parser/certainty.py",
         "planning/errors.py",  # to be read: `spoken_refusal` says it in other words
     }
 )

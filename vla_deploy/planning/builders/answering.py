@@ -8,11 +8,10 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.steps import Groups, Step, find
-from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
-from vla_deploy.planning.understanding.insertions import is_surface
+from vla_deploy.planning.understanding.furniture import is_surface
 from vla_deploy.planning.understanding.questions import did_you_mean
 from vla_deploy.planning.understanding.setting import Setting
 from vla_deploy.world import Thing
@@ -50,10 +49,8 @@ def tell_sight(groups: Groups, request: Request) -> list[Step]:
     """Say what is known, on a piece of furniture if one is named."""
     things = [] if request.scene is None else list(request.scene.things)
     where = ""
-    if "place" in groups:
-        place = match_place(groups["place"], request.world.places)
-        if place is None:
-            raise UnknownObject(groups["place"], sorted(set(request.world.places.values())))
+    place = match_place(groups.get("place", ""), request.world.places)
+    if place is not None:
         things = [one for one in things if one.rests is not None and one.rests.of == place]
         where = f" on the {place.replace('_', ' ')}"
     if not things:

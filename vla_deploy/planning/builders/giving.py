@@ -11,8 +11,7 @@ from vla_deploy.planning.builders import placing, steps
 from vla_deploy.planning.builders.steps import Groups, Step, arm_in, held_kinds, parts_of
 from vla_deploy.planning.errors import UnknownObject
 from vla_deploy.planning.references import words_of
-from vla_deploy.planning.understanding.expression import Expression, Scope
-from vla_deploy.planning.understanding.expressions import read_expression
+from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting
 from vla_deploy.planning.understanding.phrases import HELD, IT, PRONOUNS
 from vla_deploy.planning.understanding.setting import Setting

@@ -1,14 +1,11 @@
-"""Clean with what there is: put things away, and drive over the floor in rows.
-
-There is no brush, cloth or suction; what needs one is refused (`refusals.py`).
-"""
+"""Clean with what there is: put things away, and drive over the floor in rows."""
 
 from collections.abc import Iterator
 from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.placing import STORE
-from vla_deploy.planning.builders.steps import Groups, Step, look_around, parts_of
+from vla_deploy.planning.builders.steps import Groups, Step, look_around
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
 from vla_deploy.planning.knowledge import World
@@ -87,42 +84,24 @@ def surfaces_of(name: str, world: World) -> frozenset[str]:
 
 
 def patrol(groups: Groups, request: Request) -> list[Step]:
-    """Drive over the free floor around a place in rows, or to each of several places.
+    """Drive over the free floor around a place in rows.
 
     Raises:
         NotAble: no map is at hand, or no floor is free there.
-        UnknownPlace: one of several is none that the robot knows.
     """
-    if len(parts_of(groups["place"])) > 1:
-        return visit(groups, request)
     name = match_place(groups["place"], request.world.places)
     site = request.world.sites.get(name or "")
     if site is None:
         raise NotAble(f'I do not know the area "{groups["place"]}"')
     if request.world.is_free is None:
         raise NotAble("without a map I cannot drive over an area")
-    points = list(rows(request, site.pose.x_m, site.pose.y_m))
+    points = list(_rows(request, site.pose.x_m, site.pose.y_m))
     if not points:
         raise NotAble(f"the map shows no free floor around the {name}")
     return [("navigate_to", {"x_m": x_m, "y_m": y_m}) for x_m, y_m in points[:MOST_POINTS]]
 
 
-def visit(groups: Groups, request: Request) -> list[Step]:
-    """Drive to each of the places that are listed.
-
-    Raises:
-        UnknownPlace: one of them is none that the robot knows.
-    """
-    steps: list[Step] = []
-    for part in parts_of(groups["place"]):
-        name = match_place(part, request.world.places)
-        if name is None:
-            raise UnknownPlace(part, set(request.world.places.values()))
-        steps.append(("navigate_to", {"place": name}))
-    return steps
-
-
-def rows(request: Request, x_m: float, y_m: float) -> Iterator[tuple[float, float]]:
+def _rows(request: Request, x_m: float, y_m: float) -> Iterator[tuple[float, float]]:
     """Yield the ends of rows of free floor in a square, each row begun where the last ended."""
     is_free = request.world.is_free
     count = round(2 * REACH_M / ROW_M) + 1

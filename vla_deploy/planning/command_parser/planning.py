@@ -12,7 +12,6 @@ from typing import Final
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders import answering, moving, placing, tidying
 from vla_deploy.planning.builders import steps as building
-from vla_deploy.planning.command_parser.amounts import METRES, RADIANS, SECONDS
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spoken import Spoken
 from vla_deploy.planning.errors import CannotBeDone, Declined, UnknownPlace
@@ -163,13 +162,13 @@ def _look(spoken: Spoken, step: Step) -> list[Skill]:
 
 def _move(spoken: Spoken, step: Step) -> list[Skill]:
     sign = -1.0 if step["way"] == "backward" else 1.0
-    return [("move", {"distance_m": sign * spoken.amount(step, METRES, DEFAULT_MOVE_M, "m")})]
+    return [("move", {"distance_m": sign * spoken.amount(step, "m", DEFAULT_MOVE_M)})]
 
 
 def _turn(spoken: Spoken, step: Step) -> list[Skill]:
     sign = -1.0 if step["way"] == "right" else 1.0
     default = math.pi if step["way"] == "around" else DEFAULT_TURN_RAD
-    return [("turn", {"angle_rad": sign * spoken.amount(step, RADIANS, default, "degree")})]
+    return [("turn", {"angle_rad": sign * spoken.amount(step, "rad", default)})]
 
 
 def _arm(step: Step) -> dict[str, str]:
@@ -187,7 +186,7 @@ def _say(_spoken: Spoken, step: Step) -> list[Skill]:
 
 
 def _wait(spoken: Spoken, step: Step) -> list[Skill]:
-    return [("wait", {"duration_s": spoken.amount(step, SECONDS, DEFAULT_WAIT_S, "second")})]
+    return [("wait", {"duration_s": spoken.amount(step, "s", DEFAULT_WAIT_S)})]
 
 
 def _ask(spoken: Spoken, step: Step) -> list[Skill]:

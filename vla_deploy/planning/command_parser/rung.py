@@ -27,10 +27,10 @@ from vla_deploy.planning.command_parser.certainty import (
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
 from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
 from vla_deploy.planning.command_parser.read_back import question
-from vla_deploy.planning.command_parser.spans import copied_spans
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
     asks_about_speaker,
+    copied_spans,
     foreign_share,
     plain_words,
 )

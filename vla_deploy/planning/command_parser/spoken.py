@@ -1,17 +1,22 @@
 """Read what the fields of an answer say, in the words of the command that they were copied from."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders import steps as building
-from vla_deploy.planning.command_parser.amounts import amount_of, amount_words, is_silent
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.command_parser.spans import find_span
+from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.references import match_place
-from vla_deploy.planning.understanding.insertions import is_surface
+from vla_deploy.planning.understanding.furniture import is_surface
+from vla_deploy.planning.understanding.quantities import (
+    UNITS,
+    amount_of,
+    amount_words,
+    is_silent,
+)
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS
 
 Skill = building.Step
@@ -91,20 +96,19 @@ class Spoken:
             return self.spoken(step, "from")
         return self.spoken(step, "what").partition(" from ")[2] if "what" in step else ""
 
-    def amount(self, step: Step, units: Mapping[str, float], default: float, bare: str) -> float:
-        """Return the amount of a step in SI units.
+    def amount(self, step: Step, dimension: str, default: float) -> float:
+        """Return the amount of a step in SI units; a bare number is one of degrees, not radians.
 
         Raises:
             PlanInvalid: its words are no amount.
         """
-        if "by" not in step:
+        words = step["by"].split() if "by" in step else []
+        units = UNITS[dimension]
+        bare = units["degree"] if dimension == "rad" else 1.0
+        # More may have been copied than the amount.
+        for told in (words, amount_words(words, units)):
+            if told and (value := amount_of(told, units, bare)) is not None:
+                return value
+        if is_silent(words):
             return default
-        words = step["by"].split()
-        value = amount_of(words, units, bare)
-        if value is None and (told := amount_words(words, units)):
-            value = amount_of(told, units, bare)  # more was copied than the amount
-        if value is None and is_silent(words):
-            return default
-        if value is None:
-            raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])
-        return value
+        raise PlanInvalid([f'"{step["by"]}" is no amount that I know'])

@@ -87,7 +87,7 @@ def plan_command(text: str, world: World, here: tuple[float, float, float] | Non
     """
     request = Request(command_id="", text=text, world=world, here=here)
     try:
-        return ground_plan(pattern_plan(request), request).plan
+        return ground_plan(pattern_plan(request), request)
     except Declined as error:
         raise NotUnderstood(text) from error
 

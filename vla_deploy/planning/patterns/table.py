@@ -9,7 +9,6 @@ from vla_deploy.planning.builders import (
     giving,
     moving,
     placing,
-    returning,
     steps,
     tidying,
 )
@@ -84,7 +83,7 @@ _ROWS: Final[tuple[tuple[Intent, str, Builder], ...]] = (
     (_HOLD, r"(?:tuck|fold)(?: in)?(?: your)?(?: (?P<arm>left|right))? arms?(?: in)?", steps.tuck),
     (_HOLD, r"(?:put|set) (?:it|them|that) down", placing.put_down),
     (_HOLD, rf"put (?P<object>{THING}) down|put down {_OBJECT}|drop {_THING}", placing.put_down),
-    (_HOLD, rf"{_CARRY} {_THING} back(?: where it was)?", returning.put_back),
+    (_HOLD, rf"{_CARRY} {_THING} back(?: where it was)?", placing.put_back),
     (_HOLD, rf"(?:put|tidy|clear) {_OBJECT} away|put away {_OBJECT}", placing.put_away),
     (_HOLD, rf"{_PUT} {_THING} here", placing.put_here),
     (_HOLD, rf"{_PUT} {_THING} (?P<destination>there|over there)", placing.put_there),

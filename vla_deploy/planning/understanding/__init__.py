@@ -1,6 +1,6 @@
 """Understand what a command refers to: by the conversation, the scene and the robot's places."""
 
-from vla_deploy.planning.understanding.answers import Reply, Verdict, guess, reply
+from vla_deploy.planning.understanding.answers import Reply, Verdict, described, guess, reply
 from vla_deploy.planning.understanding.conversation import (
     Candidate,
     Conversation,
@@ -10,7 +10,6 @@ from vla_deploy.planning.understanding.conversation import (
     Role,
     Turn,
 )
-from vla_deploy.planning.understanding.described import described
 
 __all__ = [
     "Candidate",

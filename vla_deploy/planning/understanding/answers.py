@@ -6,22 +6,79 @@ yes, for a question of yes or no      -> it goes on
 words that one candidate alone has    -> that one
 not the red one                       -> the one that is left
 words that several have, or none      -> not clear: ask once more
+
+A word that no candidate has, and that is not listed as saying nothing, makes it no answer.
 """
 
 import re
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Final
 
-from vla_deploy.planning.understanding import answer_words
-from vla_deploy.planning.understanding.answer_remarks import picked_beside
 from vla_deploy.planning.understanding.conversation import Candidate, Conversation, Question
-from vla_deploy.planning.understanding.known_words import known_words
-from vla_deploy.planning.understanding.phrases import NUMBERS, SIDES
+from vla_deploy.planning.understanding.expressions import known_words
+from vla_deploy.planning.understanding.phrases import (
+    EXTREMES,
+    NUMBERS,
+    ORDER_WORDS,
+    ORDINALS,
+    SIDES,
+)
 from vla_deploy.planning.understanding.questions import MOST_CHOICES, either, from_side
-from vla_deploy.planning.understanding.wordings import in_plain_words
-from vla_deploy.world.vocabulary import ARTICLES
+from vla_deploy.world.query import ORDERS
+from vla_deploy.world.vocabulary import ARTICLES, KIND_WORDS
 
 Candidates = tuple[Candidate, ...]
+
+_NO: Final = re.compile(
+    r"(?:no|nope|nah|never ?mind|forget (?:it|about it|that)|cancel|neither|none|nothing|"
+    r"not now|don'?t|do not|leave it|no thanks?|no thank you|"
+    r"(?:none|neither) of (?:them|those|these|the (?:two|three|four)))"
+    r"(?: (?:one|please|thanks|thank you))*"
+)
+_YES: Final = re.compile(
+    r"(?:yes|yeah|yep|yup|sure|ok|okay|right|correct|exactly|of course|please do|do it|do that|"
+    r"go now|go|now|go ahead|go on|confirm(?:ed)?|affirmative|that'?s right|that is right)"
+    r"(?: (?:please|now|go|do it|do that|do|go ahead|that one|that'?s right))*"
+)
+_ANY: Final = re.compile(
+    r"(?:either|any|whichever|any one|anyone|i don'?t care|(?:it )?doesn'?t matter|you choose|your "
+    r"choice|whatever)(?: (?:one|of them|will do|is fine))*"
+)
+# Several, where one was asked for: no other command, and nothing that could be gone on with.
+_ALL: Final = re.compile(r"(?:both|all|each|every one)(?: (?:of (?:them|those|these)|two|three))*")
+_PLACES: Final = {**ORDINALS, "former": 1, "latter": 2}
+"""Places in the row of the candidates, from 1."""
+_SILENT_WORDS: Final = (
+    "the a an one ones please i mean meant want take pick it is its it's that this that's thing on "
+    "in at to of with my your side and uh um er well just give me bring use from yes no rather "
+    "other which there over said oh sorry ah hm actually thanks thank you like would think was "
+    "then two three those these good for them we only going back course"
+)
+_SILENT: Final = frozenset(_SILENT_WORDS.split())
+"""What says nothing of which one is meant."""
+_FILL: Final = frozenset({"the", "one", "on", "in", "a", "an"})
+"""Words of the questions themselves, which each candidate has."""
+_COMPARING: Final = frozenset({*EXTREMES, *SIDES, *ORDERS, *ORDER_WORDS, *ORDINALS})
+"""Words of an answer even where they tell no candidate from the others."""
+_WORD: Final = re.compile(r"[a-z0-9_']+")
+_TO: Final = re.compile(r"^(?:(?:go |back |over )*(?:to|into|in|at|on|by) )?(?:(?:the|my|your) )?")
+_PIECE: Final = re.compile(r"\s*(?:[,;.!?]|\s-+\s)\s*")
+_NOT: Final = re.compile(
+    r"(?:no )?(?P<any>(?:any|either|anything|whichever)(?: one)? )?(?:the one )?"
+    r"(?:but not|but|not|except|other than|(?:that |which )?is(?:n't| not)|(?:you can )?"
+    r"(?:leave|keep)|i (?:don't|do not) (?:want|mean)) (?P<not>.+?)(?: alone| where it is)?"
+    r"(?: but (?P<rest>.+))?"
+)
+_OR: Final = re.compile(r" (?:or|nor|and)(?: not)? ")
+_FROM_SIDE: Final = re.compile(
+    rf"\b({'|'.join(ORDINALS)})(?: one)? (?:from|on) (?:the )?(left|right)\b"
+)
+_DENIES: Final = re.compile(
+    r"\b(?:not|no|never|neither|nor|but|except|where|why|how|who|avoid|instead|without|hardly|"
+    r"forget|hate|wrong|out|if|when|later|tomorrow|do you|are you|leave|keep)\b|n't\b|"
+    r"^(?:is|are|was|does|did|what)\b"
+)
 
 
 class Verdict(StrEnum):
@@ -57,7 +114,7 @@ def reply(conversation: Conversation, text: str, now_ns: int) -> Reply:
     if verdict is Verdict.ANEW:
         return Reply(verdict=verdict, text=text, conversation=free)
     if verdict is Verdict.UNCLEAR:
-        again = replace(conversation, question=replace(narrowed(question, text), asked_ns=now_ns))
+        again = replace(conversation, question=replace(_narrowed(question, text), asked_ns=now_ns))
         return Reply(verdict=verdict, text=question.command_text, conversation=again)
     return _going_on(conversation, question, verdict, chosen)
 
@@ -66,13 +123,21 @@ def guess(conversation: Conversation, text: str) -> Reply | None:
     """Return the reply that picks the one candidate which an answer calls, whatever else it says.
 
     "The green, my oil". None where a word of it could mean another thing. Ask first whether it is a
-    command.
+    command, and read it back.
     """
     question = conversation.question
-    chosen = None if question is None else _guessed(question, text)
-    if question is None or chosen is None:
+    said = " ".join(_WORD.findall(_plain(text)))
+    if question is None or _DENIES.search(said) or text.strip().endswith("?"):
         return None
-    return _going_on(conversation, question, Verdict.CHOSEN, chosen)
+    words = _telling(question.candidates, said)
+    known = _known(question.candidates) | _COMPARING
+    told = [word for word in words if word in known]
+    if not told or not (known_words() - ARTICLES).isdisjoint({*words} - known):
+        return None
+    fitting = [one for one in question.candidates if one.features.issuperset(told)]
+    if len(fitting) != 1:
+        return None
+    return _going_on(conversation, question, Verdict.CHOSEN, fitting[0])
 
 
 def _going_on(
@@ -92,47 +157,26 @@ def _going_on(
 
 def judge_answer(question: Question, text: str) -> tuple[Verdict, Candidate | None]:
     """Return what an utterance is to a question, and the candidate that it picks."""
-    said = " ".join(answer_words.WORD.findall(text.lower()))
-    if answer_words.NO_WORDS.fullmatch(said):
+    said = " ".join(_WORD.findall(_plain(text)))
+    if _NO.fullmatch(said):
         return Verdict.NO, None
+    agrees = _YES.fullmatch(said) is not None
     if not question.candidates:
-        return (Verdict.YES if answer_words.YES_WORDS.fullmatch(said) else Verdict.ANEW), None
-    if answer_words.ANY_WORDS.fullmatch(said):
+        return (Verdict.YES if agrees else Verdict.ANEW), None
+    if _ANY.fullmatch(said) or (agrees and len(question.candidates) == 1):
         return Verdict.CHOSEN, question.candidates[0]
-    if answer_words.ALL_WORDS.fullmatch(said):
+    if _ALL.fullmatch(said):
         return Verdict.UNCLEAR, None
-    agrees = answer_words.YES_WORDS.fullmatch(said) is not None
-    if agrees and len(question.candidates) == 1:
-        return Verdict.CHOSEN, question.candidates[0]
-    verdict, chosen = _judged(question.candidates, in_plain_words(text.lower()))
-    if verdict is Verdict.ANEW:
-        verdict, chosen = _beside_remarks(question.candidates, text.lower())
+    verdict, chosen = _among(question.candidates, text)
     # "right" is the one on the right where there is one; of several a yes picks none.
     return (Verdict.UNCLEAR if agrees and verdict is Verdict.ANEW else verdict), chosen
 
 
-def _guessed(question: Question, text: str) -> Candidate | None:
-    said = " ".join(answer_words.WORD.findall(in_plain_words(text.lower())))
-    if not question.candidates or answer_words.NEGATES.search(said) or text.strip().endswith("?"):
-        return None
-    known = _known(question.candidates) | answer_words.COMPARING
-    words = _telling(question.candidates, said)
-    told = [word for word in words if word in known]
-    if not told or any(word in known_words() - ARTICLES for word in words if word not in known):
-        return None
-    fitting = [one for one in question.candidates if one.features.issuperset(told)]
-    return fitting[0] if len(fitting) == 1 else None
+def _plain(text: str) -> str:
+    return text.lower().replace("\u2019", "'")
 
 
-def _beside_remarks(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
-    """Let what some pieces of an answer pick count, if the others only tell."""
-    chosen = picked_beside(
-        answer_words.PIECE.split(text), lambda piece: _judged(candidates, piece)[1]
-    )
-    return (Verdict.ANEW if chosen is None else Verdict.CHOSEN), chosen
-
-
-def _judged(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
+def _among(candidates: Candidates, text: str) -> tuple[Verdict, Candidate | None]:
     """Take what is said not to be meant from the candidates; let the rest pick one of those left.
 
     Where it is said to be any of them, it is the first.
@@ -157,15 +201,13 @@ def _remaining(candidates: Candidates, text: str) -> tuple[Candidates, str, bool
     Return what the whole is instead where something unknown is ruled out.
     """
     left, rest, any_will_do = list(candidates), list[str](), False
-    for piece in answer_words.PIECE.split(text):
-        said = " ".join(answer_words.WORD.findall(piece))
-        if answer_words.SURPRISE.fullmatch(said) and said not in SIDES:
-            continue
-        found = answer_words.NOT.fullmatch(said)
+    for piece in _PIECE.split(_plain(text)):
+        said = " ".join(_WORD.findall(piece))
+        found = _NOT.fullmatch(said)
         if found is None:
             rest.append(said)
             continue
-        named = [_telling(candidates, one) for one in answer_words.OR.split(found["not"])]
+        named = [_telling(candidates, one) for one in _OR.split(found["not"])]
         if not all(words and _known(candidates).issuperset(words) for words in named):
             return Verdict.ANEW if all(named) else Verdict.UNCLEAR
         left = [one for one in left if not any(one.features.issuperset(it) for it in named)]
@@ -174,13 +216,13 @@ def _remaining(candidates: Candidates, text: str) -> tuple[Candidates, str, bool
     return tuple(left), " ".join(part for part in rest if part), any_will_do
 
 
-def narrowed(question: Question, text: str) -> Question:
+def _narrowed(question: Question, text: str) -> Question:
     """Return the question without the candidates that an answer rules out, where several are left.
 
     "not the blue one", to "the red one, the blue one or the white one?" -> "the red one or the
     white one?".
     """
-    remaining = _remaining(question.candidates, text.lower())
+    remaining = _remaining(question.candidates, text)
     if isinstance(remaining, Verdict) or len(remaining[0]) < 2:
         return question
     left = remaining[0]
@@ -191,8 +233,8 @@ def narrowed(question: Question, text: str) -> Question:
 
 
 def _picked(candidates: Candidates, said: str) -> tuple[Verdict, Candidate | None]:
-    called = (said, answer_words.TO.sub("", said))
-    by_name = [one for one in candidates if one.name in called or _spoken(one) in called]
+    called = (said, _TO.sub("", said))
+    by_name = [one for one in candidates if {one.name, one.name.replace("_", " ")} & {*called}]
     if len(by_name) == 1:
         return Verdict.CHOSEN, by_name[0]
     words = _telling(candidates, said)
@@ -203,14 +245,10 @@ def _picked(candidates: Candidates, said: str) -> tuple[Verdict, Candidate | Non
         return (Verdict.CHOSEN, candidates[at]) if in_row else (Verdict.UNCLEAR, None)
     if not words:
         return Verdict.UNCLEAR, None
-    if not (_known(candidates) | answer_words.COMPARING).issuperset(words):
+    if not (_known(candidates) | _COMPARING).issuperset(words):
         return Verdict.ANEW, None
     fitting = [one for one in candidates if one.features.issuperset(words)]
     return (Verdict.CHOSEN, fitting[0]) if len(fitting) == 1 else (Verdict.UNCLEAR, None)
-
-
-def _spoken(candidate: Candidate) -> str:
-    return candidate.name.replace("_", " ")
 
 
 def _known(candidates: Candidates) -> frozenset[str]:
@@ -220,12 +258,8 @@ def _known(candidates: Candidates) -> frozenset[str]:
 def _telling(candidates: Candidates, said: str) -> list[str]:
     """Return the words of an answer that may tell candidates apart."""
     known = _known(candidates)
-    said = answer_words.FROM_SIDE.sub(lambda found: from_side(found[1], found[2]), said)
-    return [
-        word
-        for word in said.split()
-        if word not in answer_words.SILENT or word in known - answer_words.FILL
-    ]
+    said = _FROM_SIDE.sub(lambda found: from_side(found[1], found[2]), said)
+    return [word for word in said.split() if word not in _SILENT or word in known - _FILL]
 
 
 def _place_of(candidates: Candidates, said: str, words: list[str]) -> int | None:
@@ -234,4 +268,39 @@ def _place_of(candidates: Candidates, said: str, words: list[str]) -> int | None
     if number:
         return NUMBERS.get(number[1])
     apart = [word for word in words if not all(word in one.features for one in candidates)]
-    return answer_words.PLACES.get(apart[0]) if len(apart) == 1 else None
+    return _PLACES.get(apart[0]) if len(apart) == 1 else None
+
+
+# --- an answer by another thing -----------------------------------------------------------------
+
+_WHERE: Final = re.compile(
+    r"(?:(?:no|yes|well|oh|sorry|it(?:'s| is)|i (?:mean|meant|want|said)|take) )*"
+    r"(?:the|that) (?P<which>[a-z]+ )??(?:one|(?P<noun>[a-z]+)) (?:(?:that|which)(?:'s| is) )?"
+    r"(?P<where>(?:over )?(?:next to|close to|beside|behind|in front of|near|nearest(?: to)?|"
+    r"closest to|by|under|on top of|(?:to the )?(?:left|right) of|inside|in|on) .+?)"
+    r"(?: (?:please|then|thanks))*"
+)
+_KIND: Final = re.compile(rf"\b(?:{KIND_WORDS})\b")
+
+
+def described(question: Question, text: str) -> str | None:
+    """Return the waiting command in full where an answer says by which other thing one stands.
+
+    "the one next to the book", to "pick up the cup" -> "pick up the cup next to the book".
+    """
+    found = _WHERE.fullmatch(" ".join(_WORD.findall(_plain(text))))
+    expression, command = question.expression, question.command_text
+    if found is None or not question.candidates or not expression:
+        return None
+    if found["noun"] and found["noun"] not in expression.split():
+        return None
+    noun = _KIND.search(expression)
+    # "The ball from the table" may have been said as "lift the ball up off the table".
+    spelt = (expression, *(() if noun is None else (f"the {noun[0]}",)))
+    found_in = [list(re.finditer(rf"\b{re.escape(it)}\b", command, re.IGNORECASE)) for it in spelt]
+    named = next((one for one in found_in if one), [])
+    if len(named) != 1:
+        return None
+    start, end = named[0].span()
+    which = found["which"] or ""
+    return f"{command[:start]}{which}{command[start:end]} {found['where']}{command[end:]}"

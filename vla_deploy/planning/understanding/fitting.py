@@ -7,22 +7,11 @@ from enum import StrEnum
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import DependsOnView
-from vla_deploy.planning.understanding.expression import Expression, Scope
-from vla_deploy.planning.understanding.insertions import surface_of
-from vla_deploy.planning.understanding.parting import Place
-from vla_deploy.planning.understanding.selection import (
-    by_distance,
-    facing,
-    in_a_row,
-    most,
-    nth,
-    off_line_m,
-    on_side,
-    ranked,
-    together,
-)
+from vla_deploy.planning.understanding.expressions import Expression, Scope
+from vla_deploy.planning.understanding.furniture import surface_of
+from vla_deploy.planning.understanding.selection import by_distance, in_place, most, on_side
 from vla_deploy.planning.understanding.setting import Setting
-from vla_deploy.world import Query, Thing, Viewpoint, find
+from vla_deploy.world import Query, Thing, find
 from vla_deploy.world.query import FROM_A_VIEW, ORDERS
 from vla_deploy.world.relations import NEXT_TO
 from vla_deploy.world.resting import IN
@@ -45,7 +34,7 @@ def fitting(read: Expression, use: Use, setting: Setting) -> list[Thing]:
     Raises:
         DependsOnView: it says left, right, in front or behind, and nobody knows who looks at what.
     """
-    found = told_apart(read, alike(read, use, setting), setting)
+    found = _told_apart(read, alike(read, use, setting), setting)
     return [one for one in found if suits(one, use, _query(read, use, setting), setting)]
 
 
@@ -72,9 +61,41 @@ def alike(read: Expression, use: Use, setting: Setting) -> list[Thing]:
         before = setting.latest_id(replace(query, is_named=query.kind != ANY_CLASS))
         found = [one for one in found if before is None or not one.is_called(before)]
     for other in read.besides:
-        meant = told_apart(other, _described_by(other, found, setting), setting)
+        meant = _described_by(other, found, setting)
         found = [one for one in found if one not in meant]
-    return _best_kinds(found, read)
+    return found
+
+
+def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
+    """Tell whether a thing can play its part: what is held is not taken, nor put upon."""
+    may_move = query.kind != ANY_CLASS or thing.kind in GRASPABLE_CLASSES
+    match use:
+        case Use.ONTO:
+            return not thing.held_by and not setting.is_object_here(thing)
+        case Use.TAKE:
+            return may_move and (not thing.held_by or bool(query.thing_id))
+        case Use.PUT:
+            return may_move
+        case Use.SEE | Use.REACH:
+            return True
+
+
+def _query(read: Expression, use: Use, setting: Setting) -> Query:
+    query = read.query
+    is_first_of_what = read.place is not None and not read.place.side
+    if query.is_named or query.thing_id or is_first_of_what:
+        return query
+    return replace(query, kind=_kind_spoken_of(query, use, setting))
+
+
+def _kind_spoken_of(query: Query, use: Use, setting: Setting) -> str:
+    """Return the kind that "the red one" means after "the cups": the last of which one is red."""
+    for one in setting.spoken_of():
+        if not one.kind or (use in (Use.TAKE, Use.PUT) and one.kind not in GRASPABLE_CLASSES):
+            continue
+        if find(replace(query, kind=one.kind), setting.scene, setting.view):
+            return one.kind
+    return ANY_CLASS
 
 
 def _beside_at_a_distance(query: Query, setting: Setting) -> list[Thing]:
@@ -109,20 +130,20 @@ def _rests_on(thing: Thing, names: Collection[str]) -> bool:
     return thing.rests is not None and thing.rests.of in names
 
 
-def told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[Thing]:
+# --- what tells things apart that are alike -----------------------------------------------------
+
+
+def _told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[Thing]:
     """Return of things that are alike the one at a side, a place in a row, or an extreme."""
     view = setting.view
-    looks = facing(view) if read.by_speaker and view is not None else view
     if read.among and len(found) not in (1, read.among):
         return found
-    if read.between:
-        found = _between(read.between, found, setting)
     if read.near is not None:
         return _by_nearness(read, read.near, found, setting)
     if read.place is not None:
-        return _in_place(read, read.place, found, looks)
+        return in_place(found, read.place.number, read.place.side, view)
     if read.side:
-        found = on_side(found, read.side, looks)
+        found = on_side(found, read.side, view)
     if read.extreme:
         return most(found, read.extreme)
     if read.query.order and view is not None:
@@ -131,98 +152,22 @@ def told_apart(read: Expression, found: list[Thing], setting: Setting) -> list[T
     return found
 
 
-def _query(read: Expression, use: Use, setting: Setting) -> Query:
-    query = read.query
-    if query.is_named or query.thing_id:
-        return query
-    return replace(query, kind=_kind_spoken_of(query, use, setting))
-
-
 def _described_by(read: Expression, things: list[Thing], setting: Setting) -> list[Thing]:
     """Return those of some things that a part such as "the red one" describes."""
     known = find(replace(read.query, order=""), setting.scene, setting.view)
     found = [one for one in things if one in known]
     if read.support:
         found = [one for one in found if _rests_on(one, read.support)]
-    return _best_kinds(found, read)
-
-
-def _best_kinds(found: list[Thing], read: Expression) -> list[Thing]:
-    """Return of what a word such as "round" fits those that it fits best."""
-    if not read.kinds:
-        return found
-    fitting_it = ([one for one in found if one.kind in kinds] for kinds in read.kinds)
-    return next((some for some in fitting_it if some), [])
+    return _told_apart(read, found, setting)
 
 
 def _by_nearness(
     read: Expression, near: Expression, found: list[Thing], setting: Setting
 ) -> list[Thing]:
     """Return the nearest to another thing, or the farthest; none where that is not known."""
-    others = told_apart(near, _described_by(near, list(setting.scene.things), setting), setting)
+    others = _described_by(near, list(setting.scene.things), setting)
     if not others or (len(others) > 1 and near.scope is not Scope.ALL):
         return found if others else []
     row = [one for one in found if one not in others]
     row.sort(key=lambda one: min(math.dist(one.xy_m, other.xy_m) for other in others))
     return row[:1] if ORDERS[read.order] > 0 else row[-1:]
-
-
-def _between(ends: tuple[Expression, ...], found: list[Thing], setting: Setting) -> list[Thing]:
-    """Return what stands between two things, the nearest to their line first; none if unknown."""
-    known = list(setting.scene.things)
-    named = [told_apart(one, _described_by(one, known, setting), setting) for one in ends]
-    if not all(named):
-        return []
-    # "Between the books" names them together; of several cups, one pair has it between them.
-    pairs = [(one, other) for one in named[0] for other in named[1] if one is not other]
-    aside = [
-        (off_m, thing)
-        for thing in found
-        for pair in pairs
-        if thing not in pair and (off_m := off_line_m(thing, *pair)) is not None
-    ]
-    aside.sort(key=lambda row: row[0])
-    return list({thing.thing_id: thing for _, thing in aside}.values())
-
-
-def _in_place(
-    read: Expression, place: Place, found: list[Thing], view: Viewpoint | None
-) -> list[Thing]:
-    """Return the thing at a place in a row; none where the row is too short, all without a row."""
-    row: list[Thing] | None = None
-    if len(found) < place.number or not found:
-        return []
-    if read.extreme:
-        row = ranked(found, read.extreme)
-    elif read.query.order and view is not None:
-        row = by_distance(found, (view.x_m, view.y_m))[:: ORDERS[read.query.order]]
-    elif place.side:
-        row = in_a_row(together(found, place.number) or (), view)
-        row = row[::-1] if row and place.side == "right" else row
-    if row is None:
-        return found
-    return nth(row, place.number)
-
-
-def suits(thing: Thing, use: Use, query: Query, setting: Setting) -> bool:
-    """Tell whether a thing can play its part: what is held is not taken, nor put upon."""
-    may_move = query.kind != ANY_CLASS or thing.kind in GRASPABLE_CLASSES
-    match use:
-        case Use.ONTO:
-            return not thing.held_by and not setting.is_object_here(thing)
-        case Use.TAKE:
-            return may_move and (not thing.held_by or bool(query.thing_id))
-        case Use.PUT:
-            return may_move
-        case Use.SEE | Use.REACH:
-            return True
-
-
-def _kind_spoken_of(query: Query, use: Use, setting: Setting) -> str:
-    """Return the kind that "the red one" means after "the cups": the last of which one is red."""
-    for one in setting.spoken_of():
-        if not one.kind or (use in (Use.TAKE, Use.PUT) and one.kind not in GRASPABLE_CLASSES):
-            continue
-        if find(replace(query, kind=one.kind), setting.scene, setting.view):
-            return one.kind
-    return ANY_CLASS

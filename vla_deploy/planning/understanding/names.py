@@ -1,13 +1,11 @@
-"""Recognise names that were misspelt or misheard: by edit distance, by sound, by homophones.
+"""Recognise names that were misspelt or misheard: by homophones and edit distance.
 
-Nothing here decides alone: a spelling that is one letter off a long word is taken, what only sounds
-alike is offered as a question.
+A spelling that is one letter off a long word is taken; what is only like a short one is offered as
+a question.
 """
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
@@ -23,31 +21,23 @@ HOMOPHONES: Final[Mapping[str, str]] = MappingProxyType(
 )  # fmt: skip
 # A word this long may be one letter wrong, or two; shorter ones are too near to other words.
 SPELLING: Final = ((5, 1), (8, 2))
-# What only sounds alike must still look alike.
-MOST_UNLIKE: Final = 2
-
-
-class Likeness(StrEnum):
-    """Say in what way a word is like a known one, the surest first."""
-
-    SAME = "same"
-    SOUNDS_SAME = "homophone"
-    MISSPELT = "one letter off"
-    SOUNDS_ALIKE = "sounds alike"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Match:
-    """Hold the known words that a word may mean; several are equally like it."""
+    """Hold the known words that a word may mean; several are equally like it.
+
+    What is `near` sounds the same, or is misspelt.
+    """
 
     word: str
     known: tuple[str, ...]
-    likeness: Likeness
+    near: bool
 
     @property
     def is_sure(self) -> bool:
         """Tell whether it may be taken without asking."""
-        return len(self.known) == 1 and self.likeness is not Likeness.SOUNDS_ALIKE
+        return self.near and len(self.known) == 1
 
 
 def closest(word: str, known: Iterable[str]) -> Match | None:
@@ -57,17 +47,14 @@ def closest(word: str, known: Iterable[str]) -> Match | None:
 
 @lru_cache(maxsize=1024)
 def _closest(word: str, words: tuple[str, ...]) -> Match | None:
-    if word in words:
-        return Match(word=word, known=(word,), likeness=Likeness.SAME)
-    if HOMOPHONES.get(word) in words:
-        return Match(word=word, known=(HOMOPHONES[word],), likeness=Likeness.SOUNDS_SAME)
-    tests = (
-        (Likeness.MISSPELT, tuple(one for one in words if _is_misspelt(word, one))),
-        (Likeness.SOUNDS_ALIKE, tuple(one for one in words if _sounds_alike(word, one))),
-    )
-    return next(
-        (Match(word=word, known=found, likeness=how) for how, found in tests if found), None
-    )
+    same = word if word in words else HOMOPHONES.get(word)
+    if same in words:
+        return Match(word=word, known=(str(same),), near=True)
+    misspelt = tuple(one for one in words if _is_misspelt(word, one))
+    if misspelt:
+        return Match(word=word, known=misspelt, near=True)
+    alike = tuple(one for one in words if _is_alike(word, one))
+    return Match(word=word, known=alike, near=False) if alike else None
 
 
 def edit_distance(one: str, other: str) -> int:
@@ -84,32 +71,13 @@ def edit_distance(one: str, other: str) -> int:
     return row[-1]
 
 
-# Applied in this order; capital letters are sounds that no single letter stands for.
-_SOUNDS: Final[tuple[tuple[re.Pattern[str], str], ...]] = tuple(
-    (re.compile(pattern), sound)
-    for pattern, sound in (
-        (r"[^a-z]", ""),
-        (r"^(?:kn|gn|pn)", "n"), (r"^wr", "r"), (r"^wh", "w"), (r"mb$", "m"),
-        (r"tch|ch", "X"), (r"sh|sch|(?<=.)ti(?=on)", "S"), (r"th", "0"), (r"ph", "f"),
-        (r"gh(?=t|$)", ""), (r"dge", "j"), (r"c(?=[eiy])", "s"), (r"ck|c|q", "k"), (r"x", "ks"),
-        (r"z", "s"), (r"(?<=.)[aeiouyhw]", ""), (r"^[aeiouy]", "A"), (r"(.)\1+", r"\1"),
-    )
-)  # fmt: skip
-
-
-@lru_cache(maxsize=1024)
-def phonetic_key(word: str) -> str:
-    """Return the consonants of a word by their sound: "phone" and "fan" are both "fn"."""
-    for pattern, sound in _SOUNDS:
-        word = pattern.sub(sound, word)
-    return word
-
-
 def _is_misspelt(word: str, known: str) -> bool:
     allowed = max((most for least, most in SPELLING if min(len(word), len(known)) >= least),
                   default=0)  # fmt: skip
     return abs(len(word) - len(known)) <= allowed and 0 < edit_distance(word, known) <= allowed
 
 
-def _sounds_alike(word: str, known: str) -> bool:
-    return phonetic_key(word) == phonetic_key(known) and edit_distance(word, known) <= MOST_UNLIKE
+def _is_alike(word: str, known: str) -> bool:
+    """Tell whether words differ by one letter between the first and the last: "cap" and "cup"."""
+    ends_alike = word[:1] == known[:1] and word[-1:] == known[-1:]
+    return len(word) > 2 and ends_alike and edit_distance(word, known) == 1

@@ -1,10 +1,10 @@
-"""Bring the values of a plan into the catalogue's form: units, hands, poses, ids.
+"""Bring the values of a plan into the catalogue's form: units, hands, poses.
 
 Only what has one meaning is changed. What has none stays as it is, and the validator names it.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from vla_deploy.planning.catalogue import ARMS, SKILLS, Type
@@ -12,7 +12,6 @@ from vla_deploy.planning.plan import Action
 from vla_deploy.planning.understanding.quantities import UNITS, quantity_of
 from vla_deploy.world.relations import NEXT_TO
 
-LONGEST_ID: Final = 48
 DIRECTIONS: Final[Mapping[str, str]] = {
     "forward": "ahead", "forwards": "ahead", "straight": "ahead", "straight ahead": "ahead",
     "front": "ahead", "upwards": "up", "downwards": "down", "floor": "down", "ceiling": "up",
@@ -73,27 +72,3 @@ _TEXTS: Final[Mapping[str, Callable[[str, frozenset[str]], str]]] = {
     "direction": _named(DIRECTIONS),
     "relation": _named(RELATIONS),
 }
-
-
-def with_unique_ids(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Give each action an id of its own; who depends on a doubled id means the latest before it."""
-    taken: set[str] = set()
-    latest: dict[str, str] = {}
-    unique = []
-    for action in actions:
-        depends_on = tuple(latest.get(one, one) for one in action.depends_on)
-        name = free_id(action.id, taken)
-        taken.add(name)
-        latest[action.id] = name
-        unique.append(action.model_copy(update={"id": name, "depends_on": depends_on}))
-    return tuple(unique)
-
-
-def free_id(wanted: str, taken: set[str]) -> str:
-    """Return an id like the wanted one that is not taken."""
-    if wanted not in taken:
-        return wanted
-    number = 2
-    while f"{wanted[:LONGEST_ID]}_{number}" in taken:
-        number += 1
-    return f"{wanted[:LONGEST_ID]}_{number}"

@@ -50,7 +50,8 @@ EXTREMES: Final[Mapping[str, str]] = MappingProxyType(
 )  # fmt: skip
 ORDER_WORDS: Final[Mapping[str, str]] = MappingProxyType(
     {"nearer": "nearest", "closer": "nearest", "further": "farthest", "furthest": "farthest",
-     "farther": "farthest", "tiny": "small", "mini": "small", "huge": "big", "giant": "big"}
+     "farther": "farthest", "tiny": "small", "mini": "small", "wee": "small", "huge": "big",
+     "giant": "big"}
 )  # fmt: skip
 # Places in a row or in a list; -1 is the end.
 ORDINALS: Final[Mapping[str, int]] = MappingProxyType(
@@ -65,20 +66,6 @@ NUMBERS: Final[Mapping[str, int]] = MappingProxyType(
         "1": 1, "2": 2, "3": 3, "4": 4, "5": 5, "6": 6,
     }
 )  # fmt: skip
-# Words that fit some kinds, those that they fit best first: they mean the first that is there.
-FITTING_KINDS: Final[Mapping[str, tuple[frozenset[str], ...]]] = MappingProxyType(
-    {
-        "round": (frozenset({"ball"}), frozenset({"bowl", "cup", "can", "bottle"})),
-        "spherical": (frozenset({"ball"}),),
-        "cylindrical": (frozenset({"can", "bottle", "cup"}),),
-        "square": (frozenset({"box"}),),
-        "rectangular": (frozenset({"box", "book"}), frozenset({"phone", "remote"})),
-        "drink": (frozenset({"can", "bottle"}), frozenset({"cup"})),
-        "beverage": (frozenset({"can", "bottle"}), frozenset({"cup"})),
-    }
-)
-# Of these, those that name a thing by themselves.
-KIND_NOUNS: Final = frozenset({"drink", "beverage"})
 # What a kind of thing is called by in two words or more.
 COMPOUNDS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -92,17 +79,18 @@ COMPOUNDS: Final[Mapping[str, str]] = MappingProxyType(
 # What a thing is for or made of, before its kind, tells no two of the known kinds apart.
 MODIFIERS: Final = frozenset(
     {
-        "coffee", "tea", "water", "soda", "coke", "beer", "juice", "tennis", "toy", "rubber",
-        "plastic", "cardboard", "storage", "tv", "telly", "television", "car", "house", "door",
-        "cell", "mobile", "paper", "wooden", "metal", "ceramic", "drinking", "office", "favourite",
-        "favorite", "nice", "lovely", "same",
+        "coffee", "tea", "water", "soda", "coke", "cola", "pop", "beer", "juice", "wine", "milk",
+        "soup", "salad", "cereal", "breakfast", "fruit", "tennis", "bouncy", "toy", "car", "house",
+        "door", "office", "tv", "telly", "television", "cell", "mobile", "cook", "reading", "story",
+        "school", "library", "storage", "drinking", "rubber", "plastic", "cardboard", "paper",
+        "wooden", "metal", "ceramic", "glass", "favourite", "favorite", "nice", "lovely", "good",
+        "shiny", "same",
     }
 )  # fmt: skip
 # Words between a thing and where it stands, which say nothing.
 SILENT: Final = frozenset(
     {"is", "are", "which", "standing", "lying", "sitting", "resting", "please", "lies", "stands"}
 )
-EVERYTHING: Final = frozenset({"everything", "all", "anything"})
 COUNTS: Final[Mapping[str, int]] = MappingProxyType(
     {"two": 2, "three": 3, "four": 4, "2": 2, "3": 3, "4": 4, "both": 2, "couple": 2, "pair": 2}
 )

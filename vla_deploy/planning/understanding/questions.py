@@ -4,13 +4,13 @@ colour, kind, what it stands on or in, left or right, nearer or farther, size, t
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.understanding.conversation import Candidate
 from vla_deploy.planning.understanding.names import Match
-from vla_deploy.planning.understanding.phrases import EXTREMES, FITTING_KINDS, ORDINALS
+from vla_deploy.planning.understanding.phrases import EXTREMES, ORDINALS
 from vla_deploy.planning.understanding.selection import MEASURES, by_distance, in_a_row, most
 from vla_deploy.world import Thing, Viewpoint
 
@@ -19,13 +19,11 @@ MOST_CHOICES: Final = 4
 # What is not that much nearer than another is not "the nearer one".
 LEAST_DISTANCE_M: Final = 0.05
 
-Contrast = Callable[[Sequence[Thing], Viewpoint | None], list[str] | None]
-
 
 def which_thing(things: Sequence[Thing], view: Viewpoint | None, expression: str) -> Ambiguous:
     """Return the question which of these was meant; the nearest ones come first."""
     asked = list(things)[:MOST_CHOICES]
-    words = next(found for contrast in _CONTRASTS if (found := contrast(asked, view)) is not None)
+    words = next(_contrasts(asked, view))
     candidates = [
         Candidate(name=thing.thing_id, words=said, features=_features(thing, said, asked, view))
         for thing, said in zip(asked, words, strict=True)
@@ -52,14 +50,15 @@ def which_hand(held: Mapping[str, str], expression: str) -> Ambiguous:
         )
         for hand, said in held.items()
     ]
-    return Ambiguous(
-        f"Which one, {either([one.words for one in candidates])}?", candidates, expression
-    )
+    return _which_one(candidates, expression)
 
 
 def which_place(places: Sequence[str], expression: str) -> Ambiguous:
     """Return the question which of these places was meant."""
-    candidates = _places(places)
+    return _which_one(_places(places), expression)
+
+
+def _which_one(candidates: Sequence[Candidate], expression: str) -> Ambiguous:
     words = [one.words for one in candidates[:MOST_CHOICES]]
     return Ambiguous(f"Which one, {either(words)}?", candidates, expression)
 
@@ -97,22 +96,25 @@ def either(words: Sequence[str]) -> str:
     return " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
 
 
-def _distinct(words: Sequence[str]) -> list[str] | None:
-    return list(words) if len(set(words)) == len(words) and all(words) else None
-
-
-def _by_colour(things: Sequence[Thing], _: Viewpoint | None) -> list[str] | None:
-    same_kind = len({thing.kind for thing in things}) == 1
-    words = [f"the {one.colour} {'one' if same_kind else one.kind}" for one in things]
-    return _distinct(words) if all(one.colour for one in things) else None
-
-
-def _by_kind(things: Sequence[Thing], _: Viewpoint | None) -> list[str] | None:
-    return _distinct([f"the {one.kind}" for one in things])
-
-
-def _by_support(things: Sequence[Thing], _: Viewpoint | None) -> list[str] | None:
-    return _distinct([_support(one) for one in things])
+def _contrasts(things: Sequence[Thing], view: Viewpoint | None) -> Iterator[list[str]]:
+    """Yield the ways to call each of some things that tell them apart, the shortest first."""
+    kinds = {one.kind for one in things}
+    nouns = ["one" if len(kinds) == 1 else one.kind for one in things]
+    there = [_support(one) for one in things]
+    coloured = [f"the {one.colour} {noun}" for one, noun in zip(things, nouns, strict=True)]
+    ways = [
+        coloured if all(one.colour for one in things) else [],
+        [f"the {one.kind}" for one in things],
+        [f"the one {where}" for where in there] if all(there) else [],
+        _by_side(things, view),
+        _by_distance(things, view),
+        _by_size(things),
+        [f"{words} {where}" for words, where in zip(coloured, there, strict=True)]
+        if all(there) and len(kinds) == 1
+        else [],
+    ]
+    yield from (words for words in ways if len({*words}) == len(things))
+    yield [one.thing_id for one in things]
 
 
 def _support(thing: Thing) -> str:
@@ -120,62 +122,45 @@ def _support(thing: Thing) -> str:
         return ""
     of = thing.rests.of
     name = of.rpartition("_")[0] if of.rpartition("_")[2].isdigit() else of
-    return f"the one {thing.rests.relation} the {name.replace('_', ' ')}"
+    return f"{thing.rests.relation} the {name.replace('_', ' ')}"
 
 
-def _by_side(things: Sequence[Thing], view: Viewpoint | None) -> list[str] | None:
+def _by_side(things: Sequence[Thing], view: Viewpoint | None) -> list[str]:
     row = in_a_row(things, view)
     if row is None or len(row) > 3:
-        return None
-    names = ("left", "middle", "right") if len(row) == 3 else ("left", "right")
-    sides = [names[row.index(one)] for one in things]
-    return ["the middle one" if side == "middle" else f"the one on the {side}" for side in sides]
+        return []
+    sides = ("the one on the left", *["the middle one"][: len(row) - 2], "the one on the right")
+    return [sides[row.index(one)] for one in things]
 
 
-def _by_distance(things: Sequence[Thing], view: Viewpoint | None) -> list[str] | None:
+def _by_distance(things: Sequence[Thing], view: Viewpoint | None) -> list[str]:
     if view is None or len(things) != 2:
-        return None
-    here = (view.x_m, view.y_m)
-    near, far = (math.dist(one.xy_m, here) for one in things)
+        return []
+    near, far = (math.dist(one.xy_m, (view.x_m, view.y_m)) for one in things)
     if abs(near - far) < LEAST_DISTANCE_M:
-        return None
+        return []
     return ["the nearer one", "the farther one"][:: 1 if near < far else -1]
 
 
-def _by_size(things: Sequence[Thing], _: Viewpoint | None) -> list[str] | None:
-    if len(things) != 2 or len(most(things, "big")) != 1:
-        return None
-    return ["the big one" if one is most(things, "big")[0] else "the small one" for one in things]
-
-
-def _by_name(things: Sequence[Thing], _: Viewpoint | None) -> list[str]:
-    return [one.thing_id for one in things]
-
-
-def _by_colour_there(things: Sequence[Thing], _: Viewpoint | None) -> list[str] | None:
-    words = [_support(one).replace("the one", f"the {one.colour} one", 1) for one in things]
-    return _distinct(words) if len({one.kind for one in things}) == 1 else None
-
-
-_CONTRASTS: Final[tuple[Contrast, ...]] = (
-    _by_colour, _by_kind, _by_support, _by_side, _by_distance, _by_size, _by_colour_there, _by_name,
-)  # fmt: skip
+def _by_size(things: Sequence[Thing]) -> list[str]:
+    big = most(things, "big")
+    if len(things) != 2 or len(big) != 1:
+        return []
+    return ["the big one" if one is big[0] else "the small one" for one in things]
 
 
 def _features(
     thing: Thing, said: str, things: Sequence[Thing], view: Viewpoint | None
 ) -> frozenset[str]:
     """Return every word that is true of a thing, whichever way the question was put."""
-    words = {*said.split(), thing.kind, thing.colour, thing.thing_id, *_support(thing).split()}
-    for contrast in (_by_side, _by_distance, _by_size):
-        told = contrast(things, view)
-        if told is not None:
-            words |= set(told[list(things).index(thing)].split())
+    at = things.index(thing) if thing in things else None
+    told = [] if at is None else [words[at] for words in _contrasts(things, view)]
+    words = {*" ".join((said, _support(thing), *told)).split()}
+    words |= {thing.kind, thing.colour, thing.thing_id}
     words |= {word for word in MEASURES if most(things, word) == [thing]}
     words |= {word for word, measure in EXTREMES.items() if most(things, measure) == [thing]}
     words |= {"large"} if "big" in words else set()
     words |= {"little"} if "small" in words else set()
-    words |= {word for word, kinds in FITTING_KINDS.items() if any(thing.kind in k for k in kinds)}
     words |= {*_by_nearness(thing, things, view), *_in_row(thing, things, view)}
     return frozenset(word for word in words if word)
 

@@ -10,20 +10,19 @@ from vla_deploy.planning.plan import Action
 from vla_deploy.planning.symbolic.state import Held, Pose, State
 from vla_deploy.planning.symbolic.subjects import subject_of
 from vla_deploy.planning.understanding import phrases
-from vla_deploy.planning.understanding.conversation import Role
-from vla_deploy.planning.understanding.destinations import (
+from vla_deploy.planning.understanding.fitting import Use
+from vla_deploy.planning.understanding.places import (
     GetState,
     Parameters,
     check_readable,
     destination_of,
     pronoun_of,
+    resolve_place,
     thing_unless_place,
 )
-from vla_deploy.planning.understanding.fitting import Use
-from vla_deploy.planning.understanding.insertions import Step
-from vla_deploy.planning.understanding.places import resolve_place
-from vla_deploy.planning.understanding.referents import Referent
-from vla_deploy.planning.understanding.resolver import Resolver
+from vla_deploy.planning.understanding.resolver import Referent, Resolver
+
+Step = tuple[str, Parameters]
 
 
 def grounded_steps(action: Action, resolver: Resolver, state: GetState) -> Iterator[Step]:
@@ -64,9 +63,7 @@ def _here(text: str, resolver: Resolver) -> Parameters:
     if here is None:
         raise UnknownPlace(text, set(resolver.setting.request.world.places.values()))
     pose = pose_parameters(here)
-    resolver.referents.note(
-        text, Role.PLACE, f"{here[0]:.2f}, {here[1]:.2f}", "where the command was given"
-    )
+    resolver.note(text, f"{here[0]:.2f}, {here[1]:.2f}", "where the command was given")
     return pose
 
 

@@ -9,7 +9,7 @@ from vla_deploy.planning.command_parser.certainty import (
     features_of,
     oddities_of,
 )
-from vla_deploy.planning.command_parser.spans import find_span
+from vla_deploy.planning.command_parser.wording import find_span
 
 KNOWN = frozenset(
     [

@@ -9,6 +9,7 @@ from vla_deploy.planning.understanding import (
     Question,
     Verdict,
     described,
+    guess,
     reply,
 )
 
@@ -28,11 +29,10 @@ SURE = Question(text="Shall I?", asked_ns=0, command_text="throw the cup away")
 @pytest.mark.parametrize(
     ("said", "verdict", "chosen"),
     [
-        ("Oh, there's two of them? The red one then.", Verdict.CHOSEN, RED),
-        ("Right of you to check. The blue one is what I meant.", Verdict.ANEW, None),
-        ("I see. The blue one is what I meant.", Verdict.CHOSEN, BLUE),
+        ("Oh, sorry, the red one then.", Verdict.CHOSEN, RED),
+        ("I see. The blue one is what I meant.", Verdict.ANEW, None),
         ("Red. Keep the blue one.", Verdict.CHOSEN, RED),
-        ("Hang on to the red one", Verdict.CHOSEN, BLUE),
+        ("you can leave the red one where it is", Verdict.CHOSEN, BLUE),
         ("number two", Verdict.CHOSEN, BLUE),
         ("cup_2", Verdict.CHOSEN, BLUE),
         ("either one", Verdict.CHOSEN, RED),
@@ -172,3 +172,24 @@ def test_an_answer_by_another_thing_makes_the_command_whole(said: str, full: str
 def test_a_yes_that_is_taken_back_is_none(said: str) -> None:
     talk = Conversation(question=SURE)
     assert reply(talk, said, now_ns=1).verdict is not Verdict.YES
+
+
+@pytest.mark.parametrize(
+    ("said", "chosen"),
+    [
+        ("I see. The blue one is what I meant.", BLUE),
+        ("the red, my darling", RED),
+        ("Red. Keep the blue one.", None),
+        ("the red one is what I don't want", None),
+        ("what about the red one", None),
+        ("is it the red one?", None),
+        ("the red book", None),
+        ("the red one or the blue one", None),
+        ("go to the kitchen", None),
+    ],
+)
+def test_a_guess_is_made_of_what_one_candidate_alone_is_called(
+    said: str, chosen: Candidate | None
+) -> None:
+    got = guess(Conversation(question=WHICH), said)
+    assert (None if got is None else got.chosen) == chosen

@@ -56,13 +56,11 @@ def names(request: Request, text: str, use: Use = Use.TAKE) -> list[str]:
         # --- rows
         ("the last bottle on the left", "bottle_3"),
         ("the second of the bottles from the right", "bottle_2"),
-        ("the second bottle from my left", "bottle_2"),
         ("the second green bottle from the left", "bottle_1"),
         # --- extremes
         ("the bottle that is farthest away", "bottle_4"),
         ("the tallest bottle", "bottle_2"),
         ("the bigger of the two balls", "ball_1"),
-        ("the second nearest bottle", "bottle_3"),
         ("the widest one of the bottles", "bottle_2"),
         ("the bottle closest to the ball", "bottle_3"),
         # --- what it is not
@@ -71,10 +69,7 @@ def names(request: Request, text: str, use: Use = Use.TAKE) -> list[str]:
         ("any bottle but the nearest", "bottle_3"),
         ("the non-pink bottle on the kitchen table", None),
         # --- where it is
-        ("the kitchen table's bottle", "bottle_4"),
         ("that ball on the table there", "ball_1"),
-        # --- words for several kinds
-        ("the cylindrical pink one on the coffee table", "can_1"),
     ],
 )
 def test_it_is_told_from_the_things_around(scene: Request, text: str, meant: str | None) -> None:
@@ -97,7 +92,7 @@ def test_all_but_one_are_all_the_others(scene: Request) -> None:
         ("the bottle that isn't white", "Which bottle, "),
         ("the wider of the two bottles", "Which bottle, "),  # there are four
         ("the highest of the cups", "Which cup, "),
-        ("the pink drink", "Which one, the pink can or the pink bottle?"),
+        ("the second nearest bottle", "Which bottle, "),
     ],
 )
 def test_what_still_means_several_is_asked(home: "Home", text: str, question: str) -> None:
@@ -115,7 +110,6 @@ def test_what_still_means_several_is_asked(home: "Home", text: str, question: st
         ("the first book from the left", "I see no book"),
         ("any cup but the blue one", "I see no cup"),
         ("the bottle nearest to the bowl", "I do not see"),
-        ("the spherical white thing", "I see nothing that is"),
     ],
 )
 def test_what_is_not_there_is_said_to_be_not(scene: Request, text: str, says: str) -> None:
@@ -155,19 +149,9 @@ def test_a_thing_in_the_hand_stands_in_no_row(home: "Home") -> None:
     assert names(home.ask(*BOTTLES[:2], held), "the first bottle from the left") == ["bottle_2"]
 
 
-def test_the_second_one_alone_is_of_those_spoken_of(home: "Home") -> None:
-    talk = home.spoke_of("cup_4", "cup_2", "ball_1")
-    scene = home.ask("cup_1", "cup_2", "cup_4", "ball_1", conversation=talk)
-    assert names(scene, "the second one") == ["cup_2"]
-    assert names(scene, "the last one") == ["ball_1"]
-    for text in ("the fourth one", "the fifth"):
-        with pytest.raises(UnknownObject):
-            names(scene, text)
-
-
-@pytest.mark.parametrize("text", ["the second one", "the last", "number two"])
-def test_a_place_in_no_list_is_refused(home: "Home", text: str) -> None:
-    with pytest.raises(UnknownObject):
+@pytest.mark.parametrize("text", ["the second one", "the last"])
+def test_a_place_in_no_row_is_asked(home: "Home", text: str) -> None:
+    with pytest.raises(Ambiguous):
         names(home.ask("cup_1", "cup_2", conversation=home.spoke_of("cup_1")), text)
 
 
@@ -202,6 +186,6 @@ def test_one_of_several_is_not_one_of_many(scene: Request) -> None:
 def test_the_log_tells_among_which_things_it_was_told(scene: Request) -> None:
     resolver = Resolver(scene)
     resolver.thing("the second bottle from the left", Use.TAKE)
-    assert str(resolver.referents.decisions[0]) == (
+    assert resolver.reasons == [
         '"second bottle from left" is bottle_2 (white bottle) (the only one of 4 that fits)'
-    )
+    ]

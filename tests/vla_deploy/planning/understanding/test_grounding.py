@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError, UnknownPlace
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.understanding import Conversation, Mention, Role, Turn
-from vla_deploy.planning.understanding.grounding import Grounded, ground_plan
+from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import plan_faults
 
 if TYPE_CHECKING:
@@ -27,15 +27,15 @@ def plan_of(*steps: Step) -> Plan:
     return Plan(goal="test", actions=actions)
 
 
-def grounded(home: "Home", *steps: Step, scene: tuple[Any, ...] = (), **changes: Any) -> Grounded:
+def grounded(home: "Home", *steps: Step, scene: tuple[Any, ...] = (), **changes: Any) -> Plan:
     request = home.ask(*scene, **changes)
     found = ground_plan(plan_of(*steps), request)
-    assert plan_faults(found.plan, request.world, request.scene, request.here) == []
+    assert plan_faults(found, request.world, request.scene, request.here) == []
     return found
 
 
-def steps_of(found: Grounded) -> list[Step]:
-    return [(one.skill, one.parameters) for one in found.plan.actions]
+def steps_of(found: Plan) -> list[Step]:
+    return [(one.skill, one.parameters) for one in found.actions]
 
 
 MAIN = [
@@ -198,7 +198,7 @@ def test_ids_become_unique_and_actions_that_share_a_part_come_in_turn(home: "Hom
                Action(id="a", skill="move", parameters={"distance_m": 0.2}),
                Action(id="s", skill="speak", parameters={"text": "hello"}))  # fmt: skip
     found = ground_plan(Plan(goal="x", actions=actions), home.ask())
-    assert {one.id: one.depends_on for one in found.plan.actions} == {
+    assert {one.id: one.depends_on for one in found.actions} == {
         "a": (),
         "a_2": ("a",),
         "s": (),
@@ -207,9 +207,12 @@ def test_ids_become_unique_and_actions_that_share_a_part_come_in_turn(home: "Hom
 
 def test_the_plan_says_how_it_was_understood(home: "Home") -> None:
     found = grounded(home, ("pick_up", {"object": "the left cup"}), scene=("cup_1", "cup_2"))
-    assert '"left cup" is cup_2 (blue cup) (the only one that fits)' in found.plan.reasoning
-    assert found.inserted == {"a1_find_object", "a1_navigate_to"}
-    assert found.plan.actions[-1].preconditions[:2] == ("object known", "not held")
+    assert '"left cup" is cup_2 (blue cup) (the only one that fits)' in found.reasoning
+    assert [one.id for one in found.actions if one.description == PUT_IN] == [
+        "a1_find_object",
+        "a1_navigate_to",
+    ]
+    assert found.actions[-1].preconditions[:2] == ("object known", "not held")
 
 
 def test_what_is_ambiguous_or_unknown_is_not_grounded(home: "Home") -> None:
@@ -250,5 +253,5 @@ def test_any_plan_is_refused_by_name_or_grounded_and_then_judged(
     except PlanningError as error:
         assert str(error)
         return
-    faults = plan_faults(found.plan, request.world, request.scene, request.here)
+    faults = plan_faults(found, request.world, request.scene, request.here)
     assert all(isinstance(one, str) for one in faults)

@@ -1,6 +1,6 @@
 import pytest
 
-from vla_deploy.planning.understanding.names import Likeness, closest, edit_distance, phonetic_key
+from vla_deploy.planning.understanding.names import closest, edit_distance
 from vla_deploy.world.vocabulary import COLOURS, OBJECT_CLASSES
 
 KNOWN = (*OBJECT_CLASSES, *COLOURS, "kitchen", "bedroom", "coffee")
@@ -18,28 +18,21 @@ def test_edit_distance_counts_a_swap_of_neighbours_as_one(
 
 
 @pytest.mark.parametrize(
-    ("one", "other"),
-    [("phone", "fone"), ("keys", "quiz"), ("cup", "kup"), ("box", "bocks"), ("bottle", "botel"),
-     ("write", "right"), ("kitchen", "kichen")],
-)  # fmt: skip
-def test_words_that_sound_alike_share_a_key(one: str, other: str) -> None:
-    assert phonetic_key(one) == phonetic_key(other)
-
-
-@pytest.mark.parametrize(
-    ("word", "known", "likeness", "is_sure"),
+    ("word", "known", "is_sure"),
     [
-        ("cup", ("cup",), Likeness.SAME, True),
-        ("quays", ("keys",), Likeness.SOUNDS_SAME, True),
-        ("bell", ("ball", "bowl"), Likeness.SOUNDS_ALIKE, False),
+        ("cup", ("cup",), True),
+        ("quays", ("keys",), True),
+        ("kitchne", ("kitchen",), True),
+        ("cap", ("cup",), False),
+        ("bell", ("ball",), False),
     ],
 )
 def test_a_word_that_is_not_known_is_matched_to_what_it_is_like(
-    word: str, known: tuple[str, ...], likeness: Likeness, is_sure: bool
+    word: str, known: tuple[str, ...], is_sure: bool
 ) -> None:
     match = closest(word, KNOWN)
     assert match is not None
-    assert (match.known, match.likeness, match.is_sure) == (known, likeness, is_sure)
+    assert (match.known, match.is_sure) == (known, is_sure)
 
 
 @pytest.mark.parametrize("word", ["dinosaur", "moon", "cat", "dog", "knife", "gun", "stairs"])
