@@ -14,12 +14,11 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.interfaces import Answer, Attempt, Request
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.ladder import Answer, Attempt
 from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription, load_robot

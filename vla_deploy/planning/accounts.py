@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from vla_deploy.model_servers.metrics import percentile_s
-from vla_deploy.planning.ladder import Attempt
+from vla_deploy.planning.interfaces import Attempt
 
 _KEPT: Final = 256
 

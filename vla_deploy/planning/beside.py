@@ -7,9 +7,8 @@ from typing import Final
 
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.inbox import Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer, Request
 
 # Whoever speaks to the robot hears by then that it has heard.
 PATIENCE_S: Final = 1.5

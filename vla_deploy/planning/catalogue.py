@@ -15,6 +15,8 @@ RELATIONS = (IN, ON, NEXT_TO)
 NAVIGATION_TIMEOUT_S = 300.0
 MANIPULATION_TIMEOUT_S = 120.0
 DEFAULT_TIMEOUT_S = 60.0
+# These skills move nothing.
+MOTIONLESS = frozenset({"speak", "wait", "stop"})
 
 
 class Type(Enum):

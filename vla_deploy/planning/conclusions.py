@@ -5,13 +5,12 @@ from operator import attrgetter
 from typing import Final
 
 from vla_deploy.planning.accounts import Accounts
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.dialogue import Dialogue
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.inbox import Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer, Request
 from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.phrasing import Says, spoken_refusal
 from vla_deploy.planning.plan import Plan

@@ -7,7 +7,8 @@ is unsure is always asked, since nobody has asked for it surely.
 from collections.abc import Callable, Mapping, Set
 from typing import Final
 
-from vla_deploy.planning.asking import Request
+from vla_deploy.planning.catalogue import MOTIONLESS
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.phrasing import Says, steps_in_words
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.symbolic.conditions import Setting
@@ -24,8 +25,6 @@ LONG_S: Final = 900.0
 MANY_THINGS: Final = 4
 HEAVY_RATIO: Final = 0.8
 FAR_BACK_M: Final = -1.0
-# These move nothing.
-STILL: Final = frozenset({"speak", "wait", "stop"})
 
 
 def confirmation_of(plan: Plan, request: Request, agreed: Set[str] = frozenset()) -> str:
@@ -47,7 +46,7 @@ def agreement_to(plan: Plan, request: Request) -> frozenset[str]:
 
 def _reasons(plan: Plan, request: Request) -> dict[str, str]:
     """Return why a plan waits for a yes, by what would be agreed to."""
-    if all(action.skill in STILL for action in plan.actions):
+    if all(action.skill in MOTIONLESS for action in plan.actions):
         return {}
     wanted = request.world.bounds.require_confirmation
     risks = _DOUBTS if wanted is Confirm.NEVER else {**_DOUBTS, **_RISKS}

@@ -13,14 +13,13 @@ from drivers.clock import Clock
 from vla_deploy.aside import AtOnce
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.accounts import Accounts
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.beside import Beside
 from vla_deploy.planning.conclusions import Conclusions
 from vla_deploy.planning.correction import CORRECTED, corrected_by
 from vla_deploy.planning.dialogue import Dialogue, Waiting
 from vla_deploy.planning.errors import PlanningError
 from vla_deploy.planning.inbox import READ_BACK, Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer, Proposal, Request
 from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner

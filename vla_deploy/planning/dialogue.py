@@ -4,10 +4,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import Ambiguous
 from vla_deploy.planning.inbox import Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer, Request
 from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import (

@@ -6,9 +6,9 @@ from itertools import islice
 from typing import Any, Final
 
 from vla_deploy.ipc import Event
-from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
 from vla_deploy.planning.patterns.stopping import is_stop
+from vla_deploy.planning.plan import MOST_CHARACTERS
 
 VOICE: Final = "voice"
 READ_BACK: Final = 0.5

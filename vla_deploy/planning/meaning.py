@@ -5,8 +5,7 @@ from typing import Any, Final
 
 from vla_deploy.planning.catalogue import SKILLS, Type
 from vla_deploy.planning.errors import PlanningError
-from vla_deploy.planning.graph import execution_order
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import Action, Plan, execution_order
 from vla_deploy.planning.references import match_place, parse_object
 
 _DIGITS: Final = 2

@@ -14,11 +14,10 @@ from typing import Final
 
 from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.steps import is_seen
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.inbox import READ_BACK, Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer, Request
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to planners that take time, too."""

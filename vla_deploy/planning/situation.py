@@ -9,13 +9,14 @@ from drivers.clock import NS_PER_S, Clock
 from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace
 from vla_deploy.ipc.rgbd_image import colours
-from vla_deploy.memory import MemoryStore
+from vla_deploy.memory import LastSeen, MemoryStore, MemoryUnusable
+from vla_deploy.memory.episode import unix_s
+from vla_deploy.memory.wording import sentence_of
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.planning.aids import Aid, Recall
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NotReady
 from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.interfaces import Aid, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription
@@ -26,6 +27,10 @@ STATUS_AGE_S: Final = 2.0
 _POSE_AGE_S: Final = 1.0
 _SCENE_AGE_S: Final = 10.0
 _IMAGE_AGE_S: Final = 2.0
+MOST_SENTENCES: Final = 5
+MOST_THINGS: Final = 60
+# What is older says nothing of where a thing is now.
+OLDEST_S: Final = 30 * 86_400.0
 
 _log = logging.getLogger(__name__)
 
@@ -132,3 +137,30 @@ class Situation:
         sample = reader.latest()
         is_fresh = sample is not None and sample.age_s(self._clock.now_ns()) <= age_limit_s
         return sample if is_fresh else None
+
+
+class Recall:
+    """Read the memory; one that cannot be read is done without."""
+
+    def __init__(self, store: MemoryStore) -> None:
+        self._store = store
+
+    def sentences(self, text: str) -> tuple[str, ...]:
+        """Return what is remembered that fits a command, a sentence each."""
+        now_s = unix_s()
+        try:
+            found = self._store.recall(text, MOST_SENTENCES)
+        except MemoryUnusable as error:
+            _log.warning("%s", error)
+            return ()
+        return tuple(sentence_of(one.episode, now_s) for one in found)
+
+    def things(self) -> tuple[LastSeen, ...]:
+        """Return things with where they were in the last weeks, the newest first."""
+        oldest_s = unix_s() - OLDEST_S
+        try:
+            seen = self._store.last_seen(count=MOST_THINGS)
+        except MemoryUnusable as error:
+            _log.warning("%s", error)
+            return ()
+        return tuple(one for one in seen if one.seen_s > oldest_s)

@@ -8,7 +8,7 @@ from vla_deploy.ipc import RingWriter, SharedSpace
 from vla_deploy.ipc.announcer import Announcer
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.inbox import Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer
 from vla_deploy.planning.phrasing import Says, first_part
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import Question

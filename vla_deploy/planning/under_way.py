@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from vla_deploy.planning.inbox import Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery import RECOVERY, Carried, read_setback
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED

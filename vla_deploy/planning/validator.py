@@ -12,10 +12,9 @@ from vla_deploy.planning.catalogue import (
     Type,
 )
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
-from vla_deploy.planning.graph import dependency_faults
 from vla_deploy.planning.instead import instead_of
 from vla_deploy.planning.knowledge import World, spoken_places
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import Action, Plan, dependency_faults
 from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic import bounds_faults, symbolic_faults
 from vla_deploy.planning.symbolic.sharing import sharing_faults

@@ -14,7 +14,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.plan import Plan
@@ -37,7 +37,7 @@ class StepClock:
         self.time_ns += round(duration_s * NS_PER_S)
 
 
-class ScriptedRung:
+class ScriptedRung(BackEnd):
     """A rung that does the next of what it was told: propose a plan, raise, or take its time."""
 
     def __init__(self, name: str, clock: StepClock, *script: Any, takes_s: float = 0.0) -> None:

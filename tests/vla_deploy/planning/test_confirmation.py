@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.confirmation import agreement_to, confirmation_of
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.understanding.grounding import PUT_IN

@@ -185,7 +185,8 @@ class TestQuestions:
 class TestReadingBack:
     @pytest.fixture
     def desk(self, open_desk, rung, propose):
-        desk = open_desk(rung("model", propose(GO, read_back="Shall I go to the kitchen?")))
+        go = propose(GO, read_back="Shall I go to the kitchen?", saw_scene=True)
+        desk = open_desk(rung("model", go))
         desk.give(text="kitchen, like, you know")
         return desk
 

@@ -8,8 +8,8 @@ import pytest
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_desk import Answer, fresh_desk
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import CannotBeDone
+from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.scope import guarded, scope_words

@@ -6,7 +6,7 @@ import pytest
 
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.inbox import Command
-from vla_deploy.planning.ladder import Answer
+from vla_deploy.planning.interfaces import Answer
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED

@@ -3,7 +3,6 @@
 import re
 from typing import Any, Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.steps import (
     BESIDE_WORDS,
     NO_THING,
@@ -17,6 +16,7 @@ from vla_deploy.planning.builders.steps import (
     split_put,
 )
 from vla_deploy.planning.errors import NotAble, UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expressions import read_expression

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from vla_deploy.memory.episode import LastSeen
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.steps import Groups, Step
 from vla_deploy.planning.errors import NotAble
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.conversation import Mention
 from vla_deploy.planning.understanding.expressions import read_expression

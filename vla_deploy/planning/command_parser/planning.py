@@ -9,13 +9,13 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders import answering, moving, placing, tidying
 from vla_deploy.planning.builders import steps as building
 from vla_deploy.planning.command_parser.amounts import METRES, RADIANS, SECONDS
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spoken import Spoken
 from vla_deploy.planning.errors import CannotBeDone, Declined, UnknownPlace
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.references import match_place
 

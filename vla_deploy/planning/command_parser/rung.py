@@ -17,7 +17,6 @@ from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.asking import Proposal, Request, Sureness
 from vla_deploy.planning.command_parser.certainty import (
     Oddities,
     confidence_of,
@@ -35,6 +34,7 @@ from vla_deploy.planning.command_parser.wording import (
     plain_words,
 )
 from vla_deploy.planning.errors import Declined
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request, Sureness
 from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import WORDS, ScopeGroup
@@ -60,10 +60,10 @@ class Parsed:
     oddities: Oddities
 
 
-class CommandParser:
+class CommandParser(BackEnd):
     """Hold the model and the words that it was shown."""
 
-    name: Final = NAME
+    name = NAME
 
     def __init__(self, model: LanguageModel, known_words: frozenset[str]) -> None:
         """Take an open model.

@@ -4,12 +4,12 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders import steps as building
 from vla_deploy.planning.command_parser.amounts import amount_of, amount_words, is_silent
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spans import find_span
 from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.insertions import is_surface
 from vla_deploy.world.vocabulary import CONTAINERS, SYNONYMS

@@ -12,11 +12,9 @@ from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.chat import Chat
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.aids import Aid
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
+from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
 from vla_deploy.planning.knowledge import spoken_places
-from vla_deploy.planning.ladder import Check
 from vla_deploy.planning.language_model.generating import Answer, Bounds
 from vla_deploy.planning.language_model.model import LanguageModel, Message, open_language_model
 from vla_deploy.planning.phrasing import Says, steps_in_words
@@ -31,8 +29,10 @@ _CHARACTERS_PER_TOKEN: Final = 3
 _MOST_ROOM: Final = 12_000
 
 
-class ChatRung:
+class ChatRung(BackEnd):
     """Ask one model on board for plans."""
+
+    uses = frozenset({Aid.MEMORY})
 
     def __init__(
         self, name: str, model: LanguageModel, robot: RobotDescription, check: Check
@@ -46,11 +46,6 @@ class ChatRung:
         self._schema = self._answer.model_json_schema()
         free_tokens = model.config.context_tokens - model.language.most_tokens
         self._room = min(_MOST_ROOM, _CHARACTERS_PER_TOKEN * free_tokens)
-
-    @property
-    def aids(self) -> frozenset[Aid]:
-        """Return what its prompts can tell besides command and scene: memories."""
-        return frozenset({Aid.MEMORY})
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
         """Return the plan that the model finds likeliest.

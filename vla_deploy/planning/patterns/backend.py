@@ -6,10 +6,10 @@ from typing import Final
 
 from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.builders.steps import Groups, Step, chained
 from vla_deploy.planning.correction import corrected_by, correction_in
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
 from vla_deploy.planning.patterns.phrase import clauses
@@ -25,10 +25,10 @@ NAME: Final = "patterns"
 _THERE: Final = frozenset({"there", "over there", "back there"})
 
 
-class Patterns:
+class Patterns(BackEnd):
     """Plan what the table of patterns covers, the same every time."""
 
-    name: Final = NAME
+    name = NAME
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
         """Return the plan; a pattern fits or it does not, so there is no doubt about it.

@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import NothingBefore
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import PUT_IN, Plan
 from vla_deploy.planning.understanding.conversation import Outcome, Turn
 

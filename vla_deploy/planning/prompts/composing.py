@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vla_deploy.model_servers.chat import Chat, Message
-from vla_deploy.planning.asking import Request
-from vla_deploy.planning.bounds import MOST_CHARACTERS
+from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.plan import MOST_CHARACTERS
 from vla_deploy.planning.prompts.fitting import fitted
 from vla_deploy.planning.prompts.instructions import filled, limits_in_words, skills_in_words
 from vla_deploy.planning.prompts.quoting import as_data, plain

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any, Final
 
-from vla_deploy.planning.asking import Request
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.prompts.quoting import SENTENCE_CHARACTERS, plain
 from vla_deploy.planning.understanding import Turn
 from vla_deploy.world import Snapshot, Thing, Viewpoint

@@ -4,9 +4,8 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
-from vla_deploy.planning.ladder import Answer, Check
+from vla_deploy.planning.interfaces import Answer, Check, Proposal, Request
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.recovery.setback import Carried
 from vla_deploy.planning.recovery.strategies import STRATEGIES, Steps

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
-from vla_deploy.planning.graph import execution_order
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import Action, Plan, execution_order
 
 
 class Cause(StrEnum):

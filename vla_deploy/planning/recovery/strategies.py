@@ -8,10 +8,9 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.graph import execution_order
-from vla_deploy.planning.plan import Action
+from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.plan import Action, execution_order
 from vla_deploy.planning.recovery.setback import Carried, Cause
 from vla_deploy.planning.references import parse_object
 from vla_deploy.planning.symbolic.state import State, state_of

@@ -12,10 +12,8 @@ from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.aids import Aid
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
-from vla_deploy.planning.ladder import Check
+from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
 from vla_deploy.planning.phrasing import Says, steps_in_words
 from vla_deploy.planning.prompts.composing import DEFAULT_ROOM, Wish, chat_for
 from vla_deploy.planning.prompts.instructions import filled
@@ -38,7 +36,7 @@ class Effort:
     prompt_characters: int = DEFAULT_ROOM
 
 
-class ServedRung:
+class ServedRung(BackEnd):
     """Ask one server for plans; calls block until the deadline at most."""
 
     def __init__(
@@ -55,17 +53,13 @@ class ServedRung:
         self._check = check
         self._effort = effort
         self._asker = StructuredAsker(server, answer_for(places))
+        self.uses = frozenset({Aid.MEMORY, Aid.IMAGE} if self.sees else {Aid.MEMORY})
 
     @property
     def sees(self) -> bool:
         """Tell whether the model takes images, and may be shown them."""
         settings = self._server.settings
         return settings.vision and (settings.is_local or settings.allow_images_off_robot)
-
-    @property
-    def aids(self) -> frozenset[Aid]:
-        """Return what its prompts can tell: memories, and what the camera sees."""
-        return frozenset({Aid.MEMORY, Aid.IMAGE} if self.sees else {Aid.MEMORY})
 
     def document(self) -> dict[str, Any]:
         """Return how the server has been doing."""

@@ -7,11 +7,17 @@ JSON. Each may say "pick up it" and leave the way there out; what they say too m
 from dataclasses import dataclass, replace
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import PlanInvalid
-from vla_deploy.planning.graph import dependency_faults, execution_order
-from vla_deploy.planning.plan import MOST_ACTIONS, PUT_IN, Action, Plan
+from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.plan import (
+    MOST_ACTIONS,
+    PUT_IN,
+    Action,
+    Plan,
+    dependency_faults,
+    execution_order,
+)
 from vla_deploy.planning.symbolic import LOGIC, after, state_of
 from vla_deploy.planning.symbolic.sharing import in_turn
 from vla_deploy.planning.understanding.conversation import Mention

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from vla_deploy.planning.asking import Request
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.symbolic.conditions import (

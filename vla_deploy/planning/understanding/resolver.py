@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding.absence import not_as_many, not_there
 from vla_deploy.planning.understanding.conversation import Role
 from vla_deploy.planning.understanding.expression import Expression, Scope

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot

@@ -13,9 +13,9 @@ from vla_deploy.inference.errors import InferenceError, ModelFileSpoiled
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import EMBEDDED, Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.rung import CommandParser, open_command_parser
 from vla_deploy.planning.errors import Declined, PlanningError
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
 from vla_deploy.robots import load_robot

@@ -7,7 +7,7 @@ import pytest
 
 from vla_deploy.memory import Episode, MemoryStore, Outcome
 from vla_deploy.memory.episode import unix_s
-from vla_deploy.planning.aids import Aid
+from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.language_model import LanguageModel
 from vla_deploy.planning.language_model.rung import ChatRung
 from vla_deploy.planning.planner import Planner, checked

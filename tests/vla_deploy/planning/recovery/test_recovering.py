@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import CannotBeDone
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.planner import checked
 from vla_deploy.planning.recovery import Carried, Cause, Setback, numbered, read_setback, recover

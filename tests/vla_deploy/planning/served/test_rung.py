@@ -12,8 +12,8 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.planning.aids import Aid
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanInvalid, UnknownPlace
+from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.planner import checked
 from vla_deploy.planning.served.rung import Effort, ServedRung
 
@@ -273,12 +273,12 @@ def test_the_picture_is_shown_to_a_model_that_sees_and_may(loopback, served, ask
     image = np.full((48, 64, 3), 128, np.uint8)
     loopback.then(loopback.says(answer(GO)))
     assert not served().sees
-    assert served().aids == {Aid.MEMORY}
+    assert served().uses == {Aid.MEMORY}
     assert not served().propose(ask(TIDY, image=image), within()).is_momentary
     assert "image_url" not in json.dumps(loopback.heard[-1].body)
     rung = served(vision=True)
     assert rung.sees
-    assert rung.aids == {Aid.MEMORY, Aid.IMAGE}
+    assert rung.uses == {Aid.MEMORY, Aid.IMAGE}
     assert rung.propose(ask(TIDY, image=image), within()).is_momentary
     body = json.dumps(loopback.heard[-1].body)
     assert "image_url" in body

@@ -1,12 +1,24 @@
+"""A plan has an order, or the cycle is named; its schema is the published one."""
+
+import json
 from itertools import pairwise
+from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vla_deploy.planning.graph import dependency_faults, execution_order, find_cycle
-from vla_deploy.planning.plan import Action, Priority
+from vla_deploy.planning.plan import (
+    Action,
+    Plan,
+    Priority,
+    dependency_faults,
+    execution_order,
+    find_cycle,
+    plan_schema,
+)
 
 NAMES = "abcdefg"
+PUBLISHED = Path(__file__).parents[3] / "docs" / "plan.schema.json"
 
 
 def actions_of(edges: set[tuple[str, str]]) -> list[Action]:
@@ -48,3 +60,14 @@ def test_duplicates_and_unknown_dependencies_are_named() -> None:
     found = dependency_faults(actions)
     assert any("used twice" in fault for fault in found)
     assert any('"q", which is not in the plan' in fault for fault in found)
+
+
+def test_the_published_schema_is_the_one_in_force() -> None:
+    """Mend with: vla-deploy schema > docs/plan.schema.json."""
+    assert json.loads(PUBLISHED.read_text(encoding="utf-8")) == plan_schema()
+
+
+def test_the_example_in_the_documentation_is_a_plan() -> None:
+    text = (PUBLISHED.parent / "plans.md").read_text(encoding="utf-8")
+    example = text.split("```json\n")[1].split("```")[0]
+    assert len(Plan.model_validate_json(example).actions) == 3
