@@ -15,11 +15,11 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.planning.assembly import planner_for
+from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.interfaces import Answer, Attempt, Request
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.supervisor.runtime import default_base

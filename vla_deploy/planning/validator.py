@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from vla_deploy.planning.alternatives import instead_of
 from vla_deploy.planning.catalogue import (
     GRASPABLE_CLASSES,
     NOT_SKILLS,
@@ -12,7 +13,6 @@ from vla_deploy.planning.catalogue import (
     Type,
 )
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
-from vla_deploy.planning.instead import instead_of
 from vla_deploy.planning.knowledge import World, spoken_places
 from vla_deploy.planning.plan import Action, Plan, dependency_faults
 from vla_deploy.planning.references import match_place, parse_object

@@ -12,12 +12,12 @@ from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.chat import Chat
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
+from vla_deploy.planning.dialogue.phrasing import Says, steps_in_words
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
 from vla_deploy.planning.knowledge import spoken_places
 from vla_deploy.planning.language_model.generating import Answer, Bounds
 from vla_deploy.planning.language_model.model import LanguageModel, Message, open_language_model
-from vla_deploy.planning.phrasing import Says, steps_in_words
 from vla_deploy.planning.prompts.composing import Wish, chat_for
 from vla_deploy.planning.served.plan_answer import PlanAnswer, answer_for
 from vla_deploy.robots import RobotDescription

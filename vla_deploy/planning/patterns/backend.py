@@ -7,7 +7,7 @@ from typing import Final
 from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Groups, Step, chained
-from vla_deploy.planning.correction import corrected_by, correction_in
+from vla_deploy.planning.dialogue.correction import corrected_by, correction_in
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World

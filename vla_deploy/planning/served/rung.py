@@ -12,9 +12,9 @@ from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
+from vla_deploy.planning.dialogue.phrasing import Says, steps_in_words
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
-from vla_deploy.planning.phrasing import Says, steps_in_words
 from vla_deploy.planning.prompts.composing import DEFAULT_ROOM, Wish, chat_for
 from vla_deploy.planning.prompts.instructions import filled
 from vla_deploy.planning.served.candidates import Candidate, chosen

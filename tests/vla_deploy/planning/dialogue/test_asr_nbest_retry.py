@@ -2,8 +2,8 @@
 
 import pytest
 
+from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.errors import Declined
-from vla_deploy.planning.phrasing import Says
 
 GO = ("navigate_to", {"place": "kitchen"})
 SAYS_AGAIN = [Says.HEARD_BADLY.value]

@@ -1,14 +1,15 @@
 """A plan that fails is planned anew, seen from the topics: another plan, or why there is none."""
 
+import re
 from typing import Any
 
 import pytest
 
-from vla_deploy.planning.errors import Declined
-from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.dialogue.active_plans import ActivePlans
+from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.errors import CannotBeDone, Declined
 from vla_deploy.planning.interfaces import Answer
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.under_way import UnderWay
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
 
@@ -81,17 +82,16 @@ def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_t
     ],
 )
 def test_no_more_plans_than_the_robot_file_allows(further_plans: int, words: str) -> None:
-    under_way = UnderWay(further_plans)
+    active = ActivePlans(further_plans)
     go = {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
     plan = Plan.model_validate({"goal": "go", "actions": [go]})
     command = Command(command_id="c1", text="go to the kitchen", told_ns=0)
     told = {"action_id": "a1", "error": "blocked", "cause": "skill", "done": []}
-    under_way.carry(command, plan, Answer())
+    active.add(command, plan, Answer())
     for _ in range(further_plans):
-        again = under_way.set_back("c1", told)
-        assert isinstance(again, Command)
-        under_way.carry(again, plan, Answer())
-    assert words in str(under_way.set_back("c1", told))
+        active.add(active.set_back("c1", told), plan, Answer())
+    with pytest.raises(CannotBeDone, match=re.escape(words)):
+        active.set_back("c1", told)
 
 
 HEARD = {"text": "go to the kitchen", "heard": {"confidence": 0.4}}

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Set
 from typing import Final
 
 from vla_deploy.planning.catalogue import MOTIONLESS
+from vla_deploy.planning.dialogue.phrasing import Says, steps_in_words
 from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.phrasing import Says, steps_in_words
 from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.simulation import expected_s

@@ -1,4 +1,4 @@
-"""Tell what becomes of commands: to whoever follows them, to the executor, and aloud."""
+"""Publish what becomes of commands: as events, as plans for the executor, and aloud."""
 
 from collections import OrderedDict
 from typing import Any, Final
@@ -6,20 +6,20 @@ from typing import Any, Final
 from drivers.clock import Clock
 from vla_deploy.ipc import RingWriter, SharedSpace
 from vla_deploy.ipc.announcer import Announcer
+from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.dialogue.phrasing import Says, first_part
 from vla_deploy.planning.errors import PlanInvalid
-from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.interfaces import Answer
-from vla_deploy.planning.phrasing import Says, first_part
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import Question
 
-# What a slot of the topic holds, less what is told beside the plan.
+# What a slot of the topic holds, less what stands beside the plan.
 MOST_PLAN_BYTES: Final = 28_000
 _MOST_REASON_CHARACTERS: Final = 1_500  # of up to four bytes each
 _MOST_SPOKEN: Final = 16
 
 
-class Telling:
+class EventPublisher:
     """Publish the planner's side of every command."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
@@ -29,37 +29,37 @@ class Telling:
         # Commands that came by voice and are carried out now, and whether their plan ends aloud.
         self._spoken: OrderedDict[str, tuple[Command, bool]] = OrderedDict()
 
-    def aloud(self, command: Command, text: str) -> None:
-        """Say something to whoever gave a command by voice; others read it."""
+    def say(self, command: Command, text: str) -> None:
+        """Say something to a person who gave a command by voice; others read it."""
         if command.is_spoken:
             self._voice.say(text)
 
     def ended(self, command_id: str, success: bool, error: str) -> None:
-        """Tell aloud how a command ended that was given by voice."""
-        command, says_so = self._spoken.pop(command_id, (None, False))
-        if command is None:
+        """Say how a command ended that was given by voice."""
+        if command_id not in self._spoken:
             return
+        command, says_so = self._spoken.pop(command_id)
         if not success:
-            self.aloud(command, Says.FAILED.format(reason=first_part(error) or "I cannot say why"))
+            self.say(command, Says.FAILED.format(reason=first_part(error) or "I cannot say why"))
         elif not says_so:
-            self.aloud(command, Says.DONE)
+            self.say(command, Says.DONE)
 
     def cancelled_all(self, command_id: str) -> None:
-        """Let the executor end what it does; whoever wanted that need not be told aloud."""
+        """Let the executor end what it does; the person who wanted that needs no answer aloud."""
         self._spoken.clear()
         self._plans.publish({"command_id": command_id, "cancel": True})
 
-    def planning(self, command: Command, rungs: tuple[str, ...]) -> None:
-        """Tell that a plan takes time, and who is asked."""
-        self._tell(command, "planning", rungs=list(rungs))
+    def planning(self, command: Command, back_ends: tuple[str, ...]) -> None:
+        """Publish that a plan takes time, and which back ends are asked."""
+        self._publish(command, "planning", rungs=list(back_ends))
 
     def queued(self, command: Command, place: int) -> None:
-        """Tell that others are planned first."""
-        self._tell(command, "queued", place=place)
+        """Publish that others are planned first."""
+        self._publish(command, "queued", place=place)
 
     def asked(self, command: Command, question: Question, plan: Plan | None) -> None:
-        """Tell what only the person knows; `plan` is what a yes lets run."""
-        self._tell(
+        """Ask what only the person knows; `plan` is what a yes lets run."""
+        self._publish(
             command,
             "asked",
             question=_bounded(question.text),
@@ -67,22 +67,22 @@ class Telling:
             answer_within_s=question.limit_s,
             plan=None if plan is None else plan.model_dump(mode="json"),
         )
-        self.aloud(command, question.text)
+        self.say(command, question.text)
 
     def answered(self, answer: Command, asked: Command) -> None:
-        """Tell that an utterance answers a question; what comes of it is told of the command."""
-        self._tell(answer, "answered", of=asked.command_id)
+        """Publish that an utterance answers a question; more events follow for that command."""
+        self._publish(answer, "answered", of=asked.command_id)
 
     def refused(self, command: Command, reason: str, answer: Answer | None = None) -> None:
-        """Tell why nothing is done, and what every rung said."""
-        self._tell(command, "rejected", reason=_bounded(reason), **_attempts(answer))
+        """Publish why nothing is done, and what every back end said."""
+        self._publish(command, "rejected", reason=_bounded(reason), **_attempts(answer))
 
     def gave_up(self, command_id: str, reason: str) -> None:
         """Let the executor end a command for which there is no other plan."""
         self._plans.publish({"command_id": command_id, "give_up": _bounded(reason)})
 
     def check_length(self, plan: Plan) -> None:
-        """Accept a plan that can be told whole.
+        """Accept a plan that fits into a message.
 
         Raises:
             PlanInvalid: it is too long.
@@ -91,20 +91,19 @@ class Telling:
         if length > MOST_PLAN_BYTES:
             raise PlanInvalid([f"expected at most {MOST_PLAN_BYTES} bytes of JSON, got {length}"])
 
-    def handed_on(self, command: Command, plan: Plan, answer: Answer) -> None:
-        """Give a plan to the executor, and tell who made it."""
+    def dispatched(self, command: Command, plan: Plan, answer: Answer) -> None:
+        """Give a plan to the executor, and publish which back end made it."""
         document = plan.model_dump(mode="json")
-        told = {"command_id": command.command_id, "event": "plan", "plan": document}
         if not command.recovers:
-            self._tell(command, "accepted")
-        self._events.publish(told | _maker(answer) | _attempts(answer))
+            self._publish(command, "accepted")
+        self._publish(command, "plan", plan=document, **_maker(answer), **_attempts(answer))
         self._plans.publish({"command_id": command.command_id, "plan": document})
         if command.is_spoken:
             self._spoken[command.command_id] = command, plan.actions[-1].skill == "speak"
             while len(self._spoken) > _MOST_SPOKEN:
                 self._spoken.popitem(last=False)
 
-    def _tell(self, command: Command, event: str, **details: Any) -> None:
+    def _publish(self, command: Command, event: str, **details: Any) -> None:
         self._events.publish({"command_id": command.command_id, "event": event} | details)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.phrasing import _PHRASES, Says, steps_in_words
+from vla_deploy.planning.dialogue.phrasing import _PHRASES, Says, steps_in_words
 
 
 @pytest.mark.parametrize("sentence", Says)

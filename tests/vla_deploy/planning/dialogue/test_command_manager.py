@@ -2,8 +2,8 @@
 
 import pytest
 
+from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.errors import Ambiguous, Declined
-from vla_deploy.planning.phrasing import Says
 from vla_deploy.planning.understanding import Candidate
 
 GO = ("navigate_to", {"place": "kitchen"})

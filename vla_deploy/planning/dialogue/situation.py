@@ -14,8 +14,8 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import sentence_of
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.planning.dialogue.command import Command
 from vla_deploy.planning.errors import NotReady
-from vla_deploy.planning.inbox import Command
 from vla_deploy.planning.interfaces import Aid, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
+from vla_deploy.planning.dialogue.phrasing import spoken_refusal
 from vla_deploy.planning.errors import PlanInvalid
-from vla_deploy.planning.phrasing import spoken_refusal
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.validator import check_plan
 from vla_deploy.world import Snapshot

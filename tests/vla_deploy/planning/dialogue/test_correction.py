@@ -2,7 +2,7 @@
 
 import pytest
 
-from vla_deploy.planning.correction import corrected, correction_in
+from vla_deploy.planning.dialogue.correction import corrected, correction_in
 
 TAKE = ("pick_up", {"object": "red cup"})
 PUT = ("place", {"destination": "box", "relation": "in"})

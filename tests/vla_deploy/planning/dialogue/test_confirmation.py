@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from vla_deploy.planning.confirmation import agreement_to, confirmation_of
+from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World, world_of
 from vla_deploy.planning.plan import Action, Plan

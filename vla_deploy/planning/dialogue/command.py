@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from vla_deploy.ipc import Event
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
+from vla_deploy.planning.interfaces import Answer, Request
 from vla_deploy.planning.patterns.stopping import is_stop
 from vla_deploy.planning.plan import MOST_CHARACTERS
 
@@ -45,6 +46,15 @@ class Command:
     def is_spoken(self) -> bool:
         """Tell whether it came by voice, so that answers are spoken too."""
         return self.source == VOICE
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCommand:
+    """Hold a command, the request that was made of it, and what came of that."""
+
+    command: Command
+    request: Request
+    answer: Answer
 
 
 def asks_to_stop(event: Event) -> bool:

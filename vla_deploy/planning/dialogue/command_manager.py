@@ -1,0 +1,302 @@
+"""Take commands in their order, ask back, wait for answers, and dispatch plans."""
+
+import logging
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from dataclasses import replace
+from functools import partial
+from threading import Event
+from typing import Any, Final
+
+from drivers.clock import Clock
+from vla_deploy.aside import AtOnce
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.dialogue.active_plans import ActivePlans
+from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
+from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
+from vla_deploy.planning.dialogue.command import READ_BACK, Command, PlannedCommand
+from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by
+from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
+from vla_deploy.planning.dialogue.dispatch import Dispatcher
+from vla_deploy.planning.dialogue.event_publisher import EventPublisher
+from vla_deploy.planning.dialogue.phrasing import Says
+from vla_deploy.planning.dialogue.situation import Situation
+from vla_deploy.planning.errors import CannotBeDone, PlanningError
+from vla_deploy.planning.interfaces import Answer, Proposal, Request
+from vla_deploy.planning.metrics import PlannerMetrics
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.planner import Planner
+from vla_deploy.planning.prohibitions import Prohibitions
+from vla_deploy.planning.recovery import recover
+from vla_deploy.planning.understanding import Outcome, Reply, Turn, Verdict, described, guess
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED
+
+MOST_WAITING: Final = 8
+CANCELLED: Final = "cancelled on request"
+_log = logging.getLogger(__name__)
+
+
+class CommandManager:
+    """Plan one command at a time; slow planning is done in `executor`, and a stop overtakes it."""
+
+    def __init__(
+        self,
+        planner: Planner,
+        situation: Situation,
+        events: EventPublisher,
+        executor: Executor,
+        clock: Clock,
+        further_plans: int = NOT_BOUNDED.further_plans,
+        prohibitions: Prohibitions | None = None,
+    ) -> None:
+        self.planner = planner
+        self.dialogue = DialogueState(clock)
+        self._situation = situation
+        self._events = events
+        self._async = AsyncPlanner(executor)
+        self._clock = clock
+        self._queue: deque[Command] = deque()
+        self._active = ActivePlans(further_plans)
+        self._retry = NBestRetry(clock)
+        self._prohibitions = prohibitions or Prohibitions()
+        self._dispatcher = Dispatcher(self._accept, situation, events, self.dialogue, self._active)
+
+    @property
+    def metrics(self) -> PlannerMetrics:
+        """Return the counts of commands."""
+        return self._dispatcher.metrics
+
+    # --- what comes in --------------------------------------------------------------------------
+
+    def take(self, command: Command) -> None:
+        """Take an utterance: the answer to what was asked, or a command of its own."""
+        self._guarded(command, partial(self._take, command))
+
+    def _take(self, command: Command) -> None:
+        pending = self.dialogue.pending
+        if pending is not None and command.is_doubted:
+            reason = f"heard too badly to answer: {pending.question.text}"
+            self._dispatcher.refuse(command, reason)
+        elif pending is not None and self._takes_as_answer(command, pending):
+            return
+        elif command.is_answer:
+            self._dispatcher.refuse(command, Says.NOTHING_ASKED)
+        elif len(self._queue) >= MOST_WAITING:
+            self._dispatcher.refuse(command, Says.MANY_WAIT)
+        else:
+            self._queue.append(command)
+            if self._async.command is not None:
+                self._events.queued(command, len(self._queue))
+
+    def stop_all(self, command_id: str) -> None:
+        """Drop every command, and let the executor end what it does."""
+        self._events.cancelled_all(command_id)
+        pending = self.dialogue.settle()
+        asked = None if pending is None else pending.command
+        dropped = (asked, self._async.call_off(), *self._queue)
+        self._queue.clear()
+        self._retry.forget()
+        for command in dropped:
+            if command is not None:
+                self._dispatcher.refuse(command, CANCELLED, outcome=Outcome.CANCELLED)
+        # "Again" after a stop cannot mean what was done before it.
+        stop = Turn(said="stop", command_id=command_id, outcome=Outcome.CANCELLED)
+        self.dialogue.remember(stop)
+
+    def has_ended(self, command_id: str, success: bool, error: str) -> None:
+        """Note how the executor ended a command; a plan that failed is not given again."""
+        self._active.end(command_id)
+        turn = self.dialogue.ended(command_id, success, error)
+        self._events.ended(command_id, success, error)
+        if turn is not None and not success:
+            self.planner.cache.forget(turn.said)
+
+    def turned_away(self, command_id: str, error: str) -> None:
+        """Note that the executor does not carry out a plan that it was given."""
+        if self._active.of(command_id) is not None:
+            self._active.end(command_id)
+            self.dialogue.ended(command_id, False, error)
+
+    def set_back(self, command_id: str, setback: Mapping[str, Any]) -> None:
+        """Plan a command anew whose plan has failed, before any other, or say that it ends."""
+        try:
+            self._queue.appendleft(self._active.set_back(command_id, setback))
+        except CannotBeDone as error:
+            self._events.gave_up(command_id, str(error))
+
+    # --- what goes on ---------------------------------------------------------------------------
+
+    def advance(self) -> None:
+        """Go on with what has become possible."""
+        if self.dialogue.is_overdue:
+            self._leave(Says.NO_ANSWER)
+        self._look_after_job()
+        while self._queue and self._async.command is None and self.dialogue.pending is None:
+            command = self._queue.popleft()
+            self._guarded(command, partial(self._begin, command))
+            self._look_after_job()
+
+    def document(self) -> dict[str, Any]:
+        """Return which commands are in work, what was asked, and the counts."""
+        pending = self.dialogue.pending
+        asked = None if pending is None else pending.command
+        in_work = (self._async.command, asked, *self._queue)
+        return {
+            **self.metrics.document(),
+            "commands": [one.command_id for one in in_work if one is not None],
+            "question": None if pending is None else pending.question.text,
+            **self.planner.document(),
+            "prohibitions": self._prohibitions.document(),
+        }
+
+    def _begin(self, command: Command) -> None:
+        request = self._request(command)
+        if command.plan is not None:
+            answer = self.planner.check_given(command.plan, request)
+            self._dispatcher.conclude(PlannedCommand(command, request, answer))
+            return
+        if command.recovers:
+            carried = self._active.of(command.command_id)
+            if carried is None:  # it has ended meanwhile
+                return
+            request = replace(request, failed=carried.history)
+            deadline = self._deadline(self.planner.within_s)
+            answer = recover(carried, request, self.planner.check)
+        else:
+            deadline = self._deadline(self._retry.within_s(command, self.planner.within_s))
+            answer = self.planner.plan_at_once(request, deadline)
+        if answer.is_final or not self.planner.slow_rungs or self._retry.is_urgent(command):
+            self._conclude(PlannedCommand(command, request, answer))
+            return
+        self._events.planning(command, self.planner.slow_rungs)
+        slowly = partial(self.planner.plan_slowly, request, deadline, answer)
+        self._async.begin(command, request, deadline, slowly)
+
+    def _deadline(self, within_s: float) -> Deadline:
+        return Deadline.within(self._clock, within_s, Event())
+
+    def _look_after_job(self) -> None:
+        job = self._async.take_done()
+        if job is not None:
+            self._guarded(job.command, lambda: self._conclude(job.result()))
+        tedious = self._async.take_tedious()
+        if tedious is not None:
+            self._events.say(tedious, Says.WORKING)
+
+    def _conclude(self, done: PlannedCommand) -> None:
+        """Conclude a command, or try it next in other words that may have been said."""
+        found = self._retry.next(done)
+        if isinstance(found, Command):
+            self._queue.appendleft(found)
+        else:
+            self._dispatcher.conclude(found)
+
+    def _guarded(self, command: Command, work: Callable[[], None]) -> None:
+        """Do work for one command; a fault of the planner ends that command, and no other."""
+        error = AtOnce().submit(work).exception()
+        if error is not None:
+            _log.error("planning %r failed", command.text, exc_info=error)
+            self.metrics.failed += 1
+            self._dispatcher.refuse(command, f"the planner failed: {type(error).__name__}")
+
+    def _accept(self, request: Request, answer: Answer) -> None:
+        """Obey an order from now on, whatever planner another profile brings."""
+        if answer.proposal is not None and answer.proposal.order is not None:
+            self._prohibitions.apply(answer.proposal.order)
+        self.planner.accepted(request, answer)
+
+    def _request(self, command: Command) -> Request:
+        talk = self.dialogue.conversation
+        request = self._situation.request(command, talk, of_use=self.planner.uses)
+        return replace(request, prohibitions=self._prohibitions.items)
+
+    # --- answers --------------------------------------------------------------------------------
+
+    def _takes_as_answer(self, command: Command, pending: PendingQuestion) -> bool:
+        """Take an utterance as an answer if it can be one; else the question is dropped for it."""
+        go_on = self._continuation(command, pending)
+        if go_on is not None:
+            self._events.answered(command, pending.command)
+            go_on()
+        elif command.is_answer:
+            self._dispatcher.refuse(command, f"that does not answer: {pending.question.text}")
+        else:
+            self._leave(Says.REPLACED)
+            return False
+        return True
+
+    def _continuation(
+        self, command: Command, pending: PendingQuestion
+    ) -> Callable[[], None] | None:
+        """Return how an utterance lets the pending command go on, None where it is no answer."""
+        if command.plan is not None:
+            return None
+        said = self.dialogue.read(command.text)
+        full = described(pending.question, command.text)
+        if said.verdict is not Verdict.ANEW and not (full and said.verdict is Verdict.UNCLEAR):
+            return partial(self._go_on, pending, said)
+        if pending.is_open and not self._at_once(command).is_final:
+            return partial(self._replan, pending, f"{pending.command.text}: {command.text}")
+        if plan := corrected_by(pending.plan, command.text):
+            return partial(self._correct, pending, plan)
+        if full:
+            return partial(self._replan, pending, full)
+        guessed = guess(self.dialogue.conversation, command.text)
+        if guessed and self._at_once(command).plan is None:
+            doubted = replace(pending.command, heard_confidence=READ_BACK)
+            return partial(self._go_on, replace(pending, command=doubted), guessed)
+        return None
+
+    def _at_once(self, command: Command) -> Answer:
+        """Return what words that may be an answer are as a command, without slow planning."""
+        deadline = self._deadline(self.planner.within_s)
+        return self.planner.plan_at_once(self._request(command), deadline)
+
+    def _go_on(self, pending: PendingQuestion, said: Reply) -> None:
+        if said.verdict is Verdict.NO:
+            self._leave(Says.LEFT)
+        elif said.verdict is Verdict.UNCLEAR:
+            question = said.conversation.question or pending.question
+            asked = self.dialogue.ask_again(pending, question)
+            if asked is None:
+                self._leave(Says.STILL_UNCLEAR)
+            else:
+                self._events.asked(pending.command, asked, pending.plan)
+        else:
+            self.dialogue.settle(said)
+            if pending.plan is None:
+                self._queue.appendleft(pending.command)
+            else:
+                self._run_confirmed(pending, pending.plan)
+
+    def _replan(self, pending: PendingQuestion, text: str) -> None:
+        """Plan a command anew in the words that an answer makes of it."""
+        self.dialogue.settle()
+        self._queue.appendleft(replace(pending.command, text=text))
+
+    def _correct(self, pending: PendingQuestion, plan: Plan) -> None:
+        """Go on with another plan in the place of the one that was read back."""
+        self.dialogue.settle()
+        request = self._request(pending.command)
+        proposal = Proposal(plan=plan, rung=CORRECTED, confidence=1.0)
+        try:
+            answer = Answer(plan=self.planner.check(plan, request), proposal=proposal)
+        except PlanningError as error:
+            answer = Answer(error=error)
+        self._dispatcher.conclude(PlannedCommand(pending.command, request, answer))
+
+    def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:
+        """Check a plan once more: the world may have changed while the person thought."""
+        request = self._request(pending.command)
+        done = PlannedCommand(pending.command, request, pending.answer)
+        try:
+            self._situation.check_ready()
+            self._dispatcher.dispatch(done, self.planner.check(plan, request))
+        except PlanningError as error:
+            self._dispatcher.refuse(pending.command, error, pending.answer)
+
+    def _leave(self, why: Says) -> None:
+        pending = self.dialogue.settle()
+        if pending is not None:
+            self._dispatcher.refuse(pending.command, why, pending.answer, Outcome.CANCELLED)

@@ -1,0 +1,111 @@
+"""Hold the conversation, and the command in it that waits for the person's answer."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from drivers.clock import Clock
+from vla_deploy.planning.dialogue.command import Command, PlannedCommand
+from vla_deploy.planning.dialogue.phrasing import Says
+from vla_deploy.planning.errors import Ambiguous
+from vla_deploy.planning.interfaces import Answer
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.understanding import (
+    Conversation,
+    Outcome,
+    Question,
+    Reply,
+    Turn,
+    Verdict,
+    reply,
+)
+
+MOST_ASKED: Final = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PendingQuestion:
+    """Hold the command that waits for an answer; `plan` is what a yes lets run."""
+
+    command: Command
+    answer: Answer
+    question: Question
+    times_asked: int = 1
+
+    @property
+    def plan(self) -> Plan | None:
+        """Return what a yes lets run."""
+        return self.answer.plan
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether any words may answer it, rather than yes, no, or one of a few."""
+        return self.plan is None and not self.question.candidates
+
+
+class DialogueState:
+    """Remember what was said; at most one question waits at a time."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.conversation = Conversation()
+        self.pending: PendingQuestion | None = None
+        self._clock = clock
+
+    @property
+    def is_overdue(self) -> bool:
+        """Return whether the answer to the question would come too late by now."""
+        now_ns = self._clock.now_ns()
+        return self.pending is not None and not self.pending.question.is_open(now_ns)
+
+    def ask(self, done: PlannedCommand, unclear: Ambiguous) -> PendingQuestion:
+        """Wait for the answer to a question."""
+        question = Question(
+            text=unclear.question,
+            asked_ns=self._clock.now_ns(),
+            command_id=done.command.command_id,
+            command_text=done.command.text,
+            expression=unclear.expression,
+            candidates=unclear.candidates,
+            choices=done.request.conversation.choices,
+        )
+        self.conversation = self.conversation.asks(question)
+        self.pending = PendingQuestion(command=done.command, answer=done.answer, question=question)
+        return self.pending
+
+    def ask_again(self, pending: PendingQuestion, question: Question) -> Question | None:
+        """Wait once more, and return the question in other words; None when that was enough.
+
+        `question` is the one that waits, or what an answer has left of it.
+        """
+        if pending.times_asked >= MOST_ASKED:
+            return None
+        asked = replace(question, asked_ns=self._clock.now_ns())
+        self.conversation = self.conversation.asks(asked)
+        self.pending = replace(pending, question=asked, times_asked=pending.times_asked + 1)
+        return replace(asked, text=Says.NOT_CLEAR.format(question=asked.text))
+
+    def read(self, text: str) -> Reply:
+        """Return what an utterance is to the question that waits, changing nothing."""
+        return reply(self.conversation, text, self._clock.now_ns())
+
+    def declines(self, text: object) -> bool:
+        """Return whether words such as "never mind" mean the question, and not all that goes on."""
+        if self.pending is None or not isinstance(text, str):
+            return False
+        return self.read(text).verdict is Verdict.NO
+
+    def settle(self, said: Reply | None = None) -> PendingQuestion | None:
+        """Wait no more, and return what waited; what a reply has settled counts from now on."""
+        pending, self.pending = self.pending, None
+        self.conversation = self.conversation.settled() if said is None else said.conversation
+        return pending
+
+    def remember(self, turn: Turn) -> None:
+        """Add a turn to the conversation."""
+        self.conversation = self.conversation.after(turn)
+
+    def ended(self, command_id: str, success: bool, error: str) -> Turn | None:
+        """Note how a command ended that was carried out, and return its turn if it is known."""
+        outcome = Outcome.SUCCEEDED if success else Outcome.FAILED
+        self.conversation = self.conversation.ended(command_id, outcome, error)
+        turns = self.conversation.turns
+        return next((one for one in turns if one.command_id == command_id), None)

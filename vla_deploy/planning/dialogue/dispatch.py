@@ -1,0 +1,126 @@
+"""Bring what was planned for a command to its end: handed to the executor, asked, or refused."""
+
+from collections.abc import Callable
+
+from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
+from vla_deploy.planning.dialogue.active_plans import ActivePlans
+from vla_deploy.planning.dialogue.command import Command, PlannedCommand
+from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of
+from vla_deploy.planning.dialogue.dialogue_state import DialogueState
+from vla_deploy.planning.dialogue.event_publisher import EventPublisher
+from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
+from vla_deploy.planning.dialogue.situation import Situation
+from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
+from vla_deploy.planning.interfaces import Answer, Request
+from vla_deploy.planning.metrics import PlannerMetrics
+from vla_deploy.planning.patterns.backend import Patterns
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.recovery import numbered
+from vla_deploy.planning.understanding import Outcome, Turn
+from vla_deploy.planning.understanding.mentioned import mentions_of
+
+
+class Dispatcher:
+    """Conclude commands, publish it, and remember it for what is said next.
+
+    `accepted` is called for every plan that is dispatched for a command of its own.
+    """
+
+    def __init__(
+        self,
+        accepted: Callable[[Request, Answer], None],
+        situation: Situation,
+        events: EventPublisher,
+        dialogue: DialogueState,
+        active: ActivePlans,
+    ) -> None:
+        self.metrics = PlannerMetrics()
+        self._accepted = accepted
+        self._situation = situation
+        self._events = events
+        self._dialogue = dialogue
+        self._active = active
+
+    def conclude(self, done: PlannedCommand) -> None:
+        """Dispatch a command's plan where it may run at once; else ask, or say what forbids it."""
+        command, answer = done.command, done.answer
+        self.metrics.note(answer.attempts)
+        self._dialogue.settle()  # what was chosen concerned this command alone
+        try:
+            if answer.is_final:
+                self._situation.check_ready()
+            if answer.plan is None:
+                raise answer.error or PlanInvalid(["no back end was asked for a plan"])
+            self._events.check_length(answer.plan)
+            agreed = self._active.agreed(command)
+            question = answer.read_back or confirmation_of(answer.plan, done.request, agreed)
+            if question:
+                raise Ambiguous(question)
+            self.dispatch(done, answer.plan)
+        except Ambiguous as unclear:
+            if command.recovers:  # the robot stands in the middle of it: it does not wait
+                self.refuse(command, unclear, answer)
+                return
+            self.metrics.asked += 1
+            pending = self._dialogue.ask(done, unclear)
+            self._events.asked(command, pending.question, pending.plan)
+        except PlanningError as error:
+            self.refuse(command, error, answer)
+
+    def dispatch(self, done: PlannedCommand, plan: Plan) -> None:
+        """Give a checked plan to the executor, and remember what was understood."""
+        command, request, answer = done.command, done.request, done.answer
+        if command.recovers:
+            plan = numbered(plan, len(request.failed))
+        self._events.dispatched(command, plan, answer)
+        self._active.add(command, plan, answer, agreement_to(plan, request))
+        self.metrics.planned += 1
+        if not command.recovers:
+            self._accepted(request, answer)
+        self._dialogue.remember(
+            Turn(
+                said=command.text,
+                command_id=command.command_id,
+                told_ns=command.told_ns,
+                understood=plan.summary,
+                mentioned=mentions_of(plan, request.scene),
+                plan=plan,
+                here=request.here,
+                in_full=_in_full(plan, answer),
+            )
+        )
+
+    def refuse(
+        self,
+        command: Command,
+        reason: PlanningError | str,
+        answer: Answer | None = None,
+        outcome: Outcome = Outcome.REFUSED,
+    ) -> None:
+        """Say why a command is not done."""
+        if command.recovers:
+            self._events.gave_up(command.command_id, str(reason))
+            return
+        self.metrics.refused += 1
+        self._events.refused(command, str(reason), answer)
+        if command.is_doubted and command.may_ask_again:
+            self._events.say(command, Says.HEARD_BADLY)
+        elif not command.is_doubted and (
+            outcome is not Outcome.CANCELLED or isinstance(reason, Says)
+        ):
+            self._events.say(command, spoken_refusal(reason))
+        self._dialogue.remember(
+            Turn(
+                said=command.text,
+                command_id=command.command_id,
+                told_ns=command.told_ns,
+                outcome=outcome,
+                answer=str(reason),
+            )
+        )
+
+
+def _in_full(plan: Plan, answer: Answer) -> str:
+    """Return the words that stand for a command; "" of models that sum it up freely."""
+    by_back_end = {Patterns.name: plan.goal, COMMAND_PARSER: plan.summary}
+    return "" if answer.proposal is None else by_back_end.get(answer.proposal.rung, "")
