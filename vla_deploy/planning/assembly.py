@@ -19,11 +19,11 @@ from vla_deploy.memory import MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.one_line import one_line
+from vla_deploy.planning.chat_models.local import LocalModel, open_local_model
+from vla_deploy.planning.chat_models.served import Effort, ServedModel
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
-from vla_deploy.planning.language_model.rung import ChatRung, open_chat_rung
 from vla_deploy.planning.planner import Planner, checked
-from vla_deploy.planning.served.rung import Effort, ServedRung
 from vla_deploy.robots import RobotDescription
 
 ROLE: Final = "planner"
@@ -74,7 +74,7 @@ def open_planner(
 
 def open_local_models(
     robot: RobotDescription, profile: Profile, shelf: ModelShelf, model_tier: int = 0
-) -> tuple[tuple[CommandParser | ChatRung, ...], dict[str, str]]:
+) -> tuple[tuple[CommandParser | LocalModel, ...], dict[str, str]]:
     """Open the models on board that plan; return them, and why others are away.
 
     The command parser that comes with the software goes before any larger model, since it answers
@@ -83,7 +83,7 @@ def open_local_models(
     choice = profile.models.get(ROLE)
     if choice is None:
         return (), {}
-    opened: list[CommandParser | ChatRung] = []
+    opened: list[CommandParser | LocalModel] = []
     away: dict[str, str] = {}
     for name in dict.fromkeys((NAME, tier_name(choice, model_tier))):
         try:
@@ -107,7 +107,7 @@ def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:
 
 def _open(
     robot: RobotDescription, shelf: ModelShelf, model: Model, choice: ModelChoice
-) -> CommandParser | ChatRung:
+) -> CommandParser | LocalModel:
     language = model.manifest.language
     if language is not None and language.use is Use.COMMAND_PARSER:
         # So small a model is done on the CPU before a GPU has begun.
@@ -115,12 +115,12 @@ def _open(
             PLAIN_CHOICE, providers=(CPU,), threads=1, memory_arena=choice.memory_arena
         )
         return shelf.load(model, on_cpu, lambda: open_command_parser(model, on_cpu))
-    return shelf.load(model, choice, lambda: open_chat_rung(model, choice, robot, checked))
+    return shelf.load(model, choice, lambda: open_local_model(model, choice, robot, checked))
 
 
 def _servers(
     robot: RobotDescription, settings: PlanningSettings, base: Path, away: dict[str, str]
-) -> Iterator[ServedRung]:
+) -> Iterator[ServedModel]:
     effort = Effort(candidates=settings.candidates, prompt_characters=settings.prompt_characters)
     for name in settings.servers:
         try:
@@ -129,4 +129,4 @@ def _servers(
         except ModelServerError as error:
             away[name] = one_line(error)
             continue
-        yield ServedRung(server, robot.name, sorted(robot.places), checked, effort)
+        yield ServedModel(server, robot.name, sorted(robot.places), checked, effort)

@@ -14,11 +14,14 @@ from vla_deploy.inference.manifest import Language, Manifest, ModelFile, Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.language_model.decoding import Bounds
 from vla_deploy.planning.language_model.errors import ModelFolderInvalid
-from vla_deploy.planning.language_model.genai_config import read_genai_config
-from vla_deploy.planning.language_model.generating import Answer, Bounds
-from vla_deploy.planning.language_model.model import LanguageModel, open_language_model
-from vla_deploy.planning.language_model.prompting import CONFIG, TEMPLATE
+from vla_deploy.planning.language_model.model import Answer, LanguageModel, open_language_model
+from vla_deploy.planning.language_model.model_folder import (
+    CONFIG,
+    TEMPLATE,
+    read_genai_config,
+)
 
 # What such a folder has besides, some of it only for other runtimes.
 _WEIGHTS: Final = ("*.onnx", "*.onnx.data", "*.onnx_data")

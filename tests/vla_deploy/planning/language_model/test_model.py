@@ -22,8 +22,7 @@ from vla_deploy.planning.language_model import (
     PromptTooLong,
     SchemaUnusable,
 )
-from vla_deploy.planning.language_model.constraint import Constraint, grammar_of
-from vla_deploy.planning.language_model.generating import generate
+from vla_deploy.planning.language_model.decoding import Constraint, generate, grammar_of
 
 SCHEMA = {
     "type": "object",

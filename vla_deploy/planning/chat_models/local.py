@@ -12,38 +12,34 @@ from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.chat import Chat
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.dialogue.phrasing import Says, steps_in_words
-from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined
-from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
-from vla_deploy.planning.knowledge import spoken_places
-from vla_deploy.planning.language_model.generating import Answer, Bounds
-from vla_deploy.planning.language_model.model import LanguageModel, Message, open_language_model
-from vla_deploy.planning.prompts.composing import Wish, chat_for
-from vla_deploy.planning.served.plan_answer import PlanAnswer, answer_for
+from vla_deploy.planning.chat_models.chat_back_end import ChatBackEnd
+from vla_deploy.planning.errors import Declined
+from vla_deploy.planning.interfaces import Check, Proposal, Request
+from vla_deploy.planning.language_model import (
+    Answer,
+    Bounds,
+    LanguageModel,
+    Message,
+    open_language_model,
+)
+from vla_deploy.planning.prompts.composing import chat_for
 from vla_deploy.robots import RobotDescription
 
-SURE: Final = 0.75
-"""A plan of which the model is less sure is read back before anything moves."""
 # English has about four characters to a token; what is left of the context is for the answer.
 _CHARACTERS_PER_TOKEN: Final = 3
 _MOST_ROOM: Final = 12_000
 
 
-class ChatRung(BackEnd):
+class LocalModel(ChatBackEnd):
     """Ask one model on board for plans."""
-
-    uses = frozenset({Aid.MEMORY})
 
     def __init__(
         self, name: str, model: LanguageModel, robot: RobotDescription, check: Check
     ) -> None:
-        self.name = name
+        super().__init__(name, robot.name, sorted(robot.places), check)
         self.model = model
         self.claim = MemoryClaim()
-        self._robot = robot.name
-        self._check = check
-        self._answer = answer_for(sorted(set(spoken_places(robot.places).values())))
-        self._schema = self._answer.model_json_schema()
+        self._schema = self.shape.model_json_schema()
         free_tokens = model.config.context_tokens - model.language.most_tokens
         self._room = min(_MOST_ROOM, _CHARACTERS_PER_TOKEN * free_tokens)
 
@@ -56,40 +52,22 @@ class ChatRung(BackEnd):
             Ambiguous: the model asks something, or what it names is not clear.
             PlanInvalid: what it plans may not run.
         """
-        chat = chat_for(
-            request, self._robot, Wish(variant="structured", failed=request.failed), self._room
-        )
+        chat = chat_for(request, self.robot, "structured", self._room)
         bounds = Bounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
         try:
             answer = self.model.answer(messages_of(chat), bounds, self._schema)
-            told = self._answer.model_validate_json(answer.text)
+            found = self.shape.model_validate_json(answer.text)
         except InferenceError as error:
             raise Declined(one_line(error)) from error
         except ValidationError as error:
             raise Declined(f"its answer cannot be read: {one_line(error)}") from error
-        return self._proposal(request, told, answer)
+        candidate = self.candidate(found, request)
+        return self.proposal(candidate, min(candidate.confidence, certainty_of(answer)))
 
     def close(self) -> None:
         """Release the memory."""
         self.model.close()
         self.claim.release()
-
-    def _proposal(self, request: Request, told: PlanAnswer, answer: Answer) -> Proposal:
-        if told.question:
-            raise Ambiguous(told.question)
-        if not told.feasible or not told.steps:
-            raise CannotBeDone(f"{self.name} sees no way to do it: {told.reasoning or 'no reason'}")
-        plan = told.plan(request.text)
-        confidence = min(told.confidence, certainty_of(answer))
-        asked = Says.CONFIRM.format(steps=steps_in_words(self._check(plan, request)))
-        return Proposal(
-            plan=plan,
-            rung=self.name,
-            confidence=round(confidence, 3),
-            read_back="" if confidence >= SURE else asked,
-            saw_scene=True,
-            knows_grammar=True,
-        )
 
 
 def certainty_of(answer: Answer) -> float:
@@ -104,12 +82,12 @@ def messages_of(chat: Chat) -> list[Message]:
     return [{"role": "system", "content": chat.system}, *turns] if chat.system else turns
 
 
-def open_chat_rung(
+def open_local_model(
     model: Model, choice: ModelChoice, robot: RobotDescription, check: Check
-) -> ChatRung:
+) -> LocalModel:
     """Open a model of the store.
 
     Raises:
         InferenceError: it cannot be opened; each kind says why.
     """
-    return ChatRung(model.manifest.name, open_language_model(model, choice), robot, check)
+    return LocalModel(model.manifest.name, open_language_model(model, choice), robot, check)

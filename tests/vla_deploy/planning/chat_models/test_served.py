@@ -12,10 +12,10 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
+from vla_deploy.planning.chat_models.served import Effort, ServedModel
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanInvalid, UnknownPlace
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.served.rung import Effort, ServedRung
 
 TIDY = "make it tidy here"
 GO = {"skill": "navigate_to", "place": "kitchen", "yaw_rad": None}
@@ -36,9 +36,9 @@ def answer(*steps: dict, **changes) -> str:
 
 @pytest.fixture
 def served(loopback):
-    """Return a rung that asks the loopback server."""
+    """Return a back end that asks the loopback server."""
 
-    def served(candidates: int = 3, **changes) -> ServedRung:
+    def served(candidates: int = 3, **changes) -> ServedModel:
         declared = {
             "api": "openai_compatible",
             "url": loopback.url,
@@ -51,7 +51,7 @@ def served(loopback):
             "bench", settings, None, Exchange(settings), MonotonicClock(), lambda: 0.5
         )
         places = ("charging_station", "kitchen")
-        return ServedRung(server, "butler", places, checked, Effort(candidates=candidates))
+        return ServedModel(server, "butler", places, checked, Effort(candidates=candidates))
 
     return served
 

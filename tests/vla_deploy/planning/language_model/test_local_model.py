@@ -1,4 +1,4 @@
-"""A chat model on board is a rung like a server: it is told what is remembered."""
+"""A chat model on board is a back end like a server: its prompt holds what is remembered."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -7,16 +7,16 @@ import pytest
 
 from vla_deploy.memory import Episode, MemoryStore, Outcome
 from vla_deploy.memory.episode import unix_s
+from vla_deploy.planning.chat_models.local import LocalModel
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.language_model import LanguageModel
-from vla_deploy.planning.language_model.rung import ChatRung
 from vla_deploy.planning.planner import Planner, checked
 from vla_deploy.robots import load_robot
 
 
 @pytest.fixture
-def chat(model: LanguageModel) -> ChatRung:
-    return ChatRung("chat", model, load_robot("butler"), checked)
+def chat(model: LanguageModel) -> LocalModel:
+    return LocalModel("chat", model, load_robot("butler"), checked)
 
 
 @pytest.fixture
@@ -26,12 +26,12 @@ def memory(tmp_path: Path) -> Iterator[MemoryStore]:
     store.close()
 
 
-def test_what_is_remembered_is_of_use_to_a_chat_model(clock, chat: ChatRung) -> None:
+def test_what_is_remembered_is_of_use_to_a_chat_model(clock, chat: LocalModel) -> None:
     assert Planner(clock, (chat,)).uses == {Aid.MEMORY}
 
 
 def test_a_chat_model_is_told_what_is_remembered(
-    open_desk: Callable, chat: ChatRung, memory: MemoryStore, monkeypatch: pytest.MonkeyPatch
+    open_desk: Callable, chat: LocalModel, memory: MemoryStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[tuple[str, ...]] = []
     propose = chat.propose

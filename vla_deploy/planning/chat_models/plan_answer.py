@@ -1,6 +1,6 @@
-"""Read what a model answers: a plan in any dialect, a question, or that it cannot be done."""
+"""Define a model's answer: a plan in any dialect, a question, or that it cannot be done."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Final
 
 from pydantic import (
@@ -12,22 +12,23 @@ from pydantic import (
     model_validator,
 )
 
-from vla_deploy.planning.catalogue import SKILLS
+from vla_deploy.planning.catalogue import SKILLS, Parameter, SkillSpec, Type
 from vla_deploy.planning.dialects import ACTION_KEYS, PLAN_LISTS, parse_plan
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.plan import Plan
-from vla_deploy.planning.prompts.quoting import plain
-from vla_deploy.planning.served.step_schema import steps_schema
+from vla_deploy.planning.prompts.situation_data import plain
 
 _REASON_CHARACTERS: Final = 400
 _QUESTION_CHARACTERS: Final = 160
 _MOST_STEPS: Final = 100
+_MOST_ASKED: Final = 60
 _KNOWN_KEYS: Final = frozenset(alias for aliases in ACTION_KEYS.values() for alias in aliases)
 _PARAMETER_KEYS: Final = frozenset(ACTION_KEYS["parameters"])
+Schema = dict[str, Any]
 
 
 class PlanAnswer(BaseModel):
-    """Hold an answer whose steps can be read; whether they may run is for others to say.
+    """Hold an answer whose steps can be read; whether they may run is checked elsewhere.
 
     `reasoning` comes first, so that a model thinks before it decides.
     """
@@ -66,7 +67,7 @@ class PlanAnswer(BaseModel):
 
     @model_validator(mode="after")
     def _is_readable(self) -> "PlanAnswer":
-        """Read the steps once, so that a model is told at once what cannot be read."""
+        """Read the steps once, so that the faults are sent back at once."""
         try:
             self.plan("")
         except PlanInvalid as error:
@@ -91,7 +92,7 @@ class PlanAnswer(BaseModel):
 
 def answer_for(places: Sequence[str]) -> type[PlanAnswer]:
     """Return the shape of answers for a robot that knows these places."""
-    schema = steps_schema(places)
+    schema = _steps_schema(places)
 
     class Answer(PlanAnswer):
         steps: Annotated[tuple[dict[str, Any], ...], WithJsonSchema(schema)] = Field(
@@ -102,9 +103,49 @@ def answer_for(places: Sequence[str]) -> type[PlanAnswer]:
     return Answer
 
 
+def _steps_schema(places: Sequence[str]) -> Schema:
+    """Return the JSON Schema of a list of steps, each a skill with its parameters beside it.
+
+    Places are an enumeration; a parameter that may be left out may be null.
+    """
+    forms = [form for name, spec in SKILLS.items() for form in _forms(name, spec, places)]
+    return {"type": "array", "maxItems": _MOST_ASKED, "items": {"anyOf": forms}}
+
+
+def _forms(name: str, spec: SkillSpec, places: Sequence[str]) -> Iterator[Schema]:
+    """Yield one form for each group of parameters of which exactly one is given."""
+    choices = {one for group in spec.one_of for one in group}
+    for group in spec.one_of or ((),):
+        given: Schema = {}
+        for key, parameter in spec.parameters.items():
+            if key in group or key not in choices:
+                schema = _typed(parameter, places)
+                is_given = key in group or parameter.required
+                given[key] = schema if is_given else {"anyOf": [schema, {"type": "null"}]}
+        yield {
+            "type": "object",
+            "properties": {"skill": {"const": name}, **given},
+            "required": ["skill", *given],
+            "additionalProperties": False,
+        }
+
+
+def _typed(parameter: Parameter, places: Sequence[str]) -> Schema:
+    match parameter.type:
+        case Type.NUMBER:
+            bounds = {"minimum": parameter.minimum, "maximum": parameter.maximum}
+            return {"type": "number", **bounds}
+        case Type.CHOICE:
+            return {"type": "string", "enum": list(parameter.choices)}
+        case Type.PLACE:
+            return {"type": "string", "enum": list(places)}
+        case _:
+            return {"type": "string"}
+
+
 def _action(step: Mapping[str, Any]) -> dict[str, Any]:
     """Return a step with its parameters apart; what is null was not given."""
-    given = {key: _told(value) for key, value in step.items() if value is not None}
+    given = {key: _cleaned(value) for key, value in step.items() if value is not None}
     if _PARAMETER_KEYS.isdisjoint(given):
         parameters = {key: value for key, value in given.items() if key not in _KNOWN_KEYS}
         given = {key: value for key, value in given.items() if key in _KNOWN_KEYS}
@@ -115,10 +156,10 @@ def _action(step: Mapping[str, Any]) -> dict[str, Any]:
     return given
 
 
-def _told(value: Any) -> Any:
-    """Return what a model wrote without what nobody could see; only texts can hide anything."""
+def _cleaned(value: Any) -> Any:
+    """Return what a model wrote without invisible characters."""
     if isinstance(value, str):
         return plain(value, 500)
     if isinstance(value, Mapping):
-        return {plain(key): _told(one) for key, one in value.items()}
-    return [_told(one) for one in value] if isinstance(value, list) else value
+        return {plain(key): _cleaned(one) for key, one in value.items()}
+    return [_cleaned(one) for one in value] if isinstance(value, list) else value

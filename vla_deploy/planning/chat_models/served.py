@@ -12,16 +12,14 @@ from vla_deploy.model_servers.errors import AnswerUnusable, ModelServerError
 from vla_deploy.model_servers.picture import Image, small_jpeg
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.dialogue.phrasing import Says, steps_in_words
+from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd
+from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
+from vla_deploy.planning.chat_models.voting import Candidate, elected
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
-from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
-from vla_deploy.planning.prompts.composing import DEFAULT_ROOM, Wish, chat_for
-from vla_deploy.planning.prompts.instructions import filled
-from vla_deploy.planning.served.candidates import Candidate, chosen
-from vla_deploy.planning.served.plan_answer import PlanAnswer, answer_for
+from vla_deploy.planning.interfaces import Aid, Check, Proposal, Request
+from vla_deploy.planning.prompts.composing import DEFAULT_ROOM, chat_for, filled
 
-SURE: Final = 0.75
-"""A plan of which a model is less sure is asked for in other ways, too, then read back."""
+# A plan of which the model is not sure is asked for in the other ways, too.
 _WAYS: Final = ("few_shot", "chain_of_thought", "structured")
 _FAULT_CHARACTERS: Final = 400
 # Another question takes about as long as the longest before it.
@@ -36,7 +34,7 @@ class Effort:
     prompt_characters: int = DEFAULT_ROOM
 
 
-class ServedRung(BackEnd):
+class ServedModel(ChatBackEnd):
     """Ask one server for plans; calls block until the deadline at most."""
 
     def __init__(
@@ -47,17 +45,17 @@ class ServedRung(BackEnd):
         check: Check,
         effort: Effort = Effort(),
     ) -> None:
-        self.name = f"server {server.name}"
+        super().__init__(f"server {server.name}", robot, places, check)
         self._server = server
-        self._robot = robot
-        self._check = check
         self._effort = effort
-        self._asker = StructuredAsker(server, answer_for(places))
+        self._asker = StructuredAsker(server, self.shape)
+        # The schema is a part of the prompt, too.
+        self._room = effort.prompt_characters - self._asker.schema_characters
         self.uses = frozenset({Aid.MEMORY, Aid.IMAGE} if self.sees else {Aid.MEMORY})
 
     @property
     def sees(self) -> bool:
-        """Tell whether the model takes images, and may be shown them."""
+        """Return whether the model takes images, and may be shown them."""
         settings = self._server.settings
         return settings.vision and (settings.is_local or settings.allow_images_off_robot)
 
@@ -72,7 +70,7 @@ class ServedRung(BackEnd):
             Declined: the server gives no answer in time, or none that can be read.
             CannotBeDone: the model sees no way, and says why.
             Ambiguous: the model asks something, or what it names is not clear.
-            PlanInvalid: what it plans may not run, also after it was told why.
+            PlanInvalid: what it plans may not run, also after it was sent the reason.
         """
         found: list[Candidate] = []
         asked = 0
@@ -81,7 +79,7 @@ class ServedRung(BackEnd):
             began_ns = deadline.clock.now_ns()
             asked += 1
             try:
-                found.append(self._candidate(request, way, deadline))
+                found.append(self._planned(request, way, deadline))
             except PlanningError as error:
                 failure = error
                 if isinstance(error, Ambiguous | _Gone):
@@ -92,34 +90,24 @@ class ServedRung(BackEnd):
                 break
         if not found:
             raise failure
-        return self._proposal(request, found, asked)
+        candidate, confidence = elected(found, asked, request.world.places)
+        was_shown = self._image(request) is not None
+        return self.proposal(candidate, confidence, is_momentary=was_shown)
 
-    def _proposal(self, request: Request, found: Sequence[Candidate], asked: int) -> Proposal:
-        choice = chosen(found, asked, request.world.places)
-        unsure = choice.confidence < SURE
-        steps = steps_in_words(choice.candidate.checked)
-        return Proposal(
-            plan=choice.candidate.plan,
-            rung=self.name,
-            confidence=choice.confidence,
-            read_back=Says.CONFIRM.format(steps=steps) if unsure else "",
-            saw_scene=True,
-            knows_grammar=True,
-            is_momentary=self._shown(request) is not None,
-        )
-
-    def _candidate(self, request: Request, way: str, deadline: Deadline) -> Candidate:
-        """Return one plan that may run; a model whose plan is refused is told why, once."""
-        chat = chat_for(request, self._robot, self._wish(request, way), self._room)
+    def _planned(self, request: Request, way: str, deadline: Deadline) -> Candidate:
+        """Return one plan that may run; a model whose plan is refused is sent the reason, once."""
+        image = self._image(request)
+        jpeg = None if image is None else small_jpeg(image)
+        chat = chat_for(request, self.robot, way, self._room, jpeg)
         answer = self._ask(chat, deadline)
         try:
-            return self._checked(answer, request)
+            return self.candidate(answer, request)
         except (Ambiguous, CannotBeDone):
             raise
         except PlanningError as error:
             if deadline.left_s <= 0.0:
                 raise
-            return self._checked(self._ask(_told(chat, answer, error), deadline), request)
+            return self.candidate(self._ask(_refused(chat, answer, error), deadline), request)
 
     def _ask(self, chat: Chat, deadline: Deadline) -> PlanAnswer:
         try:
@@ -129,36 +117,16 @@ class ServedRung(BackEnd):
         except ModelServerError as error:
             raise _Gone(one_line(error)) from error
 
-    def _checked(self, answer: PlanAnswer, request: Request) -> Candidate:
-        if answer.question:
-            raise Ambiguous(answer.question)
-        if not answer.feasible or not answer.steps:
-            reason = answer.reasoning or "it gives no reason"
-            raise CannotBeDone(f"{self.name} sees no way to do it: {reason}")
-        plan = answer.plan(request.text)
-        checked = self._check(plan, request)
-        return Candidate(plan=plan, checked=checked, confidence=answer.confidence)
-
-    def _wish(self, request: Request, way: str) -> Wish:
-        image = self._shown(request)
-        jpeg = None if image is None else small_jpeg(image)
-        return Wish(variant=way, jpeg=jpeg, failed=request.failed)
-
-    def _shown(self, request: Request) -> Image | None:
+    def _image(self, request: Request) -> Image | None:
         return request.image if self.sees else None
-
-    @property
-    def _room(self) -> int:
-        """Return the characters of a prompt, less those of the schema: it is told in words too."""
-        return self._effort.prompt_characters - self._asker.schema_characters
 
 
 class _Gone(Declined):
     """Say that asking the server again would be in vain."""
 
 
-def _told(chat: Chat, answer: PlanAnswer, error: PlanningError) -> Chat:
-    """Return the conversation that tells a model why its plan was refused, without images."""
+def _refused(chat: Chat, answer: PlanAnswer, error: PlanningError) -> Chat:
+    """Return the conversation that says why a model's plan was refused, without images."""
     before = tuple(replace(message, images=()) for message in chat.messages)
     said = Message(role=Role.ASSISTANT, text=answer.model_dump_json())
     wish = Message(text=filled("refused", faults=one_line(error)[:_FAULT_CHARACTERS]))
