@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.plan import Plan
 
@@ -39,6 +40,7 @@ ACTION_KEYS: Mapping[str, tuple[str, ...]] = {
     "preconditions": ("preconditions",),
     "effects": ("effects",),
 }
+_KNOWN_KEYS: Final = frozenset(alias for aliases in ACTION_KEYS.values() for alias in aliases)
 # The typed dialect's `type` is a category beside `action`; it is dropped when a skill is named.
 CATEGORIES = frozenset({"navigation", "manipulation", "interaction", "perception", "movement"})
 PLAN_TEXTS = ("summary", "reasoning", "feasible", "safety_concerns", "success_criteria")
@@ -178,23 +180,26 @@ def _canonical_plan(document: Any) -> Json:
 def _canonical_action(action: Any, number: int, previous: str | None) -> Json:
     if not isinstance(action, Mapping):
         raise PlanInvalid([f"action {number} is no JSON object: {action!r:.60}"])
-    unknown = set(action) - {alias for aliases in ACTION_KEYS.values() for alias in aliases}
-    if unknown:
+    given = {key: value for key, value in action.items() if value is not None}
+    unknown = [key for key in given if key not in _KNOWN_KEYS]
+    if unknown and any(key in given for key in ACTION_KEYS["parameters"]):
         raise PlanInvalid([f"action {number} has unknown keys: {', '.join(sorted(unknown))}"])
-    found = {key: _first(action, aliases) for key, aliases in ACTION_KEYS.items()}
+    if unknown:  # the parameters stand beside the skill
+        given["parameters"] = {key: given.pop(key) for key in unknown}
+    found = {key: _first(given, aliases) for key, aliases in ACTION_KEYS.items()}
     canonical = {key: value for key, value in found.items() if value is not None}
     canonical["id"] = str(canonical.get("id", f"a{number}"))
     if isinstance(canonical.get("depends_on"), list):
         canonical["depends_on"] = [str(name) for name in canonical["depends_on"]]
     elif "depends_on" not in canonical and previous is not None:
         canonical["depends_on"] = [previous]
-    if "priority" in canonical:
-        given = canonical["priority"]
-        known = isinstance(given, str | int)
-        canonical["priority"] = PRIORITIES.get(given, given) if known else given
+    priority = canonical.get("priority")
+    if isinstance(priority, str | int):
+        canonical["priority"] = PRIORITIES.get(priority, priority)
     skill = str(canonical.get("skill", "")).strip().lower().replace(" ", "_")
     parameters = canonical.get("parameters", {})
-    if "skill" in action or not isinstance(parameters, Mapping):
+    is_canonical = "skill" in given and skill in SKILLS
+    if is_canonical or not isinstance(parameters, Mapping):
         return canonical | {"skill": skill}
     skill, convert = SKILL_DIALECT.get(skill, (skill, _rename()))
     return canonical | {"skill": skill, "parameters": convert(dict(parameters))}

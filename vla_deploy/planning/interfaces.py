@@ -1,5 +1,6 @@
 """Define what passes between the planner's parts, and what every back end does."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
 from typing import Any, Protocol
@@ -152,18 +153,9 @@ class Answer:
         return self.plan is not None or isinstance(self.error, Ambiguous | NotAble)
 
 
-class Check(Protocol):
-    """Make a proposed plan one that may run, or say why it may not."""
-
-    def __call__(self, plan: Plan, request: Request) -> Plan:
-        """Return the plan with its references grounded and everything checked.
-
-        Raises:
-            PlanInvalid: it may not run; carries every fault.
-            Ambiguous: only the person can tell what is meant.
-            PlanningError: it speaks of what the robot does not know.
-        """
-        ...
+Check = Callable[[Plan, Request], Plan]
+"""Return a proposed plan grounded and checked, or raise the PlanningError that says why it may not
+run."""
 
 
 class BackEnd(Protocol):

@@ -13,7 +13,7 @@ from pydantic import (
 )
 
 from vla_deploy.planning.catalogue import SKILLS, Parameter, SkillSpec, Type
-from vla_deploy.planning.dialects import ACTION_KEYS, PLAN_LISTS, parse_plan
+from vla_deploy.planning.dialects import PLAN_LISTS, parse_plan
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.prompts.situation_data import plain
@@ -22,8 +22,6 @@ _REASON_CHARACTERS: Final = 400
 _QUESTION_CHARACTERS: Final = 160
 _MOST_STEPS: Final = 100
 _MOST_ASKED: Final = 60
-_KNOWN_KEYS: Final = frozenset(alias for aliases in ACTION_KEYS.values() for alias in aliases)
-_PARAMETER_KEYS: Final = frozenset(ACTION_KEYS["parameters"])
 Schema = dict[str, Any]
 
 
@@ -85,7 +83,7 @@ class PlanAnswer(BaseModel):
                 "goal": goal or "unnamed",
                 "reasoning": self.reasoning,
                 "feasible": self.feasible,
-                "actions": [_action(step) for step in self.steps],
+                "actions": [_cleaned(step) for step in self.steps],
             }
         )
 
@@ -141,19 +139,6 @@ def _typed(parameter: Parameter, places: Sequence[str]) -> Schema:
             return {"type": "string", "enum": list(places)}
         case _:
             return {"type": "string"}
-
-
-def _action(step: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a step with its parameters apart; what is null was not given."""
-    given = {key: _cleaned(value) for key, value in step.items() if value is not None}
-    if _PARAMETER_KEYS.isdisjoint(given):
-        parameters = {key: value for key, value in given.items() if key not in _KNOWN_KEYS}
-        given = {key: value for key, value in given.items() if key in _KNOWN_KEYS}
-        given["parameters"] = parameters
-    # A skill that is none of ours is a word of another dialect.
-    if "skill" in given and given["skill"] not in SKILLS and "action" not in given:
-        given["action"] = given.pop("skill")
-    return given
 
 
 def _cleaned(value: Any) -> Any:

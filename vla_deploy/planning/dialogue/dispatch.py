@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.command import Command, PlannedCommand
 from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of
@@ -13,7 +12,6 @@ from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
 from vla_deploy.planning.interfaces import Answer, Request
 from vla_deploy.planning.metrics import PlannerMetrics
-from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery import numbered
 from vla_deploy.planning.understanding import Outcome, Turn
@@ -86,7 +84,6 @@ class Dispatcher:
                 mentioned=mentions_of(plan, request.scene),
                 plan=plan,
                 here=request.here,
-                in_full=_in_full(plan, answer),
             )
         )
 
@@ -118,9 +115,3 @@ class Dispatcher:
                 answer=str(reason),
             )
         )
-
-
-def _in_full(plan: Plan, answer: Answer) -> str:
-    """Return the words that stand for a command; "" of models that sum it up freely."""
-    by_back_end = {Patterns.name: plan.goal, COMMAND_PARSER: plan.summary}
-    return "" if answer.proposal is None else by_back_end.get(answer.proposal.rung, "")

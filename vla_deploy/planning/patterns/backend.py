@@ -1,22 +1,18 @@
 """Plan the commonest commands at once: each clause fits a whole pattern, or nothing is planned."""
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import Groups, Step, chained
-from vla_deploy.planning.dialogue.correction import corrected_by, correction_in
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
+from vla_deploy.planning.patterns.follow_up import corrected_before, follow_up
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.repeating import can_repeat, is_again, recalled, repeated
 from vla_deploy.planning.patterns.slots import is_place, is_thing
-from vla_deploy.planning.patterns.table import PATTERNS, Pattern
-from vla_deploy.planning.plan import Action, Plan, Priority
+from vla_deploy.planning.patterns.table import PATTERNS, PRIORITIES, Intent, Pattern
+from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.prohibitions import read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
@@ -58,23 +54,25 @@ def pattern_plan(request: Request) -> Plan:
         PlanningError: what a clause asks for cannot be done, or there is nothing to repeat.
     """
     said = clauses(request.text)
-    if len(said) == 1 and is_again(said[0]):
-        return repeated(request)
-    if correction_in(request.text) and can_repeat(request):
-        plan = corrected_by(repeated(request), request.text)
-        if plan is not None:
-            return plan
-    full = recalled(said[0], request) if len(said) == 1 else None
-    said = clauses(full) if full is not None else said
+    plan = follow_up(said[0], request) if len(said) == 1 else None
+    plan = plan or corrected_before(request)
+    if plan is not None:
+        return plan
     if not said:
         raise Declined("no clause that a pattern covers")
-    goal = full or request.text.strip()
-    request = replace(request, text=goal)
-    built: list[tuple[Step, Intent]] = []
+    steps: list[Step] = []
+    intents: list[Intent] = []
     for clause in said:
         pattern, groups = _fitting(clause, request)
-        built += [(step, pattern.intent) for step in pattern.build(groups, request)]
-    return Plan(goal=goal, summary=_summary(built), actions=chained(*_ranked(built)))
+        built = pattern.build(groups, request)
+        steps += built
+        intents += [pattern.intent] * len(built)
+    words = ", ".join(action_words(skill, parameters) for skill, parameters in steps)
+    return Plan(
+        goal=request.text.strip(),
+        summary=f"{', '.join(dict.fromkeys(intents))}: {words}",
+        actions=chained(steps, [PRIORITIES[intent] for intent in intents]),
+    )
 
 
 def plan_command(text: str, world: World, here: tuple[float, float, float] | None = None) -> Plan:
@@ -113,14 +111,3 @@ def _are_known(groups: Groups, request: Request) -> bool:
     place, where = groups.get("place", "there"), groups.get("destination", "there")
     is_known = is_place(place, places) or place in _THERE
     return is_known and (is_place(where, places) or is_thing(where) or where in _THERE)
-
-
-def _ranked(built: Sequence[tuple[Step, Intent]]) -> tuple[list[Step], list[Priority]]:
-    return [step for step, _ in built], [PRIORITIES[intent] for _, intent in built]
-
-
-def _summary(built: Sequence[tuple[Step, Intent]]) -> str:
-    """Return the intents and the steps in words."""
-    intents = ", ".join(dict.fromkeys(intent.value for _, intent in built))
-    said = ", ".join(action_words(skill, parameters) for (skill, parameters), _ in built)
-    return f"{intents}: {said}"

@@ -1,15 +1,19 @@
-"""Put into full words what a command leaves to the one before it: "again", "a bit more", "back".
+"""Plan commands that lean on the one before: "again", "a bit more", "the other way".
 
 Nothing is repeated that failed, was refused or called off: a person has to say that anew.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
+from vla_deploy.action_words import action_words
+from vla_deploy.planning.builders.steps import go_back
+from vla_deploy.planning.dialogue.correction import corrected_by
 from vla_deploy.planning.errors import NothingBefore
 from vla_deploy.planning.interfaces import Request
-from vla_deploy.planning.plan import PUT_IN, Plan
+from vla_deploy.planning.plan import PUT_IN, Action, Plan
 from vla_deploy.planning.understanding.conversation import Outcome, Turn
 
 _AGAIN: Final = re.compile(
@@ -18,10 +22,8 @@ _AGAIN: Final = re.compile(
 )
 # How much "a bit more" is of the distance, angle or time that was last given outright.
 RATIOS: Final[Mapping[str, float]] = {
-    r"(?:just )?a (?:tiny |little |wee )?(?:bit|touch|tad|fraction)": 0.25,
-    r"(?:just )?a little|slightly": 0.25,
+    r"(?:just )?(?:a (?:tiny |little |wee )?(?:bit|touch|tad|fraction)|a little|slightly)": 0.25,
     r"(?:some|quite a bit)": 0.5,
-    r"": 0.5,
     r"(?:much|a lot|lots)": 1.0,
 }
 _FURTHER: Final = (
@@ -29,24 +31,21 @@ _FURTHER: Final = (
     r"(?: than that|,? (?:the same|that) way|,? in (?:the same|that) direction)?"
 )
 _LESS: Final = r"(?:back(?: again)?(?:,? the other way)?|the other way|less)"
-_SHARES: Final[Mapping[str, float]] = {
-    r"half (?:that|as (?:much|far|long)|the (?:way|distance))(?: again)?": 0.5,
-    r"(?:as much|the same amount|that much)(?: again)?": 1.0,
-    r"twice (?:that|as (?:much|far|long))|double(?: (?:that|it))?": 2.0,
-}
 _GO: Final = r"(?:and |now |then )*(?:(?:go|move|drive|turn|rotate|spin|roll|come|wait) )?"
-_MORE: Final[tuple[tuple[re.Pattern[str], float], ...]] = tuple(
+_MORE: Final = tuple(
     (re.compile(rf"{_GO}(?:{words})"), ratio)
     for words, ratio in (
-        *((rf"(?:{bit}) {_FURTHER}" if bit else _FURTHER, ratio) for bit, ratio in RATIOS.items()),
-        *((rf"(?:{bit}) {_LESS}", -ratio) for bit, ratio in RATIOS.items() if bit),
-        *_SHARES.items(),
+        (_FURTHER, 0.5),
+        *((rf"{share} {_FURTHER}", ratio) for share, ratio in RATIOS.items()),
+        *((rf"{share} {_LESS}", -ratio) for share, ratio in RATIOS.items()),
+        (r"half (?:that|as (?:much|far|long)|the (?:way|distance))(?: again)?", 0.5),
+        (r"(?:as much|the same amount|that much)(?: again)?", 1.0),
+        (r"twice (?:that|as (?:much|far|long))|double(?: (?:that|it))?", 2.0),
     )
 )
 _ALL_BACK: Final = r"(?:all the way )?back(?: again)?"
 _BACK: Final = re.compile(
-    rf"(?:and )?(?:now )?(?:{_ALL_BACK}|"
-    r"(?:turn|move|drive|go|come|step|roll) back again)"
+    rf"(?:and )?(?:now )?(?:{_ALL_BACK}|(?:turn|move|drive|go|come|step|roll) back again)"
 )
 # After a look these are for the head.
 _AHEAD: Final = re.compile(
@@ -59,75 +58,45 @@ _REVERSE: Final = re.compile(
     r"(?:and )?(?:now )?(?:the )?same (?:distance|amount|way|thing)?(?: ?again)?,? "
     r"(?:but |only |just )?(?:backwards?|in reverse|the other way|in the other direction)"
 )
-
-Amounts = tuple[str, Callable[[float], str]]
-
-
-def _straight(distance_m: float) -> str:
-    return f"move {'backward' if distance_m < 0 else 'forward'} {_figure(distance_m)} m"
+_OPPOSITE: Final = {"left": "right", "right": "left", "up": "down", "down": "up"}
+# What of a step can be more or less, and can be done in the other direction.
+_AMOUNTS: Final = {"move": "distance_m", "turn": "angle_rad", "wait": "duration_s"}
+_REVERSIBLE: Final = ("move", "turn")
 
 
-def _turning(angle_rad: float) -> str:
-    return f"turn {'right' if angle_rad < 0 else 'left'} {_figure(angle_rad)} rad"
-
-
-def _waiting(duration_s: float) -> str:
-    return f"wait {_figure(duration_s)} s"
-
-
-def _figure(value: float) -> str:
-    return f"{abs(value):.4f}".rstrip("0").rstrip(".")
-
-
-# What of a step can be more or less, and the words for it.
-_AMOUNTS: Final[Mapping[str, Amounts]] = {
-    "move": ("distance_m", _straight),
-    "turn": ("angle_rad", _turning),
-    "wait": ("duration_s", _waiting),
-}
-
-
-def recalled(text: str, request: Request) -> str | None:
-    """Return the full words of a command that only points at the one before it, else None.
+def follow_up(text: str, request: Request) -> Plan | None:
+    """Return the plan of a clause that only points at the command before it, else None.
 
     Raises:
         NothingBefore: there is none, it did not end well, or it has no amount.
     """
+    if _AGAIN.fullmatch(text):
+        return _repeated(_last(request))
     ratio = _ratio(text)
     if ratio is not None:
         return _more(ratio, request)
     if _REVERSE.fullmatch(text):
-        return _reverse(request)
+        return _reversed(_last(request))
     if _AHEAD.fullmatch(text) and any(map(_looked, request.conversation.turns[-1:])):
-        return "look ahead"
-    return (_reverse(request) or "go back") if _BACK.fullmatch(text) else None
+        return _single("look_at", {"direction": "ahead"})
+    if _BACK.fullmatch(text):
+        return _reversed(_last(request)) or _returned(request)
+    return None
 
 
-def is_again(text: str) -> bool:
-    """Tell whether words want what was done last to be done again, and nothing else."""
-    return _AGAIN.fullmatch(text) is not None
+def corrected_before(request: Request) -> Plan | None:
+    """Return what "no, the blue one" makes of the command before, None where it corrects nothing.
 
-
-def can_repeat(request: Request) -> bool:
-    """Tell whether the command before this one was carried out, or is."""
-    last = next(iter(request.conversation.turns[-1:]), None)
-    is_done = last is not None and last.outcome in (Outcome.UNDER_WAY, Outcome.SUCCEEDED)
-    return is_done and last is not None and last.plan is not None
-
-
-def repeated(request: Request) -> Plan:
-    """Return the plan of the command before this one, without what grounding has put in.
-
-    Raises:
-        NothingBefore: there is none, or it did not end well.
+    What was not done is not corrected.
     """
-    last = _last(request)
-    own = [one for one in last.plan.actions if one.description != PUT_IN] if last.plan else []
-    chained = tuple(
-        one.model_copy(update={"depends_on": (own[number - 1].id,) if number else ()})
-        for number, one in enumerate(own)
-    )
-    return Plan(goal=last.words, summary=last.understood, actions=chained)
+    turns = request.conversation.turns
+    if not turns or not _is_done(turns[-1]):
+        return None
+    return corrected_by(_repeated(turns[-1]), request.text)
+
+
+def _is_done(turn: Turn) -> bool:
+    return turn.outcome in (Outcome.UNDER_WAY, Outcome.SUCCEEDED) and turn.plan is not None
 
 
 def _last(request: Request) -> Turn:
@@ -140,7 +109,7 @@ def _last(request: Request) -> Turn:
     if not turns:
         raise NothingBefore("there is no command yet that I could repeat; say the whole command")
     last = turns[-1]
-    if not can_repeat(request):
+    if not _is_done(last):
         raise NothingBefore(
             f'"{last.said[:60]}" was not done ({last.outcome.value}), so I do not repeat it; '
             "say the whole command"
@@ -148,11 +117,33 @@ def _last(request: Request) -> Turn:
     return last
 
 
+def _repeated(last: Turn) -> Plan:
+    """Return the plan of a turn, without what grounding has put in."""
+    plan = last.plan or Plan(goal=last.said)
+    own = [one for one in plan.actions if one.description != PUT_IN]
+    chained = tuple(
+        one.model_copy(update={"depends_on": (own[number - 1].id,) if number else ()})
+        for number, one in enumerate(own)
+    )
+    return Plan(goal=plan.goal, summary=last.understood, actions=chained)
+
+
+def _single(skill: str, parameters: Mapping[str, Any]) -> Plan:
+    action = Action(id="a1", skill=skill, parameters=dict(parameters))
+    words = action_words(skill, parameters)
+    return Plan(goal=words, summary=words, actions=(action,))
+
+
+def _returned(request: Request) -> Plan:
+    ((skill, parameters),) = go_back({}, replace(request, text="go back"))
+    return _single(skill, parameters)
+
+
 def _ratio(text: str) -> float | None:
     return next((ratio for pattern, ratio in _MORE if pattern.fullmatch(text)), None)
 
 
-def _more(ratio: float, request: Request) -> str:
+def _more(ratio: float, request: Request) -> Plan:
     """Return more of the last way, turn or wait, by what was given before any "more"."""
     last = _last(request)
     amount = _amount(last)
@@ -169,41 +160,34 @@ def _more(ratio: float, request: Request) -> str:
         value = outright[1]
         if _ratio(turn.said.lower().strip(" .!?")) is None:
             break
-    return _AMOUNTS[skill][1](ratio * value)
+    more = round(ratio * value, 4)
+    return _single(skill, {_AMOUNTS[skill]: abs(more) if skill == "wait" else more})
 
 
 def _amount(turn: Turn) -> tuple[str, float] | None:
     """Return the last step of a turn that can be more or less, with its amount in SI units."""
     actions = () if turn.plan is None else turn.plan.actions
     for action in reversed(actions):
-        if action.skill in _AMOUNTS:
-            return action.skill, _number(action.parameters.get(_AMOUNTS[action.skill][0]))
+        value = action.parameters.get(_AMOUNTS.get(action.skill, ""))
+        if isinstance(value, int | float):
+            return action.skill, float(value)
     return None
 
 
-def _reverse(request: Request) -> str | None:
+def _reversed(last: Turn) -> Plan | None:
     """Return the last straight way, turn or look in the other direction, None for other things."""
-    last = _last(request)
     if way := _looked(last):
-        return f"look {_OPPOSITE[way]}"
+        return _single("look_at", {"direction": _OPPOSITE[way]})
     amount = _amount(last)
-    if amount is None or amount[0] == "wait":
+    if amount is None or amount[0] not in _REVERSIBLE:
         return None
     skill, value = amount
-    return _AMOUNTS[skill][1](-value)
-
-
-_OPPOSITE: Final = {"left": "right", "right": "left", "up": "down", "down": "up"}
+    return _single(skill, {_AMOUNTS[skill]: round(-value, 4)})
 
 
 def _looked(turn: Turn) -> str:
     """Return the side to which a turn's last action turned the head, "" for none."""
-    if turn.plan is None:
-        return ""
-    action = turn.plan.actions[-1]
-    way = str(action.parameters.get("direction", ""))
-    return way if action.skill == "look_at" and way in _OPPOSITE else ""
-
-
-def _number(value: Any) -> float:
-    return float(value) if isinstance(value, int | float) else 0.0
+    action = turn.plan.actions[-1] if turn.plan is not None and turn.plan.actions else None
+    way = "" if action is None else str(action.parameters.get("direction", ""))
+    is_look = action is not None and action.skill == "look_at"
+    return way if is_look and way in _OPPOSITE else ""
