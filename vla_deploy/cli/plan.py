@@ -75,7 +75,7 @@ def told(answer: Answer, away: Mapping[str, str]) -> dict[str, Any]:
     is_asked = isinstance(answer.error, Ambiguous)
     return {
         "plan": None if answer.plan is None else answer.plan.model_dump(mode="json"),
-        "rung": None if proposal is None else proposal.rung,
+        "rung": None if proposal is None else proposal.back_end,
         "confidence": None if proposal is None else round(proposal.confidence, 3),
         "read_back": None if proposal is None else proposal.read_back or None,
         "question": str(answer.error) if is_asked else None,
@@ -103,7 +103,7 @@ def as_text(answer: Answer, away: Mapping[str, str]) -> str:
 
 def _attempt_line(attempt: Attempt) -> str:
     why = f": {attempt.reason}" if attempt.reason else ""
-    return f"{attempt.rung} {attempt.outcome} in {1000 * attempt.took_s:.1f} ms{why}"
+    return f"{attempt.back_end} {attempt.outcome} in {1000 * attempt.took_s:.1f} ms{why}"
 
 
 def _told(arguments: argparse.Namespace, topic: str) -> Mapping[str, Any]:

@@ -77,7 +77,7 @@ class Proposal:
     """
 
     plan: Plan
-    rung: str
+    back_end: str
     confidence: float
     read_back: str = ""
     saw_scene: bool = False
@@ -119,14 +119,15 @@ class AttemptOutcome(StrEnum):
 class Attempt:
     """Hold what one back end said to a command, and how long that took."""
 
-    rung: str
+    back_end: str
     outcome: AttemptOutcome
     took_s: float
     reason: str = ""
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON takes it."""
-        told = {"rung": self.rung, "outcome": self.outcome.value, "took_s": round(self.took_s, 4)}
+        took_s = round(self.took_s, 4)
+        told = {"rung": self.back_end, "outcome": self.outcome.value, "took_s": took_s}
         return {**told, "reason": self.reason} if self.reason else told
 
 

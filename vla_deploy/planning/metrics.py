@@ -41,7 +41,7 @@ class PlannerMetrics:
     def note(self, attempts: Iterable[Attempt]) -> None:
         """Count what the back ends did for one command."""
         for one in attempts:
-            metrics = self._back_ends[one.rung]
+            metrics = self._back_ends[one.back_end]
             metrics.outcomes[one.outcome.value] += 1
             metrics.took_s.append(one.took_s)
 

@@ -72,7 +72,7 @@ class PlanCache(BackEnd):
             raise Declined("what the plan of before depends on has changed")
         self._kept.move_to_end(key)
         self._counts["hits"] += 1
-        return replace(kept.proposal, rung=self.name, origin=kept.proposal.rung)
+        return replace(kept.proposal, back_end=self.name, origin=kept.proposal.back_end)
 
     def keep(self, request: Request, proposal: Proposal) -> None:
         """Remember what a model proposed and was accepted; the oldest may go for it.

@@ -83,12 +83,12 @@ class Planner:
         self._slow = tuple(slow)
 
     @property
-    def rungs(self) -> tuple[str, ...]:
+    def back_ends(self) -> tuple[str, ...]:
         """Return the names of all back ends, in the order in which they are asked."""
         return tuple(one.name for one in (*self._quick, *self._slow))
 
     @property
-    def slow_rungs(self) -> tuple[str, ...]:
+    def slow_back_ends(self) -> tuple[str, ...]:
         """Return the names of the back ends that take time."""
         return tuple(one.name for one in self._slow)
 
@@ -101,7 +101,7 @@ class Planner:
         """Return how cache and servers have been doing, as JSON takes it."""
         documents = (one.document() for one in self._slow)
         return {
-            "rungs": list(self.rungs),
+            "rungs": list(self.back_ends),
             "cache": self.cache.document(),
             "servers": [one for one in documents if one is not None],
             "away": self.away,
@@ -134,7 +134,7 @@ class Planner:
 
     def accepted(self, request: Request, answer: Answer) -> None:
         """Keep a plan that was dispatched for when the same is asked again."""
-        if answer.proposal is not None and answer.proposal.rung != self.cache.name:
+        if answer.proposal is not None and answer.proposal.back_end != self.cache.name:
             self.cache.keep(request, answer.proposal)
 
     def first_plan(
@@ -157,7 +157,7 @@ class Planner:
             began_ns = self._clock.now_ns()
             found = self._ask(back_end, request, share, deadline)
             attempt = Attempt(
-                rung=back_end.name,
+                back_end=back_end.name,
                 outcome=_outcome(found.error, share),
                 took_s=(self._clock.now_ns() - began_ns) / NS_PER_S,
                 reason="" if found.error is None else one_line(found.error)[:_REASON_CHARACTERS],
@@ -190,7 +190,7 @@ class _GivenPlan(BackEnd):
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
         del request, deadline  # the plan is there already
-        return Proposal(plan=parse_plan(self._given), rung=self.name, confidence=1.0)
+        return Proposal(plan=parse_plan(self._given), back_end=self.name, confidence=1.0)
 
 
 def _rank(error: PlanningError) -> int:

@@ -29,7 +29,7 @@ def look(cache, clock):
             proposal = cache.propose(request, Deadline.within(clock, 1.0))
         except Declined:
             return False
-        assert (proposal.rung, proposal.origin) == ("cache", "model")
+        assert (proposal.back_end, proposal.origin) == ("cache", "model")
         return True
 
     return look

@@ -77,7 +77,7 @@ def test_the_question_names_what_may_not_be_understood() -> None:
 
 def proposed(skill: str = "navigate_to", **changes: object) -> Proposal:
     plan = Plan(goal="g", summary="go to the kitchen", actions=(Action(id="a", skill=skill),))
-    return Proposal(plan=plan, rung="test", confidence=1.0, **changes)
+    return Proposal(plan=plan, back_end="test", confidence=1.0, **changes)
 
 
 def request_for(text: str) -> Request:

@@ -48,7 +48,7 @@ class ChatBackEnd(BackEnd):
         steps = steps_in_words(candidate.checked)
         return Proposal(
             plan=candidate.plan,
-            rung=self.name,
+            back_end=self.name,
             confidence=round(confidence, 3),
             read_back="" if confidence >= SURE else Says.CONFIRM.format(steps=steps),
             saw_scene=True,

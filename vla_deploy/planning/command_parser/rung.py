@@ -109,7 +109,7 @@ class CommandParser(BackEnd):
         )
         proposal = Proposal(
             plan=plan,
-            rung=self.name,
+            back_end=self.name,
             confidence=sureness.confidence,
             is_momentary=are_of_the_moment(parsed.steps),
             sureness=sureness,

@@ -35,7 +35,7 @@ class ActivePlans:
         """
         _, before = self._active.pop(command.command_id, (command, None))
         proposal = answer.proposal
-        strategy = proposal.origin if proposal is not None and proposal.rung == RECOVERY else ""
+        strategy = proposal.origin if proposal is not None and proposal.back_end == RECOVERY else ""
         if command.recovers and before is not None:
             carried = before.going_on(plan, strategy)
         else:

@@ -89,7 +89,7 @@ def _gives_way(done: PlannedCommand) -> bool:
     The command parser makes something of misheard words, too.
     """
     proposal, plan, scene = done.answer.proposal, done.answer.plan, done.request.scene
-    if proposal is not None and proposal.rung == COMMAND_PARSER:
+    if proposal is not None and proposal.back_end == COMMAND_PARSER:
         return True
     if plan is None or scene is None or not scene.things:
         return False

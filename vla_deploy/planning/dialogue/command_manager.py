@@ -166,10 +166,10 @@ class CommandManager:
         else:
             deadline = self._deadline(self._retry.within_s(command, self.planner.within_s))
             answer = self.planner.plan_at_once(request, deadline)
-        if answer.is_final or not self.planner.slow_rungs or self._retry.is_urgent(command):
+        if answer.is_final or not self.planner.slow_back_ends or self._retry.is_urgent(command):
             self._conclude(PlannedCommand(command, request, answer))
             return
-        self._events.planning(command, self.planner.slow_rungs)
+        self._events.planning(command, self.planner.slow_back_ends)
         slowly = partial(self.planner.plan_slowly, request, deadline, answer)
         self._async.begin(command, request, deadline, slowly)
 
@@ -279,7 +279,7 @@ class CommandManager:
         """Go on with another plan in the place of the one that was read back."""
         self.dialogue.settle()
         request = self._request(pending.command)
-        proposal = Proposal(plan=plan, rung=CORRECTED, confidence=1.0)
+        proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0)
         try:
             answer = Answer(plan=self.planner.check(plan, request), proposal=proposal)
         except PlanningError as error:

@@ -118,7 +118,7 @@ def _maker(answer: Answer) -> dict[str, Any]:
     if proposal is None:
         return {}
     origin = {"origin": proposal.origin} if proposal.origin else {}
-    return {"rung": proposal.rung, "confidence": round(proposal.confidence, 3), **origin}
+    return {"rung": proposal.back_end, "confidence": round(proposal.confidence, 3), **origin}
 
 
 def _attempts(answer: Answer | None) -> dict[str, Any]:

@@ -40,10 +40,10 @@ class Patterns(BackEnd):
         if order is not None:
             said = Action(id="a1", skill="speak", parameters={"text": order.answer})
             plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
-            return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None, order=order)
+            return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None, order=order)
         plan = pattern_plan(request)
         # What may stand in a slot has no words beside it that change anything.
-        return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None)
+        return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None)
 
 
 def pattern_plan(request: Request) -> Plan:

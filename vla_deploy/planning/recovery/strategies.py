@@ -45,7 +45,7 @@ def recover(carried: Carried, request: Request, check: Check) -> Answer:
             continue
         in_turn = {"actions": _in_turn(steps), "reasoning": f"after a failure: {name}"}
         plan = carried.plan.model_copy(update={**in_turn, "feasible": True})
-        proposal = Proposal(plan=plan, rung=RECOVERY, confidence=_CONFIDENCE, origin=name)
+        proposal = Proposal(plan=plan, back_end=RECOVERY, confidence=_CONFIDENCE, origin=name)
         try:
             return Answer(plan=check(plan, request), proposal=proposal)
         except PlanningError as refused:

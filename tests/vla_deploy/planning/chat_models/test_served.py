@@ -73,7 +73,8 @@ def test_a_sure_answer_is_the_plan(loopback, served, ask):
     loopback.then(loopback.says(answer(GO)))
     proposal = served().propose(ask(TIDY), within())
     assert places_of(proposal) == ["kitchen"]
-    assert (proposal.rung, proposal.confidence, proposal.read_back) == ("server bench", 0.95, "")
+    assert proposal.back_end == "server bench"
+    assert (proposal.confidence, proposal.read_back) == (0.95, "")
     assert proposal.saw_scene
     assert len(loopback.heard) == 1
     body = loopback.heard[0].body
@@ -200,12 +201,12 @@ def test_a_server_that_fails_is_declined_with_the_reason(loopback, served, ask, 
 
 def test_a_server_that_is_gone_is_asked_once_and_then_left_alone(loopback, served, ask):
     loopback.then(loopback.sends(503, b""))
-    rung = served(breaker_failures=1)
+    back_end = served(breaker_failures=1)
     for _ in range(3):
         with pytest.raises(Declined):
-            rung.propose(ask(TIDY), within())
+            back_end.propose(ask(TIDY), within())
     assert len(loopback.heard) == 1
-    assert rung.document()["failures"]["CircuitOpen"] == 2
+    assert back_end.document()["failures"]["CircuitOpen"] == 2
 
 
 def test_an_unknown_skill_is_named_and_nothing_is_proposed(loopback, served, ask):
@@ -276,10 +277,10 @@ def test_the_picture_is_shown_to_a_model_that_sees_and_may(loopback, served, ask
     assert served().uses == {Aid.MEMORY}
     assert not served().propose(ask(TIDY, image=image), within()).is_momentary
     assert "image_url" not in json.dumps(loopback.heard[-1].body)
-    rung = served(vision=True)
-    assert rung.sees
-    assert rung.uses == {Aid.MEMORY, Aid.IMAGE}
-    assert rung.propose(ask(TIDY, image=image), within()).is_momentary
+    back_end = served(vision=True)
+    assert back_end.sees
+    assert back_end.uses == {Aid.MEMORY, Aid.IMAGE}
+    assert back_end.propose(ask(TIDY, image=image), within()).is_momentary
     body = json.dumps(loopback.heard[-1].body)
     assert "image_url" in body
     assert "The image shows what the robot sees now" in body
@@ -288,7 +289,7 @@ def test_the_picture_is_shown_to_a_model_that_sees_and_may(loopback, served, ask
 
 def test_tokens_and_times_are_told(loopback, served, ask):
     loopback.then(loopback.says(answer(GO)))
-    rung = served()
-    rung.propose(ask(TIDY), within())
-    told = rung.document()
+    back_end = served()
+    back_end.propose(ask(TIDY), within())
+    told = back_end.document()
     assert (told["tokens_in"], told["tokens_out"], told["answers"]) == (11, 7, 1)

@@ -56,10 +56,10 @@ def test_after_the_last_strategy_the_command_is_given_up_with_the_first_cause(op
 
 
 def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_times(
-    open_desk, rung, propose
+    open_desk, back_end, propose
 ):
     go = propose(("navigate_to", {"place": "bedroom"}))
-    model = rung("model", Declined("nothing"), go)
+    model = back_end("model", Declined("nothing"), go)
     desk = open_desk(model)
     desk.give(text="sing one")
     assert desk.answers()[-1]["event"] == "rejected"
@@ -114,18 +114,20 @@ def test_what_the_person_has_agreed_to_is_mended_without_another_yes(open_desk):
     assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
 
 
-def test_what_is_risky_in_another_way_than_what_was_agreed_to_is_not_done(open_desk, rung, propose):
+def test_what_is_risky_in_another_way_than_what_was_agreed_to_is_not_done(
+    open_desk, back_end, propose
+):
     back = propose(("move", {"distance_m": -2.0}))
-    desk = open_desk(rung("model", back))
+    desk = open_desk(back_end("model", back))
     plan = agreed(desk, **HEARD)
     (plan,) = set_back(desk, plan)
     (end,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
     assert "I would drive 2 m backward" in end["give_up"]
 
 
-def test_who_takes_time_is_told_what_was_done_before_the_failure(open_desk, rung, propose):
+def test_who_takes_time_is_told_what_was_done_before_the_failure(open_desk, back_end, propose):
     go = propose(("speak", {"text": "I go"}), ("move", {"distance_m": 1.0}))
-    model = rung("model", go, Declined("nothing"))
+    model = back_end("model", go, Declined("nothing"))
     desk = open_desk(model)
     desk.give(text="sing one")
     desk.answers()
@@ -160,8 +162,8 @@ def test_a_planner_that_was_started_again_has_no_other_plan(open_desk):
     assert first["command_id"] == "c1"
 
 
-def test_a_stop_ends_the_search_for_another_plan(open_desk, later, rung, propose):
-    desk = open_desk(rung("model", propose(("navigate_to", {"place": "bedroom"}))), aside=later)
+def test_a_stop_ends_the_search_for_another_plan(open_desk, later, back_end, propose):
+    desk = open_desk(back_end("model", propose(("navigate_to", {"place": "bedroom"}))), aside=later)
     desk.give(text="go to the kitchen")
     desk.answers()
     (second,) = set_back(desk, desk.plans()[0])

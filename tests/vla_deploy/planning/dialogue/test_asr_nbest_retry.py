@@ -51,8 +51,8 @@ def test_where_nothing_makes_sense_the_first_reading_is_refused(open_desk):
     assert "chicken" in reason
 
 
-def test_a_model_is_asked_of_the_words_before_other_words_are_tried(open_desk, rung, propose):
-    model = rung("model", propose(GO))
+def test_a_model_is_asked_of_the_words_before_other_words_are_tried(open_desk, back_end, propose):
+    model = back_end("model", propose(GO))
     desk = open_desk(model)
     desk.give(**spoken("go where one cooks", ("go to the bedroom", 0.9)))
     desk.answers()
@@ -60,8 +60,8 @@ def test_a_model_is_asked_of_the_words_before_other_words_are_tried(open_desk, r
     assert plan["plan"]["actions"][0]["parameters"]["place"] == "kitchen"
 
 
-def test_after_models_that_have_no_plan_the_other_words_are_tried(open_desk, rung, propose):
-    desk = open_desk(rung("model", Declined("no idea"), Declined("no idea")))
+def test_after_models_that_have_no_plan_the_other_words_are_tried(open_desk, back_end, propose):
+    desk = open_desk(back_end("model", Declined("no idea"), Declined("no idea")))
     desk.give(**spoken("go to the chicken", ("go to the kitchen", 0.5)))
     assert [event for event, _ in events(desk.answers())][-1] == "asked"
 
@@ -118,8 +118,8 @@ def test_what_was_typed_is_taken_as_it_is(open_desk):
     assert [event for event, _ in events(desk.answers())] == ["rejected"]
 
 
-def test_a_planner_that_takes_long_is_not_asked_about_every_reading(open_desk, rung):
-    model = rung("model", *[Declined("no idea")] * 9, takes_s=0.7)
+def test_a_planner_that_takes_long_is_not_asked_about_every_reading(open_desk, back_end):
+    model = back_end("model", *[Declined("no idea")] * 9, takes_s=0.7)
     desk = open_desk(model)
     others = [(f"go to the kitten {number}", 0.5) for number in range(8)]
     desk.give(**spoken("go to the chicken", *others))
@@ -133,16 +133,16 @@ def test_doubted_words_are_read_back_however_sure_the_profile_wants_them(open_de
     assert [event for event, _ in events(desk.answers())] == ["asked"]
 
 
-def test_a_full_stop_is_no_other_reading(open_desk, rung):
-    model = rung("model", *[Declined("no idea")] * 9)
+def test_a_full_stop_is_no_other_reading(open_desk, back_end):
+    model = back_end("model", *[Declined("no idea")] * 9)
     desk = open_desk(model)
     desk.give(**spoken("Go to the chicken.", ("Go to the kitchen.", 0.6)))
     assert [event for event, _ in events(desk.answers())][-1] == "asked"
     assert len(model.asked) == 1
 
 
-def test_of_many_other_readings_only_the_likeliest_are_tried(open_desk, rung):
-    model = rung("model", *[Declined("no idea")] * 99)
+def test_of_many_other_readings_only_the_likeliest_are_tried(open_desk, back_end):
+    model = back_end("model", *[Declined("no idea")] * 99)
     desk = open_desk(model)
     desk.give(**spoken("go to the chicken", *[(f"go to kitten {n}", 0.5) for n in range(60)]))
     desk.answers()
@@ -169,9 +169,9 @@ def test_a_thing_that_is_there_is_likelier_meant_than_one_that_nobody_saw(
 
 @pytest.mark.parametrize(("confidence", "place"), [(0.65, "bedroom"), (0.9, "kitchen")])
 def test_what_the_parser_makes_of_unsure_words_gives_way_to_words_that_the_rules_know(
-    open_desk, rung, propose, confidence, place
+    open_desk, back_end, propose, confidence, place
 ):
-    parser = rung("command_parser", propose(GO, rung="command_parser"))
+    parser = back_end("command_parser", propose(GO, back_end="command_parser"))
     desk = open_desk(parser)
     desk.give(**spoken("go where one cooks", ("go to the bedroom", 0.5), confidence=confidence))
     desk.answers()

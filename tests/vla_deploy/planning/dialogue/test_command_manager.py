@@ -18,9 +18,9 @@ def events(told: list[dict]) -> list[tuple[str, str]]:
 
 
 def test_a_step_does_not_wait_for_a_slow_plan_and_commands_keep_their_order(
-    open_desk, later, rung, propose
+    open_desk, later, back_end, propose
 ):
-    desk = open_desk(rung("model", propose(GO), Declined("no idea")), aside=later)
+    desk = open_desk(back_end("model", propose(GO), Declined("no idea")), aside=later)
     desk.give(text="sing one")
     desk.give(command_id="c2", text="sing two")
     desk.give(command_id="c3", text="go to the kitchen")
@@ -33,17 +33,17 @@ def test_a_step_does_not_wait_for_a_slow_plan_and_commands_keep_their_order(
 
 
 def test_a_command_that_comes_while_another_is_planned_is_told_that_it_waits(
-    open_desk, later, rung, propose
+    open_desk, later, back_end, propose
 ):
-    desk = open_desk(rung("model", propose(GO)), aside=later)
+    desk = open_desk(back_end("model", propose(GO)), aside=later)
     desk.give(text="sing one")
     desk.answers()
     desk.give(command_id="c2", text="go to the kitchen")
     assert events(desk.answers()) == [("c2", "queued")]
 
 
-def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, rung, propose):
-    model = rung("model", propose(GO))
+def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, back_end, propose):
+    model = back_end("model", propose(GO))
     desk = open_desk(model, aside=later)
     desk.give(text="sing one")
     desk.give(command_id="c2", text="go to the kitchen")
@@ -57,8 +57,8 @@ def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, rung, 
     assert model.asked == [], "its deadline was called in"
 
 
-def test_too_many_commands_are_refused_at_once(open_desk, later, rung, propose):
-    desk = open_desk(rung("model", propose(GO)), aside=later)
+def test_too_many_commands_are_refused_at_once(open_desk, later, back_end, propose):
+    desk = open_desk(back_end("model", propose(GO)), aside=later)
     for number in range(10):
         desk.give(command_id=f"c{number}", text=f"sing {number}")
     refused = [one for one in desk.answers() if one["event"] == "rejected"]
@@ -66,8 +66,8 @@ def test_too_many_commands_are_refused_at_once(open_desk, later, rung, propose):
     assert refused[0]["reason"] == Says.MANY_WAIT
 
 
-def test_a_rung_that_breaks_ends_its_command_and_no_other(open_desk, rung, propose):
-    desk = open_desk(rung("model", RuntimeError("out of memory"), propose(GO)))
+def test_a_rung_that_breaks_ends_its_command_and_no_other(open_desk, back_end, propose):
+    desk = open_desk(back_end("model", RuntimeError("out of memory"), propose(GO)))
     desk.give(text="sing one")
     desk.give(command_id="c2", text="sing two")
     told = desk.answers()
@@ -91,8 +91,8 @@ def test_a_fault_of_what_plans_at_once_ends_its_command_and_not_the_planner(open
 
 class TestQuestions:
     @pytest.fixture
-    def model(self, rung, propose):
-        return rung("model", WHICH, propose(PICK))
+    def model(self, back_end, propose):
+        return back_end("model", WHICH, propose(PICK))
 
     @pytest.fixture
     def desk(self, open_desk, model):
@@ -184,9 +184,9 @@ class TestQuestions:
 
 class TestReadingBack:
     @pytest.fixture
-    def desk(self, open_desk, rung, propose):
+    def desk(self, open_desk, back_end, propose):
         go = propose(GO, read_back="Shall I go to the kitchen?", saw_scene=True)
-        desk = open_desk(rung("model", go))
+        desk = open_desk(back_end("model", go))
         desk.give(text="kitchen, like, you know")
         return desk
 
@@ -199,10 +199,10 @@ class TestReadingBack:
         assert events(desk.answers()) == [("c2", "answered"), ("c1", "accepted"), ("c1", "plan")]
         assert len(desk.plans()) == 1
 
-    def test_a_correction_changes_the_plan_that_was_read_back(self, open_desk, rung, propose):
+    def test_a_correction_changes_the_plan_that_was_read_back(self, open_desk, back_end, propose):
         bring = (("pick_up", {"object": "red cup"}), ("speak", {"text": "Here is the red cup."}))
         take = propose(*bring, read_back="Shall I bring the red cup?")
-        desk = open_desk(rung("model", take))
+        desk = open_desk(back_end("model", take))
         desk.sees("red cup_1", "blue cup_2")
         desk.give(text="cup, like, you know")
         assert desk.answers()[-1]["event"] == "asked"
@@ -244,8 +244,8 @@ class TestReadingBack:
 
 class TestAQuestionOfAModel:
     @pytest.fixture
-    def model(self, rung, propose):
-        return rung("model", Ambiguous("Where shall I put it?"), propose(GO))
+    def model(self, back_end, propose):
+        return back_end("model", Ambiguous("Where shall I put it?"), propose(GO))
 
     @pytest.fixture
     def desk(self, open_desk, model):
@@ -281,16 +281,16 @@ class TestSpokenCommands:
         assert first == Says.NOT_UNDERSTOOD
         assert second == 'Sorry, I cannot do that: I do not know the place "narnia".'
 
-    def test_a_question_is_asked_aloud_and_no_is_acknowledged(self, open_desk, rung):
-        desk = open_desk(rung("model", WHICH))
+    def test_a_question_is_asked_aloud_and_no_is_acknowledged(self, open_desk, back_end):
+        desk = open_desk(back_end("model", WHICH))
         desk.give(text="hand it over", source="voice")
         desk.answers()
         desk.give(command_id="c2", text="no", source="voice")
         desk.answers()
         assert desk.said_aloud() == [str(WHICH), Says.LEFT]
 
-    def test_a_long_wait_is_announced_once(self, open_desk, later, rung, propose):
-        desk = open_desk(rung("model", propose(GO)), aside=later)
+    def test_a_long_wait_is_announced_once(self, open_desk, later, back_end, propose):
+        desk = open_desk(back_end("model", propose(GO)), aside=later)
         desk.give(text="sing one", source="voice")
         desk.answers()
         assert desk.said_aloud() == []
