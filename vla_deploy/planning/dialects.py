@@ -41,7 +41,7 @@ ACTION_KEYS: Mapping[str, tuple[str, ...]] = {
     "effects": ("effects",),
 }
 _KNOWN_KEYS: Final = frozenset(alias for aliases in ACTION_KEYS.values() for alias in aliases)
-# The typed dialect's `type` is a category beside `action`; it is dropped when a skill is named.
+# The typed dialect's `type` is a category next to `action`; it is dropped when a skill is named.
 CATEGORIES = frozenset({"navigation", "manipulation", "interaction", "perception", "movement"})
 PLAN_TEXTS = ("summary", "reasoning", "feasible", "safety_concerns", "success_criteria")
 PRIORITIES = {0: "high", 1: "high", 2: "medium", 3: "low", "critical": "high", "normal": "medium"}
@@ -184,7 +184,7 @@ def _canonical_action(action: Any, number: int, previous: str | None) -> Json:
     unknown = [key for key in given if key not in _KNOWN_KEYS]
     if unknown and any(key in given for key in ACTION_KEYS["parameters"]):
         raise PlanInvalid([f"action {number} has unknown keys: {', '.join(sorted(unknown))}"])
-    if unknown:  # the parameters stand beside the skill
+    if unknown:  # the parameters stand next to the skill
         given["parameters"] = {key: given.pop(key) for key in unknown}
     found = {key: _first(given, aliases) for key, aliases in ACTION_KEYS.items()}
     canonical = {key: value for key, value in found.items() if value is not None}

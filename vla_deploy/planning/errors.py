@@ -73,7 +73,7 @@ class CannotBeDone(PlanningError):
 
 
 class NotAble(CannotBeDone):
-    """Say what the robot lacks for such a thing, however it is said and whoever plans it."""
+    """Say what the robot lacks for such a thing, however it is said and planned."""
 
 
 class NotThere(NotAble):

@@ -127,8 +127,8 @@ class Attempt:
     def document(self) -> dict[str, Any]:
         """Return it as JSON takes it."""
         took_s = round(self.took_s, 4)
-        told = {"rung": self.back_end, "outcome": self.outcome.value, "took_s": took_s}
-        return {**told, "reason": self.reason} if self.reason else told
+        document = {"rung": self.back_end, "outcome": self.outcome.value, "took_s": took_s}
+        return {**document, "reason": self.reason} if self.reason else document
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,7 +173,7 @@ class BackEnd(Protocol):
 
         Raises:
             Declined: this back end has no plan for it.
-            Ambiguous: only the person can tell what is meant, and is asked.
+            Ambiguous: only the person knows what is meant, and is asked.
             PlanningError: this back end cannot plan it; any of the others may.
         """
         ...

@@ -173,15 +173,15 @@ class PlannerNode:
 
     def _note(self, event: Event) -> None:
         """Note what the executor publishes of a command."""
-        told, command_id = event.payload, command_id_of(event)
-        match told.get("event"):
+        payload, command_id = event.payload, command_id_of(event)
+        match payload.get("event"):
             case "setback":
-                self._manager.set_back(command_id, told)
+                self._manager.set_back(command_id, payload)
             case "rejected":
-                self._manager.turned_away(command_id, str(told.get("reason") or ""))
+                self._manager.turned_away(command_id, str(payload.get("reason") or ""))
             case "finished":
-                error = str(told.get("error") or "")
-                self._manager.has_ended(command_id, bool(told.get("success")), error)
+                error = str(payload.get("error") or "")
+                self._manager.has_ended(command_id, bool(payload.get("success")), error)
 
     def _check_age(self, event: Event) -> None:
         """Refuse what the person has given up by now: the robot must not move by surprise."""

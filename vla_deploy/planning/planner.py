@@ -35,7 +35,7 @@ from vla_deploy.planning.validator import check_plan
 
 WITHIN_S: Final = 20.0
 _REASON_CHARACTERS: Final = 200
-# What an error is called in events, and its rank: a person is told the error of the least rank.
+# What an error is called in events, and its rank: a person reads the error of the least rank.
 _ERRORS: Final = (
     (Ambiguous, AttemptOutcome.ASKED, 0),
     (PlanInvalid, AttemptOutcome.INVALID, 2),
@@ -50,7 +50,7 @@ def checked(plan: Plan, request: Request) -> Plan:
 
     Raises:
         PlanInvalid: it may not run; carries every fault.
-        Ambiguous: only the person can tell what is meant.
+        Ambiguous: only the person knows what is meant.
         PlanningError: it speaks of what the robot does not know.
     """
     grounded = ground_plan(plan, request).plan
@@ -60,7 +60,7 @@ def checked(plan: Plan, request: Request) -> Plan:
 
 
 class Planner:
-    """Hold the chain of back ends; those in `slow` are asked beside a process' steps.
+    """Hold the chain of back ends; those in `slow` are asked outside the node's steps.
 
     `away` maps models and servers that it should ask and cannot to the reason.
     """

@@ -102,7 +102,7 @@ def answer_for(places: Sequence[str]) -> type[PlanAnswer]:
 
 
 def _steps_schema(places: Sequence[str]) -> Schema:
-    """Return the JSON Schema of a list of steps, each a skill with its parameters beside it.
+    """Return the JSON Schema of a list of steps, each a skill with its parameters next to it.
 
     Places are an enumeration; a parameter that may be left out may be null.
     """

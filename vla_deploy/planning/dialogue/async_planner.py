@@ -1,4 +1,4 @@
-"""Plan one command beside the node's steps, until it is done or called off."""
+"""Plan one command outside the node's steps, until it is done or called off."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor, Future

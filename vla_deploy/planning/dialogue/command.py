@@ -25,7 +25,7 @@ class Command:
     `heard_confidence`, 0 to 1, is how sure the recogniser is of the words; None for typed text.
     `others` are what may have been said instead, the likeliest first, each with its probability
     over that of the words; with `is_doubted` the words are not sure enough to act by, and with
-    `may_ask_again` nobody minds to be asked for them once more. With `is_answer` the words are no
+    `may_ask_again` they may be asked for once more. With `is_answer` the words are no
     command of their own; with `recovers` it is under way already, and what is planned for it goes
     on after a failure.
     """
@@ -44,7 +44,7 @@ class Command:
 
     @property
     def is_spoken(self) -> bool:
-        """Tell whether it came by voice, so that answers are spoken too."""
+        """Return whether it came by voice, so that answers are spoken too."""
         return self.source == VOICE
 
 
@@ -58,7 +58,7 @@ class PlannedCommand:
 
 
 def asks_to_stop(event: Event) -> bool:
-    """Tell whether the words of an utterance want what is under way to end."""
+    """Return whether the words of an utterance want what is under way to end."""
     return is_stop(str(event.payload.get("text", "")))
 
 
@@ -76,8 +76,8 @@ def read_command(event: Event) -> Command:
     """
     given = event.payload
     plan = given.get("plan")
-    told = given.get("heard")
-    heard: Mapping[str, Any] = told if isinstance(told, Mapping) else {}
+    heard: Any = given.get("heard")
+    heard = heard if isinstance(heard, Mapping) else {}
     return Command(
         command_id=command_id_of(event),
         told_ns=event.stamp_ns,
@@ -108,10 +108,10 @@ def _words(given: Mapping[str, Any]) -> str:
 
 def _confidence(heard: Mapping[str, Any]) -> float | None:
     """Return how sure the words are; of doubted ones so little that they are read back."""
-    told = _ratio(heard.get("confidence"))
+    confidence = _ratio(heard.get("confidence"))
     if not heard.get("doubted"):
-        return told
-    return READ_BACK if told is None else min(told, READ_BACK)
+        return confidence
+    return READ_BACK if confidence is None else min(confidence, READ_BACK)
 
 
 def _ratio(value: Any) -> float | None:
@@ -120,10 +120,9 @@ def _ratio(value: Any) -> float | None:
     return min(1.0, max(0.0, float(value)))
 
 
-def _others(told: Any) -> Iterator[tuple[str, float]]:
-    for one in told if isinstance(told, list) else []:
-        text, odds = (
-            (one.get("text"), _ratio(one.get("odds"))) if isinstance(one, Mapping) else ("", 0)
-        )
+def _others(given: Any) -> Iterator[tuple[str, float]]:
+    for one in given if isinstance(given, list) else []:
+        reading = one if isinstance(one, Mapping) else {}
+        text, odds = reading.get("text"), _ratio(reading.get("odds"))
         if isinstance(text, str) and text.strip() and odds and len(text) <= MOST_CHARACTERS:
             yield text.strip(), odds

@@ -1,7 +1,7 @@
 """Decide which plans wait for a person's yes: one table of risks, each with what it says of one.
 
 The robot file sets how far it goes (`[planning] require_confirmation`): never, risky, always. What
-is unsure is always asked, since nobody has asked for it surely.
+is unsure is always asked, since it may not be what was asked for.
 """
 
 from collections.abc import Callable, Mapping, Set
@@ -50,8 +50,8 @@ def _reasons(plan: Plan, request: Request) -> dict[str, str]:
         return {}
     wanted = request.world.bounds.require_confirmation
     risks = _DOUBTS if wanted is Confirm.NEVER else {**_DOUBTS, **_RISKS}
-    told = {kind: risk(plan, request) for kind, risk in risks.items()}
-    found = {why if kind in _EACH else kind: why for kind, why in told.items() if why}
+    whys = {kind: risk(plan, request) for kind, risk in risks.items()}
+    found = {why if kind in _EACH else kind: why for kind, why in whys.items() if why}
     return {"any motion": "", **found} if wanted is Confirm.ALWAYS else found
 
 

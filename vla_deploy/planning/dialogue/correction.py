@@ -61,13 +61,13 @@ def corrected(plan: Plan, words: str) -> Plan | None:
     instead = words if wanted.is_named else _ONE.sub(kind, words)
     if not _ONE.search(words) and not wanted.is_named:
         instead = f"{words} {kind}"
-    told = tuple(
+    actions = tuple(
         _saying(action, kind, instead)
         if action.skill == "speak"
         else _with(action, set(named), instead)
         for action in plan.actions
     )
-    return plan.model_copy(update={"actions": told, "summary": "", "reasoning": ""})
+    return plan.model_copy(update={"actions": actions, "summary": "", "reasoning": ""})
 
 
 def _saying(action: Action, kind: str, instead: str) -> Action:

@@ -13,7 +13,7 @@ from vla_deploy.planning.interfaces import Answer
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import Question
 
-# What a slot of the topic holds, less what stands beside the plan.
+# What a slot of the topic holds, less what stands next to the plan.
 MOST_PLAN_BYTES: Final = 28_000
 _MOST_REASON_CHARACTERS: Final = 1_500  # of up to four bytes each
 _MOST_SPOKEN: Final = 16

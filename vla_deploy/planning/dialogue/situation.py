@@ -1,4 +1,4 @@
-"""Read what the robot tells of itself into a planner's request."""
+"""Make a planner's request of what the robot publishes of itself."""
 
 import logging
 from collections.abc import Mapping
@@ -97,10 +97,10 @@ class Situation:
         sample = self._fresh(self._executor, STATUS_AGE_S)
         if sample is None:
             return {}
-        told: Mapping[str, str | None] = sample.document().get("holding", {})
+        held: Mapping[str, str | None] = sample.document().get("holding", {})
         hands = scene.hands if scene is not None else {}
         return {
-            name: None if is_denied(hands.get(name), kind) else kind for name, kind in told.items()
+            name: None if is_denied(hands.get(name), kind) else kind for name, kind in held.items()
         }
 
     def _here(self) -> Pose | None:

@@ -40,7 +40,7 @@ _TRIAL: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """Hold what a person tells of a model."""
+    """Hold what a person says of a model."""
 
     name: str
     folder: Path

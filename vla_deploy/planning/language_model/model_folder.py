@@ -7,12 +7,13 @@ change nothing.
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 from jinja2 import TemplateError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
-from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic import AliasPath, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from vla_deploy.inference.language_schema import GENAI_CONFIG
 from vla_deploy.planning.language_model.errors import ModelFolderInvalid
@@ -22,77 +23,58 @@ CONFIG: Final = "tokenizer_config.json"
 TEMPLATE: Final = "chat_template.jinja"
 Message = Mapping[str, str]
 
+
+def _at(*keys: str, default: Any = ...) -> Any:
+    """Return a field that stands under these keys of the document's `model`."""
+    return Field(default, validation_alias=AliasPath("model", *keys))
+
+
 _Count = Annotated[int, Field(gt=0, strict=True)]
 _TokenId = Annotated[int, Field(ge=0, strict=True)]
+_TokenIds = Annotated[
+    tuple[_TokenId, ...],
+    Field(min_length=1),
+    BeforeValidator(lambda given: given if isinstance(given, list) else [given]),
+]
 _LayerName = Annotated[str, Field(pattern="%d")]
 
 
-class _Inputs(BaseModel):
-    past_key_names: _LayerName
-    past_value_names: _LayerName
-    input_ids: str = "input_ids"
-    attention_mask: str = "attention_mask"
-    position_ids: str = ""
-
-
-class _Outputs(BaseModel):
-    present_key_names: _LayerName
-    present_value_names: _LayerName
-    logits: str = "logits"
-
-
-class _Decoder(BaseModel):
-    filename: str
-    head_size: _Count
-    num_hidden_layers: _Count
-    num_key_value_heads: _Count
-    inputs: _Inputs
-    outputs: _Outputs
-
-
-class _Model(BaseModel):
-    vocab_size: _Count
-    context_length: _Count
-    eos_token_id: Annotated[
-        tuple[_TokenId, ...],
-        Field(min_length=1),
-        BeforeValidator(lambda given: given if isinstance(given, list) else [given]),
-    ]
-    decoder: _Decoder
-
-
-class _Document(BaseModel):
-    model: _Model
-
-
-class GenaiConfig:
+class GenaiConfig(BaseModel):
     """Hold the sizes of a decoder and the names of its tensors.
 
-    `past_names` and `present_names` hold key and value of each layer in turn, in the same order.
     `position_ids` is empty where the graph takes none. Tokens in `end_ids` end an answer.
     """
 
-    def __init__(self, model: _Model) -> None:
-        decoder = model.decoder
-        inputs, outputs, layers = decoder.inputs, decoder.outputs, decoder.num_hidden_layers
-        self.file_name = decoder.filename
-        self.vocabulary = model.vocab_size
-        self.context_tokens = model.context_length
-        self.kv_heads = decoder.num_key_value_heads
-        self.head_size = decoder.head_size
-        self.end_ids = model.eos_token_id
-        self.input_ids = inputs.input_ids
-        self.attention_mask = inputs.attention_mask
-        self.position_ids = inputs.position_ids
-        self.logits = outputs.logits
-        self.past_names = _in_turn(layers, inputs.past_key_names, inputs.past_value_names)
-        self.present_names = _in_turn(
-            layers, outputs.present_key_names, outputs.present_value_names
-        )
+    model_config = ConfigDict(frozen=True)
 
+    vocabulary: _Count = _at("vocab_size")
+    context_tokens: _Count = _at("context_length")
+    end_ids: _TokenIds = _at("eos_token_id")
+    file_name: str = _at("decoder", "filename")
+    head_size: _Count = _at("decoder", "head_size")
+    layers: _Count = _at("decoder", "num_hidden_layers")
+    kv_heads: _Count = _at("decoder", "num_key_value_heads")
+    input_ids: str = _at("decoder", "inputs", "input_ids", default="input_ids")
+    attention_mask: str = _at("decoder", "inputs", "attention_mask", default="attention_mask")
+    position_ids: str = _at("decoder", "inputs", "position_ids", default="")
+    past_key: _LayerName = _at("decoder", "inputs", "past_key_names")
+    past_value: _LayerName = _at("decoder", "inputs", "past_value_names")
+    logits: str = _at("decoder", "outputs", "logits", default="logits")
+    present_key: _LayerName = _at("decoder", "outputs", "present_key_names")
+    present_value: _LayerName = _at("decoder", "outputs", "present_value_names")
 
-def _in_turn(layers: int, *patterns: str) -> tuple[str, ...]:
-    return tuple(pattern % layer for layer in range(layers) for pattern in patterns)
+    @cached_property
+    def past_names(self) -> tuple[str, ...]:
+        """Return the inputs that hold key and value of each layer in turn."""
+        return self._in_turn(self.past_key, self.past_value)
+
+    @cached_property
+    def present_names(self) -> tuple[str, ...]:
+        """Return the outputs that hold key and value of each layer, in the same order."""
+        return self._in_turn(self.present_key, self.present_value)
+
+    def _in_turn(self, *patterns: str) -> tuple[str, ...]:
+        return tuple(pattern % layer for layer in range(self.layers) for pattern in patterns)
 
 
 def read_genai_config(folder: Path) -> GenaiConfig:
@@ -103,7 +85,7 @@ def read_genai_config(folder: Path) -> GenaiConfig:
     """
     document = _json_object(folder, GENAI_CONFIG)
     try:
-        return GenaiConfig(_Document.model_validate(document).model)
+        return GenaiConfig.model_validate(document)
     except ValidationError as error:
         faults = tuple(
             f"{GENAI_CONFIG}: {'.'.join(map(str, one['loc']))}: {one['msg']}"

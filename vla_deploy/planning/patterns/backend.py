@@ -42,7 +42,7 @@ class Patterns(BackEnd):
             plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
             return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None, order=order)
         plan = pattern_plan(request)
-        # What may stand in a slot has no words beside it that change anything.
+        # Around the slots there are no words that change anything.
         return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None)
 
 

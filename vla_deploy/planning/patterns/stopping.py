@@ -29,7 +29,7 @@ _URGING: Final = frozenset(
 
 
 def is_stop(text: str) -> bool:
-    """Tell whether a command means: stop what you are doing."""
+    """Return whether a command means: stop what you are doing."""
     if len(text) > MOST_CHARACTERS:
         return False
     bare = [_urged_off(courtesy_off(part)) for part in _SENTENCE.split(text)]

@@ -88,13 +88,13 @@ def _held(what: str | None) -> str | None:
 
 
 def _turn(turn: Turn) -> dict[str, str]:
-    told = {
+    row = {
         "person": plain(turn.said, SENTENCE_CHARACTERS),
         "done": plain(turn.understood, SENTENCE_CHARACTERS),
         "robot": plain(turn.answer, SENTENCE_CHARACTERS),
         "ended": turn.outcome.value,
     }
-    return {key: value for key, value in told.items() if value}
+    return {key: value for key, value in row.items() if value}
 
 
 def fitted(situation: Mapping[str, Any], room: int) -> dict[str, Any]:

@@ -122,18 +122,18 @@ def numbered(plan: Plan, number: int) -> Plan:
     return plan.model_copy(update={"actions": actions})
 
 
-def read_setback(told: Mapping[str, Any], plan: Plan) -> Setback | None:
-    """Return what failed of that plan; None where the event speaks of another one."""
-    action = next((one for one in plan.actions if one.id == told.get("action_id")), None)
+def read_setback(event: Mapping[str, Any], plan: Plan) -> Setback | None:
+    """Return what failed of that plan; None where the event is about another one."""
+    action = next((one for one in plan.actions if one.id == event.get("action_id")), None)
     if action is None:
         return None
-    done = frozenset(str(one) for one in told.get("done", ()))
-    left: Mapping[str, Mapping[str, float]] = told.get("left", {})
+    done = frozenset(str(one) for one in event.get("done", ()))
+    left: Mapping[str, Mapping[str, float]] = event.get("left", {})
     return Setback(
         action=action,
-        error=str(told.get("error") or "no reason told"),
+        error=str(event.get("error") or "no reason told"),
         done=tuple(one for one in execution_order(plan.actions) if one.id in done),
-        cause=Cause(told.get("cause", Cause.SKILL)),
+        cause=Cause(event.get("cause", Cause.SKILL)),
         left=tuple(_rest(one, left[one.id]) for one in plan.actions if one.id in left),
     )
 
@@ -144,8 +144,8 @@ def _rest(action: Action, left: Mapping[str, float]) -> Action:
 
 
 def _words(action: Action) -> str:
-    told = ", ".join(f"{name} {value}" for name, value in action.parameters.items())
-    return f"{action.skill}({told})"
+    given = ", ".join(f"{name} {value}" for name, value in action.parameters.items())
+    return f"{action.skill}({given})"
 
 
 def _same(one: Action, other: Action) -> bool:
