@@ -15,10 +15,10 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
 from vla_deploy.planning.assembly import planner_for
-from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.interfaces import Answer, Attempt, Request
+from vla_deploy.planning.interfaces import Attempt, PlanningResult, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription, load_robot
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def told(answer: Answer, away: Mapping[str, str]) -> dict[str, Any]:
+def told(answer: PlanningResult, away: Mapping[str, str]) -> dict[str, Any]:
     """Return an answer as scripts read it, and who could not be asked, by why."""
     proposal = answer.proposal
     is_asked = isinstance(answer.error, Ambiguous)
@@ -85,7 +85,7 @@ def told(answer: Answer, away: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def as_text(answer: Answer, away: Mapping[str, str]) -> str:
+def as_text(answer: PlanningResult, away: Mapping[str, str]) -> str:
     """Return an answer as lines for a person, and who could not be asked."""
     lines = [_attempt_line(one) for one in answer.attempts]
     lines += [f"{name} away: {why}" for name, why in away.items()]
@@ -119,7 +119,7 @@ def _session(arguments: argparse.Namespace) -> Session | None:
 
 
 def _request(arguments: argparse.Namespace, robot: RobotDescription) -> Request:
-    command = Command(command_id="plan", told_ns=0, text=arguments.text)
+    command = UserCommand(command_id="plan", told_ns=0, text=arguments.text)
     session = _session(arguments)
     if session is None:
         request = Request(command_id="plan", text=command.text, world=world_of(robot, {}))

@@ -132,7 +132,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class PlanningResult:
     """Hold what came of a command: a `plan` that may run, or why there is none.
 
     `proposal` is the plan as its back end proposed it, before it was grounded and checked.

@@ -14,7 +14,7 @@ from vla_deploy.node import NodeContext
 from vla_deploy.planning.assembly import planner_for
 from vla_deploy.planning.dialogue.active_plans import RESTARTED
 from vla_deploy.planning.dialogue.command import (
-    Command,
+    UserCommand,
     asks_to_stop,
     command_id_of,
     read_command,
@@ -162,7 +162,7 @@ class PlannerNode:
             self._refuse(command_id_of(event), str(error))
 
     def _refuse(self, command_id: str, reason: str) -> None:
-        self._publisher.refused(Command(command_id=command_id, told_ns=0), reason)
+        self._publisher.refused(UserCommand(command_id=command_id, told_ns=0), reason)
 
     def _stops_all(self, event: Event) -> bool:
         """Return whether all is to end; "never mind" to a question ends the question alone."""

@@ -17,11 +17,11 @@ from vla_deploy.planning.errors import (
 )
 from vla_deploy.planning.interfaces import (
     Aid,
-    Answer,
     Attempt,
     AttemptOutcome,
     BackEnd,
     Check,
+    PlanningResult,
     Proposal,
     Request,
 )
@@ -112,27 +112,29 @@ class Planner:
         for one in self._slow:
             one.close()
 
-    def plan(self, request: Request) -> Answer:
+    def plan(self, request: Request) -> PlanningResult:
         """Return the answer of all back ends together; blocks until then."""
         deadline = Deadline.within(self._clock, self.within_s)
         answer = self.plan_at_once(request, deadline)
         return answer if answer.is_final else self.plan_slowly(request, deadline, answer)
 
-    def plan_at_once(self, request: Request, deadline: Deadline) -> Answer:
+    def plan_at_once(self, request: Request, deadline: Deadline) -> PlanningResult:
         """Return the answer of the back ends that take no time."""
         answer = self.first_plan(self._quick, request, deadline)
         return answer if self._slow else _worded(answer, request)
 
-    def plan_slowly(self, request: Request, deadline: Deadline, before: Answer) -> Answer:
+    def plan_slowly(
+        self, request: Request, deadline: Deadline, before: PlanningResult
+    ) -> PlanningResult:
         """Return the answer of the others too; blocks until the deadline at most."""
         return _worded(self.first_plan(self._slow, request, deadline, before), request)
 
-    def check_given(self, document: Json | list[object] | str, request: Request) -> Answer:
+    def check_given(self, document: Json | list[object] | str, request: Request) -> PlanningResult:
         """Return the answer to a plan that was made elsewhere, in any dialect."""
         deadline = Deadline.within(self._clock, self.within_s)
         return self.first_plan((_GivenPlan(document),), request, deadline)
 
-    def accepted(self, request: Request, answer: Answer) -> None:
+    def accepted(self, request: Request, answer: PlanningResult) -> None:
         """Keep a plan that was dispatched for when the same is asked again."""
         if answer.proposal is not None and answer.proposal.back_end != self.cache.name:
             self.cache.keep(request, answer.proposal)
@@ -142,14 +144,14 @@ class Planner:
         back_ends: Sequence[BackEnd],
         request: Request,
         deadline: Deadline,
-        before: Answer | None = None,
-    ) -> Answer:
+        before: PlanningResult | None = None,
+    ) -> PlanningResult:
         """Return the first plan that may run; `before` is what came of those asked before.
 
         Each back end may take an equal share of the time that is left for all that could still be
         asked. Without a plan, the answer has the error of those that helps a person most.
         """
-        answer = before or Answer()
+        answer = before or PlanningResult()
         for number, back_end in enumerate(back_ends):
             if answer.is_final:
                 break
@@ -167,7 +169,9 @@ class Planner:
             answer = replace(found, attempts=(*answer.attempts, attempt), error=error)
         return answer
 
-    def _ask(self, back_end: BackEnd, request: Request, share: Deadline, whole: Deadline) -> Answer:
+    def _ask(
+        self, back_end: BackEnd, request: Request, share: Deadline, whole: Deadline
+    ) -> PlanningResult:
         try:
             if share.left_s <= 0.0:
                 raise Declined("no time is left")
@@ -176,8 +180,8 @@ class Planner:
             if whole.left_s <= 0.0:
                 raise Declined("its plan came too late")
         except PlanningError as error:
-            return Answer(error=error)
-        return Answer(plan=plan, proposal=proposal)
+            return PlanningResult(error=error)
+        return PlanningResult(plan=plan, proposal=proposal)
 
 
 class _GivenPlan(BackEnd):
@@ -205,7 +209,7 @@ def _outcome(error: PlanningError | None, share: Deadline) -> AttemptOutcome:
     return AttemptOutcome.LATE if is_late else outcome
 
 
-def _worded(answer: Answer, request: Request) -> Answer:
+def _worded(answer: PlanningResult, request: Request) -> PlanningResult:
     """Replace the error by "not understood" where no back end has said more."""
     if isinstance(answer.error, Declined):
         return replace(answer, error=NotUnderstood(request.text))

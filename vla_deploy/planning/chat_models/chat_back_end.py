@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer, answer_for
-from vla_deploy.planning.chat_models.voting import Candidate
+from vla_deploy.planning.chat_models.voting import PlanCandidate
 from vla_deploy.planning.dialogue.phrasing import Says, steps_in_words
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone
 from vla_deploy.planning.interfaces import Aid, BackEnd, Check, Proposal, Request
@@ -24,7 +24,7 @@ class ChatBackEnd(BackEnd):
         self.shape = answer_for(places)
         self._check = check
 
-    def candidate(self, answer: PlanAnswer, request: Request) -> Candidate:
+    def candidate(self, answer: PlanAnswer, request: Request) -> PlanCandidate:
         """Return the plan that a model has answered, if it may run.
 
         Raises:
@@ -39,10 +39,10 @@ class ChatBackEnd(BackEnd):
             raise CannotBeDone(f"{self.name} sees no way to do it: {reason}")
         plan = answer.plan(request.text)
         checked = self._check(plan, request)
-        return Candidate(plan=plan, checked=checked, confidence=answer.confidence)
+        return PlanCandidate(plan=plan, checked=checked, confidence=answer.confidence)
 
     def proposal(
-        self, candidate: Candidate, confidence: float, *, is_momentary: bool = False
+        self, candidate: PlanCandidate, confidence: float, *, is_momentary: bool = False
     ) -> Proposal:
         """Return a plan with what is read back of it where the model is not sure."""
         steps = steps_in_words(candidate.checked)

@@ -16,10 +16,10 @@ from vla_deploy.planning.chat_models.chat_back_end import ChatBackEnd
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.interfaces import Check, Proposal, Request
 from vla_deploy.planning.language_model import (
-    Answer,
-    Bounds,
+    AnswerBounds,
     LanguageModel,
     Message,
+    ModelAnswer,
     open_language_model,
 )
 from vla_deploy.planning.prompts.composing import chat_for
@@ -53,7 +53,7 @@ class LocalModel(ChatBackEnd):
             PlanInvalid: what it plans may not run.
         """
         chat = chat_for(request, self.robot, "structured", self._room)
-        bounds = Bounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
+        bounds = AnswerBounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
         try:
             answer = self.model.answer(messages_of(chat), bounds, self._schema)
             found = self.shape.model_validate_json(answer.text)
@@ -70,7 +70,7 @@ class LocalModel(ChatBackEnd):
         self.claim.release()
 
 
-def certainty_of(answer: Answer) -> float:
+def certainty_of(answer: ModelAnswer) -> float:
     """Return the geometric mean of the probabilities of the tokens that were chosen."""
     chosen = answer.chosen
     return math.exp(sum(chosen) / len(chosen)) if chosen else 1.0

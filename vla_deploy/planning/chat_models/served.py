@@ -14,7 +14,7 @@ from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.one_line import one_line
 from vla_deploy.planning.chat_models.chat_back_end import SURE, ChatBackEnd
 from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
-from vla_deploy.planning.chat_models.voting import Candidate, elected
+from vla_deploy.planning.chat_models.voting import PlanCandidate, elected
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanningError
 from vla_deploy.planning.interfaces import Aid, Check, Proposal, Request
 from vla_deploy.planning.prompts.composing import DEFAULT_ROOM, chat_for, filled
@@ -72,7 +72,7 @@ class ServedModel(ChatBackEnd):
             Ambiguous: the model asks something, or what it names is not clear.
             PlanInvalid: what it plans may not run, also after it was sent the reason.
         """
-        found: list[Candidate] = []
+        found: list[PlanCandidate] = []
         asked = 0
         failure: PlanningError = Declined("it was not asked")
         for way in _WAYS[: self._effort.candidates]:
@@ -94,7 +94,7 @@ class ServedModel(ChatBackEnd):
         was_shown = self._image(request) is not None
         return self.proposal(candidate, confidence, is_momentary=was_shown)
 
-    def _planned(self, request: Request, way: str, deadline: Deadline) -> Candidate:
+    def _planned(self, request: Request, way: str, deadline: Deadline) -> PlanCandidate:
         """Return one plan that may run; a model whose plan is refused is sent the reason, once."""
         image = self._image(request)
         jpeg = None if image is None else small_jpeg(image)

@@ -14,7 +14,7 @@ Meaning = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
+class PlanCandidate:
     """Hold a plan that may run, and how sure its model is of it, 0 to 1.
 
     `plan` is as it was proposed, `checked` as it would run.
@@ -26,8 +26,8 @@ class Candidate:
 
 
 def elected(
-    candidates: Sequence[Candidate], asked: int, places: Mapping[str, str]
-) -> tuple[Candidate, float]:
+    candidates: Sequence[PlanCandidate], asked: int, places: Mapping[str, str]
+) -> tuple[PlanCandidate, float]:
     """Return the plan that most candidates share, and how sure the vote makes it.
 
     Between equals the more feasible one is taken. `asked` is how many plans were asked for: one
@@ -85,7 +85,7 @@ def _object(words: str) -> str:
         return words
 
 
-def _ease(candidate: Candidate) -> tuple[float, float, int]:
+def _ease(candidate: PlanCandidate) -> tuple[float, float, int]:
     """Return how feasible a plan is: its weakest action, how sure its model is, how short it is."""
     actions = candidate.checked.actions
     weakest = min((one.feasibility_score for one in actions), default=0.0)

@@ -35,7 +35,7 @@ from vla_deploy.planning.command_parser.wording import (
 )
 from vla_deploy.planning.errors import Declined
 from vla_deploy.planning.interfaces import BackEnd, Proposal, Request, Sureness
-from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
+from vla_deploy.planning.language_model import AnswerBounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import WORDS, ScopeGroup
 
@@ -135,7 +135,7 @@ class CommandParser(BackEnd):
             raise Declined("no words that I know")
         if len(words) > MOST_COMMAND_WORDS:
             raise Declined(f"{len(words)} words, more than the {MOST_COMMAND_WORDS} of a command")
-        bounds = Bounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
+        bounds = AnswerBounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
         message = {"role": "user", "content": " ".join(words)}
         answer = self.model.answer([message], bounds, answer_schema(words))
         steps = tuple(map(_stripped, json.loads(answer.text)["steps"]))

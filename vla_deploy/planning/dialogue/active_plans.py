@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import CannotBeDone
-from vla_deploy.planning.interfaces import Answer
+from vla_deploy.planning.interfaces import PlanningResult
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery import RECOVERY, Carried, read_setback
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
@@ -24,10 +24,14 @@ class ActivePlans:
 
     def __init__(self, further_plans: int = NOT_BOUNDED.further_plans) -> None:
         self._further_plans = further_plans
-        self._active: OrderedDict[str, tuple[Command, Carried]] = OrderedDict()
+        self._active: OrderedDict[str, tuple[UserCommand, Carried]] = OrderedDict()
 
     def add(
-        self, command: Command, plan: Plan, answer: Answer, agreed: frozenset[str] = frozenset()
+        self,
+        command: UserCommand,
+        plan: Plan,
+        answer: PlanningResult,
+        agreed: frozenset[str] = frozenset(),
     ) -> None:
         """Note that the executor has a plan: the first for a command, or one after a failure.
 
@@ -44,7 +48,7 @@ class ActivePlans:
         while len(self._active) > _MOST_REMEMBERED:
             self._active.popitem(last=False)
 
-    def agreed(self, command: Command) -> frozenset[str]:
+    def agreed(self, command: UserCommand) -> frozenset[str]:
         """Return what the person need not be asked again for another plan of a command."""
         carried = self.of(command.command_id) if command.recovers else None
         return frozenset() if carried is None else carried.agreed
@@ -54,7 +58,7 @@ class ActivePlans:
         known = self._active.get(command_id)
         return None if known is None else known[1]
 
-    def set_back(self, command_id: str, setback: Mapping[str, Any]) -> Command:
+    def set_back(self, command_id: str, setback: Mapping[str, Any]) -> UserCommand:
         """Note that a plan failed, and return the command to plan anew.
 
         Raises:

@@ -15,7 +15,7 @@ from drivers.clock import Clock
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.builders.steps import is_seen
 from vla_deploy.planning.command_parser.rung import NAME as COMMAND_PARSER
-from vla_deploy.planning.dialogue.command import READ_BACK, Command, PlannedCommand
+from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 
 PATIENCE_S: Final = 1.0
 """So long other readings are given to back ends that take time, too."""
@@ -33,11 +33,11 @@ class NBestRetry:
         self._clock = clock
         self._patience = Deadline.within(clock, 0.0)
 
-    def is_urgent(self, command: Command) -> bool:
+    def is_urgent(self, command: UserCommand) -> bool:
         """Return whether a reading may only be given to back ends that answer at once."""
         return self._first_of(command) is not None and self._patience.left_s <= 0.0
 
-    def within_s(self, command: Command, usual_s: float) -> float:
+    def within_s(self, command: UserCommand, usual_s: float) -> float:
         """Return how long planning a reading may take; all others share what patience is left."""
         left_s = self._patience.left_s
         return min(usual_s, left_s) if self._first_of(command) and left_s > 0.0 else usual_s
@@ -46,7 +46,7 @@ class NBestRetry:
         """Forget the command: it is given up."""
         self._first = None
 
-    def next(self, done: PlannedCommand) -> Command | PlannedCommand:
+    def next(self, done: PlannedCommand) -> UserCommand | PlannedCommand:
         """Return the command in the next words to try, or what is to be concluded.
 
         Of readings without a plan the first is concluded.
@@ -62,7 +62,7 @@ class NBestRetry:
 
     def _other_reading(
         self, done: PlannedCommand, first: PlannedCommand | None, *, gives_way: bool
-    ) -> Command | None:
+    ) -> UserCommand | None:
         command = done.command
         if not command.is_spoken or command.recovers:
             return None
@@ -77,7 +77,7 @@ class NBestRetry:
             command = replace(command, others=tuple(readings))
         return _in_other_words(command, first.command)
 
-    def _first_of(self, command: Command) -> PlannedCommand | None:
+    def _first_of(self, command: UserCommand) -> PlannedCommand | None:
         first = self._first
         same = first is not None and first.command.command_id == command.command_id
         return first if same else None
@@ -97,12 +97,12 @@ def _gives_way(done: PlannedCommand) -> bool:
     return not all(is_seen(str(text), done.request) for text in sought)
 
 
-def _is_unsure(command: Command) -> bool:
+def _is_unsure(command: UserCommand) -> bool:
     sure = command.heard_confidence
     return sure is not None and sure < WELL_HEARD
 
 
-def _readings(command: Command) -> Iterator[tuple[str, float]]:
+def _readings(command: UserCommand) -> Iterator[tuple[str, float]]:
     """Yield all other readings of a command, and of each its words alone."""
     tried = {_spoken(command.text)}
     for text, odds in ((command.text, 1.0), *command.others):
@@ -122,7 +122,7 @@ def _spoken(text: str) -> str:
     return text.lower().strip(" ,;:.!?")
 
 
-def _in_other_words(command: Command, first: Command) -> Command | None:
+def _in_other_words(command: UserCommand, first: UserCommand) -> UserCommand | None:
     """Return a command in the next of its other readings, as sure as that is."""
     if not command.others:
         return None

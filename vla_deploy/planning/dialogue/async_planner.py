@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.dialogue.command import Command, PlannedCommand
-from vla_deploy.planning.interfaces import Answer, Request
+from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
+from vla_deploy.planning.interfaces import PlanningResult, Request
 
 # A person who speaks to the robot hears by then that it has heard.
 PATIENCE_S: Final = 1.5
@@ -17,10 +17,10 @@ PATIENCE_S: Final = 1.5
 class PlanningJob:
     """Hold a command whose planning takes time."""
 
-    command: Command
+    command: UserCommand
     request: Request
     deadline: Deadline
-    future: "Future[Answer]"
+    future: "Future[PlanningResult]"
     patience: Deadline | None
 
     def result(self) -> PlannedCommand:
@@ -36,12 +36,16 @@ class AsyncPlanner:
         self._job: PlanningJob | None = None
 
     @property
-    def command(self) -> Command | None:
+    def command(self) -> UserCommand | None:
         """Return the command that is being planned."""
         return None if self._job is None else self._job.command
 
     def begin(
-        self, command: Command, request: Request, deadline: Deadline, plan: Callable[[], Answer]
+        self,
+        command: UserCommand,
+        request: Request,
+        deadline: Deadline,
+        plan: Callable[[], PlanningResult],
     ) -> None:
         """Begin to plan; no other command may be in work."""
         self._job = PlanningJob(
@@ -60,7 +64,7 @@ class AsyncPlanner:
         self._job = None
         return job
 
-    def take_tedious(self) -> Command | None:
+    def take_tedious(self) -> UserCommand | None:
         """Return the command that takes longer than people like to wait in silence, once."""
         job = self._job
         if job is None or job.patience is None or job.patience.left_s > 0.0:
@@ -68,7 +72,7 @@ class AsyncPlanner:
         job.patience = None
         return job.command
 
-    def call_off(self) -> Command | None:
+    def call_off(self) -> UserCommand | None:
         """Give up what is being planned, and return the command that it was."""
         job, self._job = self._job, None
         if job is None:

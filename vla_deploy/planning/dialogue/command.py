@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from vla_deploy.ipc import Event
 from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
-from vla_deploy.planning.interfaces import Answer, Request
+from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.patterns.stopping import is_stop
 from vla_deploy.planning.plan import MOST_CHARACTERS
 
@@ -19,7 +19,7 @@ _MOST_OTHERS: Final = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Command:
+class UserCommand:
     """Hold one utterance: words, or a `plan` made elsewhere.
 
     `heard_confidence`, 0 to 1, is how sure the recogniser is of the words; None for typed text.
@@ -52,9 +52,9 @@ class Command:
 class PlannedCommand:
     """Hold a command, the request that was made of it, and what came of that."""
 
-    command: Command
+    command: UserCommand
     request: Request
-    answer: Answer
+    answer: PlanningResult
 
 
 def asks_to_stop(event: Event) -> bool:
@@ -67,7 +67,7 @@ def command_id_of(event: Event) -> str:
     return str(event.payload.get("command_id", ""))[:_ID_CHARACTERS]
 
 
-def read_command(event: Event) -> Command:
+def read_command(event: Event) -> UserCommand:
     """Return the command that an utterance holds.
 
     Raises:
@@ -78,7 +78,7 @@ def read_command(event: Event) -> Command:
     plan = given.get("plan")
     heard: Any = given.get("heard")
     heard = heard if isinstance(heard, Mapping) else {}
-    return Command(
+    return UserCommand(
         command_id=command_id_of(event),
         told_ns=event.stamp_ns,
         source=str(given.get("source", "")),

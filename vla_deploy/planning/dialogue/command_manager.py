@@ -15,15 +15,15 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
 from vla_deploy.planning.dialogue.asr_nbest_retry import NBestRetry
 from vla_deploy.planning.dialogue.async_planner import AsyncPlanner
-from vla_deploy.planning.dialogue.command import READ_BACK, Command, PlannedCommand
+from vla_deploy.planning.dialogue.command import READ_BACK, PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.correction import CORRECTED, corrected_by
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState, PendingQuestion
-from vla_deploy.planning.dialogue.dispatch import Dispatcher
+from vla_deploy.planning.dialogue.dispatch import CommandDispatcher
 from vla_deploy.planning.dialogue.event_publisher import EventPublisher
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import CannotBeDone, PlanningError
-from vla_deploy.planning.interfaces import Answer, Proposal, Request
+from vla_deploy.planning.interfaces import PlanningResult, Proposal, Request
 from vla_deploy.planning.metrics import PlannerMetrics
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.planner import Planner
@@ -56,11 +56,13 @@ class CommandManager:
         self._events = events
         self._async = AsyncPlanner(executor)
         self._clock = clock
-        self._queue: deque[Command] = deque()
+        self._queue: deque[UserCommand] = deque()
         self._active = ActivePlans(further_plans)
         self._retry = NBestRetry(clock)
         self._prohibitions = prohibitions or Prohibitions()
-        self._dispatcher = Dispatcher(self._accept, situation, events, self.dialogue, self._active)
+        self._dispatcher = CommandDispatcher(
+            self._accept, situation, events, self.dialogue, self._active
+        )
 
     @property
     def metrics(self) -> PlannerMetrics:
@@ -69,11 +71,11 @@ class CommandManager:
 
     # --- what comes in --------------------------------------------------------------------------
 
-    def take(self, command: Command) -> None:
+    def take(self, command: UserCommand) -> None:
         """Take an utterance: the answer to what was asked, or a command of its own."""
         self._guarded(command, partial(self._take, command))
 
-    def _take(self, command: Command) -> None:
+    def _take(self, command: UserCommand) -> None:
         pending = self.dialogue.pending
         if pending is not None and command.is_doubted:
             reason = f"heard too badly to answer: {pending.question.text}"
@@ -150,7 +152,7 @@ class CommandManager:
             "prohibitions": self._prohibitions.document(),
         }
 
-    def _begin(self, command: Command) -> None:
+    def _begin(self, command: UserCommand) -> None:
         request = self._request(command)
         if command.plan is not None:
             answer = self.planner.check_given(command.plan, request)
@@ -187,12 +189,12 @@ class CommandManager:
     def _conclude(self, done: PlannedCommand) -> None:
         """Conclude a command, or try it next in other words that may have been said."""
         found = self._retry.next(done)
-        if isinstance(found, Command):
+        if isinstance(found, UserCommand):
             self._queue.appendleft(found)
         else:
             self._dispatcher.conclude(found)
 
-    def _guarded(self, command: Command, work: Callable[[], None]) -> None:
+    def _guarded(self, command: UserCommand, work: Callable[[], None]) -> None:
         """Do work for one command; a fault of the planner ends that command, and no other."""
         error = AtOnce().submit(work).exception()
         if error is not None:
@@ -200,20 +202,20 @@ class CommandManager:
             self.metrics.failed += 1
             self._dispatcher.refuse(command, f"the planner failed: {type(error).__name__}")
 
-    def _accept(self, request: Request, answer: Answer) -> None:
+    def _accept(self, request: Request, answer: PlanningResult) -> None:
         """Obey an order from now on, whatever planner another profile brings."""
         if answer.proposal is not None and answer.proposal.order is not None:
             self._prohibitions.apply(answer.proposal.order)
         self.planner.accepted(request, answer)
 
-    def _request(self, command: Command) -> Request:
+    def _request(self, command: UserCommand) -> Request:
         talk = self.dialogue.conversation
         request = self._situation.request(command, talk, of_use=self.planner.uses)
         return replace(request, prohibitions=self._prohibitions.items)
 
     # --- answers --------------------------------------------------------------------------------
 
-    def _takes_as_answer(self, command: Command, pending: PendingQuestion) -> bool:
+    def _takes_as_answer(self, command: UserCommand, pending: PendingQuestion) -> bool:
         """Take an utterance as an answer if it can be one; else the question is dropped for it."""
         go_on = self._continuation(command, pending)
         if go_on is not None:
@@ -227,7 +229,7 @@ class CommandManager:
         return True
 
     def _continuation(
-        self, command: Command, pending: PendingQuestion
+        self, command: UserCommand, pending: PendingQuestion
     ) -> Callable[[], None] | None:
         """Return how an utterance lets the pending command go on, None where it is no answer."""
         if command.plan is not None:
@@ -248,7 +250,7 @@ class CommandManager:
             return partial(self._go_on, replace(pending, command=doubted), guessed)
         return None
 
-    def _at_once(self, command: Command) -> Answer:
+    def _at_once(self, command: UserCommand) -> PlanningResult:
         """Return what words that may be an answer are as a command, without slow planning."""
         deadline = self._deadline(self.planner.within_s)
         return self.planner.plan_at_once(self._request(command), deadline)
@@ -281,9 +283,9 @@ class CommandManager:
         request = self._request(pending.command)
         proposal = Proposal(plan=plan, back_end=CORRECTED, confidence=1.0)
         try:
-            answer = Answer(plan=self.planner.check(plan, request), proposal=proposal)
+            answer = PlanningResult(plan=self.planner.check(plan, request), proposal=proposal)
         except PlanningError as error:
-            answer = Answer(error=error)
+            answer = PlanningResult(error=error)
         self._dispatcher.conclude(PlannedCommand(pending.command, request, answer))
 
     def _run_confirmed(self, pending: PendingQuestion, plan: Plan) -> None:

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from drivers.clock import Clock
-from vla_deploy.planning.dialogue.command import Command, PlannedCommand
+from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.phrasing import Says
 from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.interfaces import Answer
+from vla_deploy.planning.interfaces import PlanningResult
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import (
     Conversation,
@@ -26,8 +26,8 @@ MOST_ASKED: Final = 3
 class PendingQuestion:
     """Hold the command that waits for an answer; `plan` is what a yes lets run."""
 
-    command: Command
-    answer: Answer
+    command: UserCommand
+    answer: PlanningResult
     question: Question
     times_asked: int = 1
 

@@ -3,14 +3,14 @@
 from collections.abc import Callable
 
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
-from vla_deploy.planning.dialogue.command import Command, PlannedCommand
+from vla_deploy.planning.dialogue.command import PlannedCommand, UserCommand
 from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of
 from vla_deploy.planning.dialogue.dialogue_state import DialogueState
 from vla_deploy.planning.dialogue.event_publisher import EventPublisher
 from vla_deploy.planning.dialogue.phrasing import Says, spoken_refusal
 from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous, PlanInvalid, PlanningError
-from vla_deploy.planning.interfaces import Answer, Request
+from vla_deploy.planning.interfaces import PlanningResult, Request
 from vla_deploy.planning.metrics import PlannerMetrics
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.recovery import numbered
@@ -18,7 +18,7 @@ from vla_deploy.planning.understanding import Outcome, Turn
 from vla_deploy.planning.understanding.mentioned import mentions_of
 
 
-class Dispatcher:
+class CommandDispatcher:
     """Conclude commands, publish it, and remember it for what is said next.
 
     `accepted` is called for every plan that is dispatched for a command of its own.
@@ -26,7 +26,7 @@ class Dispatcher:
 
     def __init__(
         self,
-        accepted: Callable[[Request, Answer], None],
+        accepted: Callable[[Request, PlanningResult], None],
         situation: Situation,
         events: EventPublisher,
         dialogue: DialogueState,
@@ -89,9 +89,9 @@ class Dispatcher:
 
     def refuse(
         self,
-        command: Command,
+        command: UserCommand,
         reason: PlanningError | str,
-        answer: Answer | None = None,
+        answer: PlanningResult | None = None,
         outcome: Outcome = Outcome.REFUSED,
     ) -> None:
         """Say why a command is not done."""

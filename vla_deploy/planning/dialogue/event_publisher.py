@@ -6,10 +6,10 @@ from typing import Any, Final
 from drivers.clock import Clock
 from vla_deploy.ipc import RingWriter, SharedSpace
 from vla_deploy.ipc.announcer import Announcer
-from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.dialogue.phrasing import Says, first_part
 from vla_deploy.planning.errors import PlanInvalid
-from vla_deploy.planning.interfaces import Answer
+from vla_deploy.planning.interfaces import PlanningResult
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.understanding import Question
 
@@ -27,9 +27,9 @@ class EventPublisher:
         self._events: RingWriter = space.ring_writer("task_event")
         self._voice = Announcer(space, "planner", clock)
         # Commands that came by voice and are carried out now, and whether their plan ends aloud.
-        self._spoken: OrderedDict[str, tuple[Command, bool]] = OrderedDict()
+        self._spoken: OrderedDict[str, tuple[UserCommand, bool]] = OrderedDict()
 
-    def say(self, command: Command, text: str) -> None:
+    def say(self, command: UserCommand, text: str) -> None:
         """Say something to a person who gave a command by voice; others read it."""
         if command.is_spoken:
             self._voice.say(text)
@@ -49,15 +49,15 @@ class EventPublisher:
         self._spoken.clear()
         self._plans.publish({"command_id": command_id, "cancel": True})
 
-    def planning(self, command: Command, back_ends: tuple[str, ...]) -> None:
+    def planning(self, command: UserCommand, back_ends: tuple[str, ...]) -> None:
         """Publish that a plan takes time, and which back ends are asked."""
         self._publish(command, "planning", rungs=list(back_ends))
 
-    def queued(self, command: Command, place: int) -> None:
+    def queued(self, command: UserCommand, place: int) -> None:
         """Publish that others are planned first."""
         self._publish(command, "queued", place=place)
 
-    def asked(self, command: Command, question: Question, plan: Plan | None) -> None:
+    def asked(self, command: UserCommand, question: Question, plan: Plan | None) -> None:
         """Ask what only the person knows; `plan` is what a yes lets run."""
         self._publish(
             command,
@@ -69,11 +69,13 @@ class EventPublisher:
         )
         self.say(command, question.text)
 
-    def answered(self, answer: Command, asked: Command) -> None:
+    def answered(self, answer: UserCommand, asked: UserCommand) -> None:
         """Publish that an utterance answers a question; more events follow for that command."""
         self._publish(answer, "answered", of=asked.command_id)
 
-    def refused(self, command: Command, reason: str, answer: Answer | None = None) -> None:
+    def refused(
+        self, command: UserCommand, reason: str, answer: PlanningResult | None = None
+    ) -> None:
         """Publish why nothing is done, and what every back end said."""
         self._publish(command, "rejected", reason=_bounded(reason), **_attempts(answer))
 
@@ -91,7 +93,7 @@ class EventPublisher:
         if length > MOST_PLAN_BYTES:
             raise PlanInvalid([f"expected at most {MOST_PLAN_BYTES} bytes of JSON, got {length}"])
 
-    def dispatched(self, command: Command, plan: Plan, answer: Answer) -> None:
+    def dispatched(self, command: UserCommand, plan: Plan, answer: PlanningResult) -> None:
         """Give a plan to the executor, and publish which back end made it."""
         document = plan.model_dump(mode="json")
         if not command.recovers:
@@ -103,7 +105,7 @@ class EventPublisher:
             while len(self._spoken) > _MOST_SPOKEN:
                 self._spoken.popitem(last=False)
 
-    def _publish(self, command: Command, event: str, **details: Any) -> None:
+    def _publish(self, command: UserCommand, event: str, **details: Any) -> None:
         self._events.publish({"command_id": command.command_id, "event": event} | details)
 
 
@@ -113,7 +115,7 @@ def _bounded(reason: str) -> str:
     return f"{reason[:_MOST_REASON_CHARACTERS]} ... (and more)"
 
 
-def _maker(answer: Answer) -> dict[str, Any]:
+def _maker(answer: PlanningResult) -> dict[str, Any]:
     proposal = answer.proposal
     if proposal is None:
         return {}
@@ -121,7 +123,7 @@ def _maker(answer: Answer) -> dict[str, Any]:
     return {"rung": proposal.back_end, "confidence": round(proposal.confidence, 3), **origin}
 
 
-def _attempts(answer: Answer | None) -> dict[str, Any]:
+def _attempts(answer: PlanningResult | None) -> dict[str, Any]:
     if answer is None or not answer.attempts:
         return {}
     return {"attempts": [one.document() for one in answer.attempts]}

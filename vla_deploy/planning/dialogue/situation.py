@@ -14,7 +14,7 @@ from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import sentence_of
 from vla_deploy.model_servers.picture import Image
 from vla_deploy.navigation.base_paths import base_planner
-from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import NotReady
 from vla_deploy.planning.interfaces import Aid, Request
 from vla_deploy.planning.knowledge import world_of
@@ -59,7 +59,11 @@ class Situation:
         self._frames: FrameReader = space.frame_reader("rgbd")
 
     def request(
-        self, command: Command, conversation: Conversation, *, of_use: frozenset[Aid] = frozenset()
+        self,
+        command: UserCommand,
+        conversation: Conversation,
+        *,
+        of_use: frozenset[Aid] = frozenset(),
     ) -> Request:
         """Return the request for a command with what is known now, and what aids are of use."""
         here, recall = self._here(), self._recall

@@ -15,7 +15,7 @@ from vla_deploy.planning.language_model.model import open_language_model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bench:
+class LanguageModelBench:
     """Hold the figures of one model: answers to the same small command, and of its parts.
 
     `read_tokens_per_s` is of a prompt of `prompt_tokens`, `told_tokens_per_s` of single tokens
@@ -40,7 +40,7 @@ class Bench:
         return {**dataclasses.asdict(self), "notices": list(self.notices)}
 
 
-def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> Bench:
+def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> LanguageModelBench:
     """Measure a model.
 
     Raises:
@@ -65,7 +65,7 @@ def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> Be
             began_ns = clock.now_ns()
             opened.decoder.feed(prompt[-1:])
             tokens_s.append(_since(began_ns, clock))
-        return Bench(
+        return LanguageModelBench(
             model=model.manifest.name,
             provider=opened.provider,
             threads=choice.threads,

@@ -29,7 +29,7 @@ Scores = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Token:
+class GeneratedToken:
     """Hold one token of an answer.
 
     `log_probability` is among all tokens, also those that the schema forbids: it is low where the
@@ -42,7 +42,7 @@ class Token:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
+class AnswerBounds:
     """Bound an answer: it ends by the deadline, which also a recall ends, and by its length."""
 
     deadline: Deadline
@@ -53,7 +53,7 @@ class Bounds:
 class Generated:
     """Hold the tokens of a whole answer, and what they cost."""
 
-    tokens: tuple[Token, ...]
+    tokens: tuple[GeneratedToken, ...]
     reused_tokens: int
     runs: int
 
@@ -68,7 +68,7 @@ def generate(
     prompt: Sequence[int],
     constraint: "Constraint | None",
     end_ids: Sequence[int],
-    bounds: Bounds,
+    bounds: AnswerBounds,
 ) -> Generated:
     """Answer a prompt; without a constraint, until the model ends by itself.
 
@@ -82,13 +82,15 @@ def generate(
     """
     reused = decoder.keep(prompt)
     waiting = list(prompt[reused:])
-    tokens: list[Token] = []
+    tokens: list[GeneratedToken] = []
     runs = 0
     while True:
         forced = [] if constraint is None else constraint.forced()
         if constraint is not None and forced:
             constraint.take(forced)
-            tokens += [Token(number=one, log_probability=0.0, is_forced=True) for one in forced]
+            tokens += [
+                GeneratedToken(number=one, log_probability=0.0, is_forced=True) for one in forced
+            ]
             waiting += forced
         if constraint is not None and constraint.is_done:
             break
@@ -105,17 +107,17 @@ def generate(
     return Generated(tokens=tuple(tokens), reused_tokens=reused, runs=runs)
 
 
-def _likeliest(scores: Scores, constraint: "Constraint | None") -> Token:
+def _likeliest(scores: Scores, constraint: "Constraint | None") -> GeneratedToken:
     allowed = scores
     if constraint is not None:
         allowed = np.where(constraint.allowed(len(scores)), scores, -np.inf)
     number = int(np.argmax(allowed))
     highest = float(scores.max())
     total = highest + float(np.log(np.exp(scores - highest).sum()))
-    return Token(number=number, log_probability=float(scores[number]) - total)
+    return GeneratedToken(number=number, log_probability=float(scores[number]) - total)
 
 
-def _check_bounds(count: int, bounds: Bounds) -> None:
+def _check_bounds(count: int, bounds: AnswerBounds) -> None:
     if bounds.deadline.left_s <= 0.0:
         why = "nobody waits for it any more" if bounds.deadline.is_recalled else "time is up"
         raise AnswerLate(f"the answer is not whole after {count} tokens: {why}")

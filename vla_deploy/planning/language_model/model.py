@@ -17,7 +17,7 @@ from vla_deploy.inference.language_schema import TOKENIZER
 from vla_deploy.inference.manifest import Language
 from vla_deploy.inference.store import Model
 from vla_deploy.planning.language_model.decoding import (
-    Bounds,
+    AnswerBounds,
     Constraint,
     Decoder,
     Generated,
@@ -38,7 +38,7 @@ _MOST_PADDING: Final = 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer(Generated):
+class ModelAnswer(Generated):
     """Hold a whole answer, and how many runs of the model it took."""
 
     text: str
@@ -67,8 +67,8 @@ class LanguageModel:
         self._one_at_a_time = Lock()
 
     def answer(
-        self, messages: Sequence[Message], bounds: Bounds, schema: JsonSchema | None = None
-    ) -> Answer:
+        self, messages: Sequence[Message], bounds: AnswerBounds, schema: JsonSchema | None = None
+    ) -> ModelAnswer:
         """Return the likeliest answer, which is JSON of the schema where one is given.
 
         Raises:
@@ -79,7 +79,7 @@ class LanguageModel:
         constraint = None if schema is None else Constraint(self.guide, grammar_of(schema))
         with self._one_at_a_time:
             done = generate(self.decoder, prompt, constraint, self.config.end_ids, bounds)
-        return Answer(
+        return ModelAnswer(
             text=self.tokenizer.decode([token.number for token in done.tokens]),
             tokens=done.tokens,
             prompt_tokens=len(prompt),

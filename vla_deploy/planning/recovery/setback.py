@@ -12,7 +12,7 @@ _ID_CHARACTERS: Final = 64
 _BEFORE: Final = re.compile(r"^(?:r\d+_)+")
 
 
-class Cause(StrEnum):
+class FailureCause(StrEnum):
     """Say by what an action failed: the skill itself, or the world before or after it."""
 
     PRECONDITION = "precondition"
@@ -31,7 +31,7 @@ class Setback:
     action: Action
     error: str
     done: tuple[Action, ...]
-    cause: Cause = Cause.SKILL
+    cause: FailureCause = FailureCause.SKILL
     left: tuple[Action, ...] = ()
 
     @property
@@ -133,7 +133,7 @@ def read_setback(event: Mapping[str, Any], plan: Plan) -> Setback | None:
         action=action,
         error=str(event.get("error") or "no reason told"),
         done=tuple(one for one in execution_order(plan.actions) if one.id in done),
-        cause=Cause(event.get("cause", Cause.SKILL)),
+        cause=FailureCause(event.get("cause", FailureCause.SKILL)),
         left=tuple(_rest(one, left[one.id]) for one in plan.actions if one.id in left),
     )
 

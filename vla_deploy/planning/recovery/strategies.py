@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from vla_deploy.planning.errors import CannotBeDone, PlanningError, UnknownObject
-from vla_deploy.planning.interfaces import Answer, Check, Proposal, Request
+from vla_deploy.planning.interfaces import Check, PlanningResult, Proposal, Request
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.recovery.setback import Carried, Cause
+from vla_deploy.planning.recovery.setback import Carried, FailureCause
 from vla_deploy.planning.references import parse_object
 from vla_deploy.planning.symbolic.state import state_of
 from vla_deploy.planning.symbolic.subjects import subject_of
@@ -29,7 +29,7 @@ Steps = list[Action]
 Strategy = Callable[[Carried, Request], Steps]
 
 
-def recover(carried: Carried, request: Request, check: Check) -> Answer:
+def recover(carried: Carried, request: Request, check: Check) -> PlanningResult:
     """Return a plan that mends the last setback, or why none of the strategies has one.
 
     The proposal's `origin` names the strategy. Where it is not known how much of a drive or a turn
@@ -37,7 +37,7 @@ def recover(carried: Carried, request: Request, check: Check) -> Answer:
     """
     error = carried.setbacks[-1].error
     if not carried.setbacks[-1].is_clear:
-        return Answer(error=CannotBeDone(f"{error} ({_UNCLEAR})"))
+        return PlanningResult(error=CannotBeDone(f"{error} ({_UNCLEAR})"))
     refusals = []
     for name, strategy in STRATEGIES.items():
         steps = [] if carried.tried(name) else strategy(carried, request)
@@ -47,11 +47,11 @@ def recover(carried: Carried, request: Request, check: Check) -> Answer:
         plan = carried.plan.model_copy(update={**in_turn, "feasible": True})
         proposal = Proposal(plan=plan, back_end=RECOVERY, confidence=_CONFIDENCE, origin=name)
         try:
-            return Answer(plan=check(plan, request), proposal=proposal)
+            return PlanningResult(plan=check(plan, request), proposal=proposal)
         except PlanningError as refused:
             refusals.append(f"{name}: {refused}")
     why = "; ".join(refusals) or "nothing else is left to try"
-    return Answer(error=CannotBeDone(f"{error} ({why})"))
+    return PlanningResult(error=CannotBeDone(f"{error} ({why})"))
 
 
 def skip(carried: Carried, request: Request) -> Steps:
@@ -64,7 +64,7 @@ def skip(carried: Carried, request: Request) -> Steps:
 def put_in(carried: Carried, request: Request) -> Steps:
     """Do what is left, with what the world has turned out to lack put in before it."""
     del request
-    return [] if carried.setbacks[-1].cause is Cause.SKILL else carried.left
+    return [] if carried.setbacks[-1].cause is FailureCause.SKILL else carried.left
 
 
 def take_again(carried: Carried, request: Request) -> Steps:

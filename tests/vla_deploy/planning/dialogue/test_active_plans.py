@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from vla_deploy.planning.dialogue.active_plans import ActivePlans
-from vla_deploy.planning.dialogue.command import Command
+from vla_deploy.planning.dialogue.command import UserCommand
 from vla_deploy.planning.errors import CannotBeDone, Declined
-from vla_deploy.planning.interfaces import Answer
+from vla_deploy.planning.interfaces import PlanningResult
 from vla_deploy.planning.plan import Plan
 from vla_deploy.robots.plan_bounds import NOT_BOUNDED
 
@@ -85,11 +85,11 @@ def test_no_more_plans_than_the_robot_file_allows(further_plans: int, words: str
     active = ActivePlans(further_plans)
     go = {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
     plan = Plan.model_validate({"goal": "go", "actions": [go]})
-    command = Command(command_id="c1", text="go to the kitchen", told_ns=0)
+    command = UserCommand(command_id="c1", text="go to the kitchen", told_ns=0)
     told = {"action_id": "a1", "error": "blocked", "cause": "skill", "done": []}
-    active.add(command, plan, Answer())
+    active.add(command, plan, PlanningResult())
     for _ in range(further_plans):
-        active.add(active.set_back("c1", told), plan, Answer())
+        active.add(active.set_back("c1", told), plan, PlanningResult())
     with pytest.raises(CannotBeDone, match=re.escape(words)):
         active.set_back("c1", told)
 
