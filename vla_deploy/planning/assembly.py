@@ -20,7 +20,7 @@ from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.one_line import one_line
 from vla_deploy.planning.chat_models.local import LocalModel, open_local_model
-from vla_deploy.planning.chat_models.served import Effort, ServedModel
+from vla_deploy.planning.chat_models.served import ServedModel
 from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
 from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.planner import Planner, checked
@@ -121,7 +121,6 @@ def _open(
 def _servers(
     robot: RobotDescription, settings: PlanningSettings, base: Path, away: dict[str, str]
 ) -> Iterator[ServedModel]:
-    effort = Effort(candidates=settings.candidates, prompt_characters=settings.prompt_characters)
     for name in settings.servers:
         try:
             # A server answers by the wall clock, whatever time the robot lives by.
@@ -129,4 +128,11 @@ def _servers(
         except ModelServerError as error:
             away[name] = one_line(error)
             continue
-        yield ServedModel(server, robot.name, sorted(robot.places), checked, effort)
+        yield ServedModel(
+            server,
+            robot.name,
+            sorted(robot.places),
+            checked,
+            candidates=settings.candidates,
+            prompt_characters=settings.prompt_characters,
+        )

@@ -83,7 +83,8 @@ class PlanCache(BackEnd):
         if not proposal.saw_scene or proposal.is_momentary or only_says:
             return
         key = normalised(request.text)
-        self._kept[key] = _Kept(proposal=proposal, request=request, since_ns=self._clock.now_ns())
+        situation = replace(request, image=None)  # which takes memory, and is not compared
+        self._kept[key] = _Kept(proposal=proposal, request=situation, since_ns=self._clock.now_ns())
         self._kept.move_to_end(key)
         while len(self._kept) > self._most:
             self._kept.popitem(last=False)

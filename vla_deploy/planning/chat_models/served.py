@@ -1,7 +1,7 @@
 """Plan with one model behind a server; where it is unsure, ask it in several ways and count."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S
@@ -26,16 +26,11 @@ _FAULT_CHARACTERS: Final = 400
 _TIME_MARGIN: Final = 1.3
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effort:
-    """Say how much is asked of a server: plans for one command, and characters of a prompt."""
-
-    candidates: int = 3
-    prompt_characters: int = DEFAULT_ROOM
-
-
 class ServedModel(ChatBackEnd):
-    """Ask one server for plans; calls block until the deadline at most."""
+    """Ask one server for plans; calls block until the deadline at most.
+
+    For one command it is asked for so many `candidates` at most, in prompts of so many characters.
+    """
 
     def __init__(
         self,
@@ -43,14 +38,16 @@ class ServedModel(ChatBackEnd):
         robot: str,
         places: Sequence[str],
         check: Check,
-        effort: Effort = Effort(),
+        *,
+        candidates: int = 3,
+        prompt_characters: int = DEFAULT_ROOM,
     ) -> None:
         super().__init__(f"server {server.name}", robot, places, check)
         self._server = server
-        self._effort = effort
+        self._ways = _WAYS[:candidates]
         self._asker = StructuredAsker(server, self.shape)
         # The schema is a part of the prompt, too.
-        self._room = effort.prompt_characters - self._asker.schema_characters
+        self._room = prompt_characters - self._asker.schema_characters
         self.uses = frozenset({Aid.MEMORY, Aid.IMAGE} if self.sees else {Aid.MEMORY})
 
     @property
@@ -75,7 +72,7 @@ class ServedModel(ChatBackEnd):
         found: list[PlanCandidate] = []
         asked = 0
         failure: PlanningError = Declined("it was not asked")
-        for way in _WAYS[: self._effort.candidates]:
+        for way in self._ways:
             began_ns = deadline.clock.now_ns()
             asked += 1
             try:

@@ -12,7 +12,7 @@ from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.exchange import Exchange
 from vla_deploy.model_servers.server import ModelServer
 from vla_deploy.model_servers.settings import ServerSettings
-from vla_deploy.planning.chat_models.served import Effort, ServedModel
+from vla_deploy.planning.chat_models.served import ServedModel
 from vla_deploy.planning.errors import Ambiguous, CannotBeDone, Declined, PlanInvalid, UnknownPlace
 from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.planner import checked
@@ -51,7 +51,7 @@ def served(loopback):
             "bench", settings, None, Exchange(settings), MonotonicClock(), lambda: 0.5
         )
         places = ("charging_station", "kitchen")
-        return ServedModel(server, "butler", places, checked, Effort(candidates=candidates))
+        return ServedModel(server, "butler", places, checked, candidates=candidates)
 
     return served
 
