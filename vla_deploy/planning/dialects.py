@@ -94,36 +94,23 @@ _PUT = _rename(
 )  # fmt: skip
 
 
-SKILL_DIALECT: Mapping[str, tuple[str, ParameterMap]] = {
-    "navigate_to": ("navigate_to", _target),
-    "navigate": ("navigate_to", _target),
-    "go_to": ("navigate_to", _target),
-    "move_to": ("navigate_to", _target),
-    "move_forward": ("move", _distance(1.0)),
-    "move_backward": ("move", _distance(-1.0)),
-    "turn_left": ("turn", _angle(1.0)),
-    "turn_right": ("turn", _angle(-1.0)),
-    "rotate": ("turn", _angle(1.0)),
-    "pick_up": ("pick_up", _OBJECT),
-    "pick": ("pick_up", _OBJECT),
-    "grasp": ("pick_up", _OBJECT),
-    "grab": ("pick_up", _OBJECT),
-    "place": ("place", _PUT),
-    "put_down": ("place", _PUT),
-    "put": ("place", _PUT),
-    "put_away": ("place", _PUT),
-    "give": ("hand_over", _OBJECT),
-    "handover": ("hand_over", _OBJECT),
-    "hand_over": ("hand_over", _OBJECT),
-    "release": ("place", _PUT),
-    "drop": ("place", _PUT),
-    "detect_object": ("find_object", _OBJECT),
-    "find_object": ("find_object", _OBJECT),
-    "search": ("find_object", _OBJECT),
-    "look_at": ("look_at", _OBJECT),
-    "say": ("speak", _rename(message="text", speech="text")),
-    "speak": ("speak", _rename(message="text", speech="text")),
-    "wait": ("wait", _rename(duration="duration_s", seconds="duration_s", time="duration_s")),
+# Each skill, what its parameters become, and the names that dialects have for it.
+_SKILL_NAMES: Final[tuple[tuple[str, ParameterMap, tuple[str, ...]], ...]] = (
+    ("navigate_to", _target, ("navigate_to", "navigate", "go_to", "move_to")),
+    ("move", _distance(1.0), ("move_forward",)),
+    ("move", _distance(-1.0), ("move_backward",)),
+    ("turn", _angle(1.0), ("turn_left", "rotate")),
+    ("turn", _angle(-1.0), ("turn_right",)),
+    ("pick_up", _OBJECT, ("pick_up", "pick", "grasp", "grab")),
+    ("place", _PUT, ("place", "put_down", "put", "put_away", "release", "drop")),
+    ("hand_over", _OBJECT, ("hand_over", "handover", "give")),
+    ("find_object", _OBJECT, ("find_object", "detect_object", "search")),
+    ("look_at", _OBJECT, ("look_at",)),
+    ("speak", _rename(message="text", speech="text"), ("speak", "say")),
+    ("wait", _rename(duration="duration_s", seconds="duration_s", time="duration_s"), ("wait",)),
+)
+SKILL_DIALECT: Final = {
+    name: (skill, convert) for skill, convert, names in _SKILL_NAMES for name in names
 }
 
 
