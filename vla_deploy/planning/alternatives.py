@@ -3,20 +3,26 @@
 A replacement keeps the rules that were broken, and nothing is in the way of taking it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.symbolic.conditions import Setting
-from vla_deploy.planning.symbolic.simulation import Broken, first_broken
+from vla_deploy.planning.symbolic.simulation import first_broken
 from vla_deploy.planning.symbolic.state import Pose
 from vla_deploy.planning.symbolic.table import GRASPABLE, LOGIC, PAYLOAD, TAKES_THINGS
 from vla_deploy.world import Body, Snapshot, Thing, access_to
 from vla_deploy.world.vocabulary import CONTAINERS
 
-Candidates = Callable[[Thing, Snapshot, Body], Iterator[Thing]]
+# What another thing may keep where one does not; the other rules are about the robot.
+_OF_THE_THING: Final = frozenset({GRASPABLE, PAYLOAD, TAKES_THINGS})
+# The parameter that another thing replaces, and in which words.
+_REPLACED: Final = {
+    "pick_up": ("object", "take the {thing}"),
+    "place": ("destination", "put it in the {thing}"),
+}
 
 
 def instead_of(plan: Plan, world: World, scene: Snapshot | None, here: Pose | None) -> str:
@@ -27,13 +33,19 @@ def instead_of(plan: Plan, world: World, scene: Snapshot | None, here: Pose | No
     broken = first_broken(plan.actions, world, scene, here)
     if broken is None or scene is None or not broken.rules.keys() <= _OF_THE_THING:
         return ""
-    name, phrase, candidates = _REPLACED[broken.action.skill]
-    setting = Setting(parameters=broken.action.parameters, world=world, scene=scene)
-    subject = setting.subject(name)
+    skill, given = broken.action.skill, broken.action.parameters
+    name, phrase = _REPLACED[skill]
+    subject = Setting(parameters=given, world=world, scene=scene).subject(name)
     if subject is None or subject.thing is None:
         return ""
-    for other in candidates(subject.thing, scene, _body(world)):
-        if _keeps_the_rules(broken, {**broken.action.parameters, name: other.thing_id}, setting):
+    if skill == "pick_up":
+        others = others_like(subject.thing, scene, _body(world))
+    else:
+        others = (one for one in scene.things if one.kind in CONTAINERS and not one.held_by)
+    needs = LOGIC[skill].needs
+    for other in others:
+        setting = Setting(parameters={**given, name: other.thing_id}, world=world, scene=scene)
+        if not any(needs[rule](broken.state, setting) for rule in broken.rules):
             return f"I could {phrase.format(thing=other)} ({other.thing_id}) instead"
     return ""
 
@@ -48,30 +60,7 @@ def others_like(thing: Thing, scene: Snapshot, body: Body) -> Iterator[Thing]:
             yield other
 
 
-def containers(_: Thing, scene: Snapshot, __: Body) -> Iterator[Thing]:
-    """Yield what things can be put in."""
-    yield from (one for one in scene.things if one.kind in CONTAINERS and not one.held_by)
-
-
-def _keeps_the_rules(broken: Broken, parameters: Mapping[str, object], setting: Setting) -> bool:
-    other = Setting(parameters=parameters, world=setting.world, scene=setting.scene)
-    needs = LOGIC[broken.action.skill].needs
-    return not any(needs[rule](broken.state, other) for rule in broken.rules)
-
-
 def _body(world: World) -> Body:
-    opening_m = world.opening_max_m
     return Body(
-        opening_max_m=0.0 if opening_m is None else opening_m,
-        hands=tuple(world.holding),
-        is_free=world.is_free,
+        opening_max_m=world.opening_max_m or 0.0, hands=tuple(world.holding), is_free=world.is_free
     )
-
-
-# What another thing may keep where one does not; the other rules are about the robot.
-_OF_THE_THING: Final = frozenset({GRASPABLE, PAYLOAD, TAKES_THINGS})
-# The parameter that another thing replaces, in which words, and which things may.
-_REPLACED: Final[Mapping[str, tuple[str, str, Candidates]]] = {
-    "pick_up": ("object", "take the {thing}", others_like),
-    "place": ("destination", "put it in the {thing}", containers),
-}
