@@ -1,14 +1,14 @@
 """Define what passes between the planner's parts, and what every back end does."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from typing import Any, Protocol
 
 from vla_deploy.memory.episode import LastSeen
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.model_servers.picture import Image
-from vla_deploy.planning.errors import Ambiguous, Declined, NotAble, PlanningError
+from vla_deploy.planning.errors import Ambiguous, NotAble, PlanningError
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.prohibition import Prohibition, StandingOrder
@@ -50,28 +50,13 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sureness:
-    """Hold how sure a plan is if its words were heard right, and what to do about less.
-
-    Below `decline_below` it is none; below `read_back_below` the `question` is read back.
-    """
-
-    confidence: float
-    question: str
-    read_back_below: float
-    decline_below: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
     """Hold a plan that is not checked yet, and which back end made it.
 
     `confidence` is 0 to 1. Where there is something to `read_back`, it is said, and nothing moves
-    before the person agrees; both follow from `sureness`, where there is one, and from how well the
-    words were heard. `saw_scene` is set where all of the scene may have shaped the plan, not only
-    the words; `is_momentary` where it cannot be given again later: an answer, or what an image
-    showed. `origin` is the back end that made it first, where it was planned before. `covers` are
-    the words that change the scope of a command and are represented in the plan, None for all;
+    before the person agrees. With `may_be_kept` the plan took seconds and may be given again in the
+    same situation; `origin` is the back end that made it first, where it was. `covers` are the
+    words that change the scope of a command and are represented in the plan, None for all;
     `knows_grammar` is set where the back end has read the whole sentence. An `order` stands once
     the plan is dispatched.
     """
@@ -80,28 +65,11 @@ class Proposal:
     back_end: str
     confidence: float
     read_back: str = ""
-    saw_scene: bool = False
-    is_momentary: bool = False
-    sureness: Sureness | None = None
+    may_be_kept: bool = False
     origin: str = ""
     covers: frozenset[str] | None = frozenset()
     knows_grammar: bool = False
     order: StandingOrder | None = None
-
-    def as_heard(self, heard_confidence: float | None) -> "Proposal":
-        """Return it as unsure as its words were heard; None for words that were typed.
-
-        Raises:
-            Declined: that is too unsure.
-        """
-        own = self.sureness
-        if own is None:
-            return self
-        confidence = min(own.confidence, 1.0 if heard_confidence is None else heard_confidence)
-        if confidence < own.decline_below:
-            raise Declined(f"I am not sure of it ({confidence:.2f})")
-        read_back = own.question if confidence < own.read_back_below else ""
-        return replace(self, confidence=round(confidence, 3), read_back=read_back)
 
 
 class AttemptOutcome(StrEnum):

@@ -77,10 +77,10 @@ class PlanCache(BackEnd):
     def keep(self, request: Request, proposal: Proposal) -> None:
         """Remember what a model proposed and was accepted; the oldest may go for it.
 
-        An answer, and what was made of an image, is of the moment: it is not kept.
+        An answer is of the moment: it is not kept.
         """
         only_says = all(action.skill in MOTIONLESS for action in proposal.plan.actions)
-        if not proposal.saw_scene or proposal.is_momentary or only_says:
+        if only_says or not proposal.may_be_kept:
             return
         key = normalised(request.text)
         situation = replace(request, image=None)  # which takes memory, and is not compared

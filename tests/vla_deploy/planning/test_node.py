@@ -189,7 +189,7 @@ def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
 
 
 def test_plans_are_kept_by_the_planner_in_force(open_desk, back_end, propose):
-    model = back_end("model", propose(("turn", {"angle_rad": 1.0}), saw_scene=True))
+    model = back_end("model", propose(("turn", {"angle_rad": 1.0}), may_be_kept=True))
     desk = open_desk(model)
     desk.planner.commit(Planner(desk.clock, (model,)))
     desk.give(text="sing a sea shanty")

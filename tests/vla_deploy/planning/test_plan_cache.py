@@ -37,7 +37,7 @@ def look(cache, clock):
 
 def test_the_same_command_in_the_same_world_is_planned_once(cache, look, ask, propose):
     assert not look(ask(TIDY))
-    cache.keep(ask(TIDY), propose(PICK, saw_scene=True))
+    cache.keep(ask(TIDY), propose(PICK, may_be_kept=True))
     assert look(ask("  Tidy up  the CUP. "))
     assert cache.document() == {
         "hits": 1, "misses": 1, "changed": 0, "plans": 1, "hit_rate": 0.5
@@ -100,7 +100,7 @@ def test_a_plan_is_given_again_while_the_situation_is_the_same(
     cache, look, ask, propose, scene, thing, change
 ):
     changes, is_hit = CHANGES[change]
-    cache.keep(ask(TIDY), propose(PICK, saw_scene=True))
+    cache.keep(ask(TIDY), propose(PICK, may_be_kept=True))
     assert look(ask(TIDY, **changes(scene, thing))) == is_hit
     assert look(ask(TIDY)) == is_hit, "what has changed is forgotten"
 
@@ -108,20 +108,19 @@ def test_a_plan_is_given_again_while_the_situation_is_the_same(
 @pytest.mark.parametrize(
     ("steps", "told"),
     [
-        pytest.param((PICK,), {"saw_scene": False}, id="made in milliseconds"),
-        pytest.param((PICK,), {"is_momentary": True}, id="made of an image"),
+        pytest.param((PICK,), {"may_be_kept": False}, id="made in milliseconds"),
         pytest.param((SPEAK,), {}, id="an answer"),
     ],
 )
 def test_what_holds_for_a_moment_or_costs_nothing_is_not_kept(
     cache, look, ask, propose, steps, told
 ):
-    cache.keep(ask(TIDY), propose(*steps, **({"saw_scene": True} | told)))
+    cache.keep(ask(TIDY), propose(*steps, **({"may_be_kept": True} | told)))
     assert not look(ask(TIDY))
 
 
 def test_what_was_said_before_counts_where_words_refer_to_it(cache, look, ask, propose):
-    cache.keep(ask("pick it up", conversation=BEFORE), propose(PICK, saw_scene=True))
+    cache.keep(ask("pick it up", conversation=BEFORE), propose(PICK, may_be_kept=True))
     assert look(ask("pick it up", conversation=BEFORE))
     assert not look(ask("pick it up", conversation=LATER))
 
@@ -130,7 +129,7 @@ def test_plans_grow_old_and_are_few_and_those_that_failed_are_dropped(
     cache, look, ask, propose, clock
 ):
     for text in ("one", "two", "three"):
-        cache.keep(ask(text), propose(PICK, saw_scene=True))
+        cache.keep(ask(text), propose(PICK, may_be_kept=True))
     assert [look(ask(text)) for text in ("one", "two", "three")] == [False, True, True]
     cache.forget("Two")
     assert not look(ask("two"))

@@ -42,7 +42,7 @@ class ChatBackEnd(BackEnd):
         return PlanCandidate(plan=plan, checked=checked, confidence=answer.confidence)
 
     def proposal(
-        self, candidate: PlanCandidate, confidence: float, *, is_momentary: bool = False
+        self, candidate: PlanCandidate, confidence: float, *, may_be_kept: bool = True
     ) -> Proposal:
         """Return a plan with what is read back of it where the model is not sure."""
         steps = steps_in_words(candidate.checked)
@@ -51,7 +51,6 @@ class ChatBackEnd(BackEnd):
             back_end=self.name,
             confidence=round(confidence, 3),
             read_back="" if confidence >= SURE else Says.CONFIRM.format(steps=steps),
-            saw_scene=True,
+            may_be_kept=may_be_kept,
             knows_grammar=True,
-            is_momentary=is_momentary,
         )

@@ -88,8 +88,8 @@ class ServedModel(ChatBackEnd):
         if not found:
             raise failure
         candidate, confidence = elected(found, asked, request.world.places)
-        was_shown = self._image(request) is not None
-        return self.proposal(candidate, confidence, is_momentary=was_shown)
+        # What was made of an image cannot be compared with later.
+        return self.proposal(candidate, confidence, may_be_kept=self._image(request) is None)
 
     def _planned(self, request: Request, way: str, deadline: Deadline) -> PlanCandidate:
         """Return one plan that may run; a model whose plan is refused is sent the reason, once."""

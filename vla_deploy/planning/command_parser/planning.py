@@ -31,8 +31,6 @@ _POSES: Final[Mapping[str, str]] = {
     "carrying": "tuck", "resting": "rest", "relax": "rest", "lower": "rest", "sleep": "rest",
 }  # fmt: skip
 _CAN_PUT: Final = frozenset({"in", "on", "to", "next to", "near"})
-# These are answered from what is seen, held, or remembered when they are planned.
-_OF_THE_MOMENT: Final = frozenset({"where", "ask", "tidy"})
 Handler = Callable[[Spoken, Step], list[Skill]]
 
 
@@ -50,11 +48,6 @@ class Steps(Spoken):
         """
         skills = [skill for step in steps for skill in _HANDLERS[step["do"]](self, step)]
         return building.chained(skills)
-
-
-def are_of_the_moment(steps: Sequence[Step]) -> bool:
-    """Tell whether the same words may mean other actions a moment later."""
-    return any(one["do"] in _OF_THE_MOMENT or one.get("where") == "back" for one in steps)
 
 
 def _go(spoken: Spoken, step: Step) -> list[Skill]:

@@ -24,7 +24,7 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
+from vla_deploy.planning.command_parser.planning import Steps
 from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.spans import copied_spans
 from vla_deploy.planning.command_parser.wording import (
@@ -34,7 +34,7 @@ from vla_deploy.planning.command_parser.wording import (
     plain_words,
 )
 from vla_deploy.planning.errors import Declined
-from vla_deploy.planning.interfaces import BackEnd, Proposal, Request, Sureness
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.language_model import AnswerBounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.scope import WORDS, ScopeGroup
@@ -101,21 +101,18 @@ class CommandParser(BackEnd):
             summary=asked.removeprefix("Shall I ").removesuffix("?"),
             actions=actions,
         )
-        sureness = Sureness(
-            confidence=self._confidence(parsed),
-            question=asked,
-            read_back_below=self._weights.read_back_below,
-            decline_below=self._weights.decline_below,
-        )
-        proposal = Proposal(
+        sure = self._confidence(parsed)
+        if request.heard_confidence is not None:
+            sure = min(sure, request.heard_confidence)
+        if sure < self._weights.decline_below:
+            raise Declined(f"I am not sure of it ({sure:.2f})")
+        return Proposal(
             plan=plan,
             back_end=self.name,
-            confidence=sureness.confidence,
-            is_momentary=are_of_the_moment(parsed.steps),
-            sureness=sureness,
+            confidence=round(sure, 3),
+            read_back=asked if sure < self._weights.read_back_below else "",
             covers=_covered(parsed),
         )
-        return proposal.as_heard(request.heard_confidence)
 
     def _confidence(self, parsed: Parsed) -> float:
         """Return how sure an answer is: too little to go unasked where it leaves words out."""

@@ -185,7 +185,7 @@ class TestQuestions:
 class TestReadingBack:
     @pytest.fixture
     def desk(self, open_desk, back_end, propose):
-        go = propose(GO, read_back="Shall I go to the kitchen?", saw_scene=True)
+        go = propose(GO, read_back="Shall I go to the kitchen?", may_be_kept=True)
         desk = open_desk(back_end("model", go))
         desk.give(text="kitchen, like, you know")
         return desk
