@@ -38,8 +38,8 @@ def measure(
 ) -> dict[str, Any]:
     """Return the figures of all commands, or of some kinds; `misses` lists what went wrong."""
     verdicts = [play_afresh(case) for case in commands(kinds, corpus)]
-    models = opened(PROFILE)
-    told = {"models": [rung.name for rung in models.rungs], "models_away": models.away}
+    models, away = opened(PROFILE)
+    told = {"models": [one.name for one in models], "models_away": away}
     return told | report(verdicts) | ({"misses": _misses(verdicts)} if misses else {})
 
 

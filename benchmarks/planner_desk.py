@@ -19,10 +19,9 @@ from vla_deploy.aside import beside
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.ipc import Event, IpcError, SharedSpace
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.assembly import open_planner
+from vla_deploy.planning.assembly import open_local_models, open_planner
+from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.node import PlannerNode
-from vla_deploy.planning.on_board import OnBoard, open_on_board
-from vla_deploy.planning.planner import checked
 from vla_deploy.robots import load_robot
 
 ANSWER_LIMIT_S: Final = 20.0
@@ -70,10 +69,10 @@ def fresh_desk() -> Iterator["Desk"]:
 
 
 @cache
-def opened(profile: str) -> OnBoard:
+def opened(profile: str) -> tuple[tuple[BackEnd, ...], dict[str, str]]:
     """Open the shipped models that a profile names, once for all desks: that takes longest."""
     clock, robot = MonotonicClock(), load_robot(ROBOT)
-    return open_on_board(robot, load_profile(profile), ModelShelf.of_base(NOWHERE, clock), checked)
+    return open_local_models(robot, load_profile(profile), ModelShelf.of_base(NOWHERE, clock))
 
 
 class Desk:
@@ -163,10 +162,9 @@ class Desk:
     def _built(self) -> PlannerNode:
         """Build the node as its process does, with models that are open already."""
         robot, profile = load_robot(ROBOT), load_profile(self._context.profile)
-        models, base = opened(self._context.profile), self._context.run_dir.parent
-        planner = open_planner(
-            robot, profile.planning, self._clock, base, models.rungs, models.away
-        )
+        base = self._context.run_dir.parent
+        local, away = opened(self._context.profile)
+        planner = open_planner(robot, profile.planning, self._clock, base, local, away)
         return PlannerNode(self._context, robot, planner, beside("plan", self._context.clock, 0.2))
 
     def _start_anew(self) -> None:

@@ -11,8 +11,8 @@ from vla_deploy.analysis.document import analysis_schema
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import read_plan
 from vla_deploy.gateways.ros.launching import require_environment
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.dialects import parse_plan
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import plan_schema
 from vla_deploy.planning.planner import checked

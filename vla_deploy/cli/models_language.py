@@ -12,15 +12,19 @@ from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf, choice_for
 from vla_deploy.inference.store import Model
 from vla_deploy.perception.model_tools.verifying import Finding
-from vla_deploy.planning.language_model.adding import Request, add_language_model, try_out
-from vla_deploy.planning.language_model.benching import Bench, bench
+from vla_deploy.planning.language_model.adding import (
+    LanguageModelSource,
+    add_language_model,
+    try_out,
+)
+from vla_deploy.planning.language_model.benching import LanguageModelBench, bench
 
 Told = tuple[dict[str, object], str]
 
 
 def add(arguments: argparse.Namespace, shelf: ModelShelf) -> Told:
     """Check a language model, try it out and keep it."""
-    request = Request(
+    request = LanguageModelSource(
         name=arguments.name,
         folder=arguments.language,
         most_tokens=arguments.most_tokens,
@@ -85,7 +89,7 @@ def _finding(model: str, check: str, act: Callable[[], str]) -> Finding:
         return Finding(model=model, check=check, is_ok=False, detail=str(error))
 
 
-def _text(figures: Bench) -> str:
+def _text(figures: LanguageModelBench) -> str:
     return "\n".join(
         [
             f"answer      {1000 * figures.answer_median_s:8.1f} ms median, "

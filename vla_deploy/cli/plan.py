@@ -14,13 +14,12 @@ from vla_deploy.cli.errors import UsageError
 from vla_deploy.cli.example import add_top_command
 from vla_deploy.cli.say import EXIT_ASKED
 from vla_deploy.cli.session import Session, attach
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.assembly import planner_for
+from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.dialogue.situation import Situation
 from vla_deploy.planning.errors import Ambiguous
-from vla_deploy.planning.inbox import Command
+from vla_deploy.planning.interfaces import Attempt, PlanningResult, Request
 from vla_deploy.planning.knowledge import world_of
-from vla_deploy.planning.ladder import Answer, Attempt
-from vla_deploy.planning.situation import Situation
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.robots import RobotDescription, load_robot
 from vla_deploy.supervisor.runtime import default_base
@@ -70,13 +69,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def told(answer: Answer, away: Mapping[str, str]) -> dict[str, Any]:
+def told(answer: PlanningResult, away: Mapping[str, str]) -> dict[str, Any]:
     """Return an answer as scripts read it, and who could not be asked, by why."""
     proposal = answer.proposal
     is_asked = isinstance(answer.error, Ambiguous)
     return {
         "plan": None if answer.plan is None else answer.plan.model_dump(mode="json"),
-        "rung": None if proposal is None else proposal.rung,
+        "rung": None if proposal is None else proposal.back_end,
         "confidence": None if proposal is None else round(proposal.confidence, 3),
         "read_back": None if proposal is None else proposal.read_back or None,
         "question": str(answer.error) if is_asked else None,
@@ -86,7 +85,7 @@ def told(answer: Answer, away: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def as_text(answer: Answer, away: Mapping[str, str]) -> str:
+def as_text(answer: PlanningResult, away: Mapping[str, str]) -> str:
     """Return an answer as lines for a person, and who could not be asked."""
     lines = [_attempt_line(one) for one in answer.attempts]
     lines += [f"{name} away: {why}" for name, why in away.items()]
@@ -104,7 +103,7 @@ def as_text(answer: Answer, away: Mapping[str, str]) -> str:
 
 def _attempt_line(attempt: Attempt) -> str:
     why = f": {attempt.reason}" if attempt.reason else ""
-    return f"{attempt.rung} {attempt.outcome} in {1000 * attempt.took_s:.1f} ms{why}"
+    return f"{attempt.back_end} {attempt.outcome} in {1000 * attempt.took_s:.1f} ms{why}"
 
 
 def _told(arguments: argparse.Namespace, topic: str) -> Mapping[str, Any]:
@@ -120,7 +119,7 @@ def _session(arguments: argparse.Namespace) -> Session | None:
 
 
 def _request(arguments: argparse.Namespace, robot: RobotDescription) -> Request:
-    command = Command(command_id="plan", told_ns=0, text=arguments.text)
+    command = UserCommand(command_id="plan", told_ns=0, text=arguments.text)
     session = _session(arguments)
     if session is None:
         request = Request(command_id="plan", text=command.text, world=world_of(robot, {}))

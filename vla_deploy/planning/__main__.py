@@ -22,8 +22,8 @@ def build(context: NodeContext) -> PlannerNode:
     profile, base = load_profile(context.profile), context.run_dir.parent
     planner = planner_for(robot, profile, context.clock, base, run_dir=context.run_dir)
     memory = open_memory(profile.planning, base)
-    aside = beside("plan", context.clock, PLANNING_S)
-    return PlannerNode(context, robot, planner, aside, memory, Prohibitions.of_base(base))
+    executor = beside("plan", context.clock, PLANNING_S)
+    return PlannerNode(context, robot, planner, executor, memory, Prohibitions.of_base(base))
 
 
 if __name__ == "__main__":

@@ -1,23 +1,32 @@
-"""Build the planner that a profile asks for; what is missing is done without, and told."""
+"""Build the planner that a profile asks for; models that cannot be opened are skipped."""
 
+import dataclasses
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 from drivers.clock import Clock, MonotonicClock
-from platforms import Profile
+from platforms import ModelChoice, Profile
 from platforms.profile import PlanningSettings
-from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.inference.errors import InferenceError
+from vla_deploy.inference.manifest import Use
+from vla_deploy.inference.opening import PLAIN_CHOICE
+from vla_deploy.inference.providers import CPU
+from vla_deploy.inference.roles import ModelShelf, tier_name
+from vla_deploy.inference.store import Model
 from vla_deploy.memory import MemoryStore, MemoryUnusable
 from vla_deploy.model_servers.errors import ModelServerError
 from vla_deploy.model_servers.shelf import ServerShelf
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.asking import Rung
-from vla_deploy.planning.knowledge import spoken_places
+from vla_deploy.planning.chat_models.local import LocalModel, open_local_model
+from vla_deploy.planning.chat_models.served import ServedModel
+from vla_deploy.planning.command_parser.rung import NAME, CommandParser, open_command_parser
+from vla_deploy.planning.interfaces import BackEnd
 from vla_deploy.planning.planner import Planner, checked
-from vla_deploy.planning.served.rung import Effort, ServedRung
 from vla_deploy.robots import RobotDescription
 
+ROLE: Final = "planner"
 _log = logging.getLogger(__name__)
 
 
@@ -35,14 +44,11 @@ def planner_for(
     `model_tier` is how many steps below the best; `base` is the runtime directory, and `run_dir`
     that of the run in which the models claim their memory, None for none.
     """
-    # Its libraries take a third of a second to load, which a planner of rules can do without.
-    from vla_deploy.planning.on_board import open_on_board
-
     shelf = (
         ModelShelf.of_base(base, clock) if run_dir is None else ModelShelf.of_run(run_dir, clock)
     )
-    on_board = open_on_board(robot, profile, shelf, checked, model_tier)
-    return open_planner(robot, profile.planning, clock, base, on_board.rungs, on_board.away)
+    local, away = open_local_models(robot, profile, shelf, model_tier)
+    return open_planner(robot, profile.planning, clock, base, local, away)
 
 
 def open_planner(
@@ -50,20 +56,42 @@ def open_planner(
     settings: PlanningSettings,
     clock: Clock,
     base: Path,
-    on_board: Sequence[Rung] = (),
+    local: Sequence[BackEnd] = (),
     models_away: Mapping[str, str] | None = None,
 ) -> Planner:
-    """Return a planner for a robot: rules, cache, the models `on_board`, then the servers.
+    """Return a planner for a robot: patterns, cache, the `local` models, then the servers.
 
-    `base` is the runtime directory, which tells where `servers.toml` lies; `models_away` tells
-    which models could not be opened, and why. Nothing is sent yet.
+    `base` is the runtime directory, where `servers.toml` lies; `models_away` maps models that could
+    not be opened to the reason. Nothing is sent yet.
     """
-    away: dict[str, str] = dict(models_away or {})
-    servers = _served(robot, settings, base, away) if settings.servers else ()
-    for name in away.keys() - (models_away or {}).keys():
-        _log.warning("planning does without server %s: %s", name, away[name])
-    slow = (*on_board, *servers)[: settings.max_rungs]
-    return Planner(clock, slow, within_s=settings.within_s, away=away)
+    away: dict[str, str] = {}
+    servers = list(_servers(robot, settings, base, away))
+    for name, why in away.items():
+        _log.warning("planning does without server %s: %s", name, why)
+    slow = (*local, *servers)[: settings.max_rungs]
+    return Planner(clock, slow, within_s=settings.within_s, away={**(models_away or {}), **away})
+
+
+def open_local_models(
+    robot: RobotDescription, profile: Profile, shelf: ModelShelf, model_tier: int = 0
+) -> tuple[tuple[CommandParser | LocalModel, ...], dict[str, str]]:
+    """Open the models on board that plan; return them, and why others are away.
+
+    The command parser that comes with the software goes before any larger model, since it answers
+    in a fraction of the time.
+    """
+    choice = profile.models.get(ROLE)
+    if choice is None:
+        return (), {}
+    opened: list[CommandParser | LocalModel] = []
+    away: dict[str, str] = {}
+    for name in dict.fromkeys((NAME, tier_name(choice, model_tier))):
+        try:
+            opened.append(_open(robot, shelf, shelf.store.load(name), choice))
+        except InferenceError as error:
+            away[name] = one_line(error)
+            _log.warning("degraded: planning does without %s: %s", name, away[name])
+    return tuple(opened), away
 
 
 def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:
@@ -77,14 +105,22 @@ def open_memory(settings: PlanningSettings, base: Path) -> MemoryStore | None:
         return None
 
 
-def _served(
-    robot: RobotDescription,
-    settings: PlanningSettings,
-    base: Path,
-    away: dict[str, str],
-) -> Iterator[Rung]:
-    places = sorted(set(spoken_places(robot.places).values()))
-    effort = Effort(candidates=settings.candidates, prompt_characters=settings.prompt_characters)
+def _open(
+    robot: RobotDescription, shelf: ModelShelf, model: Model, choice: ModelChoice
+) -> CommandParser | LocalModel:
+    language = model.manifest.language
+    if language is not None and language.use is Use.COMMAND_PARSER:
+        # So small a model is done on the CPU before a GPU has begun.
+        on_cpu = dataclasses.replace(
+            PLAIN_CHOICE, providers=(CPU,), threads=1, memory_arena=choice.memory_arena
+        )
+        return shelf.load(model, on_cpu, lambda: open_command_parser(model, on_cpu))
+    return shelf.load(model, choice, lambda: open_local_model(model, choice, robot, checked))
+
+
+def _servers(
+    robot: RobotDescription, settings: PlanningSettings, base: Path, away: dict[str, str]
+) -> Iterator[ServedModel]:
     for name in settings.servers:
         try:
             # A server answers by the wall clock, whatever time the robot lives by.
@@ -92,4 +128,11 @@ def _served(
         except ModelServerError as error:
             away[name] = one_line(error)
             continue
-        yield ServedRung(server, robot.name, places, checked, effort)
+        yield ServedModel(
+            server,
+            robot.name,
+            sorted(robot.places),
+            checked,
+            candidates=settings.candidates,
+            prompt_characters=settings.prompt_characters,
+        )

@@ -15,6 +15,8 @@ RELATIONS = (IN, ON, NEXT_TO)
 NAVIGATION_TIMEOUT_S = 300.0
 MANIPULATION_TIMEOUT_S = 120.0
 DEFAULT_TIMEOUT_S = 60.0
+# These skills move nothing.
+MOTIONLESS = frozenset({"speak", "wait", "stop"})
 
 
 class Type(Enum):
@@ -55,10 +57,19 @@ class SkillSpec:
     retryable: bool = False
 
 
-_ARM = Parameter(type=Type.CHOICE, required=False, choices=ARMS)
+def _number(minimum: float, maximum: float, *, required: bool = True) -> Parameter:
+    return Parameter(type=Type.NUMBER, required=required, minimum=minimum, maximum=maximum)
+
+
+def _choice(*choices: str, required: bool = True) -> Parameter:
+    return Parameter(type=Type.CHOICE, required=required, choices=choices)
+
+
+_ARM = _choice(*ARMS, required=False)
 _OBJECT = Parameter(type=Type.OBJECT)
+_OBJECT_OR_ELSE = Parameter(type=Type.OBJECT, required=False)
 # Without it the base cruises as fast as its robot file lets it.
-_SPEED = Parameter(type=Type.NUMBER, required=False, minimum=0.05, maximum=2.0)
+_SPEED = _number(0.05, 2.0, required=False)
 
 # What older tools call for and this robot has nothing for.
 NOT_SKILLS: MappingProxyType[str, str] = MappingProxyType(
@@ -74,12 +85,10 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="drive to a named place, to where an object can be reached, or to a point",
             parameters={
                 "place": Parameter(type=Type.PLACE, required=False),
-                "object": Parameter(type=Type.OBJECT, required=False),
-                "x_m": Parameter(type=Type.NUMBER, required=False, minimum=-100, maximum=100),
-                "y_m": Parameter(type=Type.NUMBER, required=False, minimum=-100, maximum=100),
-                "yaw_rad": Parameter(
-                    type=Type.NUMBER, required=False, minimum=-math.pi, maximum=math.pi
-                ),
+                "object": _OBJECT_OR_ELSE,
+                "x_m": _number(-100, 100, required=False),
+                "y_m": _number(-100, 100, required=False),
+                "yaw_rad": _number(-math.pi, math.pi, required=False),
                 "speed_m_s": _SPEED,
             },
             one_of=(("place",), ("object",), ("x_m", "y_m")),
@@ -90,30 +99,21 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         ),
         "move": SkillSpec(
             summary="drive straight, forward or (negative) backward",
-            parameters={
-                "distance_m": Parameter(type=Type.NUMBER, minimum=-3, maximum=3),
-                "speed_m_s": _SPEED,
-            },
+            parameters={"distance_m": _number(-3, 3), "speed_m_s": _SPEED},
             resources=("base",),
             estimated_duration_s=4.0,
         ),
         "turn": SkillSpec(
             summary="turn on the spot, counter-clockwise positive",
-            parameters={
-                "angle_rad": Parameter(type=Type.NUMBER, minimum=-2 * math.pi, maximum=2 * math.pi)
-            },
+            parameters={"angle_rad": _number(-2 * math.pi, 2 * math.pi)},
             resources=("base",),
             estimated_duration_s=4.0,
         ),
         "look_at": SkillSpec(
             summary="turn the head to an object or a direction",
             parameters={
-                "object": Parameter(type=Type.OBJECT, required=False),
-                "direction": Parameter(
-                    type=Type.CHOICE,
-                    required=False,
-                    choices=("ahead", "left", "right", "up", "down"),
-                ),
+                "object": _OBJECT_OR_ELSE,
+                "direction": _choice("ahead", "left", "right", "up", "down", required=False),
             },
             one_of=(("object",), ("direction",)),
             resources=("head", "camera"),
@@ -139,7 +139,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
             summary="put what is held in, on or next to something within reach",
             parameters={
                 "destination": Parameter(type=Type.DESTINATION),
-                "relation": Parameter(type=Type.CHOICE, choices=RELATIONS),
+                "relation": _choice(*RELATIONS),
                 "arm": _ARM,
             },
             resources=("base", "head", "camera", "arms"),
@@ -180,7 +180,7 @@ SKILLS: MappingProxyType[str, SkillSpec] = MappingProxyType(
         ),
         "wait": SkillSpec(
             summary="do nothing for a while",
-            parameters={"duration_s": Parameter(type=Type.NUMBER, minimum=0, maximum=600)},
+            parameters={"duration_s": _number(0, 600)},
             timeout_s=660.0,
             estimated_duration_s=5.0,
         ),

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import PlanInvalid
 from vla_deploy.planning.plan import Plan
 
@@ -39,7 +40,8 @@ ACTION_KEYS: Mapping[str, tuple[str, ...]] = {
     "preconditions": ("preconditions",),
     "effects": ("effects",),
 }
-# The typed dialect's `type` is a category beside `action`; it is dropped when a skill is named.
+_KNOWN_KEYS: Final = frozenset(alias for aliases in ACTION_KEYS.values() for alias in aliases)
+# The typed dialect's `type` is a category next to `action`; it is dropped when a skill is named.
 CATEGORIES = frozenset({"navigation", "manipulation", "interaction", "perception", "movement"})
 PLAN_TEXTS = ("summary", "reasoning", "feasible", "safety_concerns", "success_criteria")
 PRIORITIES = {0: "high", 1: "high", 2: "medium", 3: "low", "critical": "high", "normal": "medium"}
@@ -92,36 +94,23 @@ _PUT = _rename(
 )  # fmt: skip
 
 
-SKILL_DIALECT: Mapping[str, tuple[str, ParameterMap]] = {
-    "navigate_to": ("navigate_to", _target),
-    "navigate": ("navigate_to", _target),
-    "go_to": ("navigate_to", _target),
-    "move_to": ("navigate_to", _target),
-    "move_forward": ("move", _distance(1.0)),
-    "move_backward": ("move", _distance(-1.0)),
-    "turn_left": ("turn", _angle(1.0)),
-    "turn_right": ("turn", _angle(-1.0)),
-    "rotate": ("turn", _angle(1.0)),
-    "pick_up": ("pick_up", _OBJECT),
-    "pick": ("pick_up", _OBJECT),
-    "grasp": ("pick_up", _OBJECT),
-    "grab": ("pick_up", _OBJECT),
-    "place": ("place", _PUT),
-    "put_down": ("place", _PUT),
-    "put": ("place", _PUT),
-    "put_away": ("place", _PUT),
-    "give": ("hand_over", _OBJECT),
-    "handover": ("hand_over", _OBJECT),
-    "hand_over": ("hand_over", _OBJECT),
-    "release": ("place", _PUT),
-    "drop": ("place", _PUT),
-    "detect_object": ("find_object", _OBJECT),
-    "find_object": ("find_object", _OBJECT),
-    "search": ("find_object", _OBJECT),
-    "look_at": ("look_at", _OBJECT),
-    "say": ("speak", _rename(message="text", speech="text")),
-    "speak": ("speak", _rename(message="text", speech="text")),
-    "wait": ("wait", _rename(duration="duration_s", seconds="duration_s", time="duration_s")),
+# Each skill, what its parameters become, and the names that dialects have for it.
+_SKILL_NAMES: Final[tuple[tuple[str, ParameterMap, tuple[str, ...]], ...]] = (
+    ("navigate_to", _target, ("navigate_to", "navigate", "go_to", "move_to")),
+    ("move", _distance(1.0), ("move_forward",)),
+    ("move", _distance(-1.0), ("move_backward",)),
+    ("turn", _angle(1.0), ("turn_left", "rotate")),
+    ("turn", _angle(-1.0), ("turn_right",)),
+    ("pick_up", _OBJECT, ("pick_up", "pick", "grasp", "grab")),
+    ("place", _PUT, ("place", "put_down", "put", "put_away", "release", "drop")),
+    ("hand_over", _OBJECT, ("hand_over", "handover", "give")),
+    ("find_object", _OBJECT, ("find_object", "detect_object", "search")),
+    ("look_at", _OBJECT, ("look_at",)),
+    ("speak", _rename(message="text", speech="text"), ("speak", "say")),
+    ("wait", _rename(duration="duration_s", seconds="duration_s", time="duration_s"), ("wait",)),
+)
+SKILL_DIALECT: Final = {
+    name: (skill, convert) for skill, convert, names in _SKILL_NAMES for name in names
 }
 
 
@@ -178,23 +167,26 @@ def _canonical_plan(document: Any) -> Json:
 def _canonical_action(action: Any, number: int, previous: str | None) -> Json:
     if not isinstance(action, Mapping):
         raise PlanInvalid([f"action {number} is no JSON object: {action!r:.60}"])
-    unknown = set(action) - {alias for aliases in ACTION_KEYS.values() for alias in aliases}
-    if unknown:
+    given = {key: value for key, value in action.items() if value is not None}
+    unknown = [key for key in given if key not in _KNOWN_KEYS]
+    if unknown and any(key in given for key in ACTION_KEYS["parameters"]):
         raise PlanInvalid([f"action {number} has unknown keys: {', '.join(sorted(unknown))}"])
-    found = {key: _first(action, aliases) for key, aliases in ACTION_KEYS.items()}
+    if unknown:  # the parameters stand next to the skill
+        given["parameters"] = {key: given.pop(key) for key in unknown}
+    found = {key: _first(given, aliases) for key, aliases in ACTION_KEYS.items()}
     canonical = {key: value for key, value in found.items() if value is not None}
     canonical["id"] = str(canonical.get("id", f"a{number}"))
     if isinstance(canonical.get("depends_on"), list):
         canonical["depends_on"] = [str(name) for name in canonical["depends_on"]]
     elif "depends_on" not in canonical and previous is not None:
         canonical["depends_on"] = [previous]
-    if "priority" in canonical:
-        given = canonical["priority"]
-        known = isinstance(given, str | int)
-        canonical["priority"] = PRIORITIES.get(given, given) if known else given
+    priority = canonical.get("priority")
+    if isinstance(priority, str | int):
+        canonical["priority"] = PRIORITIES.get(priority, priority)
     skill = str(canonical.get("skill", "")).strip().lower().replace(" ", "_")
     parameters = canonical.get("parameters", {})
-    if "skill" in action or not isinstance(parameters, Mapping):
+    is_canonical = "skill" in given and skill in SKILLS
+    if is_canonical or not isinstance(parameters, Mapping):
         return canonical | {"skill": skill}
     skill, convert = SKILL_DIALECT.get(skill, (skill, _rename()))
     return canonical | {"skill": skill, "parameters": convert(dict(parameters))}

@@ -10,7 +10,7 @@ PlanningError
 │   └── NotAble       nor can any other planner: the robot lacks what it takes
 │       ├── NotThere  say it of what is there: "there are only two books"
 │       └── NothingBefore  say the whole command: nothing before it can be repeated
-├── Declined          ask the next rung of the ladder: this one has no plan
+├── Declined          ask the next back end: this one has no plan
 ├── Ambiguous         answer its question; carries the candidates
 ├── NotReady          reset and arm the robot first
 └── PlanInvalid       mend the plan; carries every fault
@@ -73,7 +73,7 @@ class CannotBeDone(PlanningError):
 
 
 class NotAble(CannotBeDone):
-    """Say what the robot lacks for such a thing, however it is said and whoever plans it."""
+    """Say what the robot lacks for such a thing, however it is said and planned."""
 
 
 class NotThere(NotAble):
@@ -85,7 +85,7 @@ class NothingBefore(NotAble):
 
 
 class Declined(PlanningError):
-    """Say why one rung of the ladder has no plan for a command; the next one is asked."""
+    """Say why one back end has no plan for a command; the next one is asked."""
 
 
 class Ambiguous(PlanningError):

@@ -16,8 +16,8 @@ class World:
 
     `places` maps every spoken name to its place, `sites` each place to where one stands for it, and
     `furniture` names the places that have something to put things on. `poses` are the robot file's
-    named poses; `holding` tells which kind of object each hand holds, and is empty where nobody
-    knows. `is_free` tells whether the base fits on a point of the map; None means that no map is
+    named poses; `holding` is which kind of object each hand holds, and is empty where that is not
+    known. `is_free` returns whether the base fits on a point of the map; None means that no map is
     at hand. A gripper opens `opening_max_m` wide, None where that is not known.
     """
 

@@ -1,10 +1,14 @@
 """Define the one canonical plan that every planner emits and the executor runs."""
 
+from collections.abc import Sequence
 from enum import StrEnum
+from graphlib import CycleError, TopologicalSorter
 from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
+MOST_CHARACTERS: Final = 1000
+"""Of one command in words."""
 MOST_ACTIONS: Final = 100
 PUT_IN: Final = "put in"
 """What the description of an action says that its author did not ask for."""
@@ -57,3 +61,56 @@ class Plan(BaseModel):
 def plan_schema() -> dict[str, Any]:
     """Return the JSON Schema of a plan, as published in `docs/plan.schema.json`."""
     return Plan.model_json_schema()
+
+
+_RANK: Final = {Priority.HIGH: 0, Priority.MEDIUM: 1, Priority.LOW: 2}
+
+
+def dependency_faults(actions: Sequence[Action]) -> list[str]:
+    """Return every duplicate id, unknown dependency and cycle."""
+    ids = [action.id for action in actions]
+    faults = [
+        f'action id "{name}" is used twice' for name in sorted(set(ids)) if ids.count(name) > 1
+    ]
+    faults += [
+        f'action "{action.id}" depends on "{needed}", which is not in the plan'
+        for action in actions
+        for needed in action.depends_on
+        if needed not in ids
+    ]
+    cycle = find_cycle(actions)
+    if cycle:
+        faults.append("the dependencies form a cycle: " + " -> ".join(cycle))
+    return faults
+
+
+def find_cycle(actions: Sequence[Action]) -> list[str]:
+    """Return one cycle as ids, first one repeated at the end, or an empty list."""
+    needs: TopologicalSorter[str] = TopologicalSorter(
+        {action.id: action.depends_on for action in actions}
+    )
+    try:
+        needs.prepare()
+    except CycleError as error:
+        return list(reversed(error.args[1]))
+    return []
+
+
+def execution_order(actions: Sequence[Action]) -> list[Action]:
+    """Return actions so that dependencies come first, then priority, then the order given.
+
+    Raises:
+        ValueError: the dependencies are not a directed acyclic graph; check them first.
+    """
+    waiting = list(actions)
+    finished: set[str] = set()
+    ordered: list[Action] = []
+    while waiting:
+        ready = [action for action in waiting if finished.issuperset(action.depends_on)]
+        if not ready:
+            raise ValueError("; ".join(dependency_faults(actions)))
+        chosen = min(ready, key=lambda action: _RANK[action.priority])
+        waiting.remove(chosen)
+        finished.add(chosen.id)
+        ordered.append(chosen)
+    return ordered

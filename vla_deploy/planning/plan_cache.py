@@ -1,82 +1,50 @@
-"""Keep plans that were accepted, for the same command while what they depend on is the same."""
+"""Keep accepted plans of language models, which take seconds, while the situation is the same.
+
+Such a model was shown the whole situation, so any change of it makes the kept plan void. Plans of
+the other back ends are not kept: they are made anew in a few milliseconds.
+"""
 
 import math
 import re
 from collections import OrderedDict
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.asking import Proposal, Request
-from vla_deploy.planning.confirmation import STILL
+from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.errors import Declined
-from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.symbolic.state import Point, Pose
-from vla_deploy.world import Query, Snapshot, Thing, UnknownWord, parse_query
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
+from vla_deploy.world import Thing
 
 MOST_PLANS: Final = 64
 LONGEST_S: Final = 3600.0
-# How far robot and things may have moved: little where a plan has coordinates, or where whoever saw
-# them all chose some by their ids or spoke of them; else within the same part of the room.
-_CLOSE: Final = (0.25, 0.26)  # m, rad
-_ROOM: Final = (1.0, math.inf)
-_COORDINATES: Final = frozenset({"x_m", "y_m", "yaw_rad"})
-_SPOKEN_OF: Final = ("object", "destination")
+# How far the robot and things may have moved, and the robot may have turned.
+NEAR_M: Final = 0.25
+NEAR_RAD: Final = 0.26
 # Words whose meaning is in what was said before.
 _REFERS_BACK: Final = re.compile(
     r"\b(it|its|that|this|those|these|there|them|they|one|ones|other|others|another|again|same|"
     r"instead|him|her|too|also|no|not|back|more|else|rest)\b"
 )
 
-Facts = tuple[object, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Context:
-    """Hold what a plan depends on: facts, and where robot and things were, as far as that counts.
-
-    `within` is how far they may have moved, and the robot turned, in metres and radians.
-    """
-
-    facts: Facts
-    pose: Pose | None = None
-    spots: tuple[Point, ...] = ()
-    within: tuple[float, float] = _ROOM
-
-    def is_like(self, other: "Context") -> bool:
-        """Tell whether one plans the same in another context."""
-        if self.facts != other.facts or (self.pose is None) != (other.pose is None):
-            return False
-        reach_m, turn_rad = self.within
-        spots = zip(self.spots, other.spots, strict=True)  # of the same things, by the facts
-        has_moved = any(math.dist(before, now) > reach_m for before, now in spots)
-        return not has_moved and self._stands_like(other, reach_m, turn_rad)
-
-    def _stands_like(self, other: "Context", reach_m: float, turn_rad: float) -> bool:
-        if self.pose is None or other.pose is None:
-            return True
-        turned_rad = math.remainder(other.pose[2] - self.pose[2], math.tau)
-        return math.dist(self.pose[:2], other.pose[:2]) <= reach_m and abs(turned_rad) <= turn_rad
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Kept:
-    """Hold a plan as it was proposed, what it depends on, and since when."""
+    """Hold a plan as it was proposed, for which situation, and since when."""
 
     proposal: Proposal
-    context: Context
+    request: Request
     since_ns: int
 
 
-class PlanCache:
-    """Answer a command that was planned before, as the second rung of the ladder.
+class PlanCache(BackEnd):
+    """Answer a command that a model has planned before.
 
     What it answers is grounded and checked anew, like any other proposal.
     """
 
-    name: Final = "cache"
+    name = "cache"
 
     def __init__(self, clock: Clock, most: int = MOST_PLANS, longest_s: float = LONGEST_S) -> None:
         self._clock = clock
@@ -89,8 +57,7 @@ class PlanCache:
         """Return the plan that was accepted before.
 
         Raises:
-            Declined: there is none, the words were hardly heard this time, or what it depends on
-                has changed: then it is forgotten.
+            Declined: there is none, or what it depends on has changed: then it is forgotten.
         """
         del deadline  # a look takes no time
         key = normalised(request.text)
@@ -98,26 +65,26 @@ class PlanCache:
         if kept is None:
             self._counts["misses"] += 1
             raise Declined("not planned before")
-        if self._has_changed(kept, request):
+        is_old = self._clock.now_ns() - kept.since_ns > self._longest_ns
+        if is_old or not _is_same(kept.request, request):
             del self._kept[key]
             self._counts["changed"] += 1
             raise Declined("what the plan of before depends on has changed")
         self._kept.move_to_end(key)
         self._counts["hits"] += 1
-        origin = kept.proposal.origin or kept.proposal.rung
-        proposal = replace(kept.proposal, rung=self.name, origin=origin)
-        return proposal.as_heard(request.heard_confidence)
+        return replace(kept.proposal, back_end=self.name, origin=kept.proposal.back_end)
 
     def keep(self, request: Request, proposal: Proposal) -> None:
-        """Remember what a rung proposed and was accepted; the oldest may go for it.
+        """Remember what a model proposed and was accepted; the oldest may go for it.
 
-        An answer, and what was made of an image, is of the moment: it is not kept.
+        An answer is of the moment: it is not kept.
         """
-        if _is_momentary(proposal):
+        only_says = all(action.skill in MOTIONLESS for action in proposal.plan.actions)
+        if only_says or not proposal.may_be_kept:
             return
         key = normalised(request.text)
-        context = context_of(request, proposal)
-        self._kept[key] = _Kept(proposal=proposal, context=context, since_ns=self._clock.now_ns())
+        situation = replace(request, image=None)  # which takes memory, and is not compared
+        self._kept[key] = _Kept(proposal=proposal, request=situation, since_ns=self._clock.now_ns())
         self._kept.move_to_end(key)
         while len(self._kept) > self._most:
             self._kept.popitem(last=False)
@@ -132,89 +99,40 @@ class PlanCache:
         rate = round(self._counts["hits"] / looks, 4) if looks else None
         return {**self._counts, "plans": len(self._kept), "hit_rate": rate}
 
-    def _has_changed(self, kept: _Kept, request: Request) -> bool:
-        is_old = self._clock.now_ns() - kept.since_ns > self._longest_ns
-        return is_old or not kept.context.is_like(context_of(request, kept.proposal))
-
 
 def normalised(text: str) -> str:
     """Return a command so that only what cannot matter is lost: case, white space, a full stop."""
     return " ".join(text.casefold().split()).strip(" .!?")
 
 
-def context_of(request: Request, proposal: Proposal) -> Context:
-    """Return everything that a plan for the command depends on.
+def _is_same(before: Request, now: Request) -> bool:
+    """Return whether one plans the same in two situations."""
+    if _facts(before) != _facts(now):
+        return False
+    spots = zip(_things(before), _things(now), strict=True)  # the same things, by the facts
+    if any(math.dist(one.xy_m, other.xy_m) > NEAR_M for one, other in spots):
+        return False
+    if before.here is None or now.here is None:
+        return before.here is now.here
+    turned_rad = math.remainder(now.here[2] - before.here[2], math.tau)
+    return math.dist(before.here[:2], now.here[:2]) <= NEAR_M and abs(turned_rad) <= NEAR_RAD
 
-    Whoever was shown the whole scene may have used all of it, and where it all is.
-    """
-    scene, saw_all = request.scene, proposal.saw_scene
-    things = () if scene is None else scene.things if saw_all else _spoken_of(proposal.plan, scene)
-    known = sorted(things, key=lambda one: one.thing_id)
-    gone = tuple(one.thing.thing_id for one in scene.lost) if scene is not None else ()
-    return Context(
-        facts=(
-            tuple(sorted(request.world.holding.items(), key=str)),
-            tuple(map(_told, known)),
-            _said_before(request),
-            request.here is None,
-            (request.recollections, gone) if saw_all else (),
-        ),
-        pose=request.here if saw_all or _has_coordinates(proposal.plan) else None,
-        spots=tuple(one.xy_m for one in known) if saw_all else (),
-        within=_CLOSE if _is_of_places(proposal) else _ROOM,
+
+def _facts(request: Request) -> tuple[object, ...]:
+    gone = () if request.scene is None else request.scene.lost
+    refers_back = _REFERS_BACK.search(normalised(request.text))
+    turns = request.conversation.turns if refers_back else ()
+    return (
+        [(turn.said, turn.understood, turn.answer) for turn in turns],
+        request.world.holding,
+        request.conversation.choices,
+        request.recollections,
+        request.prohibitions,
+        [one.thing.thing_id for one in gone],
+        [(one.thing_id, one.kind, one.colour, one.rests, one.held_by) for one in _things(request)],
     )
 
 
-def _is_momentary(proposal: Proposal) -> bool:
-    """Tell whether a plan holds what was read when it was made, and nothing later can confirm."""
-    only_tells = all(action.skill in STILL for action in proposal.plan.actions)
-    return proposal.is_momentary or (proposal.saw_scene and only_tells)
-
-
-def _is_of_places(proposal: Proposal) -> bool:
-    """Tell whether a plan may be another one where things stand a little farther away."""
-    if _has_coordinates(proposal.plan):
-        return True
-    return proposal.saw_scene and any(
-        action.skill == "speak" or _names_id(action) for action in proposal.plan.actions
-    )
-
-
-def _names_id(action: Action) -> bool:
-    queries = (_query(action.parameters.get(name)) for name in _SPOKEN_OF)
-    return any(query is not None and query.thing_id for query in queries)
-
-
-def _spoken_of(plan: Plan, scene: Snapshot) -> Iterator[Thing]:
-    """Yield the things that a plan may mean, and what they must be told from."""
-    for action in plan.actions:
-        for name in _SPOKEN_OF:
-            query = _query(action.parameters.get(name))
-            if query is not None:
-                yield from (one for one in scene.things if query.fits(one))
-
-
-def _query(words: object) -> Query | None:
-    if not isinstance(words, str):
-        return None
-    try:
-        return parse_query(words)
-    except UnknownWord:  # a place, which does not change
-        return None
-
-
-def _told(thing: Thing) -> tuple[str, ...]:
-    rests = (thing.rests.relation, thing.rests.of) if thing.rests else ("", "")
-    return (thing.thing_id, thing.kind, thing.colour, *rests, thing.held_by)
-
-
-def _has_coordinates(plan: Plan) -> bool:
-    return any(_COORDINATES & action.parameters.keys() for action in plan.actions)
-
-
-def _said_before(request: Request) -> Facts:
-    talk = request.conversation
-    settled = tuple(sorted(talk.choices.items()))
-    if not _REFERS_BACK.search(normalised(request.text)):
-        return settled
-    return (settled, tuple((turn.said, turn.understood, turn.answer) for turn in talk.turns))
+def _things(request: Request) -> list[Thing]:
+    things = () if request.scene is None else request.scene.things
+    return sorted(things, key=lambda one: one.thing_id)

@@ -1,25 +1,48 @@
-"""Plan one command: what answers at once first, what takes time after it, in one time for all."""
+"""Ask the back ends for a plan, one after the other, and check what each proposes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Final, Protocol, runtime_checkable
+from dataclasses import replace
+from typing import Any, Final
 
-from drivers.clock import Clock
+from drivers.clock import NS_PER_S, Clock
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.aids import Aid
-from vla_deploy.planning.asking import Proposal, Request, Rung
-from vla_deploy.planning.correction import CORRECTED
+from vla_deploy.one_line import one_line
 from vla_deploy.planning.dialects import Json, parse_plan
-from vla_deploy.planning.errors import Declined, NotUnderstood
-from vla_deploy.planning.ladder import Answer, Check, Ladder
+from vla_deploy.planning.errors import (
+    Ambiguous,
+    Declined,
+    NotUnderstood,
+    PlanInvalid,
+    PlanningError,
+)
+from vla_deploy.planning.interfaces import (
+    Aid,
+    Attempt,
+    AttemptOutcome,
+    BackEnd,
+    Check,
+    PlanningResult,
+    Proposal,
+    Request,
+)
 from vla_deploy.planning.patterns.backend import Patterns
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.plan_cache import PlanCache
 from vla_deploy.planning.prohibitions import held_to
+from vla_deploy.planning.scope import guarded
 from vla_deploy.planning.understanding.grounding import ground_plan
 from vla_deploy.planning.validator import check_plan
 
 WITHIN_S: Final = 20.0
+_REASON_CHARACTERS: Final = 200
+# What an error is called in events, and its rank: a person reads the error of the least rank.
+_ERRORS: Final = (
+    (Ambiguous, AttemptOutcome.ASKED, 0),
+    (PlanInvalid, AttemptOutcome.INVALID, 2),
+    (NotUnderstood, AttemptOutcome.DECLINED, 3),
+    (Declined, AttemptOutcome.DECLINED, 4),
+    (PlanningError, AttemptOutcome.REFUSED, 1),
+)
 
 
 def checked(plan: Plan, request: Request) -> Plan:
@@ -27,7 +50,7 @@ def checked(plan: Plan, request: Request) -> Plan:
 
     Raises:
         PlanInvalid: it may not run; carries every fault.
-        Ambiguous: only the person can tell what is meant.
+        Ambiguous: only the person knows what is meant.
         PlanningError: it speaks of what the robot does not know.
     """
     grounded = ground_plan(plan, request)
@@ -35,44 +58,16 @@ def checked(plan: Plan, request: Request) -> Plan:
     return held_to(request.prohibitions, grounded, request.world, request.scene)
 
 
-@runtime_checkable
-class Served(Protocol):
-    """Tell more of a rung that asks a server."""
-
-    def document(self) -> dict[str, Any]:
-        """Return how its server has been doing."""
-        ...
-
-
-@runtime_checkable
-class Aided(Protocol):
-    """Tell what a rung puts before its model, besides command and scene."""
-
-    @property
-    def aids(self) -> frozenset[Aid]:
-        """Return what it can use."""
-        ...
-
-
-@runtime_checkable
-class Held(Protocol):
-    """Let go of what a rung holds in memory."""
-
-    def close(self) -> None:
-        """Release it."""
-        ...
-
-
 class Planner:
-    """Hold the parts of the ladder; the slow one is climbed beside a process' steps.
+    """Hold the chain of back ends; those in `slow` are asked outside the node's steps.
 
-    `away` tells which servers it should ask and cannot, with the reason.
+    `away` maps models and servers that it should ask and cannot to the reason.
     """
 
     def __init__(
         self,
         clock: Clock,
-        slow: Sequence[Rung] = (),
+        slow: Sequence[BackEnd] = (),
         *,
         within_s: float = WITHIN_S,
         check: Check = checked,
@@ -81,91 +76,140 @@ class Planner:
         self.cache = PlanCache(clock)
         self.within_s = within_s
         self.away = dict(away or {})
-        self._clock = clock
         self.check = check
-        self._quick = Ladder((Patterns(), self.cache), check, clock)
-        self._slow = Ladder(slow, check, clock)
+        self._clock = clock
+        self._quick: tuple[BackEnd, ...] = (Patterns(), self.cache)
+        self._slow = tuple(slow)
 
     @property
-    def _ladders(self) -> tuple[Ladder, ...]:
-        return self._quick, self._slow
+    def back_ends(self) -> tuple[str, ...]:
+        """Return the names of all back ends, in the order in which they are asked."""
+        return tuple(one.name for one in (*self._quick, *self._slow))
 
     @property
-    def rungs(self) -> tuple[str, ...]:
-        """Return the names of all rungs, in the order in which they are asked."""
-        return tuple(rung.name for ladder in self._ladders for rung in ladder.rungs)
-
-    @property
-    def slow_rungs(self) -> tuple[str, ...]:
-        """Return the names of the rungs that take time."""
-        return tuple(rung.name for rung in self._slow.rungs)
+    def slow_back_ends(self) -> tuple[str, ...]:
+        """Return the names of the back ends that take time."""
+        return tuple(one.name for one in self._slow)
 
     @property
     def uses(self) -> frozenset[Aid]:
-        """Return what any of the rungs can use."""
-        aided = [rung.aids for rung in self._slow.rungs if isinstance(rung, Aided)]
-        return frozenset(one for aids in aided for one in aids)
+        """Return what any of the back ends can use."""
+        return frozenset().union(*(one.uses for one in self._slow))
 
     def document(self) -> dict[str, Any]:
         """Return how cache and servers have been doing, as JSON takes it."""
-        servers = [rung.document() for rung in self._slow.rungs if isinstance(rung, Served)]
+        documents = (one.document() for one in self._slow)
         return {
-            "rungs": list(self.rungs),
+            "rungs": list(self.back_ends),
             "cache": self.cache.document(),
-            "servers": servers,
+            "servers": [one for one in documents if one is not None],
             "away": self.away,
         }
 
     def close(self) -> None:
         """Release the models on board; planning after that does without them."""
-        for rung in self._slow.rungs:
-            if isinstance(rung, Held):
-                rung.close()
+        for one in self._slow:
+            one.close()
 
-    def plan(self, request: Request) -> Answer:
-        """Return the answer of all rungs together; blocks until then."""
+    def plan(self, request: Request) -> PlanningResult:
+        """Return the answer of all back ends together; blocks until then."""
         deadline = Deadline.within(self._clock, self.within_s)
         answer = self.plan_at_once(request, deadline)
         return answer if answer.is_final else self.plan_slowly(request, deadline, answer)
 
-    def plan_at_once(self, request: Request, deadline: Deadline) -> Answer:
-        """Return the answer of the rungs that take no time."""
-        answer = self._quick.climb(request, deadline)
-        return answer if self._slow.rungs else _worded(answer, request)
+    def plan_at_once(self, request: Request, deadline: Deadline) -> PlanningResult:
+        """Return the answer of the back ends that take no time."""
+        answer = self.first_plan(self._quick, request, deadline)
+        return answer if self._slow else _worded(answer, request)
 
-    def plan_slowly(self, request: Request, deadline: Deadline, before: Answer) -> Answer:
+    def plan_slowly(
+        self, request: Request, deadline: Deadline, before: PlanningResult
+    ) -> PlanningResult:
         """Return the answer of the others too; blocks until the deadline at most."""
-        return _worded(self._slow.climb(request, deadline, before), request)
+        return _worded(self.first_plan(self._slow, request, deadline, before), request)
 
-    def check_given(self, document: Json | list[object] | str, request: Request) -> Answer:
-        """Return the answer to a plan that somebody made elsewhere, in any dialect."""
+    def check_given(self, document: Json | list[object] | str, request: Request) -> PlanningResult:
+        """Return the answer to a plan that was made elsewhere, in any dialect."""
         deadline = Deadline.within(self._clock, self.within_s)
-        return Ladder((_GivenPlan(document),), self.check, self._clock).climb(request, deadline)
+        return self.first_plan((_GivenPlan(document),), request, deadline)
 
-    def accepted(self, request: Request, answer: Answer) -> None:
-        """Remember a plan that was handed on; what patterns make is made anew as fast."""
-        proposal = answer.proposal
-        if proposal is not None and proposal.rung not in _NOT_KEPT:
-            self.cache.keep(request, proposal)
+    def accepted(self, request: Request, answer: PlanningResult) -> None:
+        """Keep a plan that was dispatched for when the same is asked again."""
+        if answer.proposal is not None and answer.proposal.back_end != self.cache.name:
+            self.cache.keep(request, answer.proposal)
+
+    def first_plan(
+        self,
+        back_ends: Sequence[BackEnd],
+        request: Request,
+        deadline: Deadline,
+        before: PlanningResult | None = None,
+    ) -> PlanningResult:
+        """Return the first plan that may run; `before` is what came of those asked before.
+
+        Each back end may take an equal share of the time that is left for all that could still be
+        asked. Without a plan, the answer has the error of those that helps a person most.
+        """
+        answer = before or PlanningResult()
+        for number, back_end in enumerate(back_ends):
+            if answer.is_final:
+                break
+            share = deadline.share(len(back_ends) - number)
+            began_ns = self._clock.now_ns()
+            found = self._ask(back_end, request, share, deadline)
+            attempt = Attempt(
+                back_end=back_end.name,
+                outcome=_outcome(found.error, share),
+                took_s=(self._clock.now_ns() - began_ns) / NS_PER_S,
+                reason="" if found.error is None else one_line(found.error)[:_REASON_CHARACTERS],
+            )
+            errors = [one for one in (answer.error, found.error) if one is not None]
+            error = min(errors, key=_rank) if found.error is not None else None
+            answer = replace(found, attempts=(*answer.attempts, attempt), error=error)
+        return answer
+
+    def _ask(
+        self, back_end: BackEnd, request: Request, share: Deadline, whole: Deadline
+    ) -> PlanningResult:
+        try:
+            if share.left_s <= 0.0:
+                raise Declined("no time is left")
+            proposal = guarded(back_end.propose(request, share), request)
+            plan = self.check(proposal.plan, request)
+            if whole.left_s <= 0.0:
+                raise Declined("its plan came too late")
+        except PlanningError as error:
+            return PlanningResult(error=error)
+        return PlanningResult(plan=plan, proposal=proposal)
 
 
-@dataclass(frozen=True, slots=True)
-class _GivenPlan:
+class _GivenPlan(BackEnd):
     """Propose a plan that came with the command."""
 
-    document: Json | list[object] | str
-    name: str = field(default="given", init=False)
+    name = "given"
+
+    def __init__(self, given: Json | list[object] | str) -> None:
+        self._given = given
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
         del request, deadline  # the plan is there already
-        return Proposal(plan=parse_plan(self.document), rung=self.name, confidence=1.0)
+        return Proposal(plan=parse_plan(self._given), back_end=self.name, confidence=1.0)
 
 
-_NOT_KEPT: Final = frozenset({Patterns.name, PlanCache.name, "given", CORRECTED})
+def _rank(error: PlanningError) -> int:
+    return next(rank for kind, _, rank in _ERRORS if isinstance(error, kind))
 
 
-def _worded(answer: Answer, request: Request) -> Answer:
-    """Say to a person that nobody understood, where no rung has said more."""
+def _outcome(error: PlanningError | None, share: Deadline) -> AttemptOutcome:
+    if error is None:
+        return AttemptOutcome.PLANNED
+    outcome = next(outcome for kind, outcome, _ in _ERRORS if isinstance(error, kind))
+    is_late = outcome is AttemptOutcome.DECLINED and share.left_s <= 0.0
+    return AttemptOutcome.LATE if is_late else outcome
+
+
+def _worded(answer: PlanningResult, request: Request) -> PlanningResult:
+    """Replace the error by "not understood" where no back end has said more."""
     if isinstance(answer.error, Declined):
         return replace(answer, error=NotUnderstood(request.text))
     return answer

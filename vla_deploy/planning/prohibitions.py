@@ -13,9 +13,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Self
 
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.builders.tidying import REACH_M, surfaces_of
 from vla_deploy.planning.errors import CannotBeDone, NotAble, UnknownObject
+from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.patterns.phrase import courtesy_off
 from vla_deploy.planning.patterns.slots import THING, WORDS
@@ -113,16 +113,15 @@ def order_of(groups: Mapping[str, str], forbids: bool, request: Request) -> Stan
     return StandingOrder(forbids=forbids, of=meant)
 
 
-def proposal_of(order: StandingOrder, request: Request, rung: str) -> Proposal:
+def proposal_of(order: StandingOrder, request: Request, back_end: str) -> Proposal:
     """Return the proposal to say that an order stands from now on."""
     said = Action(id="a1", skill="speak", parameters={"text": order.answer})
     plan = Plan(goal=request.text.strip(), summary=order.answer, actions=(said,))
     return Proposal(
         plan=plan,
-        rung=rung,
+        back_end=back_end,
         confidence=1.0,
         read_back=order.question,
-        is_momentary=True,
         covers=None,
         order=order,
     )

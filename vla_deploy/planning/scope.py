@@ -11,8 +11,9 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import Final
 
-from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.catalogue import MOTIONLESS
 from vla_deploy.planning.errors import CannotBeDone
+from vla_deploy.planning.interfaces import Proposal, Request
 
 
 class ScopeGroup(StrEnum):
@@ -83,7 +84,6 @@ _DENIED: Final = re.compile(
     r"no [a-z]+ing|not\b|avoid|refrain|stay|keep|hands off|nobody|nothing|neither)\b"
 )
 """How a command begins that says what not to do."""
-_STILL: Final = frozenset({"speak", "wait", "stop", "look_at"})
 
 
 def scope_words(text: str) -> tuple[str, ...]:
@@ -113,7 +113,7 @@ def guarded(proposal: Proposal, request: Request) -> Proposal:
     Raises:
         CannotBeDone: without them it may be the very thing that was not to be done.
     """
-    if all(action.skill in _STILL for action in proposal.plan.actions):
+    if all(action.skill in {*MOTIONLESS, "look_at"} for action in proposal.plan.actions):
         return proposal
     left_out = _without(scope_words(request.text), proposal.covers)
     if not left_out:

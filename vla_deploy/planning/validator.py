@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from vla_deploy.planning.alternatives import instead_of
 from vla_deploy.planning.catalogue import (
     GRASPABLE_CLASSES,
     NOT_SKILLS,
@@ -12,17 +13,13 @@ from vla_deploy.planning.catalogue import (
     Type,
 )
 from vla_deploy.planning.errors import PlanInvalid, UnknownObject
-from vla_deploy.planning.graph import dependency_faults
-from vla_deploy.planning.instead import instead_of
-from vla_deploy.planning.knowledge import World, spoken_places
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.plan import Action, Plan, dependency_faults
 from vla_deploy.planning.references import match_place, parse_object
 from vla_deploy.planning.symbolic import bounds_faults, symbolic_faults
 from vla_deploy.planning.symbolic.sharing import sharing_faults
 from vla_deploy.planning.symbolic.state import Pose
 from vla_deploy.world import Snapshot
-
-__all__ = ["World", "action_faults", "check_plan", "plan_faults", "spoken_places"]
 
 
 def check_plan(
@@ -30,27 +27,18 @@ def check_plan(
 ) -> None:
     """Accept a plan or name everything that is wrong with it.
 
-    `here` is the robot's x, y (m) and yaw (rad) in the map. What nobody tells is not judged.
+    `here` is the robot's x, y (m) and yaw (rad) in the map. What is not known is not judged.
 
     Raises:
         PlanInvalid: carries all faults, and what could be done instead.
     """
-    malformed = _form_faults(plan, world)
-    if malformed:
-        raise PlanInvalid(malformed)
-    faults = _faults_here(plan, world, scene, here)
+    faults, advice = _form_faults(plan, world), ""
+    if not faults:
+        # A plan whose actions are all right one by one is gone through symbol by symbol.
+        faults = _faults_here(plan, world, scene, here)
+        advice = instead_of(plan, world, scene, here) if faults else ""
     if faults:
-        raise PlanInvalid(faults, instead_of(plan, world, scene, here))
-
-
-def plan_faults(
-    plan: Plan, world: World, scene: Snapshot | None = None, here: Pose | None = None
-) -> list[str]:
-    """Return every fault of a plan, in the order of its actions.
-
-    A plan whose actions are all right one by one is gone through symbol by symbol.
-    """
-    return _form_faults(plan, world) or _faults_here(plan, world, scene, here)
+        raise PlanInvalid(faults, advice)
 
 
 def _faults_here(plan: Plan, world: World, scene: Snapshot | None, here: Pose | None) -> list[str]:
@@ -111,7 +99,7 @@ def _choice_of_group_faults(action: Action, spec: SkillSpec) -> list[str]:
 def _sense_faults(action: Action, world: World) -> list[str]:
     if action.skill == "move_arm" and action.parameters.get("pose") not in world.poses:
         return [f"unknown pose; known: {', '.join(sorted(world.poses))}"]
-    if action.skill == "pick_up" and not _value_faults_object(action.parameters.get("object")):
+    if action.skill == "pick_up" and not _object_faults(action.parameters.get("object")):
         kind = parse_object(str(action.parameters["object"])).kind
         if kind not in GRASPABLE_CLASSES:
             return [f"a {kind} is too large to grasp; graspable: {', '.join(GRASPABLE_CLASSES)}"]
@@ -133,10 +121,9 @@ def _value_faults(name: str, value: Any, parameter: Parameter, world: World) -> 
         case Type.PLACE:
             return _place_faults(name, value, world)
         case Type.OBJECT:
-            return _value_faults_object(value)
+            return _object_faults(value)
         case Type.DESTINATION:
-            object_faults = _value_faults_object(value)
-            return object_faults and _place_faults(name, value, world) and object_faults
+            return [] if not _place_faults(name, value, world) else _object_faults(value)
 
 
 def _number_faults(name: str, value: Any, parameter: Parameter) -> list[str]:
@@ -154,7 +141,7 @@ def _place_faults(name: str, value: Any, world: World) -> list[str]:
     return [f'{name}: unknown place "{value}"; known: {known}']
 
 
-def _value_faults_object(value: Any) -> list[str]:
+def _object_faults(value: Any) -> list[str]:
     try:
         parse_object(str(value))
     except UnknownObject as error:

@@ -10,9 +10,8 @@ from vla_deploy.client.readiness import refusal_of
 from vla_deploy.ipc import Book, ClaimRefused, IpcError
 from vla_deploy.ipc.claims import obstacles
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.graph import execution_order
-from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.recovery import Cause
+from vla_deploy.planning.plan import Action, Plan, execution_order
+from vla_deploy.planning.recovery import FailureCause
 from vla_deploy.planning.symbolic.state import State
 from vla_deploy.skills.context import Rest, Skill, SkillContext
 from vla_deploy.skills.errors import (
@@ -33,10 +32,10 @@ BACK_OFF_S = 1.0
 WORLD_WAIT_S = 0.6
 WORLD_LOOK_S = 0.1
 CAUSES = (
-    (PreconditionUnmet, Cause.PRECONDITION),
-    (EffectMissing, Cause.EFFECT),
-    (TryAgain, Cause.SKILL),
-    (NotPossible, Cause.SKILL),
+    (PreconditionUnmet, FailureCause.PRECONDITION),
+    (EffectMissing, FailureCause.EFFECT),
+    (TryAgain, FailureCause.SKILL),
+    (NotPossible, FailureCause.SKILL),
 )
 _WAITING: Final = "wait"  # lasts as long as it was asked for
 FINAL = frozenset(ActionStatus) - {ActionStatus.PENDING, ActionStatus.ACTIVE}
@@ -53,7 +52,7 @@ class ActionRecord:
     error: str = ""
     retries: int = 0
     note: str = ""
-    cause: Cause | None = None
+    cause: FailureCause | None = None
     """By what it failed, where another plan may do better; None otherwise."""
     left: Mapping[str, float] | None = None
     """What is left of a relative motion that ended early; empty where nobody knows, else None."""

@@ -14,7 +14,7 @@ from vla_deploy.ipc import SharedSpace
 from vla_deploy.memory import MemoryStore
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.node import NodeContext
-from vla_deploy.planning.asking import Proposal, Request
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.node import PlannerNode
 from vla_deploy.planning.plan import Plan
@@ -37,8 +37,8 @@ class StepClock:
         self.time_ns += round(duration_s * NS_PER_S)
 
 
-class ScriptedRung:
-    """A rung that does the next of what it was told: propose a plan, raise, or take its time."""
+class ScriptedBackEnd(BackEnd):
+    """Does the next of what it was told: propose a plan, raise, or take its time."""
 
     def __init__(self, name: str, clock: StepClock, *script: Any, takes_s: float = 0.0) -> None:
         self.name = name
@@ -162,7 +162,7 @@ class Desk:
 
 @pytest.fixture
 def open_desk(tmp_path: Path, clock: StepClock) -> Iterator[Callable[..., Desk]]:
-    """Open a desk with an armed robot and a planner that asks these slow rungs after rules."""
+    """Open a desk with an armed robot and a planner that asks these slow back ends after rules."""
     opened: list[Desk] = []
 
     def open_desk(
@@ -192,8 +192,8 @@ def clock() -> StepClock:
 
 
 @pytest.fixture
-def rung(clock: StepClock) -> Callable[..., ScriptedRung]:
-    return lambda name, *script, takes_s=0.0: ScriptedRung(name, clock, *script, takes_s=takes_s)
+def back_end(clock: StepClock) -> Callable[..., ScriptedBackEnd]:
+    return lambda name, *script, takes_s=0.0: ScriptedBackEnd(name, clock, *script, takes_s=takes_s)
 
 
 @pytest.fixture(scope="session")
@@ -229,13 +229,13 @@ def propose() -> Callable[..., Proposal]:
     """Return a proposal of one action after the other, each a skill with its parameters."""
 
     def propose(
-        *steps: tuple[str, dict[str, Any]], rung: str = "model", **changes: Any
+        *steps: tuple[str, dict[str, Any]], back_end: str = "model", **changes: Any
     ) -> Proposal:
         actions = [
             {"id": f"a{number}", "skill": skill, "parameters": parameters}
             for number, (skill, parameters) in enumerate(steps)
         ]
         plan = Plan.model_validate({"goal": "a test", "actions": actions})
-        return Proposal(**({"plan": plan, "rung": rung, "confidence": 0.9} | changes))
+        return Proposal(**({"plan": plan, "back_end": back_end, "confidence": 0.9} | changes))
 
     return propose

@@ -7,8 +7,8 @@ import pytest
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from vla_deploy.ipc import ClaimBook, SharedSpace
-from vla_deploy.planning.aids import Aid
 from vla_deploy.planning.assembly import open_planner, planner_for
+from vla_deploy.planning.interfaces import Aid
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.robots import load_robot
 
@@ -49,13 +49,13 @@ def open_with(tmp_path, loopback):
 
 def test_nobody_else_is_asked_unless_configured(open_with):
     planner = open_with("within_s = 5.0")
-    assert planner.rungs == ("patterns", "cache")
+    assert planner.back_ends == ("patterns", "cache")
     assert planner.uses == frozenset()
 
 
 def test_servers_are_asked_after_rules_and_cache(open_with, loopback, ask):
     planner = open_with('servers = ["bench"]')
-    assert planner.rungs == ("patterns", "cache", "server bench")
+    assert planner.back_ends == ("patterns", "cache", "server bench")
     assert planner.uses == {Aid.MEMORY}
     loopback.then(loopback.says(json.dumps(ANSWER)))
     answer = planner.plan(ask("make it nice in here"))
@@ -63,26 +63,26 @@ def test_servers_are_asked_after_rules_and_cache(open_with, loopback, ask):
     assert [one.outcome for one in answer.attempts] == ["declined", "declined", "planned"]
     planner.accepted(ask("make it nice in here"), answer)
     again = planner.plan(ask("make it nice in here"))
-    assert (again.proposal.rung, again.proposal.origin) == ("cache", "server bench")
+    assert (again.proposal.back_end, again.proposal.origin) == ("cache", "server bench")
     assert len(loopback.heard) == 1
     assert planner.document()["servers"][0]["answers"] == 1
 
 
 def test_a_command_of_the_rules_asks_no_server(open_with, loopback, ask):
     planner = open_with('servers = ["bench"]')
-    assert planner.plan(ask("go to the kitchen")).proposal.rung == "patterns"
+    assert planner.plan(ask("go to the kitchen")).proposal.back_end == "patterns"
     assert loopback.heard == []
 
 
 def test_servers_that_are_not_there_are_told_and_done_without(open_with):
     planner = open_with('servers = ["nobody", "cloud", "bench"]')
-    assert planner.slow_rungs == ("server bench",)
+    assert planner.slow_back_ends == ("server bench",)
     assert set(planner.document()["away"]) == {"nobody", "cloud"}
     assert "NO_SUCH_KEY_ANYWHERE" in planner.away["cloud"]
 
 
 def test_no_more_rungs_are_asked_than_the_profile_allows(open_with):
-    assert open_with('servers = ["bench"]\nmax_rungs = 0').slow_rungs == ()
+    assert open_with('servers = ["bench"]\nmax_rungs = 0').slow_back_ends == ()
 
 
 def test_the_world_of_the_robot_names_the_places_that_a_server_may_choose(open_with, loopback, ask):
@@ -99,11 +99,11 @@ def test_models_on_board_are_done_without_where_others_hold_the_memory(tmp_path)
     book.declare({"ram_mb": 500})
     robot, profile = load_robot("butler"), load_profile("desktop")
     planner = planner_for(robot, profile, clock, tmp_path / "base", run_dir=run_dir)
-    assert "command_parser" in planner.rungs
+    assert "command_parser" in planner.back_ends
     (claim,) = book.look().granted
     assert claim.holder.startswith("planner command_parser ")
     planner.close()
     book.ask("perception", {"ram_mb": 500})
     planner = planner_for(robot, profile, clock, tmp_path / "base", run_dir=run_dir)
-    assert "command_parser" not in planner.rungs
+    assert "command_parser" not in planner.back_ends
     assert "ram_mb is held by perception (500)" in planner.away["command_parser"]

@@ -94,7 +94,13 @@ def test_dialect_parameters_become_si_and_canonical_names(
 
 @pytest.mark.parametrize(
     "document",
-    ["no json here", "{broken", {"actions": ["go"]}, {"actions": [{"skill": "x", "colour": 1}]}, 7],
+    [
+        "no json here",
+        "{broken",
+        {"actions": ["go"]},
+        {"actions": [{"skill": "x", "parameters": {}, "colour": 1}]},
+        7,
+    ],
 )
 def test_garbage_is_refused_by_name(document: object) -> None:
     with pytest.raises(PlanInvalid, match="plan was refused"):

@@ -146,9 +146,9 @@ def test_a_restarted_planner_hands_on_a_stop_that_came_while_it_was_away(desk):
 
 
 def test_a_restarted_planner_tells_which_commands_went_with_the_old_one(
-    open_desk, later, rung, propose
+    open_desk, later, back_end, propose
 ):
-    desk = open_desk(rung("model", propose(("wait", {"duration_s": 1.0}))), aside=later)
+    desk = open_desk(back_end("model", propose(("wait", {"duration_s": 1.0}))), aside=later)
     desk.give(text="sing a sea shanty")
     assert [one["event"] for one in desk.answers()] == ["planning"]
     desk.start()
@@ -170,10 +170,10 @@ def test_the_status_tells_of_commands_rungs_and_the_cache(desk):
 
 
 def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
-    open_desk, later, rung, propose
+    open_desk, later, back_end, propose
 ):
     closed = []
-    model = rung("model", propose(("wait", {"duration_s": 1.0})))
+    model = back_end("model", propose(("wait", {"duration_s": 1.0})))
     model.close = lambda: closed.append("model")
     desk = open_desk(model, aside=later)
     desk.give(text="sing a sea shanty")
@@ -188,8 +188,8 @@ def test_a_planner_that_is_replaced_is_closed_when_its_work_is_done(
     assert closed == ["model"]
 
 
-def test_plans_are_kept_by_the_planner_in_force(open_desk, rung, propose):
-    model = rung("model", propose(("wait", {"duration_s": 1.0})))
+def test_plans_are_kept_by_the_planner_in_force(open_desk, back_end, propose):
+    model = back_end("model", propose(("turn", {"angle_rad": 1.0}), may_be_kept=True))
     desk = open_desk(model)
     desk.planner.commit(Planner(desk.clock, (model,)))
     desk.give(text="sing a sea shanty")

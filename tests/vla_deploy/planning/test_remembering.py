@@ -8,9 +8,9 @@ import pytest
 from platforms import load_profile
 from vla_deploy.memory import LastSeen, MemoryStore, Outcome
 from vla_deploy.memory.episode import unix_s
-from vla_deploy.planning.aids import OLDEST_S, Recall
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.assembly import open_memory
+from vla_deploy.planning.dialogue.situation import OLDEST_S, Recall
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.patterns.backend import Patterns
 
 BOUNDS = load_profile("desktop").planning

@@ -8,8 +8,8 @@ import pytest
 from benchmarks.planner_bounds import moves
 from benchmarks.planner_corpus import home, scenes
 from benchmarks.planner_desk import Answer, fresh_desk
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.errors import CannotBeDone
+from vla_deploy.planning.interfaces import Proposal, Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.scope import guarded, scope_words
@@ -77,7 +77,7 @@ def test_the_question_names_what_may_not_be_understood() -> None:
 
 def proposed(skill: str = "navigate_to", **changes: object) -> Proposal:
     plan = Plan(goal="g", summary="go to the kitchen", actions=(Action(id="a", skill=skill),))
-    return Proposal(plan=plan, rung="test", confidence=1.0, **changes)
+    return Proposal(plan=plan, back_end="test", confidence=1.0, **changes)
 
 
 def request_for(text: str) -> Request:

@@ -11,8 +11,8 @@ import pytest
 
 import vla_deploy
 from vla_deploy.planning.command_parser.read_back import question
+from vla_deploy.planning.dialogue.phrasing import first_part, spoken_refusal, steps_in_words
 from vla_deploy.planning.errors import NotUnderstood
-from vla_deploy.planning.phrasing import first_part, spoken_refusal, steps_in_words
 from vla_deploy.speech.words import STOPS
 
 PACKAGE: Final = Path(vla_deploy.__file__).parent

@@ -1,8 +1,9 @@
 import pytest
 
 from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.plan import Action, Plan
-from vla_deploy.planning.validator import World, check_plan, plan_faults
+from vla_deploy.planning.validator import check_plan
 
 WORLD = World(
     places={"kitchen": "kitchen", "galley": "kitchen"}, poses=frozenset({"tuck"}), holding={}
@@ -15,8 +16,16 @@ def action(
     return Action(id=name, skill=skill, parameters=given, depends_on=depends_on)
 
 
+def faults_of(plan: Plan) -> list[str]:
+    try:
+        check_plan(plan, WORLD)
+    except PlanInvalid as error:
+        return list(error.faults)
+    return []
+
+
 def faults(*actions: Action) -> list[str]:
-    return plan_faults(Plan(goal="test", actions=actions), WORLD)
+    return faults_of(Plan(goal="test", actions=actions))
 
 
 @pytest.mark.parametrize(
@@ -64,8 +73,8 @@ def test_all_faults_of_a_plan_are_told_at_once() -> None:
 
 
 def test_an_infeasible_or_empty_plan_is_refused() -> None:
-    assert plan_faults(Plan(goal="x", feasible=False, reasoning="no arm"), WORLD)
-    assert plan_faults(Plan(goal="x"), WORLD) == ["it has no actions"]
+    assert faults_of(Plan(goal="x", feasible=False, reasoning="no arm"))
+    assert faults_of(Plan(goal="x")) == ["it has no actions"]
 
 
 def test_aliases_of_places_are_accepted() -> None:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from vla_deploy.memory.episode import unix_s
 from vla_deploy.memory.wording import place_words
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.steps import Groups, Step, find
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.expressions import read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting

@@ -6,10 +6,10 @@ What is not in a hand is brought, as ever: who wants it may not have a hand free
 import re
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders import placing, steps
 from vla_deploy.planning.builders.steps import Groups, Step, arm_in, held_kinds, parts_of
 from vla_deploy.planning.errors import UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.understanding.expressions import Expression, Scope, read_expression
 from vla_deploy.planning.understanding.fitting import Use, fitting

@@ -3,8 +3,8 @@
 import math
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.steps import Groups, Step, quantity_in, speed_in
+from vla_deploy.planning.interfaces import Request
 
 DRIVE_M: Final = 0.5
 TURN_RAD: Final = math.pi / 2

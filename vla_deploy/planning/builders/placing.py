@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from vla_deploy.memory.episode import LastSeen
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.steps import (
     BESIDE_WORDS,
     WAYS,
@@ -18,6 +17,7 @@ from vla_deploy.planning.builders.steps import (
     split_put,
 )
 from vla_deploy.planning.errors import NotAble, UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.planning.understanding.expressions import read_expression

@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import ARMS
 from vla_deploy.planning.errors import NotUnderstood, UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action, Priority
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding.expressions import read_expression

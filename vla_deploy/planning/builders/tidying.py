@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders.placing import STORE
 from vla_deploy.planning.builders.steps import Groups, Step, look_around
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotAble, UnknownPlace
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World
 from vla_deploy.planning.references import match_place, words_of
 from vla_deploy.planning.understanding.expressions import read_expression

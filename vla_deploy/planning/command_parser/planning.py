@@ -9,12 +9,12 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders import answering, moving, placing, tidying
 from vla_deploy.planning.builders import steps as building
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.spoken import Spoken
 from vla_deploy.planning.errors import CannotBeDone, Declined, UnknownPlace
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action
 from vla_deploy.planning.prohibition import StandingOrder
 from vla_deploy.planning.prohibitions import order_of
@@ -32,8 +32,6 @@ _POSES: Final[Mapping[str, str]] = {
     "carrying": "tuck", "resting": "rest", "relax": "rest", "lower": "rest", "sleep": "rest",
 }  # fmt: skip
 _CAN_PUT: Final = frozenset({"in", "on", "to", "next to", "near"})
-# These are answered from what is seen, held, or remembered when they are planned.
-_OF_THE_MOMENT: Final = frozenset({"where", "ask", "tidy"})
 Handler = Callable[[Spoken, Step], list[Skill]]
 
 
@@ -61,11 +59,6 @@ class Steps(Spoken):
         said = (("what", "thing"), ("where", "place"))
         groups = {name: self.spoken(step, field) for field, name in said if field in step}
         return order_of(groups, step["do"] == "forbid", self.request)
-
-
-def are_of_the_moment(steps: Sequence[Step]) -> bool:
-    """Tell whether the same words may mean other actions a moment later."""
-    return any(one["do"] in _OF_THE_MOMENT or one.get("where") == "back" for one in steps)
 
 
 def _go(spoken: Spoken, step: Step) -> list[Skill]:

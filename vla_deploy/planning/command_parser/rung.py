@@ -17,7 +17,6 @@ from vla_deploy.inference.memory_claims import MemoryClaim
 from vla_deploy.inference.store import Model
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.one_line import one_line
-from vla_deploy.planning.asking import Proposal, Request, Sureness
 from vla_deploy.planning.command_parser.certainty import (
     Oddities,
     confidence_of,
@@ -25,7 +24,7 @@ from vla_deploy.planning.command_parser.certainty import (
     oddities_of,
 )
 from vla_deploy.planning.command_parser.grammar import COPIED_FIELDS, Step, answer_schema
-from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
+from vla_deploy.planning.command_parser.planning import Steps
 from vla_deploy.planning.command_parser.read_back import question
 from vla_deploy.planning.command_parser.wording import (
     MOST_COMMAND_WORDS,
@@ -35,7 +34,8 @@ from vla_deploy.planning.command_parser.wording import (
     plain_words,
 )
 from vla_deploy.planning.errors import CannotBeDone, Declined
-from vla_deploy.planning.language_model import Bounds, LanguageModel, open_language_model
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
+from vla_deploy.planning.language_model import AnswerBounds, LanguageModel, open_language_model
 from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.prohibitions import proposal_of
 from vla_deploy.planning.scope import WORDS, ScopeGroup
@@ -61,10 +61,10 @@ class Parsed:
     oddities: Oddities
 
 
-class CommandParser:
+class CommandParser(BackEnd):
     """Hold the model and the words that it was shown."""
 
-    name: Final = NAME
+    name = NAME
 
     def __init__(self, model: LanguageModel, known_words: frozenset[str]) -> None:
         """Take an open model.
@@ -110,22 +110,19 @@ class CommandParser:
             summary=asked.removeprefix("Shall I ").removesuffix("?"),
             actions=actions,
         )
-        sureness = Sureness(
-            confidence=self._confidence(parsed),
-            question=asked,
-            read_back_below=self._weights.read_back_below,
-            decline_below=self._weights.decline_below,
-        )
-        proposal = Proposal(
+        sure = self._confidence(parsed)
+        if request.heard_confidence is not None:
+            sure = min(sure, request.heard_confidence)
+        if sure < self._weights.decline_below:
+            raise Declined(f"I am not sure of it ({sure:.2f})")
+        return Proposal(
             plan=plan,
-            rung=self.name,
-            confidence=sureness.confidence,
-            is_momentary=are_of_the_moment(parsed.steps),
-            sureness=sureness,
+            back_end=self.name,
+            confidence=round(sure, 3),
+            read_back=asked if sure < self._weights.read_back_below else "",
             covers=_covered(parsed),
             awaits_word=awaits_word,
         )
-        return proposal.as_heard(request.heard_confidence)
 
     def _confidence(self, parsed: Parsed) -> float:
         """Return how sure an answer is: too little to go unasked where it leaves words out."""
@@ -145,7 +142,7 @@ class CommandParser:
             raise Declined("no words that I know")
         if len(words) > MOST_COMMAND_WORDS:
             raise Declined(f"{len(words)} words, more than the {MOST_COMMAND_WORDS} of a command")
-        bounds = Bounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
+        bounds = AnswerBounds(deadline=deadline, most_tokens=self.model.language.most_tokens)
         message = {"role": "user", "content": " ".join(words)}
         answer = self.model.answer([message], bounds, answer_schema(words))
         steps = tuple(map(_stripped, json.loads(answer.text)["steps"]))

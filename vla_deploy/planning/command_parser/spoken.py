@@ -4,11 +4,11 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.builders import steps as building
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.wording import find_span
 from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import match_place
 from vla_deploy.planning.understanding.furniture import is_surface
 from vla_deploy.planning.understanding.quantities import (

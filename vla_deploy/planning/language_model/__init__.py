@@ -1,5 +1,6 @@
 """Run language models on board: one path for the embedded one and those that a person adds."""
 
+from vla_deploy.planning.language_model.decoding import AnswerBounds, GeneratedToken
 from vla_deploy.planning.language_model.errors import (
     AnswerCut,
     AnswerLate,
@@ -8,20 +9,20 @@ from vla_deploy.planning.language_model.errors import (
     PromptTooLong,
     SchemaUnusable,
 )
-from vla_deploy.planning.language_model.generating import Answer, Bounds, Token
-from vla_deploy.planning.language_model.model import LanguageModel, Message, open_language_model
+from vla_deploy.planning.language_model.model import LanguageModel, ModelAnswer, open_language_model
+from vla_deploy.planning.language_model.model_folder import Message
 
 __all__ = [
-    "Answer",
+    "AnswerBounds",
     "AnswerCut",
     "AnswerLate",
-    "Bounds",
+    "GeneratedToken",
     "LanguageModel",
     "LanguageModelError",
     "Message",
+    "ModelAnswer",
     "ModelFolderInvalid",
     "PromptTooLong",
     "SchemaUnusable",
-    "Token",
     "open_language_model",
 ]

@@ -14,11 +14,14 @@ from vla_deploy.inference.manifest import Language, Manifest, ModelFile, Use
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.planning.language_model.decoding import AnswerBounds
 from vla_deploy.planning.language_model.errors import ModelFolderInvalid
-from vla_deploy.planning.language_model.genai_config import read_genai_config
-from vla_deploy.planning.language_model.generating import Answer, Bounds
-from vla_deploy.planning.language_model.model import LanguageModel, open_language_model
-from vla_deploy.planning.language_model.prompting import CONFIG, TEMPLATE
+from vla_deploy.planning.language_model.model import LanguageModel, ModelAnswer, open_language_model
+from vla_deploy.planning.language_model.model_folder import (
+    CONFIG,
+    TEMPLATE,
+    read_genai_config,
+)
 
 # What such a folder has besides, some of it only for other runtimes.
 _WEIGHTS: Final = ("*.onnx", "*.onnx.data", "*.onnx_data")
@@ -30,14 +33,14 @@ TRIAL_SCHEMA: Final = {
     "additionalProperties": False,
 }
 _TRIAL: Final = (
-    {"role": "system", "content": "You plan for a robot. Answer with one step as JSON."},
+    {"role": "system", "content": "You plan for a robot. ModelAnswer with one step as JSON."},
     {"role": "user", "content": "go to the kitchen"},
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
-    """Hold what a person tells of a model."""
+class LanguageModelSource:
+    """Hold what a person says of a model."""
 
     name: str
     folder: Path
@@ -48,8 +51,8 @@ class Request:
 
 
 def add_language_model(
-    store: ModelStore, request: Request, *, clock: Clock, replace: bool = False
-) -> tuple[Model, Answer]:
+    store: ModelStore, request: LanguageModelSource, *, clock: Clock, replace: bool = False
+) -> tuple[Model, ModelAnswer]:
     """Check a model, try it out and keep it; when anything is wrong, nothing has changed.
 
     Returns the model, and its answer to a small command.
@@ -66,7 +69,7 @@ def add_language_model(
     return keep_tried(store, manifest, files, request.card, lambda model: try_out(model, clock))
 
 
-def describe(request: Request) -> Manifest:
+def describe(request: LanguageModelSource) -> Manifest:
     """Return the manifest for a folder of files.
 
     Raises:
@@ -92,7 +95,7 @@ def describe(request: Request) -> Manifest:
     )
 
 
-def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> Answer:
+def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> ModelAnswer:
     """Return a model's answer to a small command, as JSON of a small schema.
 
     Raises:
@@ -105,13 +108,13 @@ def try_out(model: Model, clock: Clock, choice: ModelChoice = PLAIN_CHOICE) -> A
         opened.close()
 
 
-def ask(model: LanguageModel, clock: Clock) -> Answer:
+def ask(model: LanguageModel, clock: Clock) -> ModelAnswer:
     """Return an open model's answer to the same small command.
 
     Raises:
         InferenceError: there is no whole answer.
     """
-    bounds = Bounds(
+    bounds = AnswerBounds(
         deadline=Deadline.within(clock, TRIAL_S), most_tokens=model.language.most_tokens
     )
     return model.answer(_TRIAL, bounds, dict(TRIAL_SCHEMA))

@@ -1,8 +1,9 @@
 """Measure what a language model costs: reading a prompt, each token of an answer, memory."""
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from vla_deploy.inference.store import Model
 from vla_deploy.planning.language_model.adding import ask
 from vla_deploy.planning.language_model.model import open_language_model
 
+T = TypeVar("T")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bench:
+class LanguageModelBench:
     """Hold the figures of one model: answers to the same small command, and of its parts.
 
     `read_tokens_per_s` is of a prompt of `prompt_tokens`, `told_tokens_per_s` of single tokens
@@ -40,32 +43,25 @@ class Bench:
         return {**dataclasses.asdict(self), "notices": list(self.notices)}
 
 
-def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> Bench:
+def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> LanguageModelBench:
     """Measure a model.
 
     Raises:
         InferenceError: it cannot be run as the choice asks.
     """
-    before_mb, began_ns = resident_mb(), clock.now_ns()
-    opened = open_language_model(model, choice)
-    load_s = _since(began_ns, clock)
+    before_mb = resident_mb()
+    opened, load_s = _timed(clock, lambda: open_language_model(model, choice))
     try:
         answers_s, reads_s, tokens_s = [], [], []
         prompt_tokens = ask(opened, clock).prompt_tokens
         prompt = opened.decoder.tokens[:prompt_tokens]
         for _ in range(rounds):
             opened.decoder.keep([])
-            began_ns = clock.now_ns()
-            ask(opened, clock)
-            answers_s.append(_since(began_ns, clock))
+            answers_s.append(_timed(clock, lambda: ask(opened, clock))[1])
             opened.decoder.keep([])
-            began_ns = clock.now_ns()
-            opened.decoder.feed(prompt)
-            reads_s.append(_since(began_ns, clock))
-            began_ns = clock.now_ns()
-            opened.decoder.feed(prompt[-1:])
-            tokens_s.append(_since(began_ns, clock))
-        return Bench(
+            reads_s.append(_timed(clock, lambda: opened.decoder.feed(prompt))[1])
+            tokens_s.append(_timed(clock, lambda: opened.decoder.feed(prompt[-1:]))[1])
+        return LanguageModelBench(
             model=model.manifest.name,
             provider=opened.provider,
             threads=choice.threads,
@@ -83,5 +79,8 @@ def bench(model: Model, choice: ModelChoice, *, rounds: int, clock: Clock) -> Be
         opened.close()
 
 
-def _since(began_ns: int, clock: Clock) -> float:
-    return (clock.now_ns() - began_ns) / NS_PER_S
+def _timed(clock: Clock, act: Callable[[], T]) -> tuple[T, float]:
+    """Return what an act gives, and how many seconds it took."""
+    began_ns = clock.now_ns()
+    found = act()
+    return found, (clock.now_ns() - began_ns) / NS_PER_S

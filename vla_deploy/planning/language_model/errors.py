@@ -6,7 +6,7 @@ InferenceError
     ├── SchemaUnusable      no grammar can be made of the JSON Schema: simplify it
     ├── PromptTooLong       shorten it, or take a model with a longer context
     ├── AnswerCut           the answer came to its bound before it was whole: allow more tokens
-    └── AnswerLate          the deadline passed, or nobody waits any more: ask another
+    └── AnswerLate          the deadline passed, or it is not awaited any more: ask another
 """
 
 from pathlib import Path

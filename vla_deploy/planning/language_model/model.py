@@ -1,6 +1,7 @@
 """Open a language model from its folder and answer prompts with it."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 from typing import Final
@@ -15,16 +16,33 @@ from vla_deploy.inference.graph_session import GraphSession
 from vla_deploy.inference.language_schema import TOKENIZER
 from vla_deploy.inference.manifest import Language
 from vla_deploy.inference.store import Model
-from vla_deploy.planning.language_model.constraint import Constraint, JsonSchema, grammar_of
-from vla_deploy.planning.language_model.decoder import Decoder
+from vla_deploy.planning.language_model.decoding import (
+    AnswerBounds,
+    Constraint,
+    Decoder,
+    Generated,
+    JsonSchema,
+    generate,
+    grammar_of,
+)
 from vla_deploy.planning.language_model.errors import ModelFolderInvalid
-from vla_deploy.planning.language_model.genai_config import GenaiConfig, read_genai_config
-from vla_deploy.planning.language_model.generating import Answer, Bounds, generate
-from vla_deploy.planning.language_model.prompting import Message, Prompter
+from vla_deploy.planning.language_model.model_folder import (
+    ChatTemplate,
+    GenaiConfig,
+    Message,
+    read_genai_config,
+)
 
-__all__ = ["LanguageModel", "Message", "open_language_model"]
 # Exports pad their vocabulary up to a round number of rows.
 _MOST_PADDING: Final = 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelAnswer(Generated):
+    """Hold a whole answer, and how many runs of the model it took."""
+
+    text: str
+    prompt_tokens: int
 
 
 class LanguageModel:
@@ -41,7 +59,7 @@ class LanguageModel:
         self.language = language
         self.config = read_genai_config(folder)
         self.tokenizer, self.guide = _tokenizers(folder, self.config)
-        self._prompter = Prompter(folder)
+        self._template = ChatTemplate(folder)
         self._session = GraphSession(folder / self.config.file_name, choice)
         self.decoder = Decoder(self._session, self.config)
         self.notices = self._session.notices
@@ -49,23 +67,20 @@ class LanguageModel:
         self._one_at_a_time = Lock()
 
     def answer(
-        self, messages: Sequence[Message], bounds: Bounds, schema: JsonSchema | None = None
-    ) -> Answer:
+        self, messages: Sequence[Message], bounds: AnswerBounds, schema: JsonSchema | None = None
+    ) -> ModelAnswer:
         """Return the likeliest answer, which is JSON of the schema where one is given.
 
         Raises:
             LanguageModelError: there is no whole answer; each kind says why.
             RunFailed: a run failed.
         """
-        prompt = self.tokenizer.encode(
-            self._prompter.prompt(messages), add_special_tokens=False
-        ).ids
+        prompt = self.tokenizer.encode(self.prompt(messages), add_special_tokens=False).ids
         constraint = None if schema is None else Constraint(self.guide, grammar_of(schema))
         with self._one_at_a_time:
             done = generate(self.decoder, prompt, constraint, self.config.end_ids, bounds)
-        numbers = [token.number for token in done.tokens]
-        return Answer(
-            text=self.tokenizer.decode(numbers),
+        return ModelAnswer(
+            text=self.tokenizer.decode([token.number for token in done.tokens]),
             tokens=done.tokens,
             prompt_tokens=len(prompt),
             reused_tokens=done.reused_tokens,
@@ -78,7 +93,7 @@ class LanguageModel:
         Raises:
             ModelFolderInvalid: its chat template does not take them.
         """
-        return self._prompter.prompt(messages)
+        return self._template.prompt(messages)
 
     def close(self) -> None:
         """Release the memory; an answer after that fails."""

@@ -1,22 +1,18 @@
 """Plan the commonest commands at once: each clause fits a whole pattern, or nothing is planned."""
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 from vla_deploy.action_words import action_words
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.asking import Proposal, Request
 from vla_deploy.planning.builders.steps import Groups, Step, chained
-from vla_deploy.planning.correction import wants_other_too, with_other
 from vla_deploy.planning.errors import Declined, NotUnderstood, UnknownPlace
+from vla_deploy.planning.interfaces import BackEnd, Proposal, Request
 from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.patterns.intents import PRIORITIES, Intent
+from vla_deploy.planning.patterns.follow_up import follow_up
 from vla_deploy.planning.patterns.phrase import clauses
-from vla_deploy.planning.patterns.repeating import is_again, recalled, repeated
 from vla_deploy.planning.patterns.slots import is_place, is_thing
-from vla_deploy.planning.patterns.table import PATTERNS, Pattern
-from vla_deploy.planning.plan import Plan, Priority
+from vla_deploy.planning.patterns.table import PATTERNS, PRIORITIES, Intent, Pattern
+from vla_deploy.planning.plan import Plan
 from vla_deploy.planning.prohibitions import proposal_of, read_order
 from vla_deploy.planning.scope import scope_words
 from vla_deploy.planning.understanding.grounding import ground_plan
@@ -25,10 +21,10 @@ NAME: Final = "patterns"
 _THERE: Final = frozenset({"there", "over there", "back there"})
 
 
-class Patterns:
+class Patterns(BackEnd):
     """Plan what the table of patterns covers, the same every time."""
 
-    name: Final = NAME
+    name = NAME
 
     def propose(self, request: Request, deadline: Deadline) -> Proposal:
         """Return the plan; a pattern fits or it does not, so there is no doubt about it.
@@ -44,8 +40,8 @@ class Patterns:
         if order is not None:
             return proposal_of(order, request, self.name)
         plan = pattern_plan(request)
-        # What may stand in a slot has no words beside it that change anything.
-        return Proposal(plan=plan, rung=self.name, confidence=1.0, covers=None)
+        # Around the slots there are no words that change anything.
+        return Proposal(plan=plan, back_end=self.name, confidence=1.0, covers=None)
 
 
 def pattern_plan(request: Request) -> Plan:
@@ -56,24 +52,24 @@ def pattern_plan(request: Request) -> Plan:
         PlanningError: what a clause asks for cannot be done, or there is nothing to repeat.
     """
     said = clauses(request.text)
-    if len(said) == 1 and is_again(said[0]):
-        return repeated(request)
-    if len(said) == 1 and wants_other_too(said[0]):
-        plan = with_other(repeated(request))
-        if plan is None:
-            raise Declined("there is no one thing of which there may be another")
+    plan = follow_up(said[0], request) if len(said) == 1 else None
+    if plan is not None:
         return plan
-    full = recalled(said[0], request) if len(said) == 1 else None
-    said = clauses(full) if full is not None else said
     if not said:
         raise Declined("no clause that a pattern covers")
-    goal = full or request.text.strip()
-    request = replace(request, text=goal)
-    built: list[tuple[Step, Intent]] = []
+    steps: list[Step] = []
+    intents: list[Intent] = []
     for clause in said:
         pattern, groups = _fitting(clause, request)
-        built += [(step, pattern.intent) for step in pattern.build(groups, request)]
-    return Plan(goal=goal, summary=_summary(built), actions=chained(*_ranked(built)))
+        built = pattern.build(groups, request)
+        steps += built
+        intents += [pattern.intent] * len(built)
+    words = ", ".join(action_words(skill, parameters) for skill, parameters in steps)
+    return Plan(
+        goal=request.text.strip(),
+        summary=f"{', '.join(dict.fromkeys(intents))}: {words}",
+        actions=chained(steps, [PRIORITIES[intent] for intent in intents]),
+    )
 
 
 def plan_command(text: str, world: World, here: tuple[float, float, float] | None = None) -> Plan:
@@ -112,14 +108,3 @@ def _are_known(groups: Groups, request: Request) -> bool:
     place, where = groups.get("place", "there"), groups.get("destination", "there")
     is_known = is_place(place, places) or place in _THERE
     return is_known and (is_place(where, places) or is_thing(where) or where in _THERE)
-
-
-def _ranked(built: Sequence[tuple[Step, Intent]]) -> tuple[list[Step], list[Priority]]:
-    return [step for step, _ in built], [PRIORITIES[intent] for _, intent in built]
-
-
-def _summary(built: Sequence[tuple[Step, Intent]]) -> str:
-    """Return the intents and the steps in words."""
-    intents = ", ".join(dict.fromkeys(intent.value for _, intent in built))
-    said = ", ".join(action_words(skill, parameters) for (skill, parameters), _ in built)
-    return f"{intents}: {said}"

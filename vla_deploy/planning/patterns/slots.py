@@ -21,7 +21,7 @@ _ONE: Final = (
     rf"(?:{_ARTICLE} )?(?:{_LOOK} ){{0,3}}{KIND}|(?:the|that|this) (?:{_LOOK} ){{1,2}}one|"
     "it|that|this|that one|this one|them|those|these"
 )
-# A word for a thing that nobody has taught the robot: grounding asks what it is.
+# A word for a thing that the robot has not learnt: grounding asks what it is.
 _UNKNOWN: Final = (
     rf"(?:the|a|an|my|that|this) (?:{_LOOK} ){{0,2}}"
     r"(?!one\b|same\b|rest\b|other\b|left\b|right\b|whole\b)[a-z]{3,}"
@@ -48,10 +48,10 @@ _IS_THING: Final = re.compile(_KNOWN)
 
 
 def is_place(text: str, places: Mapping[str, str]) -> bool:
-    """Tell whether a text is the whole name of a place."""
+    """Return whether a text is the whole name of a place."""
     return match_place(text, places) is not None
 
 
 def is_thing(text: str) -> bool:
-    """Tell whether a text names a thing in words that the robot knows."""
+    """Return whether a text names a thing in words that the robot knows."""
     return _IS_THING.fullmatch(text) is not None

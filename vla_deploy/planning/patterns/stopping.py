@@ -3,8 +3,8 @@
 import re
 from typing import Final
 
-from vla_deploy.planning.bounds import MOST_CHARACTERS
 from vla_deploy.planning.patterns.phrase import courtesy_off
+from vla_deploy.planning.plan import MOST_CHARACTERS
 
 STOP_PHRASES: Final = frozenset(
     {
@@ -29,7 +29,7 @@ _URGING: Final = frozenset(
 
 
 def is_stop(text: str) -> bool:
-    """Tell whether a command means: stop what you are doing."""
+    """Return whether a command means: stop what you are doing."""
     if len(text) > MOST_CHARACTERS:
         return False
     bare = [_urged_off(courtesy_off(part)) for part in _SENTENCE.split(text)]

@@ -1,7 +1,9 @@
 """List the patterns of the commonest commands: what each is for, and what builds its steps."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final
 
 from vla_deploy.planning.builders import (
@@ -13,7 +15,6 @@ from vla_deploy.planning.builders import (
     tidying,
 )
 from vla_deploy.planning.builders.steps import Builder
-from vla_deploy.planning.patterns.intents import Intent
 from vla_deploy.planning.patterns.slots import (
     ANGLE,
     HAND,
@@ -24,6 +25,7 @@ from vla_deploy.planning.patterns.slots import (
     THINGS,
     WORDS,
 )
+from vla_deploy.planning.plan import Priority
 
 _OBJECT: Final = rf"(?P<object>{THINGS})"
 _THING: Final = rf"(?P<object>{THING})"
@@ -37,6 +39,29 @@ _CARRY: Final = "(?:put|place|set|take|bring|carry|move|get)"
 _WAY: Final = "(?P<way>forwards?|ahead|straight ahead|backwards?|back)"
 _SIDE: Final = "(?P<way>left|right|around|round)"
 _LITTLE: Final = "(?P<little>a (?:little|bit|little bit)|slightly)"
+
+
+class Intent(StrEnum):
+    """Group commands by what they are for; what is urgent comes first where the order is free."""
+
+    STOP = "stop"
+    ASSIST = "assist"
+    NAVIGATION = "navigation"
+    MANIPULATION = "manipulation"
+    SEARCH = "search"
+    QUESTION = "question"
+    CLEANING = "cleaning"
+
+
+PRIORITIES: Final[Mapping[Intent, Priority]] = {
+    Intent.STOP: Priority.HIGH,
+    Intent.ASSIST: Priority.HIGH,
+    Intent.NAVIGATION: Priority.MEDIUM,
+    Intent.MANIPULATION: Priority.MEDIUM,
+    Intent.SEARCH: Priority.MEDIUM,
+    Intent.QUESTION: Priority.MEDIUM,
+    Intent.CLEANING: Priority.LOW,
+}
 
 
 @dataclass(frozen=True, slots=True)

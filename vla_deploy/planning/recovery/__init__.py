@@ -1,12 +1,18 @@
 """Plan anew after a failure: what is left of the plan, mended by one strategy after another."""
 
-from vla_deploy.planning.recovery.recovering import RECOVERY, numbered, recover
-from vla_deploy.planning.recovery.setback import Carried, Cause, Setback, read_setback
+from vla_deploy.planning.recovery.setback import (
+    Carried,
+    FailureCause,
+    Setback,
+    numbered,
+    read_setback,
+)
+from vla_deploy.planning.recovery.strategies import RECOVERY, recover
 
 __all__ = [
     "RECOVERY",
     "Carried",
-    "Cause",
+    "FailureCause",
     "Setback",
     "numbered",
     "read_setback",

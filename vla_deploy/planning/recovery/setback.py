@@ -1,15 +1,18 @@
-"""Read what the executor tells of a plan that failed, and hold what was tried before."""
+"""Read what the executor publishes of a plan that failed, and hold what was tried before."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
-from vla_deploy.planning.graph import execution_order
-from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.plan import Action, Plan, execution_order
+
+_ID_CHARACTERS: Final = 64
+_BEFORE: Final = re.compile(r"^(?:r\d+_)+")
 
 
-class Cause(StrEnum):
+class FailureCause(StrEnum):
     """Say by what an action failed: the skill itself, or the world before or after it."""
 
     PRECONDITION = "precondition"
@@ -21,24 +24,19 @@ class Cause(StrEnum):
 class Setback:
     """Hold which action of a plan failed, why, and which had succeeded by then, in order.
 
-    `left` are the relative motions that had begun, with what is left of them; one of which nobody
-    knows that has no parameters.
+    `left` are the relative motions that had begun, with what is left of them; where that is not
+    known, without parameters.
     """
 
     action: Action
     error: str
     done: tuple[Action, ...]
-    cause: Cause = Cause.SKILL
+    cause: FailureCause = FailureCause.SKILL
     left: tuple[Action, ...] = ()
 
     @property
-    def done_ids(self) -> frozenset[str]:
-        """Return the ids of what had succeeded."""
-        return frozenset(one.id for one in self.done)
-
-    @property
     def is_clear(self) -> bool:
-        """Tell whether it is known of everything that had begun how much is left."""
+        """Return whether it is known of everything that had begun how much is left."""
         return all(one.parameters for one in self.left)
 
     def rest_of(self, action: Action) -> Action:
@@ -62,7 +60,7 @@ class Carried:
     """Hold a command's plan that is being carried out, and what failed before it.
 
     `used` are the strategies that answered each setback, "" where a planner did. A plan that came
-    `given` is whoever gave it to change. `agreed` is what the person has said yes to.
+    `given` is not changed. `agreed` is what the person has said yes to.
     """
 
     plan: Plan
@@ -80,20 +78,20 @@ class Carried:
         )
 
     @property
-    def left(self) -> tuple[Action, ...]:
-        """Return what the last setback has left undone, in order; it needs only each other."""
+    def failed(self) -> Action:
+        """Return what the last setback has left of the action that failed."""
         setback = self.setbacks[-1]
-        done = setback.done_ids
-        return tuple(
-            setback.rest_of(action).model_copy(
-                update={"depends_on": tuple(one for one in action.depends_on if one not in done)}
-            )
-            for action in execution_order(self.plan.actions)
-            if action.id not in done
-        )
+        return setback.rest_of(setback.action)
+
+    @property
+    def left(self) -> list[Action]:
+        """Return what the last setback has left undone, in the order of its dependencies."""
+        setback = self.setbacks[-1]
+        undone = (one for one in execution_order(self.plan.actions) if one not in setback.done)
+        return [setback.rest_of(one) for one in undone]
 
     def tried(self, strategy: str) -> bool:
-        """Tell whether a strategy has answered the same action's failure before."""
+        """Return whether a strategy has answered the same action's failure before."""
         failed = self.setbacks[-1].action
         return any(
             used == strategy and _same(setback.rest_of(setback.action), failed)
@@ -109,18 +107,33 @@ class Carried:
         return replace(self, plan=plan, used=(*self.used, strategy))
 
 
-def read_setback(told: Mapping[str, Any], plan: Plan) -> Setback | None:
-    """Return what failed of that plan; None where the event speaks of another one."""
-    action = next((one for one in plan.actions if one.id == told.get("action_id")), None)
+def numbered(plan: Plan, number: int) -> Plan:
+    """Return a recovery's plan with ids that none of the plans before it has."""
+    short = {one.id: _BEFORE.sub("", one.id) for one in plan.actions}
+    names = {name: f"r{number}_{own}"[:_ID_CHARACTERS] for name, own in short.items()}
+    if len(set(names.values())) < len(names):
+        names = {one.id: f"r{number}_{place}" for place, one in enumerate(plan.actions)}
+    actions = tuple(
+        one.model_copy(
+            update={"id": names[one.id], "depends_on": tuple(names[it] for it in one.depends_on)}
+        )
+        for one in plan.actions
+    )
+    return plan.model_copy(update={"actions": actions})
+
+
+def read_setback(event: Mapping[str, Any], plan: Plan) -> Setback | None:
+    """Return what failed of that plan; None where the event is about another one."""
+    action = next((one for one in plan.actions if one.id == event.get("action_id")), None)
     if action is None:
         return None
-    done = frozenset(str(one) for one in told.get("done", ()))
-    left: Mapping[str, Mapping[str, float]] = told.get("left", {})
+    done = frozenset(str(one) for one in event.get("done", ()))
+    left: Mapping[str, Mapping[str, float]] = event.get("left", {})
     return Setback(
         action=action,
-        error=str(told.get("error") or "no reason told"),
+        error=str(event.get("error") or "no reason told"),
         done=tuple(one for one in execution_order(plan.actions) if one.id in done),
-        cause=Cause(told.get("cause", Cause.SKILL)),
+        cause=FailureCause(event.get("cause", FailureCause.SKILL)),
         left=tuple(_rest(one, left[one.id]) for one in plan.actions if one.id in left),
     )
 
@@ -131,8 +144,8 @@ def _rest(action: Action, left: Mapping[str, float]) -> Action:
 
 
 def _words(action: Action) -> str:
-    told = ", ".join(f"{name} {value}" for name, value in action.parameters.items())
-    return f"{action.skill}({told})"
+    given = ", ".join(f"{name} {value}" for name, value in action.parameters.items())
+    return f"{action.skill}({given})"
 
 
 def _same(one: Action, other: Action) -> bool:

@@ -1,114 +1,131 @@
-"""Mend what is left of a plan, one idea each; none of them judges whether the result may run.
+"""Mend what is left of a plan, one idea each; the first whose plan may run is taken.
 
-A strategy returns the actions to go on with, or None where it has none to offer. What is missing
-between them, such as driving there, grounding puts in; whether they may run, the validator says.
+A strategy returns the actions to go on with, in order, or none where it has nothing to offer. What
+is missing between them, such as driving there, grounding puts in; the validator judges the result.
 """
 
 import re
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Final
 
-from vla_deploy.planning.asking import Request
-from vla_deploy.planning.errors import UnknownObject
-from vla_deploy.planning.graph import execution_order
+from vla_deploy.planning.errors import CannotBeDone, PlanningError, UnknownObject
+from vla_deploy.planning.interfaces import Check, PlanningResult, Proposal, Request
 from vla_deploy.planning.plan import Action
-from vla_deploy.planning.recovery.setback import Carried, Cause
+from vla_deploy.planning.recovery.setback import Carried, FailureCause
 from vla_deploy.planning.references import parse_object
-from vla_deploy.planning.symbolic.state import State, state_of
-from vla_deploy.planning.symbolic.subjects import Subject, subject_of
+from vla_deploy.planning.symbolic.state import state_of
+from vla_deploy.planning.symbolic.subjects import subject_of
 
-Steps = tuple[Action, ...]
-Strategy = Callable[[Carried, Request], Steps | None]
+RECOVERY: Final = "recovery"
 # What a command is about does not depend on these.
 INESSENTIAL: Final = frozenset({"look_at", "speak", "wait"})
 BLOCKED_BY_OTHERS: Final = frozenset({"navigate_to", "move", "turn"})
 WAIT_S: Final = 5.0
 OBJECT_PARAMETERS: Final = ("object", "destination")
+_CONFIDENCE: Final = 0.8
+_UNCLEAR: Final = "nobody knows how much of the way was done"
 _ANY: Final = r"\b(?:a|an|any|some|one)\s+(?:\w+\s+){0,2}"
+Steps = list[Action]
+Strategy = Callable[[Carried, Request], Steps]
 
 
-def put_in(carried: Carried, request: Request) -> Steps | None:
+def recover(carried: Carried, request: Request, check: Check) -> PlanningResult:
+    """Return a plan that mends the last setback, or why none of the strategies has one.
+
+    The proposal's `origin` names the strategy. Where it is not known how much of a drive or a turn
+    was done, none is tried: it would be done again.
+    """
+    error = carried.setbacks[-1].error
+    if not carried.setbacks[-1].is_clear:
+        return PlanningResult(error=CannotBeDone(f"{error} ({_UNCLEAR})"))
+    refusals = []
+    for name, strategy in STRATEGIES.items():
+        steps = [] if carried.tried(name) else strategy(carried, request)
+        if not steps:
+            continue
+        in_turn = {"actions": _in_turn(steps), "reasoning": f"after a failure: {name}"}
+        plan = carried.plan.model_copy(update={**in_turn, "feasible": True})
+        proposal = Proposal(plan=plan, back_end=RECOVERY, confidence=_CONFIDENCE, origin=name)
+        try:
+            return PlanningResult(plan=check(plan, request), proposal=proposal)
+        except PlanningError as refused:
+            refusals.append(f"{name}: {refused}")
+    why = "; ".join(refusals) or "nothing else is left to try"
+    return PlanningResult(error=CannotBeDone(f"{error} ({why})"))
+
+
+def skip(carried: Carried, request: Request) -> Steps:
+    """Go on without an action that does not matter."""
+    del request
+    failed = carried.failed
+    return [one for one in carried.left if one != failed] if failed.skill in INESSENTIAL else []
+
+
+def put_in(carried: Carried, request: Request) -> Steps:
     """Do what is left, with what the world has turned out to lack put in before it."""
     del request
-    return None if carried.setbacks[-1].cause is Cause.SKILL else carried.left
+    return [] if carried.setbacks[-1].cause is FailureCause.SKILL else carried.left
 
 
-def skip(carried: Carried, request: Request) -> Steps | None:
-    """Go on without an action that nothing depends on."""
-    del request
-    failed = carried.setbacks[-1].action
-    if failed.skill not in INESSENTIAL:
-        return None
-    rest = tuple(
-        action.model_copy(update={"depends_on": _replaced(action, failed)})
-        for action in carried.left
-        if action.id != failed.id
-    )
-    return rest or None
-
-
-def take_again(carried: Carried, request: Request) -> Steps | None:
+def take_again(carried: Carried, request: Request) -> Steps:
     """Take once more what the hands have lost on the way."""
-    if carried.setbacks[-1].action.skill != "place":
-        return None
+    if carried.failed.skill != "place":
+        return []
     state = state_of(request.world, request.scene, request.here)
-    done = carried.setbacks[-1].done_ids
-    taken = [one for one in execution_order(carried.plan.actions) if one.skill == "pick_up"]
-    lost = [one for one in taken if one.id in done and not _is_held(one, state, request)]
-    if not state.hands or not lost:
-        return None
-    again = lost[-1].model_copy(update={"depends_on": ()})
-    return _behind(_looked_for(again), _behind(again, carried.left))
+    held = {one.key for one in state.held}
+    lost = []
+    for action in carried.setbacks[-1].done:
+        if action.skill == "pick_up":
+            # Where it was not seen which one was taken, a thing of its kind is held.
+            subject = subject_of(str(action.parameters["object"]), request.scene)
+            lost += [action] if held.isdisjoint((subject.key, subject.kind)) else []
+    return [_looked_for(lost[-1]), lost[-1], *carried.left] if state.hands and lost else []
 
 
-def look_again(carried: Carried, request: Request) -> Steps | None:
+def look_again(carried: Carried, request: Request) -> Steps:
     """Look for the thing anew, and try once more from where it is seen then."""
     del request
-    failed = carried.setbacks[-1].action
+    failed = carried.failed
     if failed.skill == "find_object" or _object_of(failed) is None:
-        return None
-    return _behind(_looked_for(failed), carried.left)
+        return []
+    return [_looked_for(failed), *carried.left]
 
 
-def wait(carried: Carried, request: Request) -> Steps | None:
-    """Give whoever stands in the way time to go, and try once more."""
+def wait(carried: Carried, request: Request) -> Steps:
+    """Give a person who stands in the way time to go, and try once more."""
     del request
-    failed = carried.setbacks[-1].action
+    failed = carried.failed
     if failed.skill not in BLOCKED_BY_OTHERS:
-        return None
+        return []
     pause = Action(id=f"{failed.id[:40]}_wait", skill="wait", parameters={"duration_s": WAIT_S})
-    return _behind(pause, carried.left)
+    return [pause, *carried.left]
 
 
-def other_hand(carried: Carried, request: Request) -> Steps | None:
+def other_hand(carried: Carried, request: Request) -> Steps:
     """Take with the other hand, and put down with it."""
-    failed = carried.setbacks[-1].action
-    hands, used = tuple(request.world.holding), failed.parameters.get("arm")
-    if failed.skill != "pick_up" or used not in hands or len(hands) != 2:
-        return None
+    hands, used = tuple(request.world.holding), carried.failed.parameters.get("arm")
+    if carried.failed.skill != "pick_up" or used not in hands or len(hands) != 2:
+        return []
     other = next(hand for hand in hands if hand != used)
-    return tuple(
-        _with(action, {"arm": other}) if action.parameters.get("arm") == used else action
-        for action in carried.left
-    )
+    return [_exchanged(action, ("arm",), str(used), other) for action in carried.left]
 
 
-def other_thing(carried: Carried, request: Request) -> Steps | None:
+def other_thing(carried: Carried, request: Request) -> Steps:
     """Take another thing of the same kind and colour, where any was asked for."""
-    failed = carried.setbacks[-1].action
-    name = _object_of(failed)
-    if name is None or request.scene is None:
-        return None
-    subject = subject_of(name, request.scene)
-    other = _other_like(subject, request)
-    if other is None or not re.search(_ANY + re.escape(subject.kind), request.text.lower()):
-        return None
-    return tuple(
-        _with(
-            action, {key: other for key in OBJECT_PARAMETERS if action.parameters.get(key) == name}
-        )
-        for action in carried.left
-    )
+    name, scene = _object_of(carried.failed), request.scene
+    if name is None or scene is None:
+        return []
+    subject = subject_of(name, scene)
+    if not re.search(_ANY + re.escape(subject.kind), request.text.lower()):
+        return []
+    colour = subject.thing.colour if subject.thing is not None else ""
+    for one in scene.things:
+        is_like = one.kind == subject.kind and colour in ("", one.colour)
+        if is_like and one.thing_id != subject.key and not one.held_by:
+            return [
+                _exchanged(action, OBJECT_PARAMETERS, name, one.thing_id) for action in carried.left
+            ]
+    return []
 
 
 STRATEGIES: Final[Mapping[str, Strategy]] = {
@@ -122,39 +139,16 @@ STRATEGIES: Final[Mapping[str, Strategy]] = {
 }
 
 
-def _other_like(subject: Subject, request: Request) -> str | None:
-    scene, colour = request.scene, subject.thing.colour if subject.thing is not None else ""
-    if scene is None:
-        return None
-    return next(
-        (
-            one.thing_id
-            for one in scene.things
-            if one.kind == subject.kind
-            and one.thing_id != subject.key
-            and colour in ("", one.colour)
-            and not one.held_by
-        ),
-        None,
-    )
-
-
 def _object_of(action: Action) -> str | None:
     """Return the thing that an action is about; None where it is about a place, or nothing."""
     for key in OBJECT_PARAMETERS:
-        name = action.parameters.get(key)
+        name = str(action.parameters.get(key))
         try:
-            parse_object(str(name))
+            parse_object(name)
         except UnknownObject:
             continue
-        return str(name)
+        return name
     return None
-
-
-def _is_held(taken: Action, state: State, request: Request) -> bool:
-    """Tell whether a hand holds what was taken; where nobody saw which one, a thing of its kind."""
-    subject = subject_of(str(taken.parameters["object"]), request.scene)
-    return any(one.key in (subject.key, subject.kind) for one in state.held)
 
 
 def _looked_for(action: Action) -> Action:
@@ -162,21 +156,18 @@ def _looked_for(action: Action) -> Action:
     return Action(id=f"{action.id[:40]}_again", skill="find_object", parameters={"object": name})
 
 
-def _behind(first: Action, rest: Steps) -> Steps:
-    """Return the first and all others, which wait for it."""
-    after = {"depends_on": (first.id,)}
-    return (first, *(one if one.depends_on else one.model_copy(update=after) for one in rest))
+def _exchanged(action: Action, names: tuple[str, ...], old: str, new: str) -> Action:
+    parameters = {
+        name: new if name in names and value == old else value
+        for name, value in action.parameters.items()
+    }
+    return action.model_copy(update={"parameters": parameters})
 
 
-def _with(action: Action, changes: Mapping[str, Any]) -> Action:
-    return action.model_copy(update={"parameters": {**action.parameters, **changes}})
-
-
-def _replaced(action: Action, gone: Action) -> tuple[str, ...]:
-    """Return what an action waits for, with what a skipped one waited for in its place."""
-    needed = [
-        name
-        for one in action.depends_on
-        for name in ((one,) if one != gone.id else gone.depends_on)
-    ]
-    return tuple(dict.fromkeys(needed))
+def _in_turn(steps: Steps) -> tuple[Action, ...]:
+    """Return the actions with each waiting for the one before it."""
+    needed = [(), *((one.id,) for one in steps)]
+    return tuple(
+        one.model_copy(update={"depends_on": before})
+        for one, before in zip(steps, needed, strict=False)
+    )

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from vla_deploy.planning.catalogue import ARMS, SKILLS
-from vla_deploy.planning.graph import execution_order
-from vla_deploy.planning.plan import Action
+from vla_deploy.planning.plan import Action, execution_order
 
 
 def sharing_faults(actions: Sequence[Action]) -> list[str]:

@@ -4,9 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from vla_deploy.planning.catalogue import SKILLS
-from vla_deploy.planning.graph import execution_order
 from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.plan import Action
+from vla_deploy.planning.plan import Action, execution_order
 from vla_deploy.planning.symbolic.conditions import Setting
 from vla_deploy.planning.symbolic.state import Pose, State, state_of
 from vla_deploy.planning.symbolic.table import LOGIC

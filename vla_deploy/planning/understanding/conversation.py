@@ -60,8 +60,8 @@ class Mention:
 class Turn:
     """Hold one command, what the robot answered to it, and the plan that came of it or None.
 
-    `understood` is the command as the plan sums it up, `in_full` its words with what they left to
-    the command before; `here` is where the robot stood (x, y, yaw in the map) when it was told.
+    `understood` is the command as the plan sums it up; `here` is where the robot stood (x, y, yaw
+    in the map) when it was told.
     """
 
     said: str
@@ -73,12 +73,6 @@ class Turn:
     outcome: Outcome = Outcome.UNDER_WAY
     answer: str = ""
     here: Pose | None = None
-    in_full: str = ""
-
-    @property
-    def words(self) -> str:
-        """Return the command so that it can be understood alone, as far as that is known."""
-        return self.in_full or self.said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

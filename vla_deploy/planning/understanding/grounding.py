@@ -8,12 +8,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import SKILLS
 from vla_deploy.planning.errors import PlanInvalid
-from vla_deploy.planning.graph import dependency_faults, execution_order
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import World
-from vla_deploy.planning.plan import MOST_ACTIONS, PUT_IN, Action, Plan
+from vla_deploy.planning.plan import (
+    MOST_ACTIONS,
+    PUT_IN,
+    Action,
+    Plan,
+    dependency_faults,
+    execution_order,
+)
 from vla_deploy.planning.symbolic import LOGIC, after, state_of
 from vla_deploy.planning.symbolic.conditions import MET, Setting, has_free_hand, is_before, is_known
 from vla_deploy.planning.symbolic.sharing import in_turn

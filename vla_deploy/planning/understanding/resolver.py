@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.catalogue import GRASPABLE_CLASSES
 from vla_deploy.planning.errors import NotThere, UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.references import words_of
 from vla_deploy.planning.understanding import phrases
 from vla_deploy.planning.understanding.conversation import Mention, Role

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from vla_deploy.planning.asking import Request
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding.conversation import Mention, Role
 from vla_deploy.world import Query, Snapshot, Thing, Viewpoint
 

@@ -12,7 +12,7 @@ from tokenizers.trainers import BpeTrainer
 
 from vla_deploy.planning.command_parser.grammar import STEPS, answer_schema, answer_text
 from vla_deploy.planning.command_parser.wording import foreign_share, plain_words
-from vla_deploy.planning.language_model.constraint import Constraint, grammar_of
+from vla_deploy.planning.language_model.decoding import Constraint, grammar_of
 from vla_deploy.planning.language_model.errors import SchemaUnusable
 
 

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.grammar import Step
-from vla_deploy.planning.command_parser.planning import Steps, are_of_the_moment
+from vla_deploy.planning.command_parser.planning import Steps
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanInvalid, UnknownPlace
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation, Turn
 from vla_deploy.robots import load_robot
@@ -23,21 +23,6 @@ def planned(command: str, *steps: Step, request: Request | None = None) -> Skill
     actions = Steps(command.split(), request).actions(steps)
     assert [one.depends_on for one in actions[1:]] == [(one.id,) for one in actions[:-1]]
     return [(one.skill, dict(one.parameters)) for one in actions]
-
-
-@pytest.mark.parametrize(
-    ("steps", "is_one"),
-    [
-        ([{"do": "where", "what": "keys"}], True),
-        ([{"do": "pick", "what": "cup"}, {"do": "ask", "about": "seeing"}], True),
-        ([{"do": "tidy"}], True),
-        ([{"do": "go", "where": "back"}], True),
-        ([{"do": "go", "where": "kitchen"}, {"do": "say", "text": "hello"}], False),
-        ([{"do": "bring", "what": "cup"}], False),
-    ],
-)
-def test_what_is_read_while_planning_is_of_the_moment(steps: list[Step], is_one: bool) -> None:
-    assert are_of_the_moment(steps) == is_one
 
 
 def test_articles_come_back_so_that_any_cup_is_told_from_the_cup() -> None:

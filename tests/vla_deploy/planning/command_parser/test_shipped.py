@@ -13,12 +13,12 @@ from vla_deploy.inference.errors import InferenceError, ModelFileSpoiled
 from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.store import EMBEDDED, Model, ModelStore
 from vla_deploy.model_servers.deadline import Deadline
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.command_parser.certainty import Oddities
 from vla_deploy.planning.command_parser.grammar import Step
 from vla_deploy.planning.command_parser.rung import CommandParser, Parsed, open_command_parser
 from vla_deploy.planning.command_parser.wording import plain_words
 from vla_deploy.planning.errors import CannotBeDone, Declined, PlanningError
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.planner import checked
 from vla_deploy.planning.prohibition import Forbidden, Prohibition, StandingOrder
@@ -154,10 +154,14 @@ def test_what_has_failed_before_is_left_to_who_can_tell_what_is_left(parser: Com
         parser.propose(asked, soon())
 
 
-def test_only_what_is_read_while_planning_is_of_the_moment(parser: CommandParser) -> None:
-    asked = parser.propose(request("have you seen my keys"), soon())
-    ordered = parser.propose(request("I'd like you to head over to the kitchen"), soon())
-    assert (asked.is_momentary, ordered.is_momentary) == (True, False)
+def test_a_plan_is_no_surer_than_its_words_were_heard(parser: CommandParser) -> None:
+    typed = request("I'd like you to head over to the kitchen")
+    plain = parser.propose(typed, soon())
+    heard = parser.propose(replace(typed, heard_confidence=0.5), soon())
+    assert plain.read_back == ""
+    assert (heard.confidence, heard.read_back[:9]) == (0.5, "Shall I g")
+    with pytest.raises(Declined, match="not sure"):
+        parser.propose(replace(typed, heard_confidence=0.01), soon())
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.planning.language_model import ModelFolderInvalid, open_language_model
-from vla_deploy.planning.language_model.adding import Request, add_language_model
+from vla_deploy.planning.language_model.adding import LanguageModelSource, add_language_model
 from vla_deploy.planning.language_model.benching import bench
 
 
@@ -25,8 +25,10 @@ def shelf(tmp_path: Path) -> ModelShelf:
     return ModelShelf(store=store, engines=tmp_path / "engines", clock=MonotonicClock())
 
 
-def request(folder: Path, name: str = "mine") -> Request:
-    return Request(name=name, folder=folder, most_tokens=64, summary="tiny", licence="MIT")
+def request(folder: Path, name: str = "mine") -> LanguageModelSource:
+    return LanguageModelSource(
+        name=name, folder=folder, most_tokens=64, summary="tiny", licence="MIT"
+    )
 
 
 def test_a_model_is_kept_after_it_has_answered(shelf: ModelShelf, folder: Path) -> None:

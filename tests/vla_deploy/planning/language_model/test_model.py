@@ -14,16 +14,15 @@ from drivers.clock import MonotonicClock
 from vla_deploy.inference.errors import ModelFileSpoiled
 from vla_deploy.model_servers.deadline import Deadline
 from vla_deploy.planning.language_model import (
+    AnswerBounds,
     AnswerCut,
     AnswerLate,
-    Bounds,
     LanguageModel,
     ModelFolderInvalid,
     PromptTooLong,
     SchemaUnusable,
 )
-from vla_deploy.planning.language_model.constraint import Constraint, grammar_of
-from vla_deploy.planning.language_model.generating import generate
+from vla_deploy.planning.language_model.decoding import Constraint, generate, grammar_of
 
 SCHEMA = {
     "type": "object",
@@ -42,9 +41,11 @@ class StepByStep(Constraint):
         return []
 
 
-def bounds(most_tokens: int = 64, within_s: float = 30.0, recall: Event | None = None) -> Bounds:
+def bounds(
+    most_tokens: int = 64, within_s: float = 30.0, recall: Event | None = None
+) -> AnswerBounds:
     deadline = Deadline.within(MonotonicClock(), within_s, recall)
-    return Bounds(deadline=deadline, most_tokens=most_tokens)
+    return AnswerBounds(deadline=deadline, most_tokens=most_tokens)
 
 
 def prompt_of(model: LanguageModel, text: str) -> list[int]:

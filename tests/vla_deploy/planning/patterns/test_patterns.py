@@ -2,8 +2,8 @@
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import Declined, NothingBefore, UnknownPlace
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.patterns.awaiting import awaiting
 from vla_deploy.planning.patterns.backend import pattern_plan

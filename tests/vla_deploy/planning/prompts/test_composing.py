@@ -7,11 +7,10 @@ from dataclasses import replace
 import pytest
 
 from vla_deploy.planning.catalogue import SKILLS
+from vla_deploy.planning.chat_models.plan_answer import PlanAnswer
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.prompts.composing import VARIANTS, Wish, chat_for
-from vla_deploy.planning.prompts.instructions import TEMPLATES
-from vla_deploy.planning.prompts.quoting import as_data, plain
-from vla_deploy.planning.served.plan_answer import PlanAnswer
+from vla_deploy.planning.prompts.composing import TEMPLATES, VARIANTS, chat_for
+from vla_deploy.planning.prompts.situation_data import as_data, plain
 from vla_deploy.planning.understanding import Conversation, Turn
 
 ATTACK = (
@@ -51,13 +50,12 @@ def crowded(ask, scene, thing):
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("room", ROOMS)
 def test_a_prompt_has_no_more_characters_than_it_may(crowded, variant, room):
-    wish = Wish(variant=variant, failed=crowded.failed, jpeg=b"\xff\xd8")
-    assert length(chat_for(crowded, "butler", wish, room)) <= room
+    assert length(chat_for(crowded, "butler", variant, room, b"\xff\xd8")) <= room
 
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_what_is_cut_is_counted_and_what_the_command_names_stays_longest(crowded, room):
-    situation, _ = parts(chat_for(crowded, "butler", Wish(), room))
+    situation, _ = parts(chat_for(crowded, "butler", room=room))
     assert situation["things"][0]["id"] in ("cup_1", "cup_2")
     assert {one["id"] for one in situation["things"][:2]} == {"cup_1", "cup_2"}
     assert situation["left_out"] > 0
@@ -65,16 +63,16 @@ def test_what_is_cut_is_counted_and_what_the_command_names_stays_longest(crowded
 
 
 def test_recollections_are_cut_first_and_the_oldest_words_before_the_newest(crowded):
-    situation, _ = parts(chat_for(crowded, "butler", Wish(variant="structured"), 8_500))
+    situation, _ = parts(chat_for(crowded, "butler", "structured", 11_000))
     assert situation["remembered"] == []
     assert situation["said_before"][0]["person"].startswith("command 4")
-    small, _ = parts(chat_for(crowded, "butler", Wish(variant="structured"), 6_000))
+    small, _ = parts(chat_for(crowded, "butler", "structured", 6_000))
     assert len(small["things"]) < len(situation["things"])
 
 
 def test_a_small_room_gets_shorter_instructions_rather_than_no_situation(crowded):
-    large = chat_for(crowded, "butler", Wish(variant="few_shot"), 14_000)
-    small = chat_for(crowded, "butler", Wish(variant="few_shot"), 6_000)
+    large = chat_for(crowded, "butler", "few_shot", 14_000)
+    small = chat_for(crowded, "butler", "few_shot", 6_000)
     assert len(small.system) < len(large.system)
     assert all(skill in small.system for skill in SKILLS)
     assert parts(small)[0]["things"]
@@ -90,8 +88,8 @@ def test_nothing_that_is_told_of_the_scene_can_end_the_data(ask, scene, thing):
         failed=(ATTACK,),
     )
     plain_one = ask("go", failed=("it slipped",))
-    chat = chat_for(hostile, "butler", Wish(failed=hostile.failed))
-    assert chat.system == chat_for(plain_one, "butler", Wish(failed=plain_one.failed)).system
+    chat = chat_for(hostile, "butler")
+    assert chat.system == chat_for(plain_one, "butler").system
     text = chat.messages[0].text
     for tag in ("<situation>", "</situation>", "<command>", "</command>"):
         assert text.count(tag) == 1
@@ -128,7 +126,7 @@ def test_what_a_model_is_told_to_do_is_what_the_validator_accepts(ask):
 
 
 def test_instructions_tell_the_robots_own_limits(ask):
-    system = chat_for(ask("go"), "butler", Wish()).system
+    system = chat_for(ask("go"), "butler").system
     for told in (
         "butler",
         "0.6 kg",
@@ -143,7 +141,7 @@ def test_instructions_tell_the_robots_own_limits(ask):
 
 def test_failures_ask_for_another_way(ask):
     request = ask("go", failed=("pick_up: the cup slipped",))
-    chat = chat_for(request, "butler", Wish(failed=request.failed))
+    chat = chat_for(request, "butler")
     assert "Do not repeat a step that failed" in chat.system
     assert parts(chat)[0]["failed_before"] == ["pick_up: the cup slipped"]
 

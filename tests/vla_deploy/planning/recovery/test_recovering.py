@@ -4,11 +4,18 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import CannotBeDone
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.plan import Action, Plan
 from vla_deploy.planning.planner import checked
-from vla_deploy.planning.recovery import Carried, Cause, Setback, numbered, read_setback, recover
+from vla_deploy.planning.recovery import (
+    Carried,
+    FailureCause,
+    Setback,
+    numbered,
+    read_setback,
+    recover,
+)
 
 TAKE = ("pick_up", {"object": "cup_1"})
 MOVE = ("move", {"distance_m": 2.0, "speed_m_s": 0.2})
@@ -110,7 +117,9 @@ def test_the_other_hand_takes_what_one_hand_could_not(ask: Any):
 
 
 def test_a_need_that_the_world_denies_is_put_in(ask: Any):
-    carried = failed(plan_of(TAKE), 0, "robot before it: 2.1 m away", cause=Cause.PRECONDITION)
+    carried = failed(
+        plan_of(TAKE), 0, "robot before it: 2.1 m away", cause=FailureCause.PRECONDITION
+    )
     answer = recover(carried, ask("take the red cup"), checked)
     assert answer.proposal is not None
     assert answer.proposal.origin == "put in"

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from vla_deploy.planning.asking import Request
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.knowledge import world_of
 from vla_deploy.planning.understanding import Conversation, Mention, Role, Turn
 from vla_deploy.robots import load_robot

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import Ambiguous, NotThere, UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.resolver import Resolver
 from vla_deploy.world import Thing

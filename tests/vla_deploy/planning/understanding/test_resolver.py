@@ -3,8 +3,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from vla_deploy.planning.asking import Request
 from vla_deploy.planning.errors import Ambiguous, NotThere, UnknownObject
+from vla_deploy.planning.interfaces import Request
 from vla_deploy.planning.understanding import Conversation
 from vla_deploy.planning.understanding.fitting import Use
 from vla_deploy.planning.understanding.resolver import Resolver

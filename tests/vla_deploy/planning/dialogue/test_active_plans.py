@@ -1,0 +1,177 @@
+"""A plan that fails is planned anew, seen from the topics: another plan, or why there is none."""
+
+import re
+from typing import Any
+
+import pytest
+
+from vla_deploy.planning.dialogue.active_plans import ActivePlans
+from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.errors import CannotBeDone, Declined
+from vla_deploy.planning.interfaces import PlanningResult
+from vla_deploy.planning.plan import Plan
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED
+
+
+def set_back(desk: Any, plan: dict[str, Any], **changes: Any) -> list[dict[str, Any]]:
+    """Let the first action of a plan fail; return what the planner hands to the executor."""
+    action_id = plan["plan"]["actions"][0]["id"]
+    told = {"action_id": action_id, "error": "the way is blocked", "cause": "skill", "done": []}
+    desk.executor_tells(command_id=plan["command_id"], event="setback", **(told | changes))
+    desk.answers()
+    return desk.plans()
+
+
+def test_a_plan_that_failed_is_followed_by_another_for_the_same_command(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (first,) = desk.plans()
+    (second,) = set_back(desk, first)
+    assert second["command_id"] == "c1"
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
+    assert all(one["id"].startswith("r1_") for one in second["plan"]["actions"])
+
+
+def test_events_tell_who_made_the_other_plan_and_by_what_idea(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    failed = desk.plans()[0]["plan"]["actions"][0]["id"]
+    desk.executor_tells(command_id="c1", event="setback", action_id=failed, error="x", done=[])
+    told = [one for one in desk.answers() if one["event"] not in ("setback",)]
+    assert [(one["event"], one["rung"], one["origin"]) for one in told] == [
+        ("plan", "recovery", "wait")
+    ]
+
+
+def test_after_the_last_strategy_the_command_is_given_up_with_the_first_cause(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (second,) = set_back(desk, desk.plans()[0])
+    last = second["plan"]["actions"][-1]["id"]
+    (end,) = set_back(desk, second, action_id=last)
+    assert "the way is blocked" in end["give_up"]
+
+
+def test_who_takes_time_is_asked_with_the_history_and_no_more_often_than_three_times(
+    open_desk, back_end, propose
+):
+    go = propose(("navigate_to", {"place": "bedroom"}))
+    model = back_end("model", Declined("nothing"), go)
+    desk = open_desk(model)
+    desk.give(text="sing one")
+    assert desk.answers()[-1]["event"] == "rejected"
+    desk.give(command_id="c2", text="sing two")
+    desk.answers()
+    (plan,) = desk.plans()
+    for _ in range(NOT_BOUNDED.further_plans):
+        (plan,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
+        assert "plan" in plan
+    (end,) = set_back(desk, plan)
+    assert end["give_up"] == f"{NOT_BOUNDED.further_plans} other plans failed, too"
+    assert any("the way is blocked" in one for one in model.asked[-1].failed)
+
+
+@pytest.mark.parametrize(
+    ("further_plans", "words"),
+    [
+        (0, "this robot makes no other plan: [planning] further_plans is 0"),
+        (1, "1 other plan failed, too"),
+    ],
+)
+def test_no_more_plans_than_the_robot_file_allows(further_plans: int, words: str) -> None:
+    active = ActivePlans(further_plans)
+    go = {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
+    plan = Plan.model_validate({"goal": "go", "actions": [go]})
+    command = UserCommand(command_id="c1", text="go to the kitchen", told_ns=0)
+    told = {"action_id": "a1", "error": "blocked", "cause": "skill", "done": []}
+    active.add(command, plan, PlanningResult())
+    for _ in range(further_plans):
+        active.add(active.set_back("c1", told), plan, PlanningResult())
+    with pytest.raises(CannotBeDone, match=re.escape(words)):
+        active.set_back("c1", told)
+
+
+HEARD = {"text": "go to the kitchen", "heard": {"confidence": 0.4}}
+
+
+def agreed(desk: Any, **utterance: Any) -> dict[str, Any]:
+    """Give a command that is asked about, say yes, and return its plan."""
+    desk.give(**utterance)
+    assert desk.answers()[-1]["event"] == "asked"
+    desk.give(command_id="c2", text="yes")
+    desk.answers()
+    (plan,) = desk.plans()
+    return plan
+
+
+def test_what_the_person_has_agreed_to_is_mended_without_another_yes(open_desk):
+    desk = open_desk()
+    first = agreed(desk, **HEARD)
+    (second,) = set_back(desk, first)
+    assert [one["skill"] for one in second["plan"]["actions"]] == ["wait", "navigate_to"]
+
+
+def test_what_is_risky_in_another_way_than_what_was_agreed_to_is_not_done(
+    open_desk, back_end, propose
+):
+    back = propose(("move", {"distance_m": -2.0}))
+    desk = open_desk(back_end("model", back))
+    plan = agreed(desk, **HEARD)
+    (plan,) = set_back(desk, plan)
+    (end,) = set_back(desk, plan, action_id=plan["plan"]["actions"][-1]["id"])
+    assert "I would drive 2 m backward" in end["give_up"]
+
+
+def test_who_takes_time_is_told_what_was_done_before_the_failure(open_desk, back_end, propose):
+    go = propose(("speak", {"text": "I go"}), ("move", {"distance_m": 1.0}))
+    model = back_end("model", go, Declined("nothing"))
+    desk = open_desk(model)
+    desk.give(text="sing one")
+    desk.answers()
+    (plan,) = desk.plans()
+    done, failed = (one["id"] for one in plan["plan"]["actions"])
+    set_back(desk, plan, action_id=failed, done=[done], left={failed: {}})
+    (told,) = model.asked[-1].failed
+    assert "done before: speak(text I go)" in told
+
+
+def test_a_plan_that_came_as_one_is_not_changed(open_desk):
+    desk = open_desk()
+    plan = {"goal": "go", "actions": [
+        {"id": "a1", "skill": "navigate_to", "parameters": {"place": "kitchen"}}
+    ]}  # fmt: skip
+    desk.give(plan=plan)
+    desk.answers()
+    (end,) = set_back(desk, desk.plans()[0])
+    assert "given" in end["give_up"]
+
+
+def test_a_planner_that_was_started_again_has_no_other_plan(open_desk):
+    desk = open_desk()
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (first,) = desk.plans()
+    desk.executor_tells(command_id="c1", event="setback", action_id="a1", error="x", done=[])
+    desk.start()
+    assert [one.get("give_up") for one in desk.plans()] == [
+        "the planner was started again meanwhile"
+    ]
+    assert first["command_id"] == "c1"
+
+
+def test_a_stop_ends_the_search_for_another_plan(open_desk, later, back_end, propose):
+    desk = open_desk(back_end("model", propose(("navigate_to", {"place": "bedroom"}))), aside=later)
+    desk.give(text="go to the kitchen")
+    desk.answers()
+    (second,) = set_back(desk, desk.plans()[0])
+    assert set_back(desk, second, action_id=second["plan"]["actions"][-1]["id"]) == []
+    desk.give(command_id="c2", text="stop")
+    desk.answers()
+    later.do_one()
+    desk.answers()
+    told = desk.plans()
+    assert [one for one in told if "plan" in one] == []
+    assert {"command_id": "c2", "cancel": True} in told

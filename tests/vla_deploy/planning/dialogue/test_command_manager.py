@@ -1,0 +1,463 @@
+"""Commands queue, a stop overtakes, questions wait for their answer: all seen from the topics."""
+
+import pytest
+
+from vla_deploy.planning.dialogue.phrasing import Says
+from vla_deploy.planning.errors import Ambiguous, Declined
+from vla_deploy.planning.understanding import Candidate
+
+GO = ("navigate_to", {"place": "kitchen"})
+PICK = ("pick_up", {"object": "red cup"})
+RED = Candidate(name="cup_1", words="the red one", features=frozenset({"red"}))
+BLUE = Candidate(name="cup_2", words="the blue one", features=frozenset({"blue"}))
+WHICH = Ambiguous("Which cup, the red one or the blue one?", (RED, BLUE), "cup")
+
+
+def events(told: list[dict]) -> list[tuple[str, str]]:
+    return [(one["command_id"], one["event"]) for one in told]
+
+
+def test_a_step_does_not_wait_for_a_slow_plan_and_commands_keep_their_order(
+    open_desk, later, back_end, propose
+):
+    desk = open_desk(back_end("model", propose(GO), Declined("no idea")), aside=later)
+    desk.give(text="sing one")
+    desk.give(command_id="c2", text="sing two")
+    desk.give(command_id="c3", text="go to the kitchen")
+    assert events(desk.answers()) == [("c1", "planning")]
+    assert desk.status()["commands"] == ["c1", "c2", "c3"]
+    later.do_one()
+    assert events(desk.answers()) == [("c1", "accepted"), ("c1", "plan"), ("c2", "planning")]
+    later.do_one()
+    assert events(desk.answers()) == [("c2", "rejected"), ("c3", "accepted"), ("c3", "plan")]
+
+
+def test_a_command_that_comes_while_another_is_planned_is_told_that_it_waits(
+    open_desk, later, back_end, propose
+):
+    desk = open_desk(back_end("model", propose(GO)), aside=later)
+    desk.give(text="sing one")
+    desk.answers()
+    desk.give(command_id="c2", text="go to the kitchen")
+    assert events(desk.answers()) == [("c2", "queued")]
+
+
+def test_a_stop_overtakes_all_that_is_planned_and_waits(open_desk, later, back_end, propose):
+    model = back_end("model", propose(GO))
+    desk = open_desk(model, aside=later)
+    desk.give(text="sing one")
+    desk.give(command_id="c2", text="go to the kitchen")
+    desk.answers()
+    desk.give(command_id="c3", text="stop")
+    assert events(desk.answers()) == [("c1", "rejected"), ("c2", "rejected")]
+    assert desk.plans() == [{"command_id": "c3", "cancel": True}]
+    later.do_one()
+    assert desk.answers() == []
+    assert desk.plans() == []
+    assert model.asked == [], "its deadline was called in"
+
+
+def test_too_many_commands_are_refused_at_once(open_desk, later, back_end, propose):
+    desk = open_desk(back_end("model", propose(GO)), aside=later)
+    for number in range(10):
+        desk.give(command_id=f"c{number}", text=f"sing {number}")
+    refused = [one for one in desk.answers() if one["event"] == "rejected"]
+    assert [one["command_id"] for one in refused] == ["c8", "c9"]
+    assert refused[0]["reason"] == Says.MANY_WAIT
+
+
+def test_a_rung_that_breaks_ends_its_command_and_no_other(open_desk, back_end, propose):
+    desk = open_desk(back_end("model", RuntimeError("out of memory"), propose(GO)))
+    desk.give(text="sing one")
+    desk.give(command_id="c2", text="sing two")
+    told = desk.answers()
+    assert events(told)[1:3] == [("c1", "rejected"), ("c2", "planning")]
+    assert told[1]["reason"] == "the planner failed: RuntimeError"
+    assert events(told)[-1] == ("c2", "plan")
+    assert desk.status()["failed"] == 1
+
+
+def test_a_fault_of_what_plans_at_once_ends_its_command_and_not_the_planner(open_desk):
+    def check(plan, request):
+        raise ZeroDivisionError(request.text)
+
+    desk = open_desk(check=check)
+    desk.give(text="go to the kitchen")
+    desk.give(command_id="c2", text="sing")
+    told = desk.answers()
+    assert events(told) == [("c1", "rejected"), ("c2", "rejected")]
+    assert told[0]["reason"] == "the planner failed: ZeroDivisionError"
+
+
+class TestQuestions:
+    @pytest.fixture
+    def model(self, back_end, propose):
+        return back_end("model", WHICH, propose(PICK))
+
+    @pytest.fixture
+    def desk(self, open_desk, model):
+        desk = open_desk(model)
+        desk.give(text="hand it over")
+        return desk
+
+    def test_what_is_unclear_is_asked_and_nothing_moves(self, desk):
+        planning, asked = desk.answers()
+        assert (planning["event"], asked["event"]) == ("planning", "asked")
+        assert asked["question"] == "Which cup, the red one or the blue one?"
+        assert asked["choices"] == ["the red one", "the blue one"]
+        assert desk.plans() == []
+        assert desk.status()["question"] == asked["question"]
+
+    def test_the_answer_is_the_next_utterance(self, desk, model):
+        desk.answers()
+        desk.give(command_id="c2", text="the red one, please")
+        told = desk.answers()
+        assert events(told) == [
+            ("c2", "answered"), ("c1", "planning"), ("c1", "accepted"), ("c1", "plan"),
+        ]  # fmt: skip
+        assert told[0]["of"] == "c1"
+        assert model.asked[1].text == "hand it over"
+        assert dict(model.asked[1].conversation.choices) == {"cup": "cup_1"}
+        assert desk.plans()[0]["command_id"] == "c1"
+
+    @pytest.mark.parametrize("no", ["never mind", "cancel", "no"])
+    def test_no_leaves_it_and_stops_nothing_else(self, desk, no):
+        desk.answers()
+        desk.give(command_id="c2", text=no)
+        told = desk.answers()
+        assert events(told) == [("c2", "answered"), ("c1", "rejected")]
+        assert told[1]["reason"] == Says.LEFT
+        assert desk.plans() == []
+
+    def test_stop_ends_everything_also_while_a_question_waits(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="stop")
+        assert events(desk.answers()) == [("c1", "rejected")]
+        assert desk.plans() == [{"command_id": "c2", "cancel": True}]
+
+    def test_another_command_takes_the_place_of_the_question(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="go to the kitchen")
+        told = desk.answers()
+        assert events(told) == [("c1", "rejected"), ("c2", "accepted"), ("c2", "plan")]
+        assert told[0]["reason"] == Says.REPLACED
+
+    def test_an_answer_that_picks_none_is_asked_again_but_not_for_ever(self, desk):
+        desk.answers()
+        for _ in range(2):
+            desk.give(command_id="c2", text="that one")
+            told = desk.answers()
+            assert events(told) == [("c2", "answered"), ("c1", "asked")]
+            assert told[1]["question"].startswith("Sorry, I did not get that. Which cup")
+        desk.give(command_id="c2", text="that one")
+        told = desk.answers()
+        assert (told[1]["event"], told[1]["reason"]) == ("rejected", Says.STILL_UNCLEAR)
+
+    def test_an_answer_by_another_thing_is_planned_with_the_command(self, open_desk, model):
+        desk = open_desk(model)
+        desk.give(text="wheel that cup round")
+        desk.answers()
+        desk.give(command_id="c2", text="the one next to the book")
+        assert events(desk.answers())[:2] == [("c2", "answered"), ("c1", "planning")]
+        assert model.asked[1].text == "wheel that cup next to the book round"
+
+    def test_a_question_that_nobody_answers_is_left_politely(self, desk):
+        within_s = desk.answers()[-1]["answer_within_s"]
+        desk.clock.pass_s(within_s - 0.1)
+        assert desk.answers() == []
+        desk.clock.pass_s(0.2)
+        (left,) = desk.answers()
+        assert (left["command_id"], left["reason"]) == ("c1", Says.NO_ANSWER)
+
+    def test_what_is_meant_as_an_answer_only_is_never_a_command(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="go to the kitchen", answer=True)
+        (told,) = desk.answers()
+        assert (told["command_id"], told["event"]) == ("c2", "rejected")
+        assert told["reason"].startswith("that does not answer: Which cup")
+        desk.give(command_id="c3", text="no", answer=True)
+        desk.answers()
+        desk.give(command_id="c4", text="yes", answer=True)
+        (told,) = desk.answers()
+        assert (told["command_id"], told["reason"]) == ("c4", Says.NOTHING_ASKED)
+
+
+class TestWaitingForAWord:
+    @pytest.fixture
+    def desk(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1")
+        desk.give(text="when I say so, pick up the red cup")
+        return desk
+
+    def test_the_plan_is_read_back_and_held(self, desk):
+        (asked,) = desk.answers()
+        assert asked["question"] == "Shall I pick up the red cup? I wait for you to say go."
+        assert asked["plan"]["actions"][-1]["skill"] == "pick_up"
+        assert desk.plans() == []
+        desk.clock.pass_s(600.0)
+        assert desk.answers() == []
+        assert desk.status()["question"] == asked["question"]
+        assert desk.status()["commands"] == ["c1"]
+
+    @pytest.mark.parametrize(
+        ("word", "end"),
+        [
+            ("go", ("c1", "plan")),
+            ("now, please", ("c1", "plan")),
+            ("yes", ("c1", "plan")),
+            ("not now", ("c1", "rejected")),
+            ("never mind", ("c1", "rejected")),
+            ("look left", ("c2", "plan")),
+        ],
+    )
+    def test_a_word_begins_or_drops_it_and_anything_else_does_not(self, desk, word, end):
+        desk.answers()
+        desk.give(command_id="c2", text=word)
+        assert events(desk.answers())[-1] == end
+        is_held = desk.status()["question"] is not None
+        assert is_held == (end[0] == "c2")
+
+    def test_another_takes_its_place_and_none_waits_for_ever(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="look left when I call")
+        assert events(desk.answers()) == [("c1", "rejected"), ("c2", "asked")]
+        desk.clock.pass_s(3601.0)
+        (left,) = desk.answers()
+        assert (left["command_id"], left["reason"]) == ("c2", Says.NO_ANSWER)
+
+
+class TestReadingBack:
+    @pytest.fixture
+    def desk(self, open_desk, back_end, propose):
+        go = propose(GO, read_back="Shall I go to the kitchen?", may_be_kept=True)
+        desk = open_desk(back_end("model", go))
+        desk.give(text="kitchen, like, you know")
+        return desk
+
+    def test_an_unsure_plan_is_read_back_before_anything_moves(self, desk):
+        asked = desk.answers()[-1]
+        assert (asked["event"], asked["question"]) == ("asked", "Shall I go to the kitchen?")
+        assert asked["plan"]["actions"][0]["skill"] == "navigate_to"
+        assert desk.plans() == []
+        desk.give(command_id="c2", text="yes please")
+        assert events(desk.answers()) == [("c2", "answered"), ("c1", "accepted"), ("c1", "plan")]
+        assert len(desk.plans()) == 1
+
+    def test_a_correction_changes_the_plan_that_was_read_back(self, open_desk, back_end, propose):
+        bring = (("pick_up", {"object": "red cup"}), ("speak", {"text": "Here is the red cup."}))
+        take = propose(*bring, read_back="Shall I bring the red cup?")
+        desk = open_desk(back_end("model", take))
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(text="cup, like, you know")
+        assert desk.answers()[-1]["event"] == "asked"
+        desk.give(command_id="c2", text="no, the blue one")
+        told = desk.answers()
+        assert events(told) == [("c2", "answered"), ("c1", "asked")]
+        assert (
+            told[-1]["question"] == 'Shall I pick up the blue cup and say "Here is the blue cup"?'
+        )
+        desk.give(command_id="c3", text="yes")
+        told = desk.answers()
+        assert events(told) == [("c3", "answered"), ("c1", "accepted"), ("c1", "plan")]
+        assert told[-1]["rung"] == "correction"
+        actions = told[-1]["plan"]["actions"]
+        assert "blue cup" in [one["parameters"].get("object") for one in actions]
+        assert actions[-1]["parameters"]["text"] == "Here is the blue cup."
+
+    @pytest.mark.parametrize(
+        ("said", "question"),
+        [
+            ("no, the blue one", "Shall I pick up the blue cup?"),
+            ("I mean the ball", "Shall I pick up the ball?"),
+            ("the other one", "Shall I pick up the blue cup?"),
+            ("the green ball I mean", "Shall I pick up the green ball?"),
+        ],
+    )
+    def test_a_correction_ends_what_has_begun_and_is_read_back(self, open_desk, said, question):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2", "green ball_1")
+        desk.give(text="pick up the red cup")
+        desk.answers()
+        desk.plans()
+        desk.give(command_id="c2", text=said)
+        (asked,) = desk.answers()
+        assert (asked["event"], asked["question"]) == ("asked", question)
+        assert desk.plans() == [{"command_id": "c2-corrects", "cancel": True}]
+        desk.give(command_id="c3", text="yes")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+
+    def test_a_correction_of_what_was_not_done_is_a_command_of_its_own(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(text="go to narnia")
+        desk.answers()
+        desk.give(command_id="c2", text="no, the blue cup")
+        assert events(desk.answers()) == [("c2", "rejected")]
+
+    def test_what_is_done_need_not_be_ended_for_the_other_one_too(self, open_desk):
+        desk = open_desk()
+        desk.sees("red cup_1", "blue cup_2")
+        desk.give(text="look at the red cup")
+        desk.answers()
+        desk.plans()
+        desk.executor_tells(command_id="c1", event="finished", success=True, error=None)
+        desk.give(command_id="c2", text="and the other one too")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+        assert [list(one) for one in desk.plans()] == [["command_id", "plan"]]
+
+    def test_a_robot_that_was_disarmed_meanwhile_does_not_move(self, desk):
+        desk.answers()
+        desk.control("disarmed")
+        desk.give(command_id="c2", text="yes")
+        refused = desk.answers()[-1]
+        assert refused["event"] == "rejected"
+        assert "vla-deploy arm" in refused["reason"]
+        assert desk.plans() == []
+
+    def test_the_plan_that_was_agreed_to_is_kept_for_the_same_words(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="yes")
+        desk.answers()
+        desk.give(command_id="c3", text="kitchen, like, you know")
+        asked = desk.answers()[-1]
+        assert asked["event"] == "asked", "agreeing once is not agreeing for ever"
+        assert desk.status()["cache"]["hits"] == 1
+
+    def test_a_plan_that_failed_is_not_given_again(self, desk):
+        desk.answers()
+        desk.give(command_id="c2", text="yes")
+        desk.answers()
+        desk.executor_tells(command_id="c1", event="finished", success=False, error="no way")
+        desk.give(command_id="c3", text="kitchen, like, you know")
+        desk.answers()
+        assert desk.status()["cache"]["hits"] == 0
+
+
+class TestAQuestionOfAModel:
+    @pytest.fixture
+    def model(self, back_end, propose):
+        return back_end("model", Ambiguous("Where shall I put it?"), propose(GO))
+
+    @pytest.fixture
+    def desk(self, open_desk, model):
+        desk = open_desk(model)
+        desk.give(text="clear away that thing")
+        desk.answers()
+        return desk
+
+    def test_any_words_may_answer_it(self, desk, model):
+        desk.give(command_id="c2", text="somewhere warm")
+        assert events(desk.answers())[-1] == ("c1", "plan")
+        assert model.asked[1].text == "clear away that thing: somewhere warm"
+
+    def test_but_a_command_is_a_command(self, desk, model):
+        desk.give(command_id="c2", text="go to the kitchen")
+        assert events(desk.answers())[0] == ("c1", "rejected")
+        assert len(model.asked) == 1
+
+
+class TestSpokenCommands:
+    def test_what_was_typed_is_not_answered_aloud(self, open_desk):
+        desk = open_desk()
+        desk.give(text="sing a sea shanty")
+        desk.answers()
+        assert desk.said_aloud() == []
+
+    def test_a_refusal_is_told_aloud_in_a_sentence(self, open_desk):
+        desk = open_desk()
+        desk.give(text="sing a sea shanty", source="voice")
+        desk.give(text="go to narnia", source="voice")
+        desk.answers()
+        first, second = desk.said_aloud()
+        assert first == Says.NOT_UNDERSTOOD
+        assert second == 'Sorry, I cannot do that: I do not know the place "narnia".'
+
+    def test_a_question_is_asked_aloud_and_no_is_acknowledged(self, open_desk, back_end):
+        desk = open_desk(back_end("model", WHICH))
+        desk.give(text="hand it over", source="voice")
+        desk.answers()
+        desk.give(command_id="c2", text="no", source="voice")
+        desk.answers()
+        assert desk.said_aloud() == [str(WHICH), Says.LEFT]
+
+    def test_a_long_wait_is_announced_once(self, open_desk, later, back_end, propose):
+        desk = open_desk(back_end("model", propose(GO)), aside=later)
+        desk.give(text="sing one", source="voice")
+        desk.answers()
+        assert desk.said_aloud() == []
+        for _ in range(3):
+            desk.clock.pass_s(1.0)
+            desk.answers()
+        assert desk.said_aloud() == [Says.WORKING]
+
+    @pytest.mark.parametrize(
+        ("end", "said"),
+        [
+            ({"success": True, "error": None}, [Says.DONE]),
+            ({"success": False, "error": "no way; try again"},
+             ["Sorry, that did not work: no way."]),
+        ],
+    )  # fmt: skip
+    def test_the_end_is_told_aloud(self, open_desk, end, said):
+        desk = open_desk()
+        desk.give(text="go to the kitchen", source="voice")
+        desk.answers()
+        desk.executor_tells(command_id="c1", event="finished", **end)
+        desk.answers()
+        assert desk.said_aloud() == said
+
+    def test_whoever_says_stop_is_not_told_that_it_failed(self, open_desk):
+        desk = open_desk()
+        desk.give(text="go to the kitchen", source="voice")
+        desk.give(command_id="c2", text="stop", source="voice")
+        desk.answers()
+        desk.executor_tells(command_id="c1", event="finished", success=False, error="cancelled")
+        desk.answers()
+        assert desk.said_aloud() == []
+
+
+class TestRepeating:
+    @pytest.fixture
+    def desk(self, open_desk):
+        desk = open_desk()
+        desk.give(text="turn left")
+        desk.answers()
+        desk.plans()
+        return desk
+
+    def test_again_does_what_was_done(self, desk):
+        desk.executor_tells(command_id="c1", event="finished", success=True)
+        desk.give(command_id="c2", text="again")
+        assert events(desk.answers())[-1] == ("c2", "plan")
+        assert desk.plans()[-1]["plan"]["goal"] == "turn left"
+
+    def test_after_a_stop_nothing_is_done_again(self, desk):
+        desk.executor_tells(command_id="c1", event="finished", success=True)
+        desk.give(command_id="c2", text="stop")
+        desk.answers()
+        desk.plans()
+        for number, text in enumerate(("again", "a bit more", "back again")):
+            desk.give(command_id=f"d{number}", text=text)
+        told = desk.answers()
+        assert events(told) == [("d0", "rejected"), ("d1", "rejected"), ("d2", "rejected")]
+        assert told[0]["reason"] == (
+            '"stop" was not done (cancelled), so I do not repeat it; say the whole command'
+        )
+        assert desk.plans() == []
+
+    @pytest.mark.parametrize(
+        "ended",
+        [
+            {"event": "finished", "success": False, "error": "the bumper was pressed"},
+            {"event": "rejected", "reason": "not armed"},
+        ],
+    )
+    def test_what_the_executor_could_not_or_would_not_do_is_not_done_again(self, desk, ended):
+        desk.executor_tells(command_id="c1", **ended)
+        desk.answers()
+        desk.give(command_id="c2", text="again")
+        told = desk.answers()
+        assert told[-1]["event"] == "rejected"
+        assert '"turn left" was not done (failed)' in told[-1]["reason"]
+        assert desk.plans() == []

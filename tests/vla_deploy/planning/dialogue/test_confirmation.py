@@ -1,0 +1,146 @@
+from dataclasses import replace
+
+import pytest
+
+from vla_deploy.planning.dialogue.confirmation import agreement_to, confirmation_of, things_named
+from vla_deploy.planning.interfaces import Request
+from vla_deploy.planning.knowledge import World, world_of
+from vla_deploy.planning.plan import Action, Plan
+from vla_deploy.planning.understanding.grounding import PUT_IN
+from vla_deploy.robots import load_robot
+from vla_deploy.robots.plan_bounds import Confirm
+from vla_deploy.world import Snapshot, Thing
+from vla_deploy.world.thing import Rest
+
+GO = Action(id="a", skill="navigate_to", parameters={"place": "kitchen"})
+PICK = Action(id="p", skill="pick_up", parameters={"object": "bottle"})
+
+
+@pytest.fixture(scope="module")
+def butler() -> World:
+    return world_of(load_robot("butler"), {"left": None, "right": None})
+
+
+def ask(world: World, *actions: Action, **changes: object) -> str:
+    heard = changes.pop("heard_confidence", None)
+    scene = changes.pop("scene", None)
+    plan = Plan(goal="x", actions=actions).model_copy(update=changes)
+    request = Request(
+        command_id="c", text="x", world=world, scene=scene, heard_confidence=heard
+    )  # fmt: skip
+    return confirmation_of(plan, request)
+
+
+def test_an_ordinary_plan_runs_at_once(butler: World) -> None:
+    assert ask(butler, GO, PICK) == ""
+
+
+def test_the_robot_file_says_how_far_it_goes(butler: World) -> None:
+    back = Action(id="b", skill="move", parameters={"distance_m": -2.0})
+    always, never = (
+        replace(butler, bounds=replace(butler.bounds, require_confirmation=one))
+        for one in (Confirm.ALWAYS, Confirm.NEVER)
+    )
+    assert ask(always, GO) == "Shall I go to the kitchen?"
+    assert ask(never, back) == ""
+    assert ask(butler, back).endswith("I would drive 2 m backward.")
+
+
+def test_what_moves_nothing_needs_no_yes(butler: World) -> None:
+    always = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.ALWAYS))
+    assert ask(always, Action(id="s", skill="speak", parameters={"text": "hello"})) == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"feasibility_score": 0.6}, "I am not sure that I understood you."),
+        ({"description": PUT_IN, "skill": "place",
+          "parameters": {"destination": "coffee_table", "relation": "on"}},
+         "My hands are full: I would put something down first."),
+    ],
+)  # fmt: skip
+def test_each_risk_of_an_action_is_told(butler: World, change: dict[str, object], why: str) -> None:
+    assert ask(butler, PICK.model_copy(update=change)).endswith(why)
+
+
+def test_each_risk_of_a_plan_is_told(butler: World) -> None:
+    assert "There may be a danger: it is hot." in ask(butler, GO, safety_concerns=("it is hot",))
+    assert "not sure that I heard" in ask(butler, GO, heard_confidence=0.4)
+    assert ask(butler, GO, heard_confidence=0.9) == ""
+    assert "I would move 4 things." in ask(butler, *[PICK] * 4)
+    assert "It takes 70 steps and about 18 minutes." in ask(butler, *[GO] * 70)
+
+
+def test_doubt_is_asked_even_where_risks_are_not(butler: World) -> None:
+    never = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.NEVER))
+    assert ask(never, PICK.model_copy(update={"feasibility_score": 0.6}))
+
+
+def test_a_heavy_thing_is_asked_for(butler: World) -> None:
+    full = Thing(thing_id="bottle_1", kind="bottle", colour="green",
+                 position_m=(2.0, 1.5, 0.5), size_m=(0.06, 0.06, 0.20))  # fmt: skip
+    said = ask(butler, PICK, scene=Snapshot(stamp_ns=0, things=(full,)))
+    assert said.endswith("The bottle may weigh 0.5 kg.")
+
+
+def test_what_was_agreed_to_is_not_asked_about_again(butler: World) -> None:
+    request = Request(command_id="c", text="x", world=butler, heard_confidence=0.4)
+    plan = Plan(goal="x", actions=(PICK,) * 4)
+    agreed = agreement_to(plan, request)
+    assert agreed == {"many", "unheard"}
+    assert confirmation_of(plan, request, agreed) == ""
+    back = Action(id="b", skill="move", parameters={"distance_m": -2.0})
+    farther = plan.model_copy(update={"actions": (*plan.actions, back)})
+    assert confirmation_of(farther, request, agreed).endswith("I would drive 2 m backward.")
+
+
+def test_a_yes_to_one_danger_is_none_to_another(butler: World) -> None:
+    request = Request(command_id="c", text="x", world=butler)
+    hot, sharp = (Plan(goal="x", actions=(GO,), safety_concerns=(why,)) for why in ("hot", "sharp"))
+    assert confirmation_of(hot, request, agreement_to(hot, request)) == ""
+    assert "sharp" in confirmation_of(sharp, request, agreement_to(hot, request))
+
+
+def test_where_every_motion_waits_for_a_yes_an_answer_is_none(butler: World) -> None:
+    always = replace(butler, bounds=replace(butler.bounds, require_confirmation=Confirm.ALWAYS))
+    request = Request(command_id="c", text="x", world=always)
+    speak = Action(id="s", skill="speak", parameters={"text": "hello"})
+    said, moved = (Plan(goal="x", actions=(one,)) for one in (speak, GO))
+    assert confirmation_of(moved, request, agreement_to(moved, request)) == ""
+    assert confirmation_of(moved, request, agreement_to(said, request))
+
+
+CUPS = [f"red cup_{number}" for number in range(1, 6)]
+
+
+@pytest.mark.parametrize(
+    ("taken", "said"),
+    [
+        (["red cup_1"], ""),
+        (["red cup_1", "green ball_1", "keys"],
+         "That is the red cup on the coffee table, the green ball in the box and the keys."),
+        ([*CUPS, "green ball_1"], None),
+        ([*CUPS, "green ball_1", "green ball_2"],
+         "That is 7 things: 5 cups and 2 balls."),
+    ],
+)  # fmt: skip
+def test_every_thing_of_a_set_is_named_of_many_the_kinds(
+    butler: World, taken: list[str], said: str | None
+) -> None:
+    rests = {"cup": Rest("on", "coffee_table"), "ball": Rest("in", "box_1")}
+    names = [one.split() for one in taken]
+    things = tuple(
+        Thing(thing_id=name[1], kind=(kind := name[1].partition("_")[0]), colour=name[0],
+              position_m=(2.0, 1.5, 0.5), size_m=(0.06, 0.06, 0.2), rests=rests[kind])
+        for name in names if len(name) > 1
+    )  # fmt: skip
+    actions = tuple(
+        Action(id=f"a{number}", skill="pick_up", parameters={"object": name[-1]})
+        for number, name in enumerate(names)
+    )
+    request = Request(
+        command_id="c", text="x", world=butler, scene=Snapshot(stamp_ns=0, things=things)
+    )
+    found = things_named(Plan(goal="x", actions=actions), request)
+    assert found.count("on the coffee table") == 5 if said is None else found == said

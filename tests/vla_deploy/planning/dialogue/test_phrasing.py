@@ -1,0 +1,43 @@
+"""What the robot says is brief, plain, polite, and promises nothing."""
+
+import pytest
+
+from vla_deploy.planning.catalogue import SKILLS
+from vla_deploy.planning.dialogue.phrasing import _PHRASES, Says, steps_in_words
+
+
+@pytest.mark.parametrize("sentence", Says)
+def test_every_sentence_is_brief_and_promises_nothing(sentence):
+    assert len(sentence.split()) <= 15
+    assert sentence.endswith((".", "?", "}"))
+    for promise in ("I will", "I'll", "promise", "always", "certainly", "sure"):
+        assert promise not in sentence
+
+
+def test_every_skill_can_be_put_into_words():
+    assert set(_PHRASES) == set(SKILLS)
+
+
+@pytest.mark.parametrize(
+    ("steps", "words"),
+    [
+        ([("navigate_to", {"place": "living_room"})], "go to the living room"),
+        (
+            [
+                ("find_object", {"object": "red cup"}),
+                ("navigate_to", {"object": "red cup"}),
+                ("pick_up", {"object": "red cup"}),
+                ("navigate_to", {"place": "kitchen"}),
+                ("place", {"destination": "box", "relation": "in"}),
+            ],
+            "pick up the red cup, go to the kitchen and put it in the box",
+        ),
+        ([("move", {"distance_m": -0.5}), ("turn", {"angle_rad": -1.0})],
+         "drive 0.5 metres back and turn right"),
+        ([("wait", {"duration_s": 1.0})] * 9,
+         "wait 1 seconds, wait 1 seconds, wait 1 seconds, wait 1 seconds, wait 1 seconds, "
+         "wait 1 seconds and do 3 things more"),
+    ],
+)  # fmt: skip
+def test_a_plan_is_said_as_a_person_would(propose, steps, words):
+    assert steps_in_words(propose(*steps).plan) == words

@@ -1,0 +1,1 @@
+"""Plan with chat models, on board or behind a server."""

@@ -1,0 +1,84 @@
+"""Remember the plans that the executor carries out, for when one of them fails."""
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.errors import CannotBeDone
+from vla_deploy.planning.interfaces import PlanningResult
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.recovery import RECOVERY, Carried, read_setback
+from vla_deploy.robots.plan_bounds import NOT_BOUNDED
+
+RESTARTED: Final = "the planner was started again meanwhile"
+_MOST_REMEMBERED: Final = 16
+
+
+class ActivePlans:
+    """Hold command and plan of what is carried out, with all that failed before.
+
+    For one command, `further_plans` are made at most.
+    """
+
+    def __init__(self, further_plans: int = NOT_BOUNDED.further_plans) -> None:
+        self._further_plans = further_plans
+        self._active: OrderedDict[str, tuple[UserCommand, Carried]] = OrderedDict()
+
+    def add(
+        self,
+        command: UserCommand,
+        plan: Plan,
+        answer: PlanningResult,
+        agreed: frozenset[str] = frozenset(),
+    ) -> None:
+        """Note that the executor has a plan: the first for a command, or one after a failure.
+
+        What is `agreed` to with the first counts for all that follow.
+        """
+        _, before = self._active.pop(command.command_id, (command, None))
+        proposal = answer.proposal
+        strategy = proposal.origin if proposal is not None and proposal.back_end == RECOVERY else ""
+        if command.recovers and before is not None:
+            carried = before.going_on(plan, strategy)
+        else:
+            carried = Carried(plan=plan, given=command.plan is not None, agreed=agreed)
+        self._active[command.command_id] = replace(command, recovers=True), carried
+        while len(self._active) > _MOST_REMEMBERED:
+            self._active.popitem(last=False)
+
+    def agreed(self, command: UserCommand) -> frozenset[str]:
+        """Return what the person need not be asked again for another plan of a command."""
+        carried = self.of(command.command_id) if command.recovers else None
+        return frozenset() if carried is None else carried.agreed
+
+    def of(self, command_id: str) -> Carried | None:
+        """Return what is known of a command's plans, None where it is not carried out."""
+        known = self._active.get(command_id)
+        return None if known is None else known[1]
+
+    def set_back(self, command_id: str, setback: Mapping[str, Any]) -> UserCommand:
+        """Note that a plan failed, and return the command to plan anew.
+
+        Raises:
+            CannotBeDone: no other plan is made; says why.
+        """
+        known = self._active.get(command_id)
+        found = None if known is None else read_setback(setback, known[1].plan)
+        if known is None or found is None:
+            raise CannotBeDone(RESTARTED)
+        command, carried = known
+        if carried.given:
+            raise CannotBeDone("the plan was given, and is not changed")
+        if self._further_plans == 0:
+            raise CannotBeDone("this robot makes no other plan: [planning] further_plans is 0")
+        if len(carried.setbacks) >= self._further_plans:
+            plans = "plan" if self._further_plans == 1 else "plans"
+            raise CannotBeDone(f"{self._further_plans} other {plans} failed, too")
+        self._active[command_id] = command, carried.after(found)
+        return command
+
+    def end(self, command_id: str) -> None:
+        """Forget a command: it has come to its end."""
+        self._active.pop(command_id, None)

@@ -1,0 +1,135 @@
+"""Read what people and programs give the planner to do; nothing of it is trusted to be whole."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, Final
+
+from vla_deploy.ipc import Event
+from vla_deploy.planning.errors import CommandUnreadable, NotUnderstood
+from vla_deploy.planning.interfaces import PlanningResult, Request
+from vla_deploy.planning.patterns.awaiting import awaiting
+from vla_deploy.planning.patterns.stopping import is_stop
+from vla_deploy.planning.plan import MOST_CHARACTERS, Plan
+
+VOICE: Final = "voice"
+READ_BACK: Final = 0.5
+"""How surely doubted or other words are heard at most: less than what is carried out unasked."""
+_ID_CHARACTERS: Final = 128
+_MOST_OTHERS: Final = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UserCommand:
+    """Hold one utterance: words, or a `plan` made elsewhere.
+
+    `heard_confidence`, 0 to 1, is how sure the recogniser is of the words; None for typed text.
+    `others` are what may have been said instead, the likeliest first, each with its probability
+    over that of the words; with `is_doubted` the words are not sure enough to act by, and with
+    `may_ask_again` they may be asked for once more. With `is_answer` the words are no
+    command of their own; with `recovers` it is under way already, and what is planned for it goes
+    on after a failure. `corrected` is the plan that a correction made of the one before it.
+    With `awaits_word` the plan is held until the person says go.
+    """
+
+    command_id: str
+    told_ns: int
+    source: str = ""
+    text: str = ""
+    plan: Any = None
+    heard_confidence: float | None = None
+    others: tuple[tuple[str, float], ...] = ()
+    is_doubted: bool = False
+    may_ask_again: bool = False
+    corrected: Plan | None = None
+    awaits_word: bool = False
+    is_answer: bool = False
+    recovers: bool = False
+
+    @property
+    def is_spoken(self) -> bool:
+        """Return whether it came by voice, so that answers are spoken too."""
+        return self.source == VOICE
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCommand:
+    """Hold a command, the request that was made of it, and what came of that."""
+
+    command: UserCommand
+    request: Request
+    answer: PlanningResult
+
+
+def asks_to_stop(event: Event) -> bool:
+    """Return whether the words of an utterance want what is under way to end."""
+    return is_stop(str(event.payload.get("text", "")))
+
+
+def command_id_of(event: Event) -> str:
+    """Return the id that answers to an utterance carry; one that is too long is cut."""
+    return str(event.payload.get("command_id", ""))[:_ID_CHARACTERS]
+
+
+def read_command(event: Event) -> UserCommand:
+    """Return the command that an utterance holds.
+
+    Raises:
+        CommandUnreadable: it holds none, or one that is too long.
+        NotUnderstood: there are no words in it.
+    """
+    given = event.payload
+    plan = given.get("plan")
+    text = _words(given) if plan is None else ""
+    rest = awaiting(text)
+    heard: Any = given.get("heard")
+    heard = heard if isinstance(heard, Mapping) else {}
+    return UserCommand(
+        command_id=command_id_of(event),
+        told_ns=event.stamp_ns,
+        source=str(given.get("source", "")),
+        text=text if rest is None else rest,
+        plan=plan,
+        heard_confidence=_confidence(heard),
+        others=tuple(islice(_others(heard.get("others")), _MOST_OTHERS)),
+        is_doubted=bool(heard.get("doubted")),
+        may_ask_again=bool(heard.get("ask_again")),
+        is_answer=bool(given.get("answer")),
+        awaits_word=rest is not None,
+    )
+
+
+def _words(given: Mapping[str, Any]) -> str:
+    text = given.get("text")
+    if not isinstance(text, str):
+        raise CommandUnreadable(f"expected a command in words or a plan, got {dict(given)!r:.120}")
+    if not text.strip():
+        raise NotUnderstood(text)
+    if len(text) > MOST_CHARACTERS:
+        raise CommandUnreadable(
+            f"expected a command of at most {MOST_CHARACTERS} characters, got {len(text)}; "
+            "say less at a time"
+        )
+    return text.strip()
+
+
+def _confidence(heard: Mapping[str, Any]) -> float | None:
+    """Return how sure the words are; of doubted ones so little that they are read back."""
+    confidence = _ratio(heard.get("confidence"))
+    if not heard.get("doubted"):
+        return confidence
+    return READ_BACK if confidence is None else min(confidence, READ_BACK)
+
+
+def _ratio(value: Any) -> float | None:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    return min(1.0, max(0.0, float(value)))
+
+
+def _others(given: Any) -> Iterator[tuple[str, float]]:
+    for one in given if isinstance(given, list) else []:
+        reading = one if isinstance(one, Mapping) else {}
+        text, odds = reading.get("text"), _ratio(reading.get("odds"))
+        if isinstance(text, str) and text.strip() and odds and len(text) <= MOST_CHARACTERS:
+            yield text.strip(), odds

@@ -1,0 +1,129 @@
+"""Publish what becomes of commands: as events, as plans for the executor, and aloud."""
+
+from collections import OrderedDict
+from typing import Any, Final
+
+from drivers.clock import Clock
+from vla_deploy.ipc import RingWriter, SharedSpace
+from vla_deploy.ipc.announcer import Announcer
+from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.dialogue.phrasing import Says, first_part
+from vla_deploy.planning.errors import PlanInvalid
+from vla_deploy.planning.interfaces import PlanningResult
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.understanding import Question
+
+# What a slot of the topic holds, less what stands next to the plan.
+MOST_PLAN_BYTES: Final = 28_000
+_MOST_REASON_CHARACTERS: Final = 1_500  # of up to four bytes each
+_MOST_SPOKEN: Final = 16
+
+
+class EventPublisher:
+    """Publish the planner's side of every command."""
+
+    def __init__(self, space: SharedSpace, clock: Clock) -> None:
+        self._plans: RingWriter = space.ring_writer("plan")
+        self._events: RingWriter = space.ring_writer("task_event")
+        self._voice = Announcer(space, "planner", clock)
+        # Commands that came by voice and are carried out now, and whether their plan ends aloud.
+        self._spoken: OrderedDict[str, tuple[UserCommand, bool]] = OrderedDict()
+
+    def say(self, command: UserCommand, text: str) -> None:
+        """Say something to a person who gave a command by voice; others read it."""
+        if command.is_spoken:
+            self._voice.say(text)
+
+    def ended(self, command_id: str, success: bool, error: str) -> None:
+        """Say how a command ended that was given by voice."""
+        if command_id not in self._spoken:
+            return
+        command, says_so = self._spoken.pop(command_id)
+        if not success:
+            self.say(command, Says.FAILED.format(reason=first_part(error) or "I cannot say why"))
+        elif not says_so:
+            self.say(command, Says.DONE)
+
+    def cancelled_all(self, command_id: str) -> None:
+        """Let the executor end what it does; the person who wanted that needs no answer aloud."""
+        self._spoken.clear()
+        self._plans.publish({"command_id": command_id, "cancel": True})
+
+    def planning(self, command: UserCommand, back_ends: tuple[str, ...]) -> None:
+        """Publish that a plan takes time, and which back ends are asked."""
+        self._publish(command, "planning", rungs=list(back_ends))
+
+    def queued(self, command: UserCommand, place: int) -> None:
+        """Publish that others are planned first."""
+        self._publish(command, "queued", place=place)
+
+    def asked(self, command: UserCommand, question: Question, plan: Plan | None) -> None:
+        """Ask what only the person knows; `plan` is what a yes lets run."""
+        self._publish(
+            command,
+            "asked",
+            question=_bounded(question.text),
+            choices=[one.words for one in question.candidates],
+            answer_within_s=question.limit_s,
+            plan=None if plan is None else plan.model_dump(mode="json"),
+        )
+        self.say(command, question.text)
+
+    def answered(self, answer: UserCommand, asked: UserCommand) -> None:
+        """Publish that an utterance answers a question; more events follow for that command."""
+        self._publish(answer, "answered", of=asked.command_id)
+
+    def refused(
+        self, command: UserCommand, reason: str, answer: PlanningResult | None = None
+    ) -> None:
+        """Publish why nothing is done, and what every back end said."""
+        self._publish(command, "rejected", reason=_bounded(reason), **_attempts(answer))
+
+    def gave_up(self, command_id: str, reason: str) -> None:
+        """Let the executor end a command for which there is no other plan."""
+        self._plans.publish({"command_id": command_id, "give_up": _bounded(reason)})
+
+    def check_length(self, plan: Plan) -> None:
+        """Accept a plan that fits into a message.
+
+        Raises:
+            PlanInvalid: it is too long.
+        """
+        length = len(plan.model_dump_json().encode())
+        if length > MOST_PLAN_BYTES:
+            raise PlanInvalid([f"expected at most {MOST_PLAN_BYTES} bytes of JSON, got {length}"])
+
+    def dispatched(self, command: UserCommand, plan: Plan, answer: PlanningResult) -> None:
+        """Give a plan to the executor, and publish which back end made it."""
+        document = plan.model_dump(mode="json")
+        if not command.recovers:
+            self._publish(command, "accepted")
+        self._publish(command, "plan", plan=document, **_maker(answer), **_attempts(answer))
+        self._plans.publish({"command_id": command.command_id, "plan": document})
+        if command.is_spoken:
+            self._spoken[command.command_id] = command, plan.actions[-1].skill == "speak"
+            while len(self._spoken) > _MOST_SPOKEN:
+                self._spoken.popitem(last=False)
+
+    def _publish(self, command: UserCommand, event: str, **details: Any) -> None:
+        self._events.publish({"command_id": command.command_id, "event": event} | details)
+
+
+def _bounded(reason: str) -> str:
+    if len(reason) <= _MOST_REASON_CHARACTERS:
+        return reason
+    return f"{reason[:_MOST_REASON_CHARACTERS]} ... (and more)"
+
+
+def _maker(answer: PlanningResult) -> dict[str, Any]:
+    proposal = answer.proposal
+    if proposal is None:
+        return {}
+    origin = {"origin": proposal.origin} if proposal.origin else {}
+    return {"rung": proposal.back_end, "confidence": round(proposal.confidence, 3), **origin}
+
+
+def _attempts(answer: PlanningResult | None) -> dict[str, Any]:
+    if answer is None or not answer.attempts:
+        return {}
+    return {"attempts": [one.document() for one in answer.attempts]}

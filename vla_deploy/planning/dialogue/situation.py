@@ -1,0 +1,170 @@
+"""Make a planner's request of what the robot publishes of itself."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+from drivers.clock import NS_PER_S, Clock
+from vla_deploy.client.readiness import refusal_of
+from vla_deploy.ipc import BadPayload, CellReader, FrameReader, Sample, SharedSpace
+from vla_deploy.ipc.rgbd_image import colours
+from vla_deploy.memory import LastSeen, MemoryStore, MemoryUnusable
+from vla_deploy.memory.episode import unix_s
+from vla_deploy.memory.wording import sentence_of
+from vla_deploy.model_servers.picture import Image
+from vla_deploy.navigation.base_paths import base_planner
+from vla_deploy.planning.dialogue.command import UserCommand
+from vla_deploy.planning.errors import NotReady
+from vla_deploy.planning.interfaces import Aid, Request
+from vla_deploy.planning.knowledge import world_of
+from vla_deploy.planning.understanding import Conversation
+from vla_deploy.robots import RobotDescription
+from vla_deploy.world import SceneUnreadable, Snapshot, Viewpoint, read_snapshot
+from vla_deploy.world.touch import is_denied
+
+STATUS_AGE_S: Final = 2.0
+_POSE_AGE_S: Final = 1.0
+_SCENE_AGE_S: Final = 10.0
+_IMAGE_AGE_S: Final = 2.0
+MOST_SENTENCES: Final = 5
+MOST_THINGS: Final = 60
+# What is older says nothing of where a thing is now.
+OLDEST_S: Final = 30 * 86_400.0
+
+_log = logging.getLogger(__name__)
+
+Pose = tuple[float, float, float]
+
+
+class Situation:
+    """Hold the cells that say how the robot is, where it stands, and what it knows around it."""
+
+    def __init__(
+        self,
+        space: SharedSpace,
+        clock: Clock,
+        robot: RobotDescription,
+        memory: MemoryStore | None = None,
+    ) -> None:
+        self._clock = clock
+        self._robot = robot
+        self._recall = Recall(memory) if memory is not None else None
+        self._is_free = base_planner(robot).is_free
+        self._pose: CellReader = space.cell_reader("pose")
+        self._scene: CellReader = space.cell_reader("scene")
+        self._executor: CellReader = space.cell_reader("executor_status")
+        self._control: CellReader = space.cell_reader("control_status")
+        self._table: CellReader = space.cell_reader("process_table")
+        self._frames: FrameReader = space.frame_reader("rgbd")
+
+    def request(
+        self,
+        command: UserCommand,
+        conversation: Conversation,
+        *,
+        of_use: frozenset[Aid] = frozenset(),
+    ) -> Request:
+        """Return the request for a command with what is known now, and what aids are of use."""
+        here, recall = self._here(), self._recall
+        scene = self._snapshot(here)
+        recalls = recall is not None and Aid.MEMORY in of_use
+        return Request(
+            command_id=command.command_id,
+            text=command.text,
+            world=world_of(self._robot, self._holding(scene), self._is_free),
+            scene=scene,
+            here=here,
+            conversation=conversation,
+            heard_confidence=command.heard_confidence,
+            image=self._image() if Aid.IMAGE in of_use else None,
+            recollections=recall.sentences(command.text) if recall and recalls else (),
+            last_seen=recall.things() if recall else (),
+        )
+
+    def check_ready(self) -> None:
+        """Accept that the robot moves now.
+
+        Raises:
+            NotReady: it may not; says why, and what to do about it.
+        """
+        table = self._table.latest()
+        if table is not None and table.document().get("refusal"):
+            raise NotReady(str(table.document()["refusal"]))
+        control = self._fresh(self._control, STATUS_AGE_S)
+        refusal = refusal_of(control.document() if control is not None else None)
+        if refusal:
+            raise NotReady(refusal)
+
+    def _holding(self, scene: Snapshot | None) -> Mapping[str, str | None]:
+        """Return what the executor says that each hand holds, less what the fingers deny."""
+        sample = self._fresh(self._executor, STATUS_AGE_S)
+        if sample is None:
+            return {}
+        held: Mapping[str, str | None] = sample.document().get("holding", {})
+        hands = scene.hands if scene is not None else {}
+        return {
+            name: None if is_denied(hands.get(name), kind) else kind for name, kind in held.items()
+        }
+
+    def _here(self) -> Pose | None:
+        sample = self._fresh(self._pose, _POSE_AGE_S)
+        if sample is None:
+            return None
+        x_m, y_m, yaw_rad = (float(sample.data[name]) for name in ("x_m", "y_m", "yaw_rad"))
+        return x_m, y_m, yaw_rad
+
+    def _snapshot(self, here: Pose | None) -> Snapshot | None:
+        sample = self._fresh(self._scene, _SCENE_AGE_S)
+        if sample is None:
+            return None
+        try:
+            known = read_snapshot(sample.document(), self._clock.now_ns())
+        except SceneUnreadable as error:  # a fault of perception: plan as if it were away
+            _log.warning("%s", error)
+            return None
+        if here is None:
+            return known
+        return replace(known, robot=Viewpoint(x_m=here[0], y_m=here[1], yaw_rad=here[2]))
+
+    def _image(self) -> Image | None:
+        frame = self._frames.latest()
+        if frame is None or self._clock.now_ns() - frame.stamp_ns > _IMAGE_AGE_S * NS_PER_S:
+            return None
+        try:
+            return colours(frame)
+        except BadPayload as error:  # a fault of perception: plan as if it saw nothing
+            _log.warning("%s", error)
+            return None
+
+    def _fresh(self, reader: CellReader, age_limit_s: float) -> Sample | None:
+        sample = reader.latest()
+        is_fresh = sample is not None and sample.age_s(self._clock.now_ns()) <= age_limit_s
+        return sample if is_fresh else None
+
+
+class Recall:
+    """Read the memory; one that cannot be read is done without."""
+
+    def __init__(self, store: MemoryStore) -> None:
+        self._store = store
+
+    def sentences(self, text: str) -> tuple[str, ...]:
+        """Return what is remembered that fits a command, a sentence each."""
+        now_s = unix_s()
+        try:
+            found = self._store.recall(text, MOST_SENTENCES)
+        except MemoryUnusable as error:
+            _log.warning("%s", error)
+            return ()
+        return tuple(sentence_of(one.episode, now_s) for one in found)
+
+    def things(self) -> tuple[LastSeen, ...]:
+        """Return things with where they were in the last weeks, the newest first."""
+        oldest_s = unix_s() - OLDEST_S
+        try:
+            seen = self._store.last_seen(count=MOST_THINGS)
+        except MemoryUnusable as error:
+            _log.warning("%s", error)
+            return ()
+        return tuple(one for one in seen if one.seen_s > oldest_s)

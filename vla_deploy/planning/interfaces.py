@@ -1,0 +1,156 @@
+"""Define what passes between the planner's parts, and what every back end does."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum, StrEnum
+from typing import Any, Protocol
+
+from vla_deploy.memory.episode import LastSeen
+from vla_deploy.model_servers.deadline import Deadline
+from vla_deploy.model_servers.picture import Image
+from vla_deploy.planning.errors import Ambiguous, NotAble, PlanningError
+from vla_deploy.planning.knowledge import World
+from vla_deploy.planning.plan import Plan
+from vla_deploy.planning.prohibition import Prohibition, StandingOrder
+from vla_deploy.planning.understanding.conversation import Conversation
+from vla_deploy.world import Snapshot
+
+
+class Aid(Enum):
+    """Name what some back ends can use, and what takes time to get."""
+
+    IMAGE = "what the camera sees"
+    MEMORY = "what is remembered of earlier commands"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """Hold one command, with all that may be known when it is planned.
+
+    `here` is the robot's x and y in metres and its yaw in radians, in the map. `recollections` are
+    what the robot remembers that may bear on the command, a sentence each; `last_seen` says where
+    things were before, the newest first. `heard_confidence`, 0 to 1, is how sure the recogniser is
+    of the words; None for typed text. `image` (rows, columns, RGB) is what the robot sees now,
+    where a back end can use it. `failed` describes plans for this command that were tried before,
+    and what went wrong. `prohibitions` are what people have forbidden for good.
+    """
+
+    command_id: str
+    text: str
+    world: World
+    scene: Snapshot | None = None
+    here: tuple[float, float, float] | None = None
+    conversation: Conversation = field(default_factory=Conversation)
+    recollections: tuple[str, ...] = ()
+    last_seen: tuple[LastSeen, ...] = ()
+    heard_confidence: float | None = None
+    image: Image | None = field(default=None, compare=False, repr=False)
+    failed: tuple[str, ...] = ()
+    prohibitions: tuple[Prohibition, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """Hold a plan that is not checked yet, and which back end made it.
+
+    `confidence` is 0 to 1. Where there is something to `read_back`, it is said, and nothing moves
+    before the person agrees. With `may_be_kept` the plan took seconds and may be given again in the
+    same situation; `origin` is the back end that made it first, where it was. `covers` are the
+    words that change the scope of a command and are represented in the plan, None for all;
+    `knows_grammar` is set where the back end has read the whole sentence. An `order` stands once
+    the plan is dispatched. With `awaits_word` it is held until the person says go.
+    """
+
+    plan: Plan
+    back_end: str
+    confidence: float
+    read_back: str = ""
+    may_be_kept: bool = False
+    origin: str = ""
+    covers: frozenset[str] | None = frozenset()
+    knows_grammar: bool = False
+    order: StandingOrder | None = None
+    awaits_word: bool = False
+
+
+class AttemptOutcome(StrEnum):
+    """Say what came of asking one back end."""
+
+    PLANNED = "planned"
+    ASKED = "asked"
+    INVALID = "invalid"
+    REFUSED = "refused"
+    DECLINED = "declined"
+    LATE = "late"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """Hold what one back end said to a command, and how long that took."""
+
+    back_end: str
+    outcome: AttemptOutcome
+    took_s: float
+    reason: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """Return it as JSON takes it."""
+        took_s = round(self.took_s, 4)
+        document = {"rung": self.back_end, "outcome": self.outcome.value, "took_s": took_s}
+        return {**document, "reason": self.reason} if self.reason else document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanningResult:
+    """Hold what came of a command: a `plan` that may run, or why there is none.
+
+    `proposal` is the plan as its back end proposed it, before it was grounded and checked.
+    """
+
+    attempts: tuple[Attempt, ...] = ()
+    plan: Plan | None = None
+    proposal: Proposal | None = None
+    error: PlanningError | None = None
+
+    @property
+    def read_back(self) -> str:
+        """Return what the back end wants to be agreed to before anything moves, "" for nothing."""
+        return "" if self.proposal is None else self.proposal.read_back
+
+    @property
+    def is_final(self) -> bool:
+        """Return whether no other back end needs to be asked."""
+        return self.plan is not None or isinstance(self.error, Ambiguous | NotAble)
+
+
+Check = Callable[[Plan, Request], Plan]
+"""Return a proposed plan grounded and checked, or raise the PlanningError that says why it may not
+run."""
+
+
+class BackEnd(Protocol):
+    """Plan a command, or decline it so that the next back end is asked.
+
+    `name` is what it is called in events and status, `uses` what its prompts can hold.
+    """
+
+    name: str
+    uses: frozenset[Aid] = frozenset()
+
+    def propose(self, request: Request, deadline: Deadline) -> Proposal:
+        """Return a plan for the command; nothing moves by that.
+
+        Raises:
+            Declined: this back end has no plan for it.
+            Ambiguous: only the person knows what is meant, and is asked.
+            PlanningError: this back end cannot plan it; any of the others may.
+        """
+        ...
+
+    def document(self) -> dict[str, Any] | None:
+        """Return how its server has been doing, None where it has none."""
+        return None
+
+    def close(self) -> None:
+        """Release what it holds in memory."""
+        return  # most hold nothing

@@ -1,1 +1,0 @@
-"""Plan with models that run behind a server."""
