@@ -15,10 +15,10 @@ from vla_deploy.cli.example import add_top_command
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
-from vla_deploy.speech.choosing import open_best
+from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
 from vla_deploy.speech.devices import linked_microphone
-from vla_deploy.speech.hearing import Heard, Hearing
 from vla_deploy.speech.microphone import Microphone
+from vla_deploy.speech.model_selection import open_best
 from vla_deploy.speech.model_tools.benching import sound_of
 from vla_deploy.speech.recording import StreamClock, described, hear_recording, open_hearing
 from vla_deploy.supervisor.profile_choice import start_profile
@@ -76,7 +76,7 @@ def _profile(arguments: argparse.Namespace) -> Profile:
     return dataclasses.replace(profile, models={**profile.models, "speech_to_text": only})
 
 
-def _read(arguments: argparse.Namespace, phrases: list[Heard]) -> int:
+def _read(arguments: argparse.Namespace, phrases: list[HeardPhrase]) -> int:
     if arguments.json:
         print(json.dumps([described(heard) for heard in phrases], indent=2))
         return 0
@@ -87,7 +87,7 @@ def _read(arguments: argparse.Namespace, phrases: list[Heard]) -> int:
     return 0
 
 
-def _listen(arguments: argparse.Namespace, hearing: Hearing, clock: Clock) -> int:
+def _listen(arguments: argparse.Namespace, hearing: AsrPipeline, clock: Clock) -> int:
     """Follow the microphone until its time is over, or Ctrl-C."""
     robot = load_robot(arguments.robot)
     opened = linked_microphone(robot, device_links(robot), clock)
@@ -108,8 +108,8 @@ def _listen(arguments: argparse.Namespace, hearing: Hearing, clock: Clock) -> in
 
 
 def _live(
-    microphone: Microphone, hearing: Hearing, clock: Clock, deadline_ns: int
-) -> Iterator[Heard]:
+    microphone: Microphone, hearing: AsrPipeline, clock: Clock, deadline_ns: int
+) -> Iterator[HeardPhrase]:
     """Yield phrases as they end.
 
     Raises:
@@ -125,7 +125,7 @@ def _live(
         clock.sleep_until(clock.now_ns() + _STEP_NS)
 
 
-def _line(heard: Heard, since_ns: int = 0) -> str:
+def _line(heard: HeardPhrase, since_ns: int = 0) -> str:
     began_s, ended_s = (
         (one - since_ns) / NS_PER_S for one in (heard.phrase.began_ns, heard.phrase.ended_ns)
     )

@@ -20,7 +20,7 @@ from vla_deploy.speech.model_tools.benching import Bench, bench, noises, recordi
 from vla_deploy.speech.model_tools.calibrating import calibrate, keep, known_recordings
 from vla_deploy.speech.model_tools.checks import Check, checks_of
 from vla_deploy.speech.model_tools.fetching import fetch
-from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.transcript import Transcript
 
 Told = tuple[dict[str, object], str]
 
@@ -109,7 +109,7 @@ def _finding(model: str, check: str, act: Check) -> Finding:
         return Finding(model=model, check=check, is_ok=False, detail=str(error))
 
 
-def _told(model: Model, silence: Reading) -> Told:
+def _told(model: Model, silence: Transcript) -> Told:
     name = model.manifest.name
     document: dict[str, object] = {
         "name": name,

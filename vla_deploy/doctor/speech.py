@@ -8,9 +8,9 @@ from vla_deploy.doctor.finding import Finding, missing, ok, warn
 from vla_deploy.inference.errors import InferenceError
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.one_line import one_line
-from vla_deploy.speech.stop_words.errors import StopWordsError
+from vla_deploy.speech.errors import SpeechError
 from vla_deploy.speech.stop_words.listener import OFF
-from vla_deploy.speech.stop_words.opening import open_spotter
+from vla_deploy.speech.stop_words.spotter import open_spotter
 from vla_deploy.state_dir import user_base
 
 NAME: Final = "spoken stop"
@@ -29,10 +29,10 @@ def spoken_stop(context: Context) -> Iterator[Finding]:
     else:
         shelf = ModelShelf.of_base(user_base(), context.clock)
         try:
-            spotter, thresholds = open_spotter(shelf, profile)
-        except (InferenceError, StopWordsError) as error:
+            spotter = open_spotter(shelf, profile)
+        except (InferenceError, SpeechError) as error:
             yield warn(NAME, one_line(error), "vla-deploy models list")
             return
         chosen = profile.speech.stop_words
         words = ", ".join(spotter.words)
-        yield ok(NAME, f"{words}; sensitivity {chosen}, from {thresholds[chosen]:g} on")
+        yield ok(NAME, f"{words}; sensitivity {chosen}, from {spotter.thresholds[chosen]:g} on")

@@ -4,15 +4,15 @@ import sys
 from typing import Final
 
 from platforms import load_profile
-from vla_deploy.aside import beside
+from vla_deploy.aside import background, beside
 from vla_deploy.node import NodeContext
 from vla_deploy.process_main import main
 from vla_deploy.robots import load_robot
 from vla_deploy.robots.links import device_links
 from vla_deploy.speech.devices import linked_microphone, linked_speaker
 from vla_deploy.speech.node import SpeechNode
-from vla_deploy.speech.stop_words.opening import build_page_stop_words, build_stop_words
-from vla_deploy.speech.voice.engines import build_voice
+from vla_deploy.speech.stop_words.listener import build_page_stop_words, build_stop_words
+from vla_deploy.speech.voice.robot_voice import build_voice
 
 SYNTHESIS_S: Final = 0.1
 RECOGNITION_S: Final = 0.25
@@ -33,9 +33,10 @@ def build(context: NodeContext) -> SpeechNode:
         profile,
         linked_microphone(robot, links, clock),
         beside("recogniser", clock, RECOGNITION_S),
+        background(clock),
         voice=voice,
-        listeners=[build_stop_words(context, profile, voice)],
-        page_listeners=[build_page_stop_words(context, profile)],
+        stop_words=build_stop_words(context, profile, voice),
+        page_stop_words=build_page_stop_words(context, profile),
     )
 
 

@@ -12,7 +12,7 @@ from drivers.clock import Clock
 from drivers.opener import DeviceLink, DeviceOpener
 from vla_deploy.robots.description import Audio, RobotDescription
 from vla_deploy.speech.microphone import OpenInput
-from vla_deploy.speech.voice.mouth import OpenOutput
+from vla_deploy.speech.voice.audio_player import OpenOutput
 
 T = TypeVar("T")
 

@@ -3,7 +3,8 @@
 SpeechError
 ├── SpeechMissing       the `speech` extra is not installed: install it
 ├── RecordingsInvalid   recordings to learn from cannot be used: mend the folder
-└── NoRecogniser        no model can be opened: the robot is deaf to words, typed commands go on
+├── NoRecogniser        no model can be opened: the robot is deaf to words, typed commands go on
+└── SpotterMismatch     the model is not one that the spotter of stop words can run: choose another
 """
 
 
@@ -21,3 +22,7 @@ class RecordingsInvalid(SpeechError):
 
 class NoRecogniser(SpeechError):
     """Say why no model turns speech into text."""
+
+
+class SpotterMismatch(SpeechError):
+    """Say what a model needs that the spotter does not give."""

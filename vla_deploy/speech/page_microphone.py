@@ -19,8 +19,7 @@ from vla_deploy.ipc import BadPayload, RecordReader
 from vla_deploy.ipc.page_sound import PageSound, Step, unpacked
 from vla_deploy.speech.errors import SpeechMissing
 from vla_deploy.speech.resampling import Resampler
-from vla_deploy.speech.sound import SoundBlock, count_of
-from vla_deploy.speech.voice_activity import FRAME
+from vla_deploy.speech.sound import FRAME, SoundBlock, count_of
 
 TAIL_S: Final = 0.3
 """Silence beyond what ends a phrase: frames do not end where a turn does."""

@@ -1,7 +1,6 @@
 """Hear a whole recording as the robot would hear it live, only faster."""
 
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from typing import Any, Final
 
 import numpy as np
@@ -9,11 +8,11 @@ import numpy as np
 from drivers.clock import NS_PER_S, Clock
 from platforms import Profile
 from vla_deploy.aside import AtOnce
-from vla_deploy.speech.hearing import Heard, Hearing, Suspicion, unsuspected
-from vla_deploy.speech.readings import Readings
+from vla_deploy.speech.asr_pipeline import AsrPipeline, HeardPhrase
+from vla_deploy.speech.event_publisher import evidence
 from vla_deploy.speech.recogniser import Recogniser
 from vla_deploy.speech.sound import Sound, SoundBlock, count_of, duration_ns
-from vla_deploy.speech.telling import evidence
+from vla_deploy.speech.transcription_queue import TranscriptionQueue
 from vla_deploy.speech.voice_activity import open_voice_activity
 
 BLOCK: Final = count_of(0.02)
@@ -41,24 +40,19 @@ def open_hearing(
     profile: Profile,
     clock: Clock,
     hot_words: str = "",
-    suspicion: Suspicion = unsuspected,
-    executor: Executor | None = None,
-) -> Hearing:
+) -> AsrPipeline:
     """Return hearing that reads each phrase at once, as no process' steps wait for it.
-
-    An `executor` of one thread, or one that works at once, may read in its own way.
 
     Raises:
         SpeechMissing: faster-whisper is not installed.
         InferenceError: its voice network cannot be opened.
     """
-    readings = Readings(executor or AtOnce(), clock)
-    readings.take(recogniser, why)
-    activity = open_voice_activity(clock)
-    return Hearing(activity, readings, profile.speech, lambda: hot_words, suspicion)
+    queue = TranscriptionQueue(AtOnce(), clock)
+    queue.take(recogniser, why)
+    return AsrPipeline(open_voice_activity(clock), queue, profile.speech, lambda: hot_words)
 
 
-def hear_recording(hearing: Hearing, clock: StreamClock, sound: Sound) -> Iterator[Heard]:
+def hear_recording(hearing: AsrPipeline, clock: StreamClock, sound: Sound) -> Iterator[HeardPhrase]:
     """Yield what is understood, phrase by phrase; silence is added, in which the last one ends."""
     padded = np.concatenate((sound, np.zeros(count_of(AFTER_S), np.float32)))
     for at in range(0, len(padded), BLOCK):
@@ -69,7 +63,7 @@ def hear_recording(hearing: Hearing, clock: StreamClock, sound: Sound) -> Iterat
         yield from hearing.heard()
 
 
-def described(heard: Heard) -> dict[str, Any]:
+def described(heard: HeardPhrase) -> dict[str, Any]:
     """Return what was heard as JSON takes it, its times in seconds since the stream began."""
     return {
         "began_s": round(heard.phrase.began_ns / NS_PER_S, 3),

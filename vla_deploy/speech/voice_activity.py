@@ -1,4 +1,4 @@
-"""Tell frame by frame whether a voice is heard: Silero's network, from the faster-whisper package.
+"""Judge frame by frame whether a voice is heard: Silero's network, from faster-whisper's package.
 
 It takes 576 samples, the 64 before a frame of 512 and the frame, and carries its memory from frame
 to frame: fed so, it says what it says of a whole recording.
@@ -17,10 +17,8 @@ from vla_deploy.inference.opening import PLAIN_CHOICE
 from vla_deploy.inference.session import ModelSession, open_session
 from vla_deploy.inference.store import Model
 from vla_deploy.speech.errors import SpeechMissing
-from vla_deploy.speech.sound import RATE_HZ, Sound
+from vla_deploy.speech.sound import FRAME, Sound
 
-FRAME: Final = 512
-FRAME_S: Final = FRAME / RATE_HZ
 ROLE: Final = "voice_activity"
 _CONTEXT: Final = 64
 _MEMORY: Final = (1, 1, 128)

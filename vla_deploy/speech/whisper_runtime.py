@@ -6,7 +6,6 @@ arithmetic that wait for work give their core away.
 
 import logging
 import os
-from collections.abc import Sequence
 from typing import Any
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
@@ -18,7 +17,6 @@ os.environ["KMP_BLOCKTIME"] = "0"
 import ctranslate2
 import faster_whisper
 import numpy as np
-from faster_whisper.audio import pad_or_trim
 from faster_whisper.transcribe import get_compression_ratio
 from numpy.typing import NDArray
 
@@ -40,12 +38,6 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.hypotheses: list[list[tuple[str, float]]] = []
-        self._read: tuple[ctranslate2.StorageView, list[int], Any] | None = None
-
-    def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return what the encoder would be given of a phrase, (mel, frame)."""
-        frames: NDArray[np.float32] = pad_or_trim(self.feature_extractor(samples))
-        return frames
 
     def generate_with_fallback(
         self, encoder_output: ctranslate2.StorageView, prompt: list[int], tokenizer: Any, how: Any
@@ -72,7 +64,6 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
             suppress_tokens=how.suppress_tokens,
             max_initial_timestamp_index=round(how.max_initial_timestamp / self.time_precision),
         )[0]
-        self._read = encoder_output, prompt, tokenizer
         found = [
             (tokenizer.decode(tokens).strip(), score * len(tokens) ** how.length_penalty)
             for tokens, score in zip(result.sequences_ids, result.scores, strict=True)
@@ -82,27 +73,6 @@ class Whisper(faster_whisper.WhisperModel):  # type: ignore[misc,no-any-unimport
         # The end of the text is a token, too.
         mean = log_probability / (len(result.sequences_ids[0]) + 1)
         return result, mean, 0.0, get_compression_ratio(text)
-
-    def log_probabilities(self, texts: Sequence[str]) -> list[float]:
-        """Return the logarithm of each text's probability, given the window that was read last."""
-        assert self._read is not None, "nothing was read yet"
-        encoded, prompt, tokenizer = self._read
-        tokens = [tokenizer.encode(f" {text}") if text else [] for text in texts]
-        states = np.array(encoded.to_device(ctranslate2.Device.cpu))
-        results = self.model.generate(
-            ctranslate2.StorageView.from_array(np.repeat(states, len(texts), axis=0)),
-            [[*prompt, *each] for each in tokens],
-            beam_size=1,
-            # As above, it ends a text at half of that.
-            max_length=len(prompt) + 2 * (1 + max(map(len, tokens))),
-            return_logits_vocab=True,
-            suppress_blank=False,
-            suppress_tokens=[],
-        )
-        return [
-            _log_probability(result.logits[0], [*each, tokenizer.eot])
-            for result, each in zip(results, tokens, strict=True)
-        ]
 
 
 class TrimmedWhisper(Whisper):
@@ -116,19 +86,6 @@ class TrimmedWhisper(Whisper):
     def encode(self, features: NDArray[np.float32]) -> ctranslate2.StorageView:
         """Return what the encoder makes of features, (mel bands, frames)."""
         return super().encode(_trimmed(features, self.content_frames))
-
-    def frames_of(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return what the encoder would be given of a phrase, (mel, frame)."""
-        content_frames = len(samples) // self.feature_extractor.hop_length
-        return _trimmed(super().frames_of(samples), content_frames)
-
-
-def _log_probability(logits: "list[ctranslate2.StorageView]", tokens: list[int]) -> float:
-    """Return the logarithm of the probability of tokens, by what the model gave at each step."""
-    rows = np.stack([np.array(row) for row in logits[: len(tokens)]]).astype(np.float64)
-    rows -= rows.max(axis=1, keepdims=True)
-    chosen = rows[np.arange(len(tokens)), tokens]
-    return float((chosen - np.log(np.exp(rows).sum(axis=1))).sum())
 
 
 def _trimmed(features: NDArray[np.float32], content_frames: int) -> NDArray[np.float32]:

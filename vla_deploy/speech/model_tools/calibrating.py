@@ -20,12 +20,11 @@ from vla_deploy.inference.errors import ModelUnknown
 from vla_deploy.inference.manifest import Calibration
 from vla_deploy.inference.manifest_file import write_manifest
 from vla_deploy.inference.store import Model
-from vla_deploy.speech.confidence import UNCALIBRATED, confidence, evidence_of
 from vla_deploy.speech.errors import RecordingsInvalid
 from vla_deploy.speech.model_tools.benching import sound_of
-from vla_deploy.speech.reading import Reading
 from vla_deploy.speech.recogniser import open_recogniser
 from vla_deploy.speech.sound import Sound
+from vla_deploy.speech.transcript import UNCALIBRATED, Transcript, confidence, evidence_of
 from vla_deploy.speech.words import words_of
 
 LEAST: Final = 20
@@ -100,7 +99,7 @@ def calibrate(
 
 
 def learn(
-    readings: Sequence[Reading], right: Sequence[bool], before: Calibration | None = None
+    readings: Sequence[Transcript], right: Sequence[bool], before: Calibration | None = None
 ) -> Calibrated:
     """Fit the weights to readings and whether they are right; those without words teach nothing."""
     pairs = [pair for pair in zip(readings, right, strict=True) if pair[0].text]
@@ -150,7 +149,7 @@ def _fitted(evidence: NDArray[np.float64], truth: NDArray[np.float64]) -> list[f
 
 
 def _error(
-    readings: Sequence[Reading], right: Sequence[bool], calibration: Calibration | None
+    readings: Sequence[Transcript], right: Sequence[bool], calibration: Calibration | None
 ) -> float:
     sure = np.array([confidence(reading, calibration) for reading in readings])
     return float(np.mean((sure - np.array(right, dtype=float)) ** 2))

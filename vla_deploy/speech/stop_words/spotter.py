@@ -2,16 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from platforms import Profile
 from vla_deploy.inference.manifest import KeyWords, Manifest
+from vla_deploy.inference.roles import ModelShelf
+from vla_deploy.speech.errors import SpotterMismatch
 from vla_deploy.speech.sound import Sound, duration_ns
 from vla_deploy.speech.stop_words import features
-from vla_deploy.speech.stop_words.errors import SpotterMismatch
+
+ROLE: Final = "key_words"
 
 
 class Scorer(Protocol):
@@ -51,6 +55,11 @@ class Spotter:
         self.score = 0.0
         self._refractory_ns = round(self._words.refractory_s * NS_PER_S)
         self.reset()
+
+    @property
+    def thresholds(self) -> Mapping[str, float]:
+        """Return from which score on a word was said, by how easily it is to be taken for said."""
+        return self._words.thresholds
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -119,3 +128,14 @@ def _checked(manifest: Manifest) -> KeyWords:
             f"count of moments, got {shapes} and {manifest.outputs[0].shape}"
         )
     return words
+
+
+def open_spotter(shelf: ModelShelf, profile: Profile) -> Spotter:
+    """Open the network that a profile chooses.
+
+    Raises:
+        InferenceError: the profile's model cannot be opened.
+        SpotterMismatch: it is not one that a spotter can run.
+    """
+    session = shelf.open(ROLE, profile, 0)
+    return Spotter(session, session.model.manifest)

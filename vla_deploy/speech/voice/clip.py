@@ -1,6 +1,7 @@
-"""Hold a piece of sound, and bring it to another rate: that of a speaker, or of a room."""
+"""Hold a piece of sound, read one from a program, bring it to the rate of a speaker or a room."""
 
 import math
+import struct
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -8,11 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.audio.base import FULL_SCALE, AudioFormat, Samples
+from vla_deploy.speech.voice.errors import SynthesisFailed
 
 Wave = NDArray[np.float32]
 """Samples of one channel as a share of full scale, -1 to 1."""
 # Silence behind the sound: the transform is a circle, and the end must not ring into the beginning.
 _APART_ROWS: Final = 256
+_RIFF: Final = struct.Struct("<4sI4s")
+_CHUNK: Final = struct.Struct("<4sI")
+_FORMAT: Final = struct.Struct("<HHIIHH")
+_PCM: Final = 1
+_BITS: Final = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,3 +62,51 @@ def _cut(spectrum: NDArray[np.complexfloating[Any, Any]], rows: int) -> NDArray[
     kept = min(wanted, len(spectrum))
     fitted[:kept] = spectrum[:kept]
     return fitted
+
+
+def read_wav_stream(data: bytes) -> Clip:
+    """Return the sound of a WAV from a pipe: to the end of what is there, as its header knows none.
+
+    Raises:
+        SynthesisFailed: it is no WAV of 16-bit samples, or has none.
+    """
+    if len(data) < _RIFF.size or _RIFF.unpack_from(data)[::2] != (b"RIFF", b"WAVE"):
+        raise SynthesisFailed(f"expected a WAV, got {data[:12]!r}")
+    rate_hz, channels = 0, 0
+    at = _RIFF.size
+    while at + _CHUNK.size <= len(data):
+        name, length = _CHUNK.unpack_from(data, at)
+        at += _CHUNK.size
+        if name == b"fmt ":
+            rate_hz, channels = _format(data[at : at + length])
+        elif name == b"data" and rate_hz:
+            return Clip(rate_hz=rate_hz, wave=pcm_wave(data[at : at + length], channels))
+        at += length + length % 2
+    raise SynthesisFailed(f"expected a WAV with a format and samples, got {len(data)} bytes")
+
+
+def pcm_wave(data: bytes, channels: int = 1) -> Wave:
+    """Return 16-bit little-endian samples as one wave, the mean of the channels.
+
+    Raises:
+        SynthesisFailed: there is not one whole row.
+    """
+    row_bytes = 2 * channels
+    whole = len(data) - len(data) % row_bytes
+    if not whole:
+        raise SynthesisFailed("expected sound, got no sample")
+    rows = np.frombuffer(data[:whole], "<i2").reshape(-1, channels)
+    wave: Wave = (rows.mean(axis=1) / 32_768.0).astype(np.float32)
+    return wave
+
+
+def _format(chunk: bytes) -> tuple[int, int]:
+    if len(chunk) < _FORMAT.size:
+        raise SynthesisFailed("expected the format of the samples, got half of it")
+    kind, channels, rate_hz, _, _, bits = _FORMAT.unpack_from(chunk)
+    if kind != _PCM or bits != _BITS or not channels or not rate_hz:
+        raise SynthesisFailed(
+            f"expected PCM of {_BITS} bits, got kind {kind}, {bits} bits, {channels} channels, "
+            f"{rate_hz} Hz"
+        )
+    return rate_hz, channels

@@ -3,7 +3,7 @@
 import logging
 from collections import Counter
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -12,14 +12,20 @@ from drivers.audio.base import AudioFormat
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.ipc import RingReader, RingWriter, SharedSpace
 from vla_deploy.ipc.stop_button import ESTOP
-from vla_deploy.speech.companions import Playing
-from vla_deploy.speech.sound import RATE_HZ, SoundBlock, level_db
-from vla_deploy.speech.voice.engine import Engine
+from vla_deploy.robots.description import VoiceSettings
+from vla_deploy.speech.sound import RATE_HZ, Playing, SoundBlock
+from vla_deploy.speech.voice.audio_player import AudioPlayer, OpenOutput, Prepared
 from vla_deploy.speech.voice.errors import EngineMissing, OrderRefused, VoiceError
-from vla_deploy.speech.voice.mouth import Mouth, OpenOutput, Prepared
-from vla_deploy.speech.voice.orders import LONGEST_ID, Order, Withdrawal, read_order
 from vla_deploy.speech.voice.own_echo import OwnEcho
-from vla_deploy.speech.voice.waiting import LONGEST_WAIT_NS, WaitingLine
+from vla_deploy.speech.voice.say_queue import (
+    LONGEST_ID,
+    LONGEST_WAIT_NS,
+    Order,
+    SayQueue,
+    Withdrawal,
+    read_order,
+)
+from vla_deploy.speech.voice.tts import Engine, chosen_engine
 
 TAIL_NS: Final = 7 * NS_PER_S // 20
 """For so long a speaker's latency and the room let what was said be heard."""
@@ -59,10 +65,10 @@ class RobotVoice:
         self._clock = clock
         self._volume_ratio = volume_ratio
         self._echo = OwnEcho()
-        self._mouth = Mouth(open_output, clock, self._echo.note)
-        self._waiting = WaitingLine()
+        self._player = AudioPlayer(open_output, clock, self._echo.note)
+        self._waiting = SayQueue()
         self._saying: _Saying | None = None
-        self._sounding: Playing | None = None
+        self._sounding: Order | None = None
         self._missing = ""
         self._counts: Counter[str] = Counter()
         self._orders: RingReader
@@ -72,9 +78,10 @@ class RobotVoice:
     @property
     def playing(self) -> Playing | None:
         """Return what sounds at this moment, the room's answer to it included."""
-        if self._sounding is None or self._clock.now_ns() >= self._mouth.sounds_until_ns + TAIL_NS:
+        order, until_ns = self._sounding, self._player.sounds_until_ns + TAIL_NS
+        if order is None or self._clock.now_ns() >= until_ns:
             return None
-        return replace(self._sounding, echo_db=self._echo.left_db)
+        return Playing(say_id=order.say_id, text=order.text, echo_db=self._echo.left_db)
 
     def start(self, space: SharedSpace) -> None:
         """Open the topics, and try the engine for the first time."""
@@ -94,7 +101,7 @@ class RobotVoice:
             self._tell(late, "dropped", f"it waited for {LONGEST_WAIT_NS // NS_PER_S} s")
         if self._saying is None:
             self._begin_next()
-        self._mouth.step()
+        self._player.step()
         if self._saying is not None:
             self._advance(self._saying)
 
@@ -115,7 +122,7 @@ class RobotVoice:
 
     def document(self) -> dict[str, Any]:
         """Return what `speech_status` tells under "voice"."""
-        why = self._missing or self._mouth.away
+        why = self._missing or self._player.away
         state = "missing" if self._missing else "away" if why else "ready"
         return {
             "state": state,
@@ -129,8 +136,8 @@ class RobotVoice:
 
     def close(self) -> None:
         """Fall silent and release everything; closing twice is allowed."""
-        self._mouth.cut()
-        self._mouth.close()
+        self._player.cut()
+        self._player.close()
         self._aside.shutdown(wait=False, cancel_futures=True)
 
     # --- orders -------------------------------------------------------------------------------
@@ -164,9 +171,9 @@ class RobotVoice:
         order = self._waiting.take()
         if order is None:
             return
-        format_ = self._mouth.format
-        if format_ is None or self._mouth.away:
-            self._tell(order, "failed", self._mouth.away)
+        format_ = self._player.format
+        if format_ is None or self._player.away:
+            self._tell(order, "failed", self._player.away)
             return
         self._saying = _Saying(
             order=order, prepared=self._aside.submit(self._prepare, order.text, format_)
@@ -181,13 +188,13 @@ class RobotVoice:
         if saying.sound is None:
             self._play_once_prepared(saying)
             return
-        if self._mouth.away:
-            self._end(saying, "failed", self._mouth.away)
-        elif not saying.has_begun and self._mouth.has_begun:
+        if self._player.away:
+            self._end(saying, "failed", self._player.away)
+        elif not saying.has_begun and self._player.has_begun:
             saying.has_begun = True
-            self._sounding = _playing(saying.order, saying.sound)
+            self._sounding = saying.order
             self._tell(saying.order, "began", "")
-        elif self._mouth.is_done:
+        elif self._player.is_done:
             cut = f"only its first {len(saying.order.text)} letters" if saying.order.is_cut else ""
             self._end(saying, "finished", cut)
 
@@ -201,8 +208,8 @@ class RobotVoice:
             self._end(saying, "failed", str(error))
             return
         self._missing = ""
-        self._mouth.play(saying.sound)
-        self._mouth.step()
+        self._player.play(saying.sound)
+        self._player.step()
 
     def _break_off(self, reason: str) -> None:
         saying = self._saying
@@ -210,7 +217,7 @@ class RobotVoice:
             self._end(saying, "interrupted" if saying.has_begun else "dropped", reason)
 
     def _end(self, saying: _Saying, event: str, reason: str) -> None:
-        self._mouth.cut()
+        self._player.cut()
         self._saying = None
         self._tell(saying.order, event, reason)
 
@@ -231,5 +238,11 @@ class RobotVoice:
         self._events.publish({"say_id": say_id, "event": event, "reason": reason[:_REASON_LETTERS]})
 
 
-def _playing(order: Order, sound: Prepared) -> Playing:
-    return Playing(say_id=order.say_id, text=order.text, level_db=level_db(sound.wave))
+def build_voice(
+    settings: VoiceSettings, open_output: OpenOutput | None, clock: Clock, aside: Executor
+) -> RobotVoice | None:
+    """Return the voice of a robot; None where it has no speaker."""
+    if open_output is None:
+        return None
+    engine = chosen_engine(settings)
+    return RobotVoice(engine, open_output, clock, aside, volume_ratio=settings.volume_ratio)

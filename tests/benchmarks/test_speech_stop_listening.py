@@ -1,6 +1,6 @@
 import pytest
 
-from benchmarks.speech_stop_ear import Delay, delay_figures
+from benchmarks.speech_stop_listening import Delay, delay_figures
 
 
 def test_of_delays_it_tells_what_no_faster_computer_would_save() -> None:

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from platforms import SpeechSettings
-from vla_deploy.speech.frames import Frame, Framing
-from vla_deploy.speech.phrases import EARLIER_FRAMES, Happening, Phrases, Step
-from vla_deploy.speech.sound import SoundBlock, duration_ns
-from vla_deploy.speech.voice_activity import FRAME, FRAME_S
+from vla_deploy.speech.endpointing import Endpointer, NoiseFloor, VadEvent, VadEventKind
+from vla_deploy.speech.sound import FRAME, FRAME_S, Framer, SoundBlock, duration_ns, level_db
 
 SETTINGS = SpeechSettings(
     shortest_phrase_s=0.2,
@@ -25,13 +23,13 @@ class Stream:
     """Feed a scene of voice (v), silence (.) and murmur below the onset (m), 32 ms a letter."""
 
     def __init__(self) -> None:
-        self.phrases = Phrases(SETTINGS)
+        self.phrases = Endpointer(SETTINGS)
         self.at = 0
 
-    def play(self, scene: str, *, is_loud: bool = True, level: float = 0.1) -> list[Happening]:
-        found: list[Happening] = []
+    def play(self, scene: str, *, is_loud: bool = True, level: float = 0.1) -> list[VadEvent]:
+        found: list[VadEvent] = []
         for letter in scene:
-            frame = Frame(
+            frame = SoundBlock(
                 stamp_ns=duration_ns(self.at * FRAME),
                 samples=np.full(FRAME, level, np.float32),
                 follows=True,
@@ -42,16 +40,8 @@ class Stream:
         return found
 
 
-def steps(found: list[Happening]) -> list[str]:
-    """Return what happened, but for how the words so far may be looked at."""
-    return [one.step.name for one in found if one.step is not Step.SPEAKING]
-
-
-def test_the_words_so_far_may_be_looked_at_while_somebody_speaks() -> None:
-    found = Stream().play(round(2.0 / FRAME_S) * "v" + 20 * ".")
-    glances = [one for one in found if one.step is Step.SPEAKING]
-    assert len(glances) == 5
-    assert [round(one.phrase.voiced_s, 1) for one in glances] == [0.4, 0.8, 1.2, 1.5, 1.9]
+def steps(found: list[VadEvent]) -> list[str]:
+    return [one.kind.name for one in found]
 
 
 def test_a_phrase_is_its_voice_with_what_came_before_and_a_pause_after() -> None:
@@ -119,7 +109,7 @@ def test_ten_minutes_of_talk_are_refused_once_and_cost_no_memory() -> None:
 def test_clipped_samples_are_counted() -> None:
     stream = Stream()
     stream.play(20 * "v", level=1.0)
-    (ended,) = (one for one in stream.play(12 * ".") if one.step is Step.ENDED)
+    (ended,) = (one for one in stream.play(12 * ".") if one.kind is VadEventKind.ENDED)
     assert ended.phrase.clipped_ratio == pytest.approx(20 / 30, abs=0.01)
 
 
@@ -132,9 +122,9 @@ def test_a_gap_in_the_stream_forgets_what_was_begun() -> None:
 
 
 def test_blocks_of_any_length_become_frames_in_time() -> None:
-    framing = Framing()
+    framing = Framer()
     sound = np.arange(5_000, dtype=np.float32)
-    frames: list[Frame] = []
+    frames: list[SoundBlock] = []
     for at in range(0, 5_000, 333):
         block = SoundBlock(stamp_ns=duration_ns(at), samples=sound[at : at + 333], follows=at > 0)
         frames += framing.feed(block)
@@ -145,20 +135,26 @@ def test_blocks_of_any_length_become_frames_in_time() -> None:
     assert (after.stamp_ns, after.follows) == (9, False)
 
 
-def test_a_phrase_knows_what_was_heard_just_before_it() -> None:
-    stream = Stream()
-    first = stream.play(13 * "." + 10 * "v" + 10 * ".", level=0.1)[-1].phrase
-    stream.play(15 * ".", level=0.2)
-    second = stream.play(10 * "v" + 10 * ".", level=0.3)[-1].phrase
-    assert len(first.earlier) + len(first.samples) == 33 * FRAME
-    assert len(first.earlier) == 3 * FRAME
-    assert len(second.earlier) == EARLIER_FRAMES * FRAME
-    assert list(np.unique(second.earlier)) == [np.float32(0.1), np.float32(0.2)]
-    assert list(np.unique(second.samples)) == [np.float32(0.2), np.float32(0.3)]
+def settle(floor: NoiseFloor, level: float, seconds: float, *, is_voice: bool = False) -> float:
+    for _ in range(round(seconds / FRAME_S)):
+        floor.note(level, is_voice=is_voice)
+    return floor.level_db
 
 
-def test_nothing_from_before_a_gap_goes_along_with_a_phrase() -> None:
-    stream = Stream()
-    stream.play(40 * ".")
-    stream.phrases.reset()
-    assert not len(stream.play(12 * "v" + 12 * ".")[-1].phrase.earlier)
+def test_the_floor_falls_at_once_and_rises_over_seconds() -> None:
+    floor = NoiseFloor()
+    assert settle(floor, -75.0, 1.0) == pytest.approx(-75.0)
+    assert settle(floor, -45.0, 1.0) == pytest.approx(-72.0, abs=0.2)
+    assert settle(floor, -45.0, 12.0) == pytest.approx(-45.0)
+
+
+def test_a_voice_is_no_floor() -> None:
+    floor = NoiseFloor()
+    settle(floor, -70.0, 1.0)
+    assert settle(floor, -25.0, 20.0, is_voice=True) == pytest.approx(-70.0)
+
+
+def test_an_offset_of_the_microphone_is_no_sound() -> None:
+    noise = 0.001 * np.random.default_rng(1).standard_normal(FRAME).astype(np.float32)
+    assert level_db(noise + np.float32(0.1)) == pytest.approx(level_db(noise), abs=0.01)
+    assert level_db(noise) == pytest.approx(-60.0, abs=1.0)

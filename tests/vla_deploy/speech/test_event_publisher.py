@@ -10,12 +10,11 @@ import pytest
 from drivers.clock import NS_PER_S
 from sim_twin.contracts.scripted import ManualClock
 from vla_deploy.ipc import SharedSpace
-from vla_deploy.speech.hearing import Heard
+from vla_deploy.speech.asr_pipeline import HeardPhrase
+from vla_deploy.speech.endpointing import Phrase
+from vla_deploy.speech.event_publisher import EventPublisher
 from vla_deploy.speech.hot_words import HotWords, joined, thing_names
-from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.reading import Alternative, Reading
-from vla_deploy.speech.readings import Answer
-from vla_deploy.speech.telling import Telling
+from vla_deploy.speech.transcript import Alternative, Transcript
 from vla_deploy.speech.verdict import Judgement, Verdict
 
 TOPICS = ("heard", "utterance", "say", "operator")
@@ -27,8 +26,8 @@ def heard(
     *,
     ask_again: bool = False,
     others: tuple[Alternative, ...] = (),
-) -> Heard:
-    reading = Reading(
+) -> HeardPhrase:
+    reading = Transcript(
         text=text,
         log_probability=-0.25,
         no_speech=0.02,
@@ -47,9 +46,9 @@ def heard(
         voice=0.9,
         samples=np.zeros(100, np.float32),
     )
-    return Heard(
+    return HeardPhrase(
         phrase=phrase,
-        answer=Answer(phrase=phrase, reading=reading),
+        transcript=reading,
         confidence=0.83,
         judgement=Judgement(verdict=verdict, reason="because", ask_again=ask_again),
     )
@@ -69,15 +68,15 @@ def told(space: SharedSpace) -> Callable[[str], list[Any]]:
 
 
 @pytest.fixture
-def telling(space: SharedSpace, clock: ManualClock) -> Telling:
-    return Telling(space, clock)
+def publisher(space: SharedSpace, clock: ManualClock) -> EventPublisher:
+    return EventPublisher(space, clock)
 
 
 def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
-    telling: Telling, told: Any, clock: ManualClock
+    publisher: EventPublisher, told: Any, clock: ManualClock
 ) -> None:
     clock.ns = NS_PER_S + 300_000_000
-    telling.tell(heard("pick up the red cup", Verdict.ACCEPTED))
+    publisher.publish(heard("pick up the red cup", Verdict.ACCEPTED))
     (utterance,) = told("utterance")
     assert (utterance["text"], utterance["source"]) == ("pick up the red cup", "voice")
     assert utterance["command_id"].startswith("voice-")
@@ -87,48 +86,48 @@ def test_a_command_goes_to_the_planner_with_what_speaks_for_it(
     assert (event["verdict"], event["text"]) == ("accepted", "pick up the red cup")
     assert event["told_ns"] - event["ended_ns"] == 300_000_000
     assert told("say") == told("operator") == []
-    assert telling.document()["end_to_text_p95_s"] == pytest.approx(0.3, rel=0.13)
+    assert publisher.document()["end_to_text_p95_s"] == pytest.approx(0.3, rel=0.13)
 
 
-def test_a_stop_presses_the_button_and_is_no_command(telling: Telling, told: Any) -> None:
-    telling.tell(heard("stop!", Verdict.STOP))
+def test_a_stop_presses_the_button_and_is_no_command(publisher: EventPublisher, told: Any) -> None:
+    publisher.publish(heard("stop!", Verdict.STOP))
     (press,) = told("operator")
     assert (press["act"], press["source"], press["reason"]) == ("estop", "voice", 'heard "stop!"')
     assert told("utterance") == []
     assert [event["verdict"] for event in told("heard")] == ["stop"]
 
 
-def test_a_refusal_is_never_a_command(telling: Telling, told: Any) -> None:
-    telling.tell(heard("nice weather", Verdict.REJECTED))
+def test_a_refusal_is_never_a_command(publisher: EventPublisher, told: Any) -> None:
+    publisher.publish(heard("nice weather", Verdict.REJECTED))
     assert told("utterance") == told("operator") == told("say") == []
     assert told("heard")[0]["reason"] == "because"
 
 
 def test_doubted_words_go_to_the_planner_with_what_may_have_been_said_instead(
-    telling: Telling, told: Any
+    publisher: EventPublisher, told: Any
 ) -> None:
     others = (Alternative("put it in the box", 0.7), Alternative("word " * 60, 0.1))
-    telling.tell(heard("put it in the boss", Verdict.DOUBTED, others=others))
+    publisher.publish(heard("put it in the boss", Verdict.DOUBTED, others=others))
     (utterance,) = told("utterance")
     given = utterance["heard"]
     assert given["others"] == [{"text": "put it in the box", "odds": 0.7}]
     assert (given["doubted"], given["ask_again"]) == (True, True)
     assert told("say") == [], "the planner asks, if it makes no sense of them"
-    telling.tell(heard("put it in the boss", Verdict.DOUBTED))
+    publisher.publish(heard("put it in the boss", Verdict.DOUBTED))
     assert told("utterance")[0]["heard"]["ask_again"] is False, "nobody is asked again so soon"
 
 
 def test_the_robot_asks_again_ever_more_seldom_until_it_understands(
-    telling: Telling, told: Any, clock: ManualClock
+    publisher: EventPublisher, told: Any, clock: ManualClock
 ) -> None:
     asked = []
     for second in range(120):
         clock.ns = (10 + second) * NS_PER_S
-        telling.tell(heard("mumble", Verdict.REJECTED, ask_again=True))
+        publisher.publish(heard("mumble", Verdict.REJECTED, ask_again=True))
         asked += [second] * len(told("say"))
     assert asked == [0, 10, 30, 70]
-    telling.tell(heard("turn left", Verdict.ACCEPTED))
-    telling.tell(heard("mumble", Verdict.REJECTED, ask_again=True))
+    publisher.publish(heard("turn left", Verdict.ACCEPTED))
+    publisher.publish(heard("mumble", Verdict.REJECTED, ask_again=True))
     (order,) = told("say")
     assert "say it again" in order["text"]
     assert (order["interrupt"], order["source"]) == (False, "speech")

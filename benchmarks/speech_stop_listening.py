@@ -1,24 +1,20 @@
 """Run what listens for a stop on board, spotter and recogniser, over whole pieces of sound."""
 
 import time
-from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from benchmarks.percentiles import percentile, spread_s
-from benchmarks.speech_stop_recall import Glances, Recall, RecallingReader
 from drivers.clock import MonotonicClock
 from platforms import load_profile
 from training.voices.clip import RATE_HZ, Wave
 from vla_deploy.inference.roles import ModelShelf
-from vla_deploy.speech.choosing import ears_of
-from vla_deploy.speech.hearing import Room
+from vla_deploy.speech.asr_pipeline import Room
+from vla_deploy.speech.model_selection import select_recogniser
 from vla_deploy.speech.recording import StreamClock, open_hearing
 from vla_deploy.speech.sound import SoundBlock, duration_ns
-from vla_deploy.speech.stop_words.opening import open_spotter
-from vla_deploy.speech.stop_words.spotter import Spotted, Spotter
-from vla_deploy.speech.stop_words.suspicions import Suspicions, alone
+from vla_deploy.speech.stop_words.spotter import Spotted, open_spotter
 from vla_deploy.speech.verdict import Verdict
 from vla_deploy.state_dir import user_base
 
@@ -29,7 +25,7 @@ SPOTTER, WORDS = "spotter", "words"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alarm:
-    """Tell a word and who heard it, when the button is hit, and what the last block took."""
+    """Hold a word and who heard it, when the button is hit, and what the last block took."""
 
     word: str
     by: str
@@ -38,7 +34,7 @@ class Alarm:
 
 
 class Delay(NamedTuple):
-    """Tell how much had been heard since the word's end, and what the computer took for it."""
+    """Hold how much had been heard since the word's end, and what the computer took for it."""
 
     sound_s: float
     computed_s: float
@@ -52,31 +48,23 @@ def delay_figures(delays: Sequence[Delay]) -> dict[str, float | None]:
     }
 
 
-class Ear:
-    """Run over whole pieces of sound what listens on board."""
+class StopListening:
+    """Run over whole pieces of sound what listens on board.
 
-    def __init__(self, recall: Recall, glances: Glances) -> None:
+    `scores` are the spotter's in the last piece, each with its time: for the curve of thresholds.
+    """
+
+    def __init__(self) -> None:
         profile = load_profile("desktop")
         shelf = ModelShelf.of_base(user_base(), MonotonicClock())
-        self.spotter: Spotter
-        self.spotter, thresholds = open_spotter(shelf, profile)
-        self.threshold = thresholds[profile.speech.stop_words]
-        self._alone = alone(profile.speech.stop_words, self.threshold)
+        self.spotter = open_spotter(shelf, profile)
+        self.threshold = self.spotter.thresholds[profile.speech.stop_words]
         self._clock = StreamClock()
-        ears = ears_of(shelf, profile, 0)
-        self.why_no_words = ears.why
-        lately_ns = ears.recogniser.lately_ns if ears.recogniser is not None else deque[int]()
-        self._reader = RecallingReader(lately_ns, recall, glances)
-        self._suspicions = Suspicions()
-        self._hearing = open_hearing(
-            ears.recogniser,
-            ears.why,
-            profile,
-            self._clock,
-            suspicion=self._suspicions.highest,
-            executor=self._reader,
-        )
+        selected = select_recogniser(shelf, profile, 0)
+        self.why_no_words = selected.why
+        self._asr = open_hearing(selected.recogniser, selected.why, profile, self._clock)
         self._count = 0
+        self.scores: list[tuple[float, float]] = []
         self.busy_s = {SPOTTER: 0.0, WORDS: 0.0}
 
     @property
@@ -87,29 +75,28 @@ class Ear:
     def alarms(self, sound: Wave) -> Iterator[Alarm]:
         """Yield what a piece of sound sets off, heard from silence on."""
         self.spotter.reset()
-        self._suspicions.clear()
-        self._hearing.enter(Room())
+        self.scores = []
+        self._asr.enter(Room())
         for at in range(0, len(sound), BLOCK):
             samples = sound[at : at + BLOCK]
             block = SoundBlock(stamp_ns=duration_ns(self._count), samples=samples, follows=at > 0)
             self._count += len(samples)
             self._clock.ns = block.end_ns
+            at_s = (at + len(samples)) / RATE_HZ
             for by, listen in ((SPOTTER, self._spot), (WORDS, self._read)):
                 began_s, busy_s = time.perf_counter(), time.process_time()
                 word = listen(block)
-                recalled_s = self._reader.recalled_s()
-                took_s = time.perf_counter() - began_s + recalled_s
-                self.busy_s[by] += time.process_time() - busy_s + recalled_s
+                took_s = time.perf_counter() - began_s
+                self.busy_s[by] += time.process_time() - busy_s
                 if word:
-                    at_s = (at + len(samples)) / RATE_HZ
                     yield Alarm(word=word, by=by, at_s=at_s, computed_s=took_s)
+            self.scores.append((at_s, self.spotter.score))
 
     def _spot(self, block: SoundBlock) -> str:
-        spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self._alone)
-        self._suspicions.note(block.end_ns, self.spotter.score, self.threshold)
+        spotted: Spotted | None = self.spotter.feed(block.samples, block.end_ns, self.threshold)
         return "" if spotted is None else spotted.word
 
     def _read(self, block: SoundBlock) -> str:
-        self._hearing.feed(block, None)
-        told = list(self._hearing.heard())
+        self._asr.feed(block, None)
+        told = list(self._asr.heard())
         return next((one.text for one in told if one.judgement.verdict is Verdict.STOP), "")

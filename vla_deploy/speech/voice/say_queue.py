@@ -1,15 +1,19 @@
-"""Read the topic `say`: who wants what to be said, how urgently, and what is taken back."""
+"""Read the topic `say`, and keep what waits to be said in order: bounded, and none for long."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Final
 
+from drivers.clock import NS_PER_S
 from vla_deploy.speech.voice.errors import OrderRefused
 
 LONGEST_LETTERS: Final = 400
 """More is cut at a word: half a minute of talk is enough, and the text is shown whole elsewhere."""
 LONGEST_ID: Final = 80
+MOST_WAITING: Final = 16
+LONGEST_WAIT_NS: Final = 20 * NS_PER_S
+"""News that old is none any more."""
 _KEYS: Final = frozenset({"say_id", "text", "interrupt", "source", "priority", "cancel"})
 
 
@@ -39,6 +43,47 @@ class Withdrawal:
     """Take an order back, whether it waits or is being said."""
 
     say_id: str
+
+
+class SayQueue:
+    """Hold orders; those that interrupt come first among their kind, else it is first come."""
+
+    def __init__(self) -> None:
+        self._orders: list[Order] = []
+
+    def __len__(self) -> int:
+        return len(self._orders)
+
+    def __iter__(self) -> Iterator[Order]:
+        return iter(self._orders)
+
+    def add(self, order: Order) -> Order | None:
+        """Take an order; return the one that has no room: the least urgent, of those the last."""
+        rank = _rank(order)
+        before = sum(_rank(each) >= rank for each in self._orders)
+        if order.interrupt:
+            before = sum(_rank(each) > rank for each in self._orders)
+        self._orders.insert(before, order)
+        return self._orders.pop() if len(self._orders) > MOST_WAITING else None
+
+    def take(self) -> Order | None:
+        """Return and forget the first one."""
+        return self._orders.pop(0) if self._orders else None
+
+    def withdraw(self, say_id: str) -> Order | None:
+        """Return and forget one by its id."""
+        return self._taken(each for each in self._orders if each.say_id == say_id)
+
+    def expired(self, now_ns: int) -> Order | None:
+        """Return and forget one that has waited for too long."""
+        oldest_ns = now_ns - LONGEST_WAIT_NS
+        return self._taken(each for each in self._orders if each.given_ns < oldest_ns)
+
+    def _taken(self, found: Iterable[Order]) -> Order | None:
+        order = next(iter(found), None)
+        if order is not None:
+            self._orders.remove(order)
+        return order
 
 
 def read_order(payload: Mapping[str, Any], given_ns: int) -> Order | Withdrawal:
@@ -82,3 +127,7 @@ def _priority(word: object) -> Priority:
     if not isinstance(word, str) or word not in names:
         raise OrderRefused(f"priority: expected one of {', '.join(names)}, got {word!r:.100}")
     return names[word]
+
+
+def _rank(order: Order) -> tuple[int, bool]:
+    return order.priority, order.interrupt

@@ -1,7 +1,5 @@
 """Read phrases beside the steps: one in advance while a speaker pauses, the ended ones in order.
 
-While somebody speaks a fast recogniser has a glance at the words so far, for a stop among them.
-
 The rule of lateness: whoever waited longer than `LATE_NS` for an answer has gone on, and what comes
 then is not carried out; of more than `MOST_WAITING` phrases that wait, the newest is refused.
 """
@@ -13,62 +11,48 @@ from typing import Final
 
 from drivers.clock import NS_PER_S, Clock
 from vla_deploy.inference.errors import RunFailed
-from vla_deploy.speech.phrases import Phrase
-from vla_deploy.speech.reading import Reading
+from vla_deploy.speech.endpointing import Phrase
 from vla_deploy.speech.recogniser import Recogniser
+from vla_deploy.speech.transcript import Transcript
 
 LATE_NS: Final = 5 * NS_PER_S
 MOST_WAITING: Final = 3
-FAST_NS: Final = NS_PER_S // 6
-"""A recogniser that takes longer has no time for glances: what has ended would wait for them."""
-MOST_SLOW_RATIO: Final = 0.25
-"""Of the last readings so many may, as long as others have the computer for a moment."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Answer:
+class PhraseTranscript:
     """Hold what was read in a phrase, or in one so far; None, and why, where nothing could be."""
 
     phrase: Phrase
-    reading: Reading | None
+    transcript: Transcript | None
     trouble: str = ""
 
 
 @dataclass(slots=True)
 class _Asked:
     phrase: Phrase
-    future: "Future[Reading]"
+    future: "Future[Transcript]"
 
 
-class Readings:
+class TranscriptionQueue:
     """Hold the recogniser at work, or why there is none, and what it was asked."""
 
     def __init__(self, executor: Executor, clock: Clock) -> None:
         """Take an executor of one thread over, or one that works at once."""
         self.why = "the recogniser is being loaded"
         self.recogniser: Recogniser | None = None
-        self.clock = clock
+        self._clock = clock
         self._executor = executor
         self._draft: _Asked | None = None
-        self._drafting: Future[Reading] | None = None
-        self._glance: _Asked | None = None
+        self._drafting: Future[Transcript] | None = None
         self._ended: list[_Asked] = []
-        self._refused: list[Answer] = []
+        self._refused: list[PhraseTranscript] = []
         self._closed = False
 
     @property
     def is_busy(self) -> bool:
-        """Tell whether a phrase that has ended is being read."""
+        """Return whether a phrase that has ended is being read."""
         return bool(self._ended)
-
-    @property
-    def is_fast(self) -> bool:
-        """Tell whether there is a recogniser that has time for more than what must be read."""
-        if self.recogniser is None:
-            return False
-        lately_ns = self.recogniser.lately_ns.copy()  # another thread appends
-        slow = sum(took_ns > FAST_NS for took_ns in lately_ns)
-        return slow <= MOST_SLOW_RATIO * len(lately_ns)
 
     def take(self, recogniser: Recogniser | None, why: str) -> tuple[Recogniser | None, str]:
         """Put another recogniser to work for the next phrase; return the one before."""
@@ -90,33 +74,17 @@ class Readings:
             self._draft = self._ask(self.recogniser, phrase, hot_words)
             self._drafting = self._draft.future
 
-    def drafted(self) -> Answer | None:
+    def drafted(self) -> PhraseTranscript | None:
         """Return what was read in advance, as soon as it is there."""
-        return _answered(self._draft)
-
-    def glance(self, phrase: Phrase, hot_words: str) -> None:
-        """Read what has been said so far, if the recogniser is fast and has nothing else to do."""
-        recogniser = self.recogniser
-        idle = self._drafting is None or self._drafting.done()
-        busy = self._glance is not None or bool(self._ended) or not idle
-        if recogniser is not None and self.is_fast and not busy:
-            self._glance = self._ask(recogniser, phrase, hot_words)
-
-    def glanced(self) -> Answer | None:
-        """Return once what was read in a glance, as soon as it is there."""
-        answer = _answered(self._glance)
-        if self._glance is not None and self._glance.future.done():
-            self._glance = None
-        return answer
-
-    def read_again(self, phrase: Phrase, hot_words: str) -> "Future[Reading] | None":
-        """Read a phrase once more with what was heard after it, whatever else is to be read."""
-        if self.recogniser is None:
+        draft = self._draft
+        if draft is None or not draft.future.done() or draft.future.cancelled():
             return None
-        return self._ask(self.recogniser, phrase, hot_words).future
+        if draft.future.exception() is not None:
+            return None
+        return PhraseTranscript(phrase=draft.phrase, transcript=draft.future.result())
 
     def forget_draft(self) -> None:
-        """Say that the speaker has gone on: what was read in advance is not all."""
+        """Note that the speaker has gone on: what was read in advance is not all."""
         draft, self._draft = self._draft, None
         if draft is not None:
             draft.future.cancel()
@@ -133,19 +101,19 @@ class Readings:
         else:
             self._ended.append(self._ask(self.recogniser, phrase, hot_words))
 
-    def answers(self) -> Iterator[Answer]:
+    def answers(self) -> Iterator[PhraseTranscript]:
         """Yield what has been answered since the last call, in the order of the phrases."""
         refused, self._refused = self._refused, []
         yield from refused
         while self._ended and self._ended[0].future.done():
             asked = self._ended.pop(0)
             try:
-                reading = asked.future.result()
+                transcript = asked.future.result()
             except RunFailed as error:
-                yield Answer(phrase=asked.phrase, reading=None, trouble=str(error))
+                yield PhraseTranscript(phrase=asked.phrase, transcript=None, trouble=str(error))
                 continue
             trouble = self._late(asked.phrase)
-            yield Answer(phrase=asked.phrase, reading=reading, trouble=trouble)
+            yield PhraseTranscript(phrase=asked.phrase, transcript=transcript, trouble=trouble)
 
     def close(self) -> None:
         """Release everything; what is under way is given up."""
@@ -156,20 +124,11 @@ class Readings:
         self.recogniser = None
 
     def _late(self, phrase: Phrase) -> str:
-        late_ns = self.clock.now_ns() - phrase.ended_ns
+        late_ns = self._clock.now_ns() - phrase.ended_ns
         return f"read {late_ns / NS_PER_S:.1f} s after it was said" if late_ns > LATE_NS else ""
 
     def _ask(self, recogniser: Recogniser, phrase: Phrase, hot_words: str) -> _Asked:
-        reading = self._executor.submit(recogniser.read, phrase.samples, hot_words, phrase.earlier)
-        return _Asked(phrase, reading)
+        return _Asked(phrase, self._executor.submit(recogniser.read, phrase.samples, hot_words))
 
     def _refuse(self, phrase: Phrase, trouble: str) -> None:
-        self._refused.append(Answer(phrase=phrase, reading=None, trouble=trouble))
-
-
-def _answered(asked: _Asked | None) -> Answer | None:
-    if asked is None or not asked.future.done() or asked.future.cancelled():
-        return None
-    if asked.future.exception() is not None:
-        return None
-    return Answer(phrase=asked.phrase, reading=asked.future.result())
+        self._refused.append(PhraseTranscript(phrase=phrase, transcript=None, trouble=trouble))

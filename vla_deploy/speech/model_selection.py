@@ -17,7 +17,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ears:
+class SelectedRecogniser:
     """Hold an open recogniser, or why there is none."""
 
     recogniser: Recogniser | None
@@ -63,13 +63,13 @@ def _absent(name: str) -> str:
     return f"{name} is not here (vla-deploy models {remedy})"
 
 
-def ears_of(shelf: ModelShelf, profile: Profile, model_tier: int) -> Ears:
+def select_recogniser(shelf: ModelShelf, profile: Profile, model_tier: int) -> SelectedRecogniser:
     """Open the best recogniser; where there is none, say why: the robot goes on without."""
     try:
         recogniser = open_best(shelf, profile, model_tier)
     except NoRecogniser as error:
         _log.error("degraded: no model turns speech into text, type commands: %s", error)
-        return Ears(recogniser=None, why=str(error))
+        return SelectedRecogniser(recogniser=None, why=str(error))
     for notice in recogniser.notices:
         _log.warning("degraded: %s", notice)
-    return Ears(recogniser=recogniser)
+    return SelectedRecogniser(recogniser=recogniser)

@@ -12,8 +12,8 @@ from vla_deploy.inference.memory_claims import RunMemory
 from vla_deploy.inference.roles import ModelShelf
 from vla_deploy.inference.store import ModelStore
 from vla_deploy.ipc import ClaimBook, SharedSpace
-from vla_deploy.speech.choosing import ears_of, open_best
 from vla_deploy.speech.errors import NoRecogniser
+from vla_deploy.speech.model_selection import open_best, select_recogniser
 
 
 @pytest.fixture
@@ -73,6 +73,6 @@ def test_with_none_the_robot_says_why_and_goes_on(shelf: ModelShelf, scripted_wh
     profile = profile_with("empty", "missing")
     with pytest.raises(NoRecogniser, match=r"empty is not here .*; missing is not here"):
         open_best(shelf, profile, 0)
-    ears = ears_of(shelf, profile, 0)
+    ears = select_recogniser(shelf, profile, 0)
     assert ears.recogniser is None
     assert "vla-deploy models add empty --whisper FOLDER" in ears.why

@@ -1,20 +1,18 @@
 """Cut the stream into phrases: where somebody begins to speak, pauses, goes on, and has ended.
 
-Pure but for what it remembers: a frame and its judgement in, what has happened out.
+Pure but for what it remembers: a frame and its judgement in, events out.
 """
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 import numpy as np
 
 from platforms import SpeechSettings
-from vla_deploy.speech.frames import Frame, joined
-from vla_deploy.speech.sound import NOTHING, Sound
-from vla_deploy.speech.voice_activity import FRAME_S
+from vla_deploy.speech.sound import FRAME_S, SILENCE_DB, Sound, SoundBlock, joined
 
 ONSET: Final = 0.5
 OFFSET: Final = 0.45
@@ -23,17 +21,15 @@ ABOVE_FLOOR_DB: Final = 3.0
 PAUSE_RATIO: Final = 0.6
 """After this share of the silence that ends a phrase, its words are read in advance."""
 CLIPPED: Final = 0.985
-GLANCE_FRAMES: Final = round(0.4 / FRAME_S)
-"""While somebody speaks, their words so far may be looked at so often."""
-EARLIER_FRAMES: Final = round(0.6 / FRAME_S)
-"""Of what was heard just before a phrase, spoken or not, so many go along with it."""
+START_FLOOR_DB: Final = -60.0
+_RISE_DB_S: Final = 3.0
+_FALL_DB_S: Final = 30.0
 
 
-class Step(Enum):
+class VadEventKind(Enum):
     """Name what may happen to a phrase."""
 
     BEGAN = "somebody begins to speak"
-    SPEAKING = "somebody has spoken for some while more"
     PAUSED = "long enough to read the words so far in advance"
     RESUMED = "the speaker goes on"
     ENDED = "the speaker has ended"
@@ -46,7 +42,6 @@ class Phrase:
     """Hold what somebody said; `number` counts phrases, `voiced_s` is without pauses at the ends.
 
     `began_ns` and `ended_ns` are those of the voice; the samples begin before and end after it.
-    `earlier` is what was heard just before them, if anything.
     `own_words` are what the robot was saying, where it may have heard itself.
     """
 
@@ -57,26 +52,42 @@ class Phrase:
     clipped_ratio: float
     voice: float
     samples: Sound
-    earlier: Sound = field(default_factory=lambda: NOTHING)
     own_words: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Happening:
+class VadEvent:
     """Say what has happened, and the phrase so far."""
 
-    step: Step
+    kind: VadEventKind
     phrase: Phrase
 
 
-class Phrases:
+class NoiseFloor:
+    """Follow the level of frames without a voice: down at once, up slowly, so a word is no floor.
+
+    A voice holds it where it is; a noise that goes on is the floor after some seconds.
+    """
+
+    def __init__(self) -> None:
+        self.level_db = START_FLOOR_DB
+
+    def note(self, level_db: float, *, is_voice: bool) -> None:
+        """Take the level of the next frame."""
+        if is_voice and level_db > self.level_db:
+            return
+        step = level_db - self.level_db
+        most = (_RISE_DB_S if step > 0 else _FALL_DB_S) * FRAME_S
+        self.level_db = max(SILENCE_DB, self.level_db + float(np.clip(step, -most, most)))
+
+
+class Endpointer:
     """Follow one stream."""
 
     def __init__(self, settings: SpeechSettings) -> None:
         self.settings = settings
-        self._earlier: deque[Frame] = deque(maxlen=EARLIER_FRAMES)
-        self._before: deque[Frame] = deque()
-        self._frames: list[Frame] = []
+        self._before: deque[SoundBlock] = deque()
+        self._frames: list[SoundBlock] = []
         self._voices: list[float] = []
         self._rising = 0
         self._silent = 0
@@ -86,7 +97,7 @@ class Phrases:
 
     @property
     def is_open(self) -> bool:
-        """Tell whether somebody is speaking, or pausing in a phrase."""
+        """Return whether somebody is speaking, or pausing in a phrase."""
         return bool(self._frames)
 
     def wait_longer(self) -> None:
@@ -97,17 +108,16 @@ class Phrases:
         """Forget what was begun, as at a gap in the stream."""
         self._before.clear()
         self._close()
-        self._earlier.clear()
         self._swallowing = False
 
-    def feed(self, frame: Frame, voice: float, *, is_loud: bool) -> Iterator[Happening]:
+    def feed(self, frame: SoundBlock, voice: float, *, is_loud: bool) -> Iterator[VadEvent]:
         """Take the next frame, how probably it holds a voice, and whether it is above the floor."""
         if self._frames:
             yield from self._go_on(frame, voice)
         else:
             yield from self._wait(frame, voice, is_loud=is_loud)
 
-    def _wait(self, frame: Frame, voice: float, *, is_loud: bool) -> Iterator[Happening]:
+    def _wait(self, frame: SoundBlock, voice: float, *, is_loud: bool) -> Iterator[VadEvent]:
         self._before.append(frame)
         self._rising = self._rising + 1 if voice >= ONSET and is_loud else 0
         if self._swallowing:
@@ -116,10 +126,10 @@ class Phrases:
             self._rising = 0
         kept = round(self.settings.pre_roll_s / FRAME_S) + ONSET_FRAMES
         while len(self._before) > kept:
-            self._earlier.append(self._before.popleft())
+            self._before.popleft()
         if self._rising >= ONSET_FRAMES:
             self._open(voice)
-            yield Happening(Step.BEGAN, self._phrase())
+            yield VadEvent(VadEventKind.BEGAN, self._phrase())
 
     def _open(self, voice: float) -> None:
         self._number += 1
@@ -130,24 +140,22 @@ class Phrases:
         self._rising = 0
         self._patience_s = self.settings.end_silence_s
 
-    def _go_on(self, frame: Frame, voice: float) -> Iterator[Happening]:
+    def _go_on(self, frame: SoundBlock, voice: float) -> Iterator[VadEvent]:
         paused = self._silent >= self._pause_frames
         self._frames.append(frame)
         self._voices.append(voice)
         self._count_silence(voice)
         if self._silent == 0 and paused:
             self._patience_s = self.settings.end_silence_s
-            yield Happening(Step.RESUMED, self._phrase())
+            yield VadEvent(VadEventKind.RESUMED, self._phrase())
         if self._silent * FRAME_S >= self._patience_s:
             yield self._end()
         elif len(self._frames) * FRAME_S >= self.settings.longest_phrase_s:
-            yield Happening(Step.TOO_LONG, self._phrase())
+            yield VadEvent(VadEventKind.TOO_LONG, self._phrase())
             self._close()
             self._swallowing = True
         elif self._silent == self._pause_frames:
-            yield Happening(Step.PAUSED, self._phrase())
-        elif self._silent == 0 and len(self._frames) % GLANCE_FRAMES == 0:
-            yield Happening(Step.SPEAKING, self._phrase())
+            yield VadEvent(VadEventKind.PAUSED, self._phrase())
 
     @property
     def _pause_frames(self) -> int:
@@ -156,14 +164,13 @@ class Phrases:
     def _count_silence(self, voice: float) -> None:
         self._silent = 0 if voice >= OFFSET else self._silent + 1
 
-    def _end(self) -> Happening:
+    def _end(self) -> VadEvent:
         phrase = self._phrase()
         is_word = phrase.voiced_s >= self.settings.shortest_phrase_s
         self._close()
-        return Happening(Step.ENDED if is_word else Step.TOO_SHORT, phrase)
+        return VadEvent(VadEventKind.ENDED if is_word else VadEventKind.TOO_SHORT, phrase)
 
     def _close(self) -> None:
-        self._earlier.extend(self._frames)
         self._frames, self._voices = [], []
         self._silent = self._rising = 0
 
@@ -180,5 +187,4 @@ class Phrases:
             clipped_ratio=float(np.mean(np.abs(samples) >= CLIPPED)),
             voice=float(np.mean([self._voices[number] for number in voiced])),
             samples=samples,
-            earlier=joined(self._earlier),
         )

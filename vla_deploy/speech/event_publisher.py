@@ -1,4 +1,4 @@
-"""Tell the other processes what was heard: commands, stops, refusals, and a polite question."""
+"""Publish what was heard for the other processes: commands, stops, refusals, a question back."""
 
 import os
 from collections import Counter
@@ -10,7 +10,7 @@ from drivers.clock import NS_PER_S, Clock
 from drivers.latency import LatencyHistogram
 from vla_deploy.ipc import SharedSpace
 from vla_deploy.ipc.stop_button import StopButton
-from vla_deploy.speech.hearing import Heard
+from vla_deploy.speech.asr_pipeline import HeardPhrase
 from vla_deploy.speech.verdict import Verdict
 
 SOURCE: Final = "voice"
@@ -45,7 +45,7 @@ class AskingAgain:
         self._pause_ns, self._next_ns = FIRST_PAUSE_NS, 0
 
 
-class Telling:
+class EventPublisher:
     """Hold the ways out."""
 
     def __init__(self, space: SharedSpace, clock: Clock) -> None:
@@ -60,7 +60,7 @@ class Telling:
         self._asking = AskingAgain()
         self._numbers = count(1)
 
-    def tell(self, heard: Heard) -> None:
+    def publish(self, heard: HeardPhrase) -> None:
         """Publish what becomes of a phrase; a stop goes first."""
         now_ns = self._clock.now_ns()
         verdict = heard.judgement.verdict
@@ -87,7 +87,7 @@ class Telling:
             "end_to_text_p95_s": latency.percentile_ns(0.95) / NS_PER_S,
         }
 
-    def _command(self, heard: Heard, **doubt: bool) -> None:
+    def _command(self, heard: HeardPhrase, **doubt: bool) -> None:
         self._utterances.publish({"command_id": self._new_id(), **utterance(heard, **doubt)})
 
     def _ask_again(self) -> None:
@@ -99,7 +99,7 @@ class Telling:
     def _new_id(self) -> str:
         return f"{SOURCE}-{os.getpid()}-{next(self._numbers)}"
 
-    def _document(self, heard: Heard, now_ns: int) -> dict[str, Any]:
+    def _document(self, heard: HeardPhrase, now_ns: int) -> dict[str, Any]:
         return {
             "text": heard.text[:_LONGEST_TEXT],
             "verdict": str(heard.judgement.verdict),
@@ -111,7 +111,7 @@ class Telling:
         }
 
 
-def utterance(heard: Heard, **doubt: bool) -> dict[str, Any]:
+def utterance(heard: HeardPhrase, **doubt: bool) -> dict[str, Any]:
     """Return what the planner gets of a phrase; of a doubted one, if it may ask for it again."""
     return {
         "text": heard.text[:_LONGEST_TEXT],
@@ -120,10 +120,9 @@ def utterance(heard: Heard, **doubt: bool) -> dict[str, Any]:
     }
 
 
-def evidence(heard: Heard) -> dict[str, Any]:
+def evidence(heard: HeardPhrase) -> dict[str, Any]:
     """Return what speaks for the words of a phrase."""
-    reading = None if heard.answer is None else heard.answer.reading
-    told: dict[str, Any] = {} if reading is None else asdict(reading)
+    told: dict[str, Any] = {} if heard.transcript is None else asdict(heard.transcript)
     told.pop("text", None)
     others = [one for one in told.pop("others", ()) if len(one["text"]) <= _LONGEST_OTHER]
     return {
